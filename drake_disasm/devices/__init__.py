@@ -1,0 +1,1 @@
+"""Devices of the station, simulated; the real ones' protocols join them later."""

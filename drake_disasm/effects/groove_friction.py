@@ -1,0 +1,22 @@
+"""The groove rubs more, or less, than the model says."""
+
+import dataclasses
+
+from drake_disasm.effects.base import Environment, EnvironmentEffect, parameter
+
+
+@dataclasses.dataclass
+class GrooveFriction(EnvironmentEffect):
+    """Coulomb friction that the nominal coefficient does not account for.
+
+    Equation: mu = max(0, mu_nominal + coefficient), static = dynamic; the
+    friction force is mu N against the sliding velocity (Coulomb).
+    Where it acts: the contact material of the groove and of the bolt.
+    """
+
+    coefficient: float = parameter("1", -1.0, 1.0, "added to the nominal mu")
+
+    def apply(self, environment: Environment) -> Environment:
+        """Adds the coefficient, never below a frictionless groove."""
+        friction = max(0.0, environment.friction + self.coefficient)
+        return dataclasses.replace(environment, friction=friction)

@@ -1,0 +1,33 @@
+"""The groove is turned or shifted."""
+
+import dataclasses
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from drake_disasm.effects.base import Environment, EnvironmentEffect, parameter
+from drake_disasm.spatial import rotation_from_vector
+
+
+@dataclasses.dataclass
+class GroovePose(EnvironmentEffect):
+    """The lock was fixed turned about A, or shifted, against where we think it is.
+
+    Equation: X_GnG = (Exp([rx, ry, rz]), [x, y, z]) with Gn the nominal groove
+    frame (origin at A, x along the groove, y out of the plate) and G the true
+    one. The thesis's turned fixture (3.3.1.1) is ry.
+    Where it acts: the pose of the lock in the plant.
+    """
+
+    rx: float = parameter("rad", -0.2, 0.2, "turned about the groove's axis")
+    ry: float = parameter("rad", -0.2, 0.2, "turned about the plate's normal")
+    rz: float = parameter("rad", -0.2, 0.2, "tilted: the far end goes up")
+    x: float = parameter("m", -0.01, 0.01, "shifted along the groove")
+    y: float = parameter("m", -0.01, 0.01, "shifted out of the plate")
+    z: float = parameter("m", -0.01, 0.01, "shifted across the groove")
+
+    def apply(self, environment: Environment) -> Environment:
+        """Composes the true groove frame onto the pose so far."""
+        R = rotation_from_vector(np.array([self.rx, self.ry, self.rz]))
+        X_GnG = environment.X_GnG @ RigidTransform(R, [self.x, self.y, self.z])
+        return dataclasses.replace(environment, X_GnG=X_GnG)

@@ -1,0 +1,33 @@
+"""The tool was weighed wrongly."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import Sensing, SensorEffect, parameter
+from drake_disasm.spatial import cross
+
+
+@dataclasses.dataclass
+class PayloadError(SensorEffect):
+    """The load on the sensor has more first moment than the tool data say.
+
+    Equation: f_S += R_SW g m, tau_S += c x (R_SW g), where m is the missing mass
+    and c = [cx, cy, cz] the missing first mass moment m p_SoScm in S. (With the
+    moment rather than the centre of mass as parameter the reading is linear in
+    all four and vanishes at zero; the error of the centre of mass is c over the
+    tool's mass.)
+    Where it acts: the reading of the force/torque sensor, at rest or in slow
+    motion, where inertial forces are negligible. Zeroing sees it.
+    """
+
+    mass: float = parameter("kg", -2.0, 2.0, "mass that the tool data lack")
+    cx: float = parameter("kg m", -0.2, 0.2, "first moment lacking, along x_S")
+    cy: float = parameter("kg m", -0.2, 0.2, "first moment lacking, along y_S")
+    cz: float = parameter("kg m", -0.2, 0.2, "first moment lacking, along z_S")
+
+    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+        """Adds the weight of what was not accounted for."""
+        g_S = sensing.R_WS.matrix().T @ sensing.g_W
+        torque = cross(np.array([self.cx, self.cy, self.cz]), g_S)
+        return wrench_S + np.concatenate([self.mass * g_S, torque])

@@ -1,0 +1,31 @@
+"""The sensor reads a constant too much."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import Sensing, SensorEffect, parameter
+
+
+@dataclasses.dataclass
+class SensorBias(SensorEffect):
+    """An offset, constant in the sensor's frame, that came up after zeroing.
+
+    Equation: F_read = F + b with b = [fx, fy, fz, tx, ty, tz] in S.
+    Where it acts: the reading of the force/torque sensor. Zeroing does not see
+    it; an offset that was there before is what zeroing removes.
+    """
+
+    fx: float = parameter("N", -50.0, 50.0, "force offset along x_S")
+    fy: float = parameter("N", -50.0, 50.0, "force offset along y_S")
+    fz: float = parameter("N", -50.0, 50.0, "force offset along z_S")
+    tx: float = parameter("N m", -5.0, 5.0, "torque offset about x_S")
+    ty: float = parameter("N m", -5.0, 5.0, "torque offset about y_S")
+    tz: float = parameter("N m", -5.0, 5.0, "torque offset about z_S")
+
+    present_at_zeroing = False
+
+    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+        """Adds the offset."""
+        offset = [self.fx, self.fy, self.fz, self.tx, self.ty, self.tz]
+        return wrench_S + np.array(offset)

@@ -1,0 +1,274 @@
+"""The door-chain lock: groove and bolt, built into a plant from dimensions.
+
+Frames: G has its origin at A, in the middle of the lips' thickness, x along the
+groove, y out of the plate, z across. B is fixed to the bolt, its origin in the
+middle of the neck; at the start of an episode B coincides with G.
+
+The bolt is rigid and the groove compliant: the bolt's round surfaces then keep
+their exact shape (a coarse compliant mesh would round the clearance off), the
+groove's boxes need only a dozen tetrahedra each, and the modulus that
+identification fits belongs to one part, the groove.
+"""
+
+import dataclasses
+
+import numpy as np
+from pydrake.geometry import (
+    AddCompliantHydroelasticProperties,
+    AddContactMaterial,
+    AddRigidHydroelasticProperties,
+    Box,
+    Cylinder,
+    GeometryId,
+    ProximityProperties,
+    RoleAssign,
+    SceneGraph,
+    Shape,
+)
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    Frame,
+    RigidBody,
+    SpatialInertia,
+    UnitInertia,
+)
+from pydrake.systems.framework import Context
+
+from drake_disasm.effects import Environment
+from drake_disasm.scenario import ContactConfig, LockConfig
+
+_BORDER = 0.010  # m, solid rim around the channel
+_FLOOR = 0.003  # m, plate under the channel
+_PAD_FRICTION = 0.8  # steel on rubber, as on the gripper's pads
+_BRASS = np.array([0.80, 0.65, 0.30, 1.0])
+_STEEL = np.array([0.55, 0.58, 0.62, 1.0])
+_R_Y_AXIS = RotationMatrix.MakeXRotation(-np.pi / 2)  # a cylinder along y
+
+
+@dataclasses.dataclass(frozen=True)
+class Lock:
+    """Handles of the lock in a plant.
+
+    Attributes:
+        config: its dimensions.
+        groove, bolt: bodies whose frames are G and B.
+        frame: the frame that the groove is welded to; its pose in Gn is a
+            parameter of the plant's Context.
+        groove_ids, bolt_ids: collision geometries of groove, and of the bolt's
+            neck and head.
+        resolution: edge length on the bolt's mesh [m].
+        nominal: the environment that the scenario denotes before effects.
+    """
+
+    config: LockConfig
+    groove: RigidBody
+    bolt: RigidBody
+    frame: FixedOffsetFrame
+    groove_ids: tuple[GeometryId, ...]
+    bolt_ids: tuple[GeometryId, ...]
+    resolution: float
+    nominal: Environment
+
+
+def lip_height(config: LockConfig) -> float:
+    """Returns y of the plate's upper face in G [m]."""
+    return config.lip_thickness / 2
+
+
+def head_top(config: LockConfig) -> float:
+    """Returns y of the head's upper face in B [m]: half the axial play below."""
+    return -config.lip_thickness / 2 - config.axial_clearance / 2
+
+
+def grip_height(config: LockConfig) -> float:
+    """Returns y of the grip's middle in B [m]."""
+    return lip_height(config) + config.grip_standoff + config.grip_size[1] / 2
+
+
+def plate_bottom(config: LockConfig) -> float:
+    """Returns y of the plate's lower face in G [m]."""
+    channel = config.head_thickness + config.axial_clearance
+    return -lip_height(config) - channel - _FLOOR
+
+
+def lift_needed(config: LockConfig, margin: float) -> float:
+    """Returns the rise of B [m] at which the head's underside clears the plate.
+
+    Args:
+        margin: height of the underside above the plate's upper face [m].
+    """
+    underside = head_top(config) - config.head_thickness
+    return lip_height(config) + margin - underside
+
+
+def add_lock(
+    plant: MultibodyPlant, frame_Gn: Frame, lock: LockConfig, contact: ContactConfig
+) -> Lock:
+    """Adds groove (welded to a movable frame in Gn) and bolt (free) to the plant."""
+    frame = plant.AddFrame(FixedOffsetFrame("groove_pose", frame_Gn, RigidTransform()))
+    nominal = Environment(
+        RigidTransform(), contact.friction, contact.modulus, contact.dissipation
+    )
+    groove = plant.AddRigidBody(
+        "groove", plant.AddModelInstance("lock"), _groove_inertia(lock)
+    )
+    plant.WeldFrames(frame, groove.body_frame())
+    bolt = plant.AddRigidBody(
+        "bolt", plant.AddModelInstance("bolt"), bolt_inertia(lock)
+    )
+    groove_ids = _add_groove_geometry(plant, groove, lock, nominal)
+    bolt_ids = _add_bolt_geometry(plant, bolt, lock, contact.resolution, nominal)
+    return Lock(
+        lock, groove, bolt, frame, groove_ids, bolt_ids, contact.resolution, nominal
+    )
+
+
+def set_environment(
+    lock: Lock,
+    environment: Environment,
+    plant_context: Context,
+    scene_graph: SceneGraph,
+    scene_graph_context: Context,
+) -> None:
+    """Writes the environment into plant's and scene graph's Contexts."""
+    lock.frame.SetPoseInParentFrame(plant_context, environment.X_GnG)
+    source = lock.groove.GetParentPlant().get_source_id()
+    groove, bolt = _materials(environment, lock.resolution)
+    for ids, properties in ((lock.groove_ids, groove), (lock.bolt_ids, bolt)):
+        for geometry_id in ids:
+            scene_graph.AssignRole(
+                scene_graph_context,
+                source,
+                geometry_id,
+                properties,
+                RoleAssign.kReplace,
+            )
+
+
+def _materials(
+    environment: Environment, resolution: float
+) -> tuple[ProximityProperties, ProximityProperties]:
+    """Returns the contact properties of the groove and of the bolt's neck and head."""
+    mu = CoulombFriction(environment.friction, environment.friction)
+    groove, bolt = ProximityProperties(), ProximityProperties()
+    for properties in (groove, bolt):
+        AddContactMaterial(
+            dissipation=environment.dissipation, friction=mu, properties=properties
+        )
+    AddCompliantHydroelasticProperties(
+        resolution_hint=1.0,
+        hydroelastic_modulus=environment.modulus,
+        properties=groove,
+    )
+    AddRigidHydroelasticProperties(resolution_hint=resolution, properties=bolt)
+    return groove, bolt
+
+
+def groove_boxes(lock: LockConfig) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Returns the solid parts of the groove by name: two opposite corners in G [m].
+
+    Two lips leave the slot for the neck and end where the keyhole begins; two
+    walls and a floor form the channel for the head; stops close both ends.
+    """
+    slot = (lock.neck_diameter + lock.clearance) / 2
+    wall = (lock.head_diameter + lock.channel_clearance) / 2
+    rim = wall + _BORDER
+    top = lip_height(lock)
+    under_lip = -top
+    floor = plate_bottom(lock) + _FLOOR
+    half_hole = (lock.head_diameter + lock.keyhole_clearance) / 2
+    start = -half_hole
+    outer = start - _BORDER / 2
+    hole, end = lock.travel - half_hole, lock.travel + half_hole
+    far = end + _BORDER / 2
+    corners = {
+        "lip_left": ([outer, under_lip, slot], [hole, top, rim]),
+        "lip_right": ([outer, under_lip, -rim], [hole, top, -slot]),
+        "wall_left": ([outer, floor, wall], [far, under_lip, rim]),
+        "wall_right": ([outer, floor, -rim], [far, under_lip, -wall]),
+        "keyhole_left": ([hole, under_lip, wall], [far, top, rim]),
+        "keyhole_right": ([hole, under_lip, -rim], [far, top, -wall]),
+        "floor": ([outer, floor - _FLOOR, -rim], [far, floor, rim]),
+        "stop_a": ([outer, floor, -wall], [start, under_lip, wall]),
+        "stop_b": ([end, floor, -wall], [far, top, wall]),
+    }
+    return {name: (np.array(a), np.array(b)) for name, (a, b) in corners.items()}
+
+
+def _add_groove_geometry(
+    plant: MultibodyPlant, body: RigidBody, lock: LockConfig, nominal: Environment
+) -> tuple[GeometryId, ...]:
+    properties, _ = _materials(nominal, 1.0)
+    ids = []
+    for name, (low, high) in groove_boxes(lock).items():
+        X_GP, shape = RigidTransform((low + high) / 2), Box(*(high - low))
+        ids.append(
+            plant.RegisterCollisionGeometry(body, X_GP, shape, name, properties)
+        )
+        plant.RegisterVisualGeometry(body, X_GP, shape, f"{name}_visual", _BRASS)
+    return tuple(ids)
+
+
+def _add_bolt_geometry(
+    plant: MultibodyPlant,
+    body: RigidBody,
+    lock: LockConfig,
+    resolution: float,
+    nominal: Environment,
+) -> tuple[GeometryId, ...]:
+    _, properties = _materials(nominal, resolution)
+    ids = []
+    for name, X_BP, shape in _bolt_parts(lock):
+        plant.RegisterVisualGeometry(body, X_BP, shape, f"{name}_visual", _STEEL)
+        part = properties if name != "grip" else _grip_material(nominal)
+        part_id = plant.RegisterCollisionGeometry(body, X_BP, shape, name, part)
+        if name != "grip":
+            ids.append(part_id)
+    return tuple(ids)
+
+
+def _bolt_parts(lock: LockConfig) -> list[tuple[str, RigidTransform, Shape]]:
+    head, grip = head_top(lock), grip_height(lock)
+    neck_end = grip - lock.grip_size[1] / 2
+    return [
+        (
+            "neck",
+            RigidTransform(_R_Y_AXIS, [0, (head + neck_end) / 2, 0]),
+            Cylinder(lock.neck_diameter / 2, neck_end - head),
+        ),
+        (
+            "head",
+            RigidTransform(_R_Y_AXIS, [0, head - lock.head_thickness / 2, 0]),
+            Cylinder(lock.head_diameter / 2, lock.head_thickness),
+        ),
+        ("grip", RigidTransform([0, grip, 0]), Box(*lock.grip_size)),
+    ]
+
+
+def _grip_material(nominal: Environment) -> ProximityProperties:
+    properties = ProximityProperties()
+    AddContactMaterial(
+        dissipation=nominal.dissipation,
+        friction=CoulombFriction(_PAD_FRICTION, _PAD_FRICTION),
+        properties=properties,
+    )
+    AddRigidHydroelasticProperties(resolution_hint=1.0, properties=properties)
+    return properties
+
+
+def _groove_inertia(lock: LockConfig) -> SpatialInertia:
+    return SpatialInertia.SolidBoxWithDensity(
+        8500.0, lock.travel, lock.lip_thickness, 2 * _BORDER
+    )
+
+
+def bolt_inertia(lock: LockConfig) -> SpatialInertia:
+    """Returns the bolt's inertia about Bo: its mass is nearly all in the grip."""
+    p_BoBcm_B = np.array([0.0, grip_height(lock), 0.0])
+    box = UnitInertia.SolidBox(*lock.grip_size)
+    return SpatialInertia.MakeFromCentralInertia(
+        lock.bolt_mass, p_BoBcm_B, box * lock.bolt_mass
+    )
+

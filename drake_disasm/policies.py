@@ -1,0 +1,88 @@
+"""Two scripted policies: the naive one, and the classical baseline."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.quantity import closest
+from drake_disasm.systems.policy import Policy
+
+
+@dataclasses.dataclass(frozen=True)
+class Straight:
+    """Always moves along +x, whatever it feels.
+
+    Attributes:
+        speed: per step [m].
+    """
+
+    speed: float = 0.001
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Returns the action (6,) for any observation (12,)."""
+        return np.array([self.speed, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@dataclasses.dataclass(frozen=True)
+class Admittance:
+    """Pushes along +x, yields to the measured wrench, and lifts once it is stopped.
+
+    A Cartesian admittance per step (Hogan 1985): a = C (w_push + w), where w is
+    the measured wrench on the bolt and C its compliance per step. Along x it pushes
+    with a bounded force, so it slows down as resistance grows and stands still
+    against a stop; then, and while it is being lifted, it pushes upwards instead.
+    It knows neither the groove's direction nor where it ends.
+
+    Attributes:
+        speed: greatest step along x [m].
+        push: force at which it stands still along x [N].
+        stop: resistance along x that counts as the end of the groove [N].
+        lift: force at which it stands still along y [N].
+        lift_speed: greatest step along y [m].
+        lifted: rise from which on it keeps lifting [m].
+        compliance: step per force [m/N], across and along.
+        rotation: step per torque [rad/(N m)].
+    """
+
+    speed: float = 0.001
+    push: float = 9.0
+    stop: float = 6.0
+    lift: float = 8.0
+    lift_speed: float = 0.0015
+    lifted: float = 0.0008
+    compliance: float = 2.5e-5
+    rotation: float = 1.5e-3
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Returns the action (6,) for an observation (12,)."""
+        y, f, t = observation[1], observation[6:9], observation[9:12]
+        yielding = np.concatenate([self.compliance * f, self.rotation * t])
+        out = y > self.lifted
+        if not out:
+            yielding[0] = min(self.speed, self.compliance * 3 * (self.push + f[0]))
+        if out or f[0] < -self.stop:
+            yielding[1] = min(
+                self.lift_speed, self.compliance * 8 * (self.lift + f[1])
+            )
+        return yielding
+
+
+#: The policies that can be named.
+SCRIPTED: dict[str, type[Straight] | type[Admittance]] = {
+    "straight": Straight,
+    "admittance": Admittance,
+}
+
+
+def make_policy(name: str) -> Policy:
+    """Returns the scripted policy of a name.
+
+    Raises:
+        DisasmError: there is no such policy.
+    """
+    if name not in SCRIPTED:
+        raise DisasmError(
+            f"policy '{name}' does not exist; {closest(name, list(SCRIPTED))}"
+        )
+    return SCRIPTED[name]()

@@ -1,0 +1,64 @@
+"""Rotation vectors, and wrenches in the vendor's order [f; tau]."""
+
+import numpy as np
+from pydrake.common.eigen_geometry import AngleAxis, Quaternion
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.math import SpatialForce
+
+
+def rotation_from_vector(vector: np.ndarray) -> RotationMatrix:
+    """Returns Exp(vector): a turn about `vector` (3,) by its length [rad]."""
+    angle = float(np.linalg.norm(vector))
+    if angle == 0.0:
+        return RotationMatrix()
+    return RotationMatrix(AngleAxis(angle, np.asarray(vector) / angle))
+
+
+def rotation_vector(R: RotationMatrix) -> np.ndarray:
+    """Returns Log(R), (3,) [rad], the inverse of `rotation_from_vector`."""
+    angle_axis = R.ToAngleAxis()
+    return angle_axis.angle() * angle_axis.axis()
+
+
+def wrench_from_spatial_force(F: SpatialForce) -> np.ndarray:
+    """Returns Drake's [tau; f] as the sensor's and observation's [f; tau], (6,)."""
+    return np.concatenate([F.translational(), F.rotational()])
+
+
+def shift_and_express(wrench_So_S: np.ndarray, X_AS: RigidTransform) -> np.ndarray:
+    """Returns a wrench at Ao expressed in A from the same wrench at So in S.
+
+    Args:
+        wrench_So_S: (6,) [f; tau] at So, expressed in S.
+        X_AS: pose of S in A.
+    """
+    R, p = X_AS.rotation().matrix(), X_AS.translation()
+    f = R @ wrench_So_S[:3]
+    return np.concatenate([f, R @ wrench_So_S[3:] + cross(p, f)])
+
+
+def weight_wrench(
+    mass: float, p_SoScm_S: np.ndarray, R_WS: RotationMatrix, g_W: np.ndarray
+) -> np.ndarray:
+    """Returns what a hanging mass loads the sensor with, (6,) [f; tau] at So in S."""
+    f = mass * (R_WS.matrix().T @ g_W)
+    return np.concatenate([f, cross(p_SoScm_S, f)])
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Returns a x b of two (3,) vectors; a tenth of the time of `np.cross`."""
+    a1, a2, a3 = a
+    b1, b2, b3 = b
+    return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1])
+
+
+def pose_to_vector(X: RigidTransform) -> np.ndarray:
+    """Returns [x, y, z, qw, qx, qy, qz] with qw >= 0, (7,)."""
+    wxyz = X.rotation().ToQuaternion().wxyz()
+    return np.concatenate([X.translation(), np.copysign(1.0, wxyz[0]) * wxyz])
+
+
+def pose_from_vector(vector: np.ndarray) -> RigidTransform:
+    """Returns the pose of [x, y, z, qw, qx, qy, qz] (7,)."""
+    wxyz = vector[3:] / np.linalg.norm(vector[3:])
+    return RigidTransform(Quaternion(wxyz), vector[:3])

@@ -1,0 +1,249 @@
+"""The cell: arm, sensor, gripper, bench and lock in one MultibodyPlant."""
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    Frame,
+    ModelInstanceIndex,
+    PdControllerGains,
+)
+from pydrake.systems.controllers import InverseDynamics
+from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    Demultiplexer,
+    MatrixGain,
+    PassThrough,
+    StateInterpolatorWithDiscreteDerivative,
+)
+
+from drake_disasm.coordinates import ArmCoordinates
+from drake_disasm.lock import add_lock, plate_bottom
+from drake_disasm.ports import CELL_PORTS
+from drake_disasm.scenario import ArmConfig, Scenario
+from drake_disasm.stations.simulated import SimulatedStation, export
+from drake_disasm.tool import FINGERS, Tool, ToolModels, add_model, add_tool, grasp_pose
+
+_BENCH = "package://disasm_models/bench/bench.urdf"
+_ARM_INERTIA = 4.0  # kg m^2, of a joint with its rotor, for the damping ratio
+_PAD_INDENTATION = 3e-5  # m, of a pad (20 MPa, 7.5 mm thick) under some 60 N
+_FINGER_MASS = 0.3  # kg, of a finger with its drive, for its damping
+
+
+class CellStation(SimulatedStation):
+    """KUKA iiwa 14, OnRobot HEX-E and Robotiq 2F-140 at the door-chain lock.
+
+    Position control is a spring and damper in each joint about the commanded
+    angle, which the discrete solver takes implicitly, plus gravity compensation
+    by Drake's InverseDynamics with the tool's data: what KUKA's position mode
+    feels like from outside, its stiffness being that of the drives. Fingers hold
+    their commanded place likewise.
+
+    @system
+    name: CellStation
+    input_ports:
+    - iiwa.position
+    - gripper.position
+    - applied_spatial_force
+    output_ports:
+    - iiwa.position_commanded
+    - iiwa.position_measured
+    - iiwa.velocity_estimated
+    - iiwa.torque_commanded
+    - iiwa.torque_measured
+    - iiwa.torque_external
+    - iiwa.health
+    - iiwa.time_measured
+    - gripper.state_measured
+    - gripper.health
+    - gripper.time_measured
+    - ft_sensor.wrench
+    - ft_sensor.health
+    - ft_sensor.time_measured
+    - bolt_pose
+    - contact_results
+    - query_object
+    @endsystem
+    """
+
+    table = CELL_PORTS
+    arm = "iiwa"
+    has_velocity_input = False
+    settling_time = 0.5
+
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__()
+        self.scenario = scenario
+        self.tool = Tool.from_models(scenario)
+        self.X_SB = self.tool.X_SB
+        self.payload_mass, self.p_SoScm_S = self.tool.mass, self.tool.p_SoScm_S
+        builder = DiagramBuilder()
+        self._build(builder)
+
+    def _build(self, builder: DiagramBuilder) -> None:
+        frame_Gn, plant, config = self._add_plant(builder), self.plant, self.scenario
+        self.coordinates = ArmCoordinates(
+            config.arm, self.X_WG, self.tool.X_FB, config.task.period
+        )
+        self.start = self.coordinates.start(RigidTransform())
+        self.iiwa, flange = add_arm(plant, config.arm)
+        self.tool_models = add_tool(plant, flange, config)
+        self.lock = add_lock(plant, frame_Gn, config.lock, config.contact)
+        self._add_bench(frame_Gn)
+        self._hold_bolt()
+        plant.Finalize()
+        self._set_gains()
+        self._wire_arm(builder)
+        self._wire_gripper(builder)
+        self._add_sensor(
+            builder, self.tool_models.sensor_joint, self.tool_models.frame_S
+        )
+        self._finish(builder, self.lock.bolt)
+
+    def _add_bench(self, frame_Gn: Frame) -> None:
+        """Puts the bench's top under the plate."""
+        bench = add_model(self.plant, _BENCH)
+        X_WTop = RigidTransform(
+            self.X_WG @ np.array([0.02, plate_bottom(self.scenario.lock), 0.0])
+        )
+        self.plant.WeldFrames(
+            self.plant.world_frame(), self.plant.GetFrameByName("top", bench), X_WTop
+        )
+
+    def _hold_bolt(self) -> None:
+        """Welds the bolt into the gripper, if the scenario says so."""
+        if self.scenario.gripper.hold == "weld":
+            self.plant.WeldFrames(
+                self.tool_models.frame_T,
+                self.lock.bolt.body_frame(),
+                grasp_pose(self.scenario),
+            )
+
+    def _set_gains(self) -> None:
+        plant, arm, gripper = self.plant, self.scenario.arm, self.scenario.gripper
+        joints = plant.GetJointActuatorIndices(self.iiwa)
+        for index, k in zip(joints, arm.stiffness, strict=True):
+            d = 2.0 * arm.damping_ratio * np.sqrt(k * _ARM_INERTIA)
+            _set_spring(plant, index, k, d)
+        for index in plant.GetJointActuatorIndices(self.tool_models.gripper):
+            k = gripper.finger_stiffness
+            _set_spring(plant, index, k, 2.0 * np.sqrt(k * _FINGER_MASS))
+
+    def _wire_arm(self, builder: DiagramBuilder) -> None:
+        plant, connect = self.plant, builder.Connect
+        command = builder.AddNamedSystem("iiwa_command", PassThrough(7))
+        builder.ExportInput(command.get_input_port(), "iiwa.position")
+        desired = builder.AddNamedSystem(
+            "iiwa_interpolator",
+            StateInterpolatorWithDiscreteDerivative(
+                7, self.scenario.arm.control_period, suppress_initial_transient=True
+            ),
+        )
+        connect(command.get_output_port(), desired.get_input_port())
+        connect(
+            desired.get_output_port(), plant.get_desired_state_input_port(self.iiwa)
+        )
+        self._add_gravity_compensation(builder)
+        state = builder.AddNamedSystem("iiwa_state", Demultiplexer([7, 7]))
+        connect(plant.get_state_output_port(self.iiwa), state.get_input_port())
+        torque = plant.get_net_actuation_output_port(self.iiwa)
+        outputs = {
+            "position_commanded": command.get_output_port(),
+            "position_measured": state.get_output_port(0),
+            "velocity_estimated": state.get_output_port(1),
+            "torque_commanded": torque,
+            "torque_measured": torque,
+            "torque_external": plant.get_generalized_contact_forces_output_port(
+                self.iiwa
+            ),
+        }
+        for quantity, port in outputs.items():
+            export(builder, port, f"iiwa.{quantity}")
+        self._add_ready_device(builder, "iiwa")
+
+    def _add_gravity_compensation(self, builder: DiagramBuilder) -> None:
+        """Adds what the controller's own model of arm and tool says of gravity."""
+        plant = MultibodyPlant(0.0)
+        _, flange = add_arm(plant, self.scenario.arm)
+        load = plant.AddRigidBody("tool", plant.AddModelInstance("tool"), self.tool.M_F)
+        plant.WeldFrames(flange, load.body_frame())
+        plant.Finalize()
+        self._controller_plant = plant
+        compensation = builder.AddNamedSystem(
+            "iiwa_gravity_compensation",
+            InverseDynamics(plant, InverseDynamics.kGravityCompensation),
+        )
+        builder.Connect(
+            self.plant.get_state_output_port(self.iiwa), compensation.get_input_port(0)
+        )
+        builder.Connect(
+            compensation.get_output_port(),
+            self.plant.get_actuation_input_port(self.iiwa),
+        )
+
+    def _wire_gripper(self, builder: DiagramBuilder) -> None:
+        plant, gripper = self.plant, self.tool_models.gripper
+        halves = np.array([[0.5], [0.5], [0.0], [0.0]])
+        fingers = builder.AddNamedSystem("gripper_fingers", MatrixGain(D=halves))
+        builder.ExportInput(fingers.get_input_port(), "gripper.position")
+        builder.Connect(
+            fingers.get_output_port(), plant.get_desired_state_input_port(gripper)
+        )
+        sums = np.array([[1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
+        opening = builder.AddNamedSystem("gripper_opening", MatrixGain(D=sums))
+        builder.Connect(
+            plant.get_state_output_port(gripper), opening.get_input_port()
+        )
+        export(builder, opening.get_output_port(), "gripper.state_measured")
+        self._add_ready_device(builder, "gripper")
+
+    @property
+    def grip_command(self) -> float:
+        """The opening [m] to command so that the pads press with the grip force.
+
+        Fingers yield like springs (the real drive is self-locking), so they are
+        sent to a place inside the grip. A welded bolt is only touched.
+        """
+        gripper, width = self.scenario.gripper, self.scenario.lock.grip_size[2]
+        if gripper.hold == "weld":
+            return width + 0.002
+        return width - 2.0 * gripper.grip_force / gripper.finger_stiffness
+
+    def _fix_commands(self, context: Context) -> None:
+        super()._fix_commands(context)
+        self.GetInputPort("gripper.position").FixValue(context, self.grip_command)
+
+    def _place_at_start(self, context: Context) -> None:
+        plant = self.plant
+        plant_context = self.part_context(plant, context)
+        plant.SetPositions(plant_context, self.iiwa, self.start)
+        for name in FINGERS:
+            plant.GetJointByName(name).set_translation(
+                plant_context, self._start_opening / 2
+            )
+        if self.scenario.gripper.hold == "friction":
+            plant.SetFreeBodyPose(plant_context, self.lock.bolt, self.X_WG)
+
+    @property
+    def _start_opening(self) -> float:
+        """Where the pads stand at first: already pressed in by the grip force.
+
+        From a mere touch both would hit the light bolt at speed and throw it.
+        """
+        pressed = self.scenario.lock.grip_size[2] - 2.0 * _PAD_INDENTATION
+        return max(self.grip_command, pressed)
+
+
+def add_arm(
+    plant: MultibodyPlant, arm: ArmConfig
+) -> tuple[ModelInstanceIndex, Frame]:
+    """Adds the arm on the world's origin; returns its instance and flange frame."""
+    instance = add_model(plant, arm.model)
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0", instance))
+    return instance, plant.GetFrameByName("iiwa_link_ee", instance)
+
+
+def _set_spring(plant: MultibodyPlant, index: int, k: float, d: float) -> None:
+    actuator = plant.get_joint_actuator(index)
+    actuator.set_controller_gains(PdControllerGains(p=k, d=d))

@@ -1,0 +1,267 @@
+"""What every station has, and what the simulated ones share."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.common import RandomDistribution
+from pydrake.common.value import Value
+from pydrake.geometry import SceneGraph
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.plant import (
+    AddMultibodyPlant,
+    MultibodyPlant,
+    MultibodyPlantConfig,
+)
+from pydrake.multibody.tree import FixedOffsetFrame, Frame, RigidBody, WeldJoint
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    Diagram,
+    DiagramBuilder,
+    LeafSystem,
+    OutputPort,
+    System,
+)
+from pydrake.systems.primitives import ConstantVectorSource, RandomSource
+
+from drake_disasm.coordinates import Coordinates
+from drake_disasm.devices.ft_sensor import ForceTorqueSensor
+from drake_disasm.effects import Effect, EnvironmentEffect, SensorEffect
+from drake_disasm.lock import Lock, set_environment
+from drake_disasm.ports import Health, Port, check_ports
+from drake_disasm.scenario import PlacementConfig, Scenario
+
+
+class Station(Diagram):
+    """A diagram with station ports, and what the task layer must know of it.
+
+    Attributes:
+        scenario: what it was built from.
+        table: its port table.
+        arm: the device whose position is commanded ("iiwa", or "bolt").
+        has_velocity_input: whether `<arm>.velocity` is an input as well.
+        coordinates: maps the arm's coordinates to X_GB and back.
+        start: the coordinates (n,) at which an episode starts, X_GB = identity.
+        X_SB: the bolt in the sensor frame, as grasped.
+        payload_mass, p_SoScm_S: what the sensor carries [kg], (3,) [m].
+        X_WG: the groove's nominal frame in the world.
+    """
+
+    scenario: Scenario
+    table: tuple[Port, ...]
+    arm: str
+    has_velocity_input: bool
+    coordinates: Coordinates
+    start: np.ndarray
+    X_SB: RigidTransform
+    payload_mass: float
+    p_SoScm_S: np.ndarray
+    X_WG: RigidTransform
+
+
+class SimulatedStation(Station):
+    """A station made of a MultibodyPlant; see CellStation and TwinStation.
+
+    Beside the table's ports it has what only a simulation knows: `bolt_pose`
+    (X_GnB, true), `contact_results`, and the applied spatial forces input.
+    """
+
+    #: How long the station is left alone before an episode begins [s].
+    settling_time: float
+
+    plant: MultibodyPlant
+    scene_graph: SceneGraph
+    lock: Lock
+    sensor: ForceTorqueSensor
+    sensor_noise: RandomSource
+
+    def _add_plant(self, builder: DiagramBuilder) -> Frame:
+        """Adds plant and scene graph; returns the groove's nominal frame."""
+        simulation = self.scenario.simulation
+        config = MultibodyPlantConfig(
+            time_step=simulation.time_step,
+            discrete_contact_approximation=simulation.contact_approximation,
+            contact_model="hydroelastic_with_fallback",
+        )
+        self.plant, self.scene_graph = AddMultibodyPlant(config, builder)
+        self.X_WG = nominal_groove_pose(self.scenario.placement)
+        return add_fixed_frame(self.plant, "groove_nominal", self.X_WG)
+
+    def _add_sensor(
+        self, builder: DiagramBuilder, joint: WeldJoint, frame_S: Frame
+    ) -> None:
+        config, plant = self.scenario.ft_sensor, self.plant
+        self.sensor = builder.AddNamedSystem(
+            "ft_sensor",
+            ForceTorqueSensor(
+                config,
+                joint.index(),
+                frame_S.body().index(),
+                frame_S.GetFixedPoseInBodyFrame(),
+                plant.gravity_field().gravity_vector(),
+            ),
+        )
+        self.sensor_noise = builder.AddNamedSystem(
+            "ft_sensor_noise",
+            RandomSource(RandomDistribution.kGaussian, 6, config.period),
+        )
+        connect = builder.Connect
+        connect(
+            plant.get_reaction_forces_output_port(),
+            self.sensor.GetInputPort("reaction_forces"),
+        )
+        connect(
+            plant.get_body_poses_output_port(), self.sensor.GetInputPort("body_poses")
+        )
+        connect(
+            self.sensor_noise.get_output_port(), self.sensor.GetInputPort("noise")
+        )
+        for quantity in ("wrench", "health", "time_measured"):
+            export(builder, self.sensor.GetOutputPort(quantity), f"ft_sensor.{quantity}")
+
+    def _add_ready_device(self, builder: DiagramBuilder, name: str) -> None:
+        """Exports health and sample time of a device that never fails."""
+        ready = builder.AddNamedSystem(
+            f"{name}_health", ConstantVectorSource([float(Health.READY)])
+        )
+        clock = builder.AddNamedSystem(f"{name}_clock", _Clock())
+        export(builder, ready.get_output_port(), f"{name}.health")
+        export(builder, clock.get_output_port(), f"{name}.time_measured")
+
+    def _finish(self, builder: DiagramBuilder, bolt: RigidBody) -> None:
+        """Exports the simulation's own ports, builds, and checks the table."""
+        plant = self.plant
+        truth = builder.AddNamedSystem(
+            "bolt_pose", _BodyPose(int(bolt.index()), self.X_WG)
+        )
+        builder.Connect(plant.get_body_poses_output_port(), truth.get_input_port())
+        export(builder, truth.get_output_port(), "bolt_pose")
+        export(builder, plant.get_contact_results_output_port(), "contact_results")
+        builder.ExportInput(
+            plant.get_applied_spatial_force_input_port(), "applied_spatial_force"
+        )
+        export(builder, self.scene_graph.get_query_output_port(), "query_object")
+        builder.BuildInto(self)
+        check_ports(self, self.table)
+
+    def set_effects(self, context: Context, effects: Sequence[Effect]) -> None:
+        """Puts effects into this station's Context; nothing is rebuilt.
+
+        The bolt stays where it was: `settled` gives a state that fits them.
+        """
+        environment = self.lock.nominal
+        for effect in effects:
+            if isinstance(effect, EnvironmentEffect):
+                environment = effect.apply(environment)
+        set_environment(
+            self.lock,
+            environment,
+            self.part_context(self.plant, context),
+            self.scene_graph,
+            self.part_context(self.scene_graph, context),
+        )
+        self.sensor.set_effects(
+            self.part_context(self.sensor, context),
+            [e for e in effects if isinstance(e, SensorEffect)],
+        )
+
+    def settled(self, effects: Sequence[Effect]) -> Context:
+        """Returns a Context of this station alone: bolt gripped at A, at rest."""
+        simulator = Simulator(self)
+        context = simulator.get_mutable_context()
+        self.set_effects(context, effects)
+        self._place_at_start(context)
+        self._fix_commands(context)
+        simulator.Initialize()
+        simulator.AdvanceTo(self.settling_time)
+        return context
+
+    def reading_at_zeroing(self, context: Context) -> np.ndarray:
+        """Returns what the sensor reads, noise averaged away, (6,) [f; tau] in S."""
+        return self.sensor.reading_at_zeroing(self.part_context(self.sensor, context))
+
+    def true_groove_pose(self, context: Context) -> RigidTransform:
+        """Returns X_GnG, where the groove truly is."""
+        return self.lock.frame.GetPoseInParentFrame(
+            self.part_context(self.plant, context)
+        )
+
+    def part_context(self, part: System, context: Context) -> Context:
+        """Returns the Context of a part of this station from the station's own."""
+        return self.GetMutableSubsystemContext(part, context)
+
+    def _place_at_start(self, context: Context) -> None:
+        """Puts the plant's state where an episode starts."""
+        raise AssertionError("each station places its own bodies")
+
+    def _fix_commands(self, context: Context) -> None:
+        """Commands the start, for a station that stands alone."""
+        self.GetInputPort(f"{self.arm}.position").FixValue(context, self.start)
+
+
+class _Clock(LeafSystem):
+    """Puts out the time of the newest sample, which in simulation is now.
+
+    @system
+    name: Clock
+    output_ports:
+    - time
+    @endsystem
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.DeclareVectorOutputPort(
+            "time", 1, self._calc, prerequisites_of_calc={self.time_ticket()}
+        )
+
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector([context.get_time()])
+
+
+class _BodyPose(LeafSystem):
+    """Picks one body's pose, expressed in the groove's nominal frame.
+
+    @system
+    name: BodyPose
+    input_ports:
+    - body_poses
+    output_ports:
+    - X_GnB
+    @endsystem
+    """
+
+    def __init__(self, body: int, X_WG: RigidTransform) -> None:
+        super().__init__()
+        self._body, self._X_GW = body, X_WG.inverse()
+        poses = self.DeclareAbstractInputPort(
+            "body_poses", Value[list[RigidTransform]]()
+        )
+        self._poses = poses
+        self.DeclareAbstractOutputPort(
+            "X_GnB",
+            Value[RigidTransform],
+            self._calc,
+            prerequisites_of_calc={poses.ticket()},
+        )
+
+    def _calc(self, context: Context, output: Value) -> None:
+        X_WB = self._poses.Eval(context)[self._body]
+        output.set_value(self._X_GW @ X_WB)
+
+
+def nominal_groove_pose(placement: PlacementConfig) -> RigidTransform:
+    """Returns X_WGn: x along the groove at `yaw`, y up, z across."""
+    R = RollPitchYaw(np.pi / 2, 0.0, placement.yaw).ToRotationMatrix()
+    return RigidTransform(R, placement.p_WG)
+
+
+def add_fixed_frame(plant: MultibodyPlant, name: str, X_WP: RigidTransform) -> Frame:
+    """Adds a frame P to the world."""
+    return plant.AddFrame(FixedOffsetFrame(name, plant.world_frame(), X_WP))
+
+
+def export(builder: DiagramBuilder, port: OutputPort, name: str) -> None:
+    """Exports an output port under a station's port name."""
+    builder.ExportOutput(port, name)

@@ -1,0 +1,1 @@
+"""LeafSystems between station and policy."""

@@ -1,0 +1,162 @@
+"""From sensor readings to the state that the agent sees (thesis 4.2.4)."""
+
+import dataclasses
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from drake_disasm.coordinates import Coordinates
+from drake_disasm.spatial import (
+    pose_to_vector,
+    rotation_vector,
+    shift_and_express,
+    weight_wrench,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Mounting:
+    """How the sensor sits between bolt and robot, and what it carries.
+
+    Attributes:
+        X_SB: the bolt in the sensor frame, as grasped.
+        R_WG: the groove's nominal frame in the world.
+        mass, p_SoScm_S: payload of the sensor [kg], (3,) [m].
+        g_W: gravity (3,) [m/s^2].
+    """
+
+    X_SB: RigidTransform
+    R_WG: RotationMatrix
+    mass: float
+    p_SoScm_S: np.ndarray
+    g_W: np.ndarray
+
+    def weight(self, R_GB: RotationMatrix) -> np.ndarray:
+        """Returns the payload's own load on the sensor, (6,) [f; tau] at So in S."""
+        R_WS = self.R_WG @ R_GB @ self.X_SB.rotation().inverse()
+        return weight_wrench(self.mass, self.p_SoScm_S, R_WS, self.g_W)
+
+
+def contact_wrench(
+    reading: np.ndarray, offset: np.ndarray, R_GB: RotationMatrix, mounting: Mounting
+) -> np.ndarray:
+    """Returns the environment's wrench on the bolt at Bo in G, exactly.
+
+    Takes off the zeroing offset and the payload's weight at this orientation,
+    then shifts from So to Bo and expresses in G (eq. 4.4, 4.6, 4.7 without
+    their small-angle and on-axis assumptions).
+
+    Args:
+        reading: (6,) raw [f; tau] at So in S.
+        offset: (6,) what is left of the reading at zeroing beside the weight.
+        R_GB: measured orientation of the bolt.
+        mounting: geometry and payload.
+    """
+    load = reading - offset - mounting.weight(R_GB)
+    X_BS = mounting.X_SB.inverse()
+    X_GS = RigidTransform(R_GB @ X_BS.rotation(), R_GB @ X_BS.translation())
+    return shift_and_express(load, X_GS)
+
+
+def small_angle_contact_wrench(
+    reading: np.ndarray, tare: np.ndarray, R_GB: RotationMatrix, mounting: Mounting
+) -> np.ndarray:
+    """Returns the same by the thesis's equations 4.4, 4.6 and 4.7.
+
+    They hold for a sensor whose axis (their y) is upright when zeroed, a payload
+    on that axis, and small rotations. alpha and gamma are the rotations about x
+    and z. Two signs differ from the print: our reading is the load on the sensor,
+    so the change by gravity is subtracted; and tau_z is -G sin(gamma) l1, which is
+    what eq. 4.7's own geometry (p x f on the y axis) gives, where 4.6 prints +.
+
+    Args:
+        reading, R_GB, mounting: as in `contact_wrench`.
+        tare: (6,) the reading at zeroing.
+    """
+    R_BS = mounting.X_SB.rotation().inverse().matrix()
+    f, t = R_BS @ (reading - tare)[:3], R_BS @ (reading - tare)[3:]
+    alpha, _, gamma = RollPitchYaw(R_GB).vector()
+    G = mounting.mass * np.linalg.norm(mounting.g_W)
+    l1, l2 = np.linalg.norm(mounting.p_SoScm_S), np.linalg.norm(
+        mounting.X_SB.translation()
+    )
+    rise = 2.0 - np.cos(alpha) - np.cos(gamma)
+    f = f - G * np.array([-np.sin(gamma), rise, np.sin(alpha)])
+    t = t + G * l1 * np.array([np.sin(alpha), 0.0, np.sin(gamma)])
+    return np.concatenate([f, t + l2 * np.array([f[2], 0.0, -f[0]])])
+
+
+class ObservationProcessor(LeafSystem):
+    """Puts out the state s = [x y z u v w Fx Fy Fz Tx Ty Tz] (thesis, eq. 4.1).
+
+    Pose of the bolt relative to the start, from the measured coordinates, and
+    the environment's wrench on it, both in the groove's nominal frame. The
+    zeroing of the sensor is a parameter of the Context, set by `zero`.
+
+    @system
+    name: ObservationProcessor
+    input_ports:
+    - position_measured
+    - wrench
+    output_ports:
+    - observation
+    - X_GB
+    @endsystem
+
+    Args:
+        coordinates: maps the measured coordinates to X_GB.
+        mounting: geometry and payload of the sensor.
+        variant: "exact", or "small_angle" for the thesis's equations.
+    """
+
+    def __init__(
+        self, coordinates: Coordinates, mounting: Mounting, variant: str = "exact"
+    ) -> None:
+        super().__init__()
+        self._coordinates, self._mounting = coordinates, mounting
+        self._exact = variant == "exact"
+        self._offset = self.DeclareNumericParameter(BasicVector(6))
+        self._position = self.DeclareVectorInputPort(
+            "position_measured", coordinates.size
+        )
+        self._wrench = self.DeclareVectorInputPort("wrench", 6)
+        position = self._position.ticket()
+        self.DeclareVectorOutputPort(
+            "observation",
+            12,
+            self._calc_observation,
+            prerequisites_of_calc={
+                position,
+                self._wrench.ticket(),
+                self.all_parameters_ticket(),
+            },
+        )
+        self.DeclareVectorOutputPort(
+            "X_GB", 7, self._calc_pose, prerequisites_of_calc={position}
+        )
+
+    def zero(self, context: Context, reading: np.ndarray) -> None:
+        """Zeroes the sensor: `reading` (6,) was taken at the start, X_GB = identity."""
+        offset = reading
+        if self._exact:
+            offset = reading - self._mounting.weight(RotationMatrix())
+        context.get_mutable_numeric_parameter(self._offset).SetFromVector(offset)
+
+    def _calc_observation(self, context: Context, output: BasicVector) -> None:
+        X_GB = self._coordinates.pose(self._position.Eval(context))
+        offset = context.get_numeric_parameter(self._offset).value()
+        process = contact_wrench if self._exact else small_angle_contact_wrench
+        wrench = process(
+            self._wrench.Eval(context), offset, X_GB.rotation(), self._mounting
+        )
+        rotation = (
+            rotation_vector(X_GB.rotation())
+            if self._exact
+            else RollPitchYaw(X_GB.rotation()).vector()
+        )
+        output.SetFromVector(np.concatenate([X_GB.translation(), rotation, wrench]))
+
+    def _calc_pose(self, context: Context, output: BasicVector) -> None:
+        X_GB = self._coordinates.pose(self._position.Eval(context))
+        output.SetFromVector(pose_to_vector(X_GB))

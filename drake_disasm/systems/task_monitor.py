@@ -1,0 +1,73 @@
+"""Reward and outcome of the running episode, as output ports."""
+
+import numpy as np
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiscreteValues,
+    EventStatus,
+    LeafSystem,
+)
+
+from drake_disasm.scenario import TaskConfig
+from drake_disasm.task.mdp import REWARD_TERMS, BoltState, outcome, reward_terms
+
+
+class TaskMonitor(LeafSystem):
+    """Compares the observation with the one a period ago.
+
+    Read at the end of a period, before its updates, `reward_terms` (in the order
+    of REWARD_TERMS) and `outcome` (an `Outcome`) are those of the step just done.
+
+    @system
+    name: TaskMonitor
+    input_ports:
+    - observation
+    output_ports:
+    - reward_terms
+    - outcome
+    @endsystem
+
+    Args:
+        task: the MDP.
+        lift_needed: rise of the bolt at which it is out of the groove [m].
+    """
+
+    def __init__(self, task: TaskConfig, lift_needed: float) -> None:
+        super().__init__()
+        self._task, self._lift_needed = task, lift_needed
+        self._observation = self.DeclareVectorInputPort("observation", 12)
+        self._before = self.DeclareDiscreteState(12)
+        self._steps = self.DeclareDiscreteState(1)
+        self.DeclarePeriodicDiscreteUpdateEvent(task.period, 0.0, self._update)
+        inputs = {self._observation.ticket(), self.xd_ticket()}
+        self.DeclareVectorOutputPort(
+            "reward_terms",
+            len(REWARD_TERMS),
+            self._calc_reward,
+            prerequisites_of_calc=inputs,
+        )
+        self.DeclareVectorOutputPort(
+            "outcome", 1, self._calc_outcome, prerequisites_of_calc=inputs
+        )
+
+    def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
+        steps = context.get_discrete_state(self._steps).value()
+        state.set_value(self._before, self._observation.Eval(context))
+        state.set_value(self._steps, steps + 1.0)
+        return EventStatus.Succeeded()
+
+    def _calc_reward(self, context: Context, output: BasicVector) -> None:
+        before = context.get_discrete_state(self._before).value()
+        terms = reward_terms(
+            BoltState.from_vector(before), self._state(context), self._task
+        )
+        output.SetFromVector(np.array([terms[name] for name in REWARD_TERMS]))
+
+    def _calc_outcome(self, context: Context, output: BasicVector) -> None:
+        steps = int(context.get_discrete_state(self._steps).value()[0])
+        result = outcome(self._state(context), steps, self._task, self._lift_needed)
+        output.SetFromVector([float(result)])
+
+    def _state(self, context: Context) -> BoltState:
+        return BoltState.from_vector(self._observation.Eval(context))

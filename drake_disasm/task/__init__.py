@@ -1,0 +1,1 @@
+"""The task: its MDP, its diagram, and episodes of it."""

@@ -1,0 +1,286 @@
+"""One diagram from a scenario, and stepping it by the MDP's period.
+
+```
+policy -> imprecision -> pose target -> integrator -> station -> observation
+  ^                                                                   |
+  +-------------------------------------------------------------------+
+```
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.common import RandomDistribution, RandomGenerator
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    DiscreteTimeIntegrator,
+    RandomSource,
+)
+
+from drake_disasm.effects import Effect
+from drake_disasm.lock import lift_needed
+from drake_disasm.scenario import Scenario
+from drake_disasm.stations import CellStation, SimulatedStation, make_station
+from drake_disasm.systems.imprecision import ImprecisionNoise
+from drake_disasm.systems.observation import Mounting, ObservationProcessor
+from drake_disasm.systems.policy import Policy, PolicySystem
+from drake_disasm.systems.pose_target import PoseTarget
+from drake_disasm.systems.task_monitor import TaskMonitor
+from drake_disasm.task.mdp import REWARD_TERMS, Outcome, action_bounds
+
+
+@dataclasses.dataclass(frozen=True)
+class StepResult:
+    """What one step of the MDP gave.
+
+    Attributes:
+        observation: (12,) the state after it.
+        reward_terms: the weighted terms by name; the reward is their sum.
+        outcome: how the episode stands.
+    """
+
+    observation: np.ndarray
+    reward_terms: dict[str, float]
+    outcome: Outcome
+
+    @property
+    def reward(self) -> float:
+        """Sum of the terms."""
+        return sum(self.reward_terms.values())
+
+
+class TaskSimulation:
+    """The task's diagram, built once and reset in place.
+
+    Without a policy the diagram's `action` input is fed by `step(action)`, as an
+    environment for learning does; with one, `step()` lets it act.
+
+    Args:
+        scenario: what the diagram denotes.
+        model: "cell" or "twin".
+        policy: observation (12,) to action (6,), or None.
+        observers: LeafSystems to add (visualisers); each `connect(builder, self)`
+            is called before the diagram is built.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        model: str,
+        policy: Policy | None = None,
+        observers: Sequence["Observer"] = (),
+    ) -> None:
+        self.scenario, self.model = scenario, model
+        self.bounds = action_bounds(scenario.task)
+        builder = DiagramBuilder()
+        self.station = builder.AddNamedSystem("station", make_station(model, scenario))
+        self._add_systems(builder, policy)
+        for observer in observers:
+            observer.connect(builder, self)
+        self.diagram: Diagram = builder.Build()
+        self.diagram.set_name(f"{scenario.name}_{model}")
+        self.simulator = Simulator(self.diagram)
+        self.context = self.simulator.get_mutable_context()
+        self._start: Context | None = None
+        self._effects: list[Effect] | None = None
+        self._steps = 0
+
+    def reset(
+        self, seed: int, effects: Sequence[Effect] | None = None
+    ) -> np.ndarray:
+        """Starts an episode in place and returns its first observation (12,).
+
+        Args:
+            seed: of sensor noise and imprecision.
+            effects: instead of the scenario's; a change settles the station anew.
+        """
+        wanted = list(self.scenario.effects if effects is None else effects)
+        if self._start is None or wanted != self._effects:
+            self._start, self._effects = self._starting_context(wanted), wanted
+        self.context.SetTimeStateAndParametersFrom(self._start)
+        seeds = np.random.SeedSequence(seed).generate_state(len(self._random_sources))
+        for source, number in zip(self._random_sources, seeds, strict=True):
+            source.SetRandomContext(
+                source.GetMyMutableContextFromRoot(self.context),
+                RandomGenerator(int(number)),
+            )
+        if self.policy_system and hasattr(self.policy_system.policy, "reset"):
+            self.policy_system.policy.reset()
+        self._steps = 0
+        self.simulator.Initialize()
+        return self.observation()
+
+    def step(self, action: np.ndarray | None = None) -> StepResult:
+        """Advances one period of the MDP.
+
+        Args:
+            action: (6,) for a diagram without a policy; clipped to the bounds.
+        """
+        if action is not None:
+            clipped = np.clip(action, -self.bounds, self.bounds)
+            self._action_source.get_mutable_source_value(
+                self._action_source.GetMyMutableContextFromRoot(self.context)
+            ).SetFromVector(clipped)
+        self._steps += 1
+        self.simulator.AdvanceTo(self._steps * self.scenario.task.period)
+        terms = self.monitor.GetOutputPort("reward_terms").Eval(self._monitor_context)
+        code = self.monitor.GetOutputPort("outcome").Eval(self._monitor_context)
+        named = dict(zip(REWARD_TERMS, terms.tolist(), strict=True))
+        return StepResult(self.observation(), named, Outcome(int(code[0])))
+
+    def observation(self) -> np.ndarray:
+        """Returns the present state (12,)."""
+        return self.processor.GetOutputPort("observation").Eval(
+            self._processor_context
+        )
+
+    def evaluate(self, system: Diagram | LeafSystem, port: str) -> np.ndarray:
+        """Returns the present value of a system's output port."""
+        context = system.GetMyContextFromRoot(self.context)
+        return system.GetOutputPort(port).Eval(context)
+
+    def bolt_is_out(self) -> bool:
+        """Returns whether the bolt truly is out, which only a simulation knows."""
+        X_GnB = self.evaluate(self.station, "bolt_pose")
+        station_context = self.station.GetMyMutableContextFromRoot(self.context)
+        X_GB = self.station.true_groove_pose(station_context).inverse() @ X_GnB
+        return bool(X_GB.translation()[1] >= self._lift_needed)
+
+    def _add_systems(self, builder: DiagramBuilder, policy: Policy | None) -> None:
+        station, task = self.station, self.scenario.task
+        self._lift_needed = lift_needed(self.scenario.lock, task.lift_success)
+        add = builder.AddNamedSystem
+        self.processor = add("observation_processor", self._make_processor())
+        self.monitor = add("task_monitor", TaskMonitor(task, self._lift_needed))
+        self.imprecision = add(
+            "imprecision", ImprecisionNoise(self.scenario.imprecision, self.bounds)
+        )
+        noise = add(
+            "imprecision_noise",
+            RandomSource(RandomDistribution.kGaussian, 6, task.period),
+        )
+        self.pose_target = add(
+            "pose_target",
+            PoseTarget(station.coordinates, station.start, task.period),
+        )
+        self._random_sources = [station.sensor_noise, noise]
+        connect = builder.Connect
+        connect(
+            station.GetOutputPort(f"{station.arm}.position_measured"),
+            self.processor.GetInputPort("position_measured"),
+        )
+        connect(
+            station.GetOutputPort("ft_sensor.wrench"),
+            self.processor.GetInputPort("wrench"),
+        )
+        connect(self.processor.get_output_port(0), self.monitor.get_input_port())
+        connect(noise.get_output_port(), self.imprecision.GetInputPort("noise"))
+        connect(
+            self.imprecision.get_output_port(), self.pose_target.get_input_port()
+        )
+        self._add_motion(builder)
+        self._add_policy(builder, policy)
+
+    def _make_processor(self) -> ObservationProcessor:
+        station = self.station
+        mounting = Mounting(
+            station.X_SB,
+            station.X_WG.rotation(),
+            station.payload_mass,
+            station.p_SoScm_S,
+            station.plant.gravity_field().gravity_vector(),
+        )
+        return ObservationProcessor(
+            station.coordinates, mounting, self.scenario.observation.variant
+        )
+
+    def _add_motion(self, builder: DiagramBuilder) -> None:
+        """Adds the integrator from velocity to the station's position command."""
+        station = self.station
+        period = (
+            self.scenario.arm.control_period
+            if isinstance(station, CellStation)
+            else self.scenario.simulation.time_step
+        )
+        velocity = self.pose_target.GetOutputPort("velocity")
+        self._integrator = builder.AddNamedSystem(
+            "motion", DiscreteTimeIntegrator(len(station.start), period)
+        )
+        builder.Connect(velocity, self._integrator.get_input_port())
+        builder.Connect(
+            self._integrator.get_output_port(),
+            station.GetInputPort(f"{station.arm}.position"),
+        )
+        if station.has_velocity_input:
+            builder.Connect(velocity, station.GetInputPort(f"{station.arm}.velocity"))
+        if isinstance(station, CellStation):
+            grip = builder.AddNamedSystem(
+                "grip", ConstantVectorSource([station.grip_command])
+            )
+            builder.Connect(
+                grip.get_output_port(), station.GetInputPort("gripper.position")
+            )
+
+    def _add_policy(self, builder: DiagramBuilder, policy: Policy | None) -> None:
+        self.policy_system: PolicySystem | None = None
+        if policy is None:
+            self._action_source = builder.AddNamedSystem(
+                "action", ConstantVectorSource(np.zeros(6))
+            )
+            self.action_port = self._action_source.get_output_port()
+        else:
+            self.policy_system = builder.AddNamedSystem(
+                "policy", PolicySystem(policy, self.scenario.task.period, self.bounds)
+            )
+            builder.Connect(
+                self.processor.get_output_port(0), self.policy_system.get_input_port()
+            )
+            self.action_port = self.policy_system.get_output_port()
+        builder.Connect(self.action_port, self.imprecision.GetInputPort("action"))
+
+    def _starting_context(self, effects: Sequence[Effect]) -> Context:
+        """Returns the diagram's Context at t = 0: settled at A and zeroed."""
+        settled = self.station.settled(effects)
+        root = self.diagram.CreateDefaultContext()
+        mine = self.station.GetMyMutableContextFromRoot(root)
+        self.station.set_effects(mine, effects)
+        copy_state(settled, mine)
+        self._integrator.GetMyMutableContextFromRoot(root).SetDiscreteState(
+            self.station.start
+        )
+        self.processor.zero(
+            self.processor.GetMyMutableContextFromRoot(root),
+            self.station.reading_at_zeroing(settled),
+        )
+        return root
+
+    @property
+    def _monitor_context(self) -> Context:
+        return self.monitor.GetMyContextFromRoot(self.context)
+
+    @property
+    def _processor_context(self) -> Context:
+        return self.processor.GetMyContextFromRoot(self.context)
+
+
+def copy_state(source: Context, target: Context) -> None:
+    """Copies discrete and abstract state between Contexts of one system.
+
+    Drake's own copy (SetTimeStateAndParametersFrom) takes root Contexts only, and
+    a station's is a part of the diagram's.
+    """
+    target.get_mutable_discrete_state().SetFrom(source.get_discrete_state())
+    values = target.get_mutable_abstract_state()
+    for i in range(source.num_abstract_states()):
+        values.get_mutable_value(i).SetFrom(source.get_abstract_state().get_value(i))
+
+
+class Observer:
+    """Something that watches the diagram: adds itself before it is built."""
+
+    def connect(self, builder: DiagramBuilder, simulation: TaskSimulation) -> None:
+        """Adds systems to the builder and connects them to the simulation's."""
+        raise AssertionError("each observer connects itself")
