@@ -204,9 +204,7 @@ def _add_groove_geometry(
     ids = []
     for name, (low, high) in groove_boxes(lock).items():
         X_GP, shape = RigidTransform((low + high) / 2), Box(*(high - low))
-        ids.append(
-            plant.RegisterCollisionGeometry(body, X_GP, shape, name, properties)
-        )
+        ids.append(plant.RegisterCollisionGeometry(body, X_GP, shape, name, properties))
         plant.RegisterVisualGeometry(body, X_GP, shape, f"{name}_visual", _BRASS)
     return tuple(ids)
 
@@ -271,4 +269,3 @@ def bolt_inertia(lock: LockConfig) -> SpatialInertia:
     return SpatialInertia.MakeFromCentralInertia(
         lock.bolt_mass, p_BoBcm_B, box * lock.bolt_mass
     )
-

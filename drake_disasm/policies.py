@@ -45,8 +45,8 @@ class Admittance:
         rotation: step per torque [rad/(N m)].
     """
 
-    speed: float = 0.001
-    push: float = 9.0
+    speed: float = 0.0008
+    push: float = 12.0
     stop: float = 6.0
     lift: float = 8.0
     lift_speed: float = 0.0015
@@ -62,9 +62,7 @@ class Admittance:
         if not out:
             yielding[0] = min(self.speed, self.compliance * 3 * (self.push + f[0]))
         if out or f[0] < -self.stop:
-            yielding[1] = min(
-                self.lift_speed, self.compliance * 8 * (self.lift + f[1])
-            )
+            yielding[1] = min(self.lift_speed, self.compliance * 8 * (self.lift + f[1]))
         return yielding
 
 

@@ -70,7 +70,13 @@ CELL_PORTS: tuple[Port, ...] = (
 
 #: Ports of the twin: the bolt stands for the arm.
 TWIN_PORTS: tuple[Port, ...] = (
-    Port("bolt.position", 6, "m, rad", "B in Gn: x, y, z, yaw, pitch, roll", is_input=True),
+    Port(
+        "bolt.position",
+        6,
+        "m, rad",
+        "B in Gn: x, y, z, yaw, pitch, roll",
+        is_input=True,
+    ),
     Port("bolt.velocity", 6, "m/s, rad/s", "rate of bolt.position", is_input=True),
     Port("bolt.position_measured", 6, "m, rad", "B in Gn: x, y, z, yaw, pitch, roll"),
     Port("ft_sensor.wrench", 6, "N, N m", _WRENCH_FRAME),

@@ -35,7 +35,11 @@ AnyEffect = typing.Union[(Untagged, *EFFECTS)]  # type: ignore[valid-type]  # no
 class SimulationConfig:
     """How the MultibodyPlant is discretised (how chosen: docs/physics.md)."""
 
-    time_step: float = quantity(0.005, "s", "of the plant", low=1e-4, high=0.02)
+    cell_time_step: float = quantity(0.0025, "s", "of the cell", low=1e-4, high=0.02)
+    twin_time_step: float = quantity(0.005, "s", "of the twin", low=1e-4, high=0.02)
+    stiction_tolerance: float = quantity(
+        1e-5, "m/s", "creep at which friction is full", low=1e-7, high=1e-2
+    )
     contact_approximation: str = quantity(
         "lagged", "", "of the discrete solver", choices=("lagged", "similar", "sap")
     )
@@ -65,12 +69,12 @@ class LockConfig:
         0.001, "m", "keyhole width minus head diameter", low=2e-4, high=5e-3
     )
     grip_size: list[float] = quantity(
-        [0.014, 0.024, 0.012], "m", "bolt's grip along x, y, z", low=0.004, high=0.05
+        [0.018, 0.030, 0.012], "m", "bolt's grip along x, y, z", low=0.004, high=0.05
     )
     grip_standoff: float = quantity(
         0.006, "m", "gap between plate and grip", low=0.001, high=0.05
     )
-    bolt_mass: float = quantity(0.035, "kg", "of the bolt", low=0.001, high=1.0)
+    bolt_mass: float = quantity(0.060, "kg", "of the bolt", low=0.001, high=1.0)
 
 
 @dataclasses.dataclass
@@ -99,7 +103,7 @@ class ArmConfig:
         low=-3.0, high=3.0,
     )  # fmt: skip
     stiffness: list[float] = quantity(
-        [10e3, 10e3, 10e3, 10e3, 5e3, 5e3, 5e3], "N m/rad", "of each joint",
+        [20e3, 8e3, 20e3, 8e3, 8e3, 8e3, 8e3], "N m/rad", "of each joint",
         low=10.0, high=1e6,
     )  # fmt: skip
     damping_ratio: float = quantity(
@@ -125,7 +129,7 @@ class GripperConfig:
         0.003, "m", "between fingertips and plate", low=0.001, high=0.05
     )
     finger_stiffness: float = quantity(
-        2e4, "N/m", "of each finger about its commanded place", low=1e3, high=1e6
+        3e4, "N/m", "of each finger about its commanded place", low=1e3, high=1e6
     )
 
 
@@ -164,7 +168,7 @@ class TwinConfig:
     """
 
     stiffness: list[float] = quantity(
-        [1.5e4, 1.5e4, 1.5e4, 150.0, 150.0, 150.0], "N/m, N m/rad", "",
+        [12e3, 15e3, 14e3, 330.0, 98.0, 2000.0], "N/m, N m/rad", "",
         low=1.0, high=1e7,
     )  # fmt: skip
     damping_ratio: float = quantity(1.0, "1", "of each axis", low=0.1, high=10.0)
@@ -230,9 +234,7 @@ class Scenario:
     observation: ObservationConfig = dataclasses.field(
         default_factory=ObservationConfig
     )
-    imprecision: float = quantity(
-        0.0, "m", "psi of algorithm 3.2", low=0.0, high=0.01
-    )
+    imprecision: float = quantity(0.0, "m", "psi of algorithm 3.2", low=0.0, high=0.01)
     effects: list[AnyEffect] = dataclasses.field(default_factory=list)
 
 

@@ -96,9 +96,7 @@ class ForceTorqueSensor(LeafSystem):
     def _get_effects(self, context: Context) -> Sequence[SensorEffect]:
         return context.get_abstract_parameter(self._effects).get_value()
 
-    def _through(
-        self, context: Context, effects: Sequence[SensorEffect]
-    ) -> np.ndarray:
+    def _through(self, context: Context, effects: Sequence[SensorEffect]) -> np.ndarray:
         wrench = -wrench_from_spatial_force(self._reaction.Eval(context)[self._joint])
         if effects:
             R_WBody = self._poses.Eval(context)[self._body].rotation()

@@ -82,7 +82,9 @@ class CellStation(SimulatedStation):
         self._build(builder)
 
     def _build(self, builder: DiagramBuilder) -> None:
-        frame_Gn, plant, config = self._add_plant(builder), self.plant, self.scenario
+        config = self.scenario
+        frame_Gn = self._add_plant(builder, config.simulation.cell_time_step)
+        plant = self.plant
         self.coordinates = ArmCoordinates(
             config.arm, self.X_WG, self.tool.X_FB, config.task.period
         )
@@ -192,9 +194,7 @@ class CellStation(SimulatedStation):
         )
         sums = np.array([[1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
         opening = builder.AddNamedSystem("gripper_opening", MatrixGain(D=sums))
-        builder.Connect(
-            plant.get_state_output_port(gripper), opening.get_input_port()
-        )
+        builder.Connect(plant.get_state_output_port(gripper), opening.get_input_port())
         export(builder, opening.get_output_port(), "gripper.state_measured")
         self._add_ready_device(builder, "gripper")
 
@@ -235,9 +235,7 @@ class CellStation(SimulatedStation):
         return max(self.grip_command, pressed)
 
 
-def add_arm(
-    plant: MultibodyPlant, arm: ArmConfig
-) -> tuple[ModelInstanceIndex, Frame]:
+def add_arm(plant: MultibodyPlant, arm: ArmConfig) -> tuple[ModelInstanceIndex, Frame]:
     """Adds the arm on the world's origin; returns its instance and flange frame."""
     instance = add_model(plant, arm.model)
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0", instance))

@@ -70,17 +70,22 @@ class SimulatedStation(Station):
     #: How long the station is left alone before an episode begins [s].
     settling_time: float
 
+    #: Of the discrete plant [s].
+    time_step: float
+
     plant: MultibodyPlant
     scene_graph: SceneGraph
     lock: Lock
     sensor: ForceTorqueSensor
     sensor_noise: RandomSource
 
-    def _add_plant(self, builder: DiagramBuilder) -> Frame:
+    def _add_plant(self, builder: DiagramBuilder, time_step: float) -> Frame:
         """Adds plant and scene graph; returns the groove's nominal frame."""
+        self.time_step = time_step
         simulation = self.scenario.simulation
         config = MultibodyPlantConfig(
-            time_step=simulation.time_step,
+            time_step=time_step,
+            stiction_tolerance=simulation.stiction_tolerance,
             discrete_contact_approximation=simulation.contact_approximation,
             contact_model="hydroelastic_with_fallback",
         )
@@ -114,11 +119,11 @@ class SimulatedStation(Station):
         connect(
             plant.get_body_poses_output_port(), self.sensor.GetInputPort("body_poses")
         )
-        connect(
-            self.sensor_noise.get_output_port(), self.sensor.GetInputPort("noise")
-        )
+        connect(self.sensor_noise.get_output_port(), self.sensor.GetInputPort("noise"))
         for quantity in ("wrench", "health", "time_measured"):
-            export(builder, self.sensor.GetOutputPort(quantity), f"ft_sensor.{quantity}")
+            export(
+                builder, self.sensor.GetOutputPort(quantity), f"ft_sensor.{quantity}"
+            )
 
     def _add_ready_device(self, builder: DiagramBuilder, name: str) -> None:
         """Exports health and sample time of a device that never fails."""

@@ -69,7 +69,8 @@ class TwinStation(SimulatedStation):
         self._build(builder)
 
     def _build(self, builder: DiagramBuilder) -> None:
-        frame_Gn, plant = self._add_plant(builder), self.plant
+        time_step = self.scenario.simulation.twin_time_step
+        frame_Gn, plant = self._add_plant(builder, time_step), self.plant
         self.lock = add_lock(plant, frame_Gn, self.scenario.lock, self.scenario.contact)
         carrier = self._add_carrier(frame_Gn)
         frame_S, joint = self._add_sensor_joint(carrier)
@@ -123,15 +124,9 @@ class TwinStation(SimulatedStation):
         carried = builder.AddNamedSystem("carried", ConstantVectorSource(-weight))
         measured = builder.AddNamedSystem("measured", Demultiplexer([6, 6]))
         connect = builder.Connect
-        connect(
-            desired.get_output_port(), plant.get_desired_state_input_port(instance)
-        )
-        connect(
-            carried.get_output_port(), plant.get_actuation_input_port(instance)
-        )
-        connect(
-            plant.get_state_output_port(instance), measured.get_input_port()
-        )
+        connect(desired.get_output_port(), plant.get_desired_state_input_port(instance))
+        connect(carried.get_output_port(), plant.get_actuation_input_port(instance))
+        connect(plant.get_state_output_port(instance), measured.get_input_port())
         export(builder, measured.get_output_port(0), "bolt.position_measured")
 
     def _fix_commands(self, context: Context) -> None:

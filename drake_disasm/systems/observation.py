@@ -78,8 +78,9 @@ def small_angle_contact_wrench(
     f, t = R_BS @ (reading - tare)[:3], R_BS @ (reading - tare)[3:]
     alpha, _, gamma = RollPitchYaw(R_GB).vector()
     G = mounting.mass * np.linalg.norm(mounting.g_W)
-    l1, l2 = np.linalg.norm(mounting.p_SoScm_S), np.linalg.norm(
-        mounting.X_SB.translation()
+    l1, l2 = (
+        np.linalg.norm(mounting.p_SoScm_S),
+        np.linalg.norm(mounting.X_SB.translation()),
     )
     rise = 2.0 - np.cos(alpha) - np.cos(gamma)
     f = f - G * np.array([-np.sin(gamma), rise, np.sin(alpha)])

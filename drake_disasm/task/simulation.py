@@ -88,9 +88,7 @@ class TaskSimulation:
         self._effects: list[Effect] | None = None
         self._steps = 0
 
-    def reset(
-        self, seed: int, effects: Sequence[Effect] | None = None
-    ) -> np.ndarray:
+    def reset(self, seed: int, effects: Sequence[Effect] | None = None) -> np.ndarray:
         """Starts an episode in place and returns its first observation (12,).
 
         Args:
@@ -133,9 +131,7 @@ class TaskSimulation:
 
     def observation(self) -> np.ndarray:
         """Returns the present state (12,)."""
-        return self.processor.GetOutputPort("observation").Eval(
-            self._processor_context
-        )
+        return self.processor.GetOutputPort("observation").Eval(self._processor_context)
 
     def evaluate(self, system: Diagram | LeafSystem, port: str) -> np.ndarray:
         """Returns the present value of a system's output port."""
@@ -178,9 +174,7 @@ class TaskSimulation:
         )
         connect(self.processor.get_output_port(0), self.monitor.get_input_port())
         connect(noise.get_output_port(), self.imprecision.GetInputPort("noise"))
-        connect(
-            self.imprecision.get_output_port(), self.pose_target.get_input_port()
-        )
+        connect(self.imprecision.get_output_port(), self.pose_target.get_input_port())
         self._add_motion(builder)
         self._add_policy(builder, policy)
 
@@ -203,7 +197,7 @@ class TaskSimulation:
         period = (
             self.scenario.arm.control_period
             if isinstance(station, CellStation)
-            else self.scenario.simulation.time_step
+            else station.time_step
         )
         velocity = self.pose_target.GetOutputPort("velocity")
         self._integrator = builder.AddNamedSystem(
