@@ -16,19 +16,19 @@ from typing import Any
 import yaml
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
-from drake_disasm.effects import EFFECTS
+from drake_disasm.effects import EFFECTS, Effect
 from drake_disasm.errors import DisasmError
 from drake_disasm.quantity import check, closest, quantity
 from drake_disasm.resources import models_dir
 
 
 @dataclasses.dataclass
-class Untagged:
+class Untagged(Effect):
     """Stands first in the union so that every effect needs its `!Name` tag."""
 
 
 #: The tagged union that `effects:` is a list of.
-AnyEffect = typing.Union[(Untagged, *EFFECTS)]  # type: ignore[valid-type]  # noqa: UP007
+AnyEffect = typing.Union[(Untagged, *EFFECTS)]  # type: ignore[valid-type]
 
 
 @dataclasses.dataclass
@@ -264,9 +264,19 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
         scenario = _override(scenario, override)
     try:
         check(scenario)
+        _refuse_untagged(scenario)
     except DisasmError as error:
         raise DisasmError(f"{path}: {error}") from None
     return scenario
+
+
+def _refuse_untagged(scenario: Scenario) -> None:
+    for number, effect in enumerate(scenario.effects):
+        if isinstance(effect, Untagged):
+            names = ", ".join(effect.__name__ for effect in EFFECTS)
+            raise DisasmError(
+                f"effects.{number}: has no name; write `- !Name {{...}}`, one of {names}"
+            )
 
 
 def dump_scenario(scenario: Scenario) -> str:

@@ -167,7 +167,10 @@ def _cell_vertices(values: Array) -> tuple[Array, Array]:
     n = tuple(s - 1 for s in values.shape)
     total, count = np.zeros((*n, 3)), np.zeros(n)
     corners = [(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-    at = {c: values[tuple(slice(o, o + m) for o, m in zip(c, n))] for c in corners}
+    at = {
+        c: values[tuple(slice(o, o + m) for o, m in zip(c, n, strict=True))]
+        for c in corners
+    }
     for a in corners:
         for axis in (k for k in range(3) if a[k] == 0):
             b = tuple(v + (k == axis) for k, v in enumerate(a))

@@ -55,11 +55,11 @@ class Sensing:
     g_W: np.ndarray
 
 
-class Effect(abc.ABC):
+class Effect:
     """Base of all effects; see the module's docstring."""
 
 
-class EnvironmentEffect(Effect):
+class EnvironmentEffect(Effect, abc.ABC):
     """Acts on the world around the bolt."""
 
     @abc.abstractmethod
@@ -67,7 +67,7 @@ class EnvironmentEffect(Effect):
         """Returns the environment with this effect in it."""
 
 
-class SensorEffect(Effect):
+class SensorEffect(Effect, abc.ABC):
     """Acts on what the force/torque sensor reports."""
 
     #: Whether zeroing the sensor before an episode sees the effect (a load that

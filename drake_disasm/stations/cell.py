@@ -11,7 +11,6 @@ from pydrake.multibody.tree import (
 from pydrake.systems.controllers import InverseDynamics
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import (
-    ConstantVectorSource,
     Demultiplexer,
     MatrixGain,
     PassThrough,
@@ -23,7 +22,7 @@ from drake_disasm.lock import add_lock, plate_bottom
 from drake_disasm.ports import CELL_PORTS
 from drake_disasm.scenario import ArmConfig, Scenario
 from drake_disasm.stations.simulated import SimulatedStation, export
-from drake_disasm.tool import FINGERS, Tool, ToolModels, add_model, add_tool, grasp_pose
+from drake_disasm.tool import FINGERS, Tool, add_model, add_tool, grasp_pose
 
 _BENCH = "package://disasm_models/bench/bench.urdf"
 _ARM_INERTIA = 4.0  # kg m^2, of a joint with its rotor, for the damping ratio

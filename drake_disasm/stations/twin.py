@@ -31,10 +31,11 @@ _AXES = np.eye(3)
 class TwinStation(SimulatedStation):
     """The thesis's twin: the command moves the bolt through a six-axis spring.
 
-    A carrier in Gn has six joints (x, y, z, then yaw, pitch and roll) whose controllers are the stiffness
-    and damping of arm, gripper and sensor; the solver takes them implicitly. The
-    bolt hangs on the carrier by a weld at S whose reaction is the sensor's load,
-    so the readings mean the same as the cell's and pass the same processing.
+    A carrier in Gn has six joints (x, y, z, then yaw, pitch and roll) whose
+    controllers are the stiffness and damping of arm, gripper and sensor; the
+    solver takes them implicitly. The bolt hangs on the carrier by a weld at S
+    whose reaction is the sensor's load, so the readings mean the same as the
+    cell's and pass the same processing.
 
     @system
     name: TwinStation

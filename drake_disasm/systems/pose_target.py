@@ -59,11 +59,8 @@ class PoseTarget(LeafSystem):
         self.DeclareVectorOutputPort(
             "velocity", len(start), self._calc_velocity, prerequisites_of_calc=ticket
         )
-        for name, size, index in (
-            ("X_GB_commanded", 7, self._pose),
-            ("action_executed", 6, self._executed),
-        ):
-            self.DeclareStateOutputPort(name, index)
+        self.DeclareStateOutputPort("X_GB_commanded", self._pose)
+        self.DeclareStateOutputPort("action_executed", self._executed)
 
     def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
         action = self._action.Eval(context)

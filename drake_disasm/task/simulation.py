@@ -23,7 +23,7 @@ from pydrake.systems.primitives import (
 from drake_disasm.effects import Effect
 from drake_disasm.lock import lift_needed
 from drake_disasm.scenario import Scenario
-from drake_disasm.stations import CellStation, SimulatedStation, make_station
+from drake_disasm.stations import CellStation, make_station
 from drake_disasm.systems.imprecision import ImprecisionNoise
 from drake_disasm.systems.observation import Mounting, ObservationProcessor
 from drake_disasm.systems.policy import Policy, PolicySystem
