@@ -284,6 +284,38 @@ def dump_scenario(scenario: Scenario) -> str:
     return yaml_dump_typed(scenario, schema=Scenario)
 
 
+def scenario_to_mapping(scenario: Scenario) -> dict[str, Any]:
+    """Returns the scenario as plain data, for a log's header.
+
+    An effect is a mapping of its parameters with its name under `effect`.
+    """
+    mapping = dataclasses.asdict(scenario)
+    mapping["effects"] = [
+        {"effect": type(effect).__name__, **dataclasses.asdict(effect)}
+        for effect in scenario.effects
+    ]
+    return mapping
+
+
+def scenario_from_mapping(mapping: dict[str, Any]) -> Scenario:
+    """Returns the scenario of what `scenario_to_mapping` gave.
+
+    Raises:
+        DisasmError: unknown key or effect.
+    """
+    plain = {key: value for key, value in mapping.items() if key != "effects"}
+    scenario = _load(yaml.safe_dump(plain), Scenario(), "scenario of the log")
+    lines = []
+    for effect in mapping.get("effects", []):
+        values = {key: value for key, value in effect.items() if key != "effect"}
+        flow = yaml.safe_dump(values, default_flow_style=True, width=10**6).strip()
+        lines.append(f"- !{effect['effect']} {flow}")
+    if not lines:
+        return scenario
+    text = "\n".join(["effects:", *lines])
+    return _load(text, scenario, "scenario of the log")
+
+
 def _override(scenario: Scenario, override: str) -> Scenario:
     key, separator, value = override.partition("=")
     if not separator or not key:

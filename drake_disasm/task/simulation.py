@@ -133,6 +133,17 @@ class TaskSimulation:
         """Returns the present state (12,)."""
         return self.processor.GetOutputPort("observation").Eval(self._processor_context)
 
+    def action(self) -> np.ndarray:
+        """Returns the action (6,) held now, before imprecision."""
+        owner = self.action_port.get_system()
+        return self.action_port.Eval(owner.GetMyContextFromRoot(self.context))
+
+    def joint_positions(self) -> np.ndarray:
+        """Returns the arm's measured joint angles (7,); the twin has none, (0,)."""
+        if not isinstance(self.station, CellStation):
+            return np.zeros(0)
+        return self.evaluate(self.station, "iiwa.position_measured")
+
     def evaluate(self, system: Diagram | LeafSystem, port: str) -> np.ndarray:
         """Returns the present value of a system's output port."""
         context = system.GetMyContextFromRoot(self.context)

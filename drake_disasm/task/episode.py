@@ -1,0 +1,179 @@
+"""Episodes: running one, recording its rows, summing it up."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from drake_disasm.task.mdp import BoltState, Outcome
+from drake_disasm.task.simulation import StepResult, TaskSimulation
+
+_MM = 1000.0
+
+
+@dataclasses.dataclass
+class EpisodeSummary:
+    """One row of the table that a run ends with.
+
+    Attributes:
+        seed: of the episode.
+        steps: taken.
+        reward_terms: summed by name.
+        travel, rise: largest displacement of the bolt along x and y [m].
+        max_force, mean_force: on the bolt [N].
+        max_torque: on the bolt [N m].
+        outcome: how it ended.
+        bolt_is_out: whether the bolt truly left the groove (simulation only).
+    """
+
+    seed: int
+    steps: int = 0
+    reward_terms: dict[str, float] = dataclasses.field(default_factory=dict)
+    travel: float = 0.0
+    rise: float = 0.0
+    max_force: float = 0.0
+    mean_force: float = 0.0
+    max_torque: float = 0.0
+    outcome: Outcome = Outcome.RUNNING
+    bolt_is_out: bool = False
+
+    @property
+    def reward(self) -> float:
+        """Sum of all terms over the episode."""
+        return sum(self.reward_terms.values())
+
+    def add(self, result: StepResult) -> None:
+        """Takes one more step into account."""
+        state = BoltState.from_vector(result.observation)
+        self.steps += 1
+        for name, value in result.reward_terms.items():
+            self.reward_terms[name] = self.reward_terms.get(name, 0.0) + value
+        self.travel = max(self.travel, float(state.p[0]))
+        self.rise = max(self.rise, float(state.p[1]))
+        self.max_force = max(self.max_force, state.force)
+        self.max_torque = max(self.max_torque, state.torque)
+        self.mean_force += (state.force - self.mean_force) / self.steps
+        self.outcome = result.outcome
+
+
+class EpisodeRecorder:
+    """Collects an episode's rows in the layout of a `transitions` log.
+
+    Row k holds what was measured at the start of step k and the action taken
+    from it; the last row is what was measured at the end, with no action.
+    """
+
+    def __init__(self, simulation: TaskSimulation) -> None:
+        self._simulation = simulation
+        self._rows: list[dict[str, np.ndarray]] = []
+
+    def measure(self) -> None:
+        """Opens a row with what is measured now."""
+        simulation, station = self._simulation, self._simulation.station
+        self._rows.append(
+            {
+                "time": np.float64(simulation.context.get_time()),
+                "X_GB_measured": simulation.evaluate(simulation.processor, "X_GB"),
+                "X_GB_commanded": simulation.evaluate(
+                    simulation.pose_target, "X_GB_commanded"
+                ),
+                "wrench": simulation.observation()[6:],
+                "ft_sensor": simulation.evaluate(station, "ft_sensor.wrench"),
+                "q": simulation.joint_positions(),
+                "action": np.zeros(6),
+                "action_executed": np.zeros(6),
+                "terminated": np.False_,
+                "truncated": np.False_,
+            }
+        )
+
+    def acted(self, result: StepResult) -> None:
+        """Completes the newest row with the step just done, and opens the next."""
+        row = self._rows[-1]
+        row["action"] = self._simulation.action()
+        row["action_executed"] = self._simulation.evaluate(
+            self._simulation.pose_target, "action_executed"
+        )
+        for name, value in result.reward_terms.items():
+            row[f"reward.{name}"] = np.float64(value)
+        self.measure()
+        self._rows[-1]["terminated"] = np.bool_(result.outcome.terminated)
+        self._rows[-1]["truncated"] = np.bool_(result.outcome.truncated)
+
+    @property
+    def steps(self) -> int:
+        """Whole steps recorded."""
+        return max(0, len(self._rows) - 1)
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Returns the quantities, each (T + 1,) or (T + 1, n)."""
+        names = self._rows[0].keys()
+        zero = np.float64(0.0)
+        return {
+            name: np.stack([row.get(name, zero) for row in self._rows])
+            for name in names
+        }
+
+
+def run_episode(
+    simulation: TaskSimulation,
+    seed: int,
+    recorder: EpisodeRecorder | None = None,
+    on_step: Callable[[EpisodeSummary], None] | None = None,
+) -> EpisodeSummary:
+    """Runs one episode of a simulation that has a policy.
+
+    Args:
+        simulation: its diagram holds the policy.
+        seed: of the episode.
+        recorder: gets every row, if given; up to an error, too.
+        on_step: called with the summary so far after each step.
+
+    Raises:
+        DisasmError: what the policy raised or returned.
+    """
+    summary = EpisodeSummary(seed)
+    simulation.reset(seed)
+    if recorder:
+        recorder.measure()
+    while summary.outcome is Outcome.RUNNING:
+        result = simulation.step()
+        summary.add(result)
+        if recorder:
+            recorder.acted(result)
+        if on_step:
+            on_step(summary)
+    summary.bolt_is_out = simulation.bolt_is_out()
+    return summary
+
+
+_HEADER = (
+    "episode seed  steps   reward progress    force   torque     lift "
+    "  travel     rise  max F mean F   max T  outcome"
+)
+_UNITS = (
+    "                                                                  "
+    "     mm       mm      N      N     N m"
+)
+
+
+def summary_table(summaries: list[EpisodeSummary]) -> str:
+    """Returns the episodes as a table for a terminal."""
+    lines = [_HEADER, _UNITS]
+    lines += [_table_row(i, summary) for i, summary in enumerate(summaries)]
+    successes = sum(s.outcome is Outcome.SUCCESS for s in summaries)
+    lines.append(f"{successes} of {len(summaries)} episodes succeeded")
+    return "\n".join(lines)
+
+
+def _table_row(number: int, s: EpisodeSummary) -> str:
+    terms = [
+        s.reward_terms.get(n, 0.0) for n in ("progress", "force", "torque", "lift")
+    ]
+    out = " (the bolt is out)" if s.bolt_is_out else ""
+    return (
+        f"{number:7d} {s.seed:4d} {s.steps:6d} {s.reward:8.2f} "
+        + " ".join(f"{term:8.2f}" for term in terms)
+        + f" {s.travel * _MM:8.2f} {s.rise * _MM:8.2f} {s.max_force:6.2f} "
+        f"{s.mean_force:6.2f} {s.max_torque:7.3f}  {s.outcome.label}{out}"
+    )

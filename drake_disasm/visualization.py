@@ -1,0 +1,181 @@
+"""Watching a TaskSimulation in Meshcat, live and as a page that plays offline."""
+
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import (
+    Cylinder,
+    Meshcat,
+    MeshcatParams,
+    MeshcatVisualizer,
+    MeshcatVisualizerParams,
+    Rgba,
+)
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
+from pydrake.systems.framework import Context, DiagramBuilder, EventStatus, LeafSystem
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.spatial import pose_from_vector
+from drake_disasm.task.simulation import Observer, TaskSimulation
+
+_FRAME_PERIOD = 1.0 / 32.0  # s
+_NEWTONS_PER_METRE = 100.0  # of an arrow's length
+_NEWTON_METRES_PER_METRE = 5.0
+_FORCE, _TORQUE = Rgba(0.85, 0.1, 0.1), Rgba(0.1, 0.3, 0.9)
+_PATH = Rgba(0.05, 0.55, 0.15)
+
+
+def start_meshcat(host: str = "localhost") -> Meshcat:
+    """Returns Drake's Meshcat server on a free port from 7000 on.
+
+    Args:
+        host: address to listen on; "*" for every interface.
+
+    Raises:
+        DisasmError: it can't listen there.
+    """
+    try:
+        return Meshcat(MeshcatParams(host=host, show_stats_plot=False))
+    except RuntimeError as error:
+        raise DisasmError(f"Meshcat can't listen on {host}: {error}") from None
+
+
+class MeshcatView(Observer):
+    """Shows robot, lock, contact forces, the wrench on the bolt and its path.
+
+    Args:
+        meshcat: the server.
+        record: whether to keep every frame for `save_html`.
+    """
+
+    def __init__(self, meshcat: Meshcat, record: bool = False) -> None:
+        self.meshcat, self._record = meshcat, record
+
+    def connect(self, builder: DiagramBuilder, simulation: TaskSimulation) -> None:
+        """Adds Drake's visualisers and the wrench's."""
+        station = simulation.station
+        query = station.GetOutputPort("query_object")
+        MeshcatVisualizer.AddToBuilder(
+            builder,
+            query,
+            self.meshcat,
+            MeshcatVisualizerParams(publish_period=_FRAME_PERIOD),
+        )
+        ContactVisualizer.AddToBuilder(
+            builder,
+            station.GetOutputPort("contact_results"),
+            query,
+            self.meshcat,
+            ContactVisualizerParams(
+                newtons_per_meter=_NEWTONS_PER_METRE,
+                newton_meters_per_meter=_NEWTON_METRES_PER_METRE,
+                force_threshold=0.1,
+                moment_threshold=0.1,
+                radius=0.0008,
+            ),
+        )
+        self.wrench = builder.AddNamedSystem(
+            "wrench_visualizer", WrenchVisualizer(self.meshcat, station.X_WG)
+        )
+        processor = simulation.processor
+        for port in ("observation", "X_GB"):
+            builder.Connect(
+                processor.GetOutputPort(port), self.wrench.GetInputPort(port)
+            )
+        self._look_at(station.X_WG)
+
+    def _look_at(self, X_WG: RigidTransform) -> None:
+        """Puts the camera where both the arm and the lock are seen."""
+        p_WG = X_WG.translation()
+        self.meshcat.SetProperty("/Background", "top_color", [0.82, 0.88, 0.94])
+        self.meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.98, 0.99])
+        self.meshcat.SetProperty("/Grid", "visible", True)
+        self.meshcat.SetCameraPose(
+            p_WG + np.array([0.55, -0.80, 0.42]), p_WG + np.array([-0.22, 0.0, 0.18])
+        )
+
+    def look_closely(self, X_WG: RigidTransform) -> None:
+        """Puts the camera at the groove."""
+        p_WG = X_WG.translation() + np.array([0.03, 0.0, 0.01])
+        self.meshcat.SetCameraPose(p_WG + np.array([0.06, -0.17, 0.10]), p_WG)
+
+    def begin_episode(self) -> None:
+        """Clears the path; starts recording if asked to."""
+        self.wrench.clear()
+        if self._record:
+            self.meshcat.DeleteRecording()
+            self.meshcat.StartRecording(frames_per_second=1.0 / _FRAME_PERIOD)
+
+    def end_episode(self) -> None:
+        """Publishes the recording, so that the page has a time slider."""
+        if self._record:
+            self.meshcat.StopRecording()
+            self.meshcat.PublishRecording()
+
+    def save_html(self, path: Path) -> None:
+        """Writes a page that plays the recording without a server."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = path.with_name(f".{path.name}.tmp")
+        temporary.write_text(self.meshcat.StaticHtml())
+        temporary.replace(path)
+
+
+class WrenchVisualizer(LeafSystem):
+    """Draws the wrench on the bolt as two arrows, and the way that Bo went.
+
+    @system
+    name: WrenchVisualizer
+    input_ports:
+    - observation
+    - X_GB
+    @endsystem
+
+    Args:
+        meshcat: where to draw.
+        X_WG: the groove's nominal frame.
+    """
+
+    def __init__(self, meshcat: Meshcat, X_WG: RigidTransform) -> None:
+        super().__init__()
+        self._meshcat, self._X_WG = meshcat, X_WG
+        self._way: list[np.ndarray] = []
+        self._observation = self.DeclareVectorInputPort("observation", 12)
+        self._pose = self.DeclareVectorInputPort("X_GB", 7)
+        self.DeclarePeriodicPublishEvent(_FRAME_PERIOD, 0.0, self._publish)
+        for name, color in (("force", _FORCE), ("torque", _TORQUE)):
+            meshcat.SetObject(f"wrench/{name}", Cylinder(0.002, 1.0), color)
+
+    def clear(self) -> None:
+        """Forgets the way so far."""
+        self._way = []
+        self._meshcat.Delete("path")
+
+    def _publish(self, context: Context) -> EventStatus:
+        X_GB = pose_from_vector(self._pose.Eval(context))
+        p_WB = self._X_WG @ X_GB.translation()
+        R_WG = self._X_WG.rotation().matrix()
+        wrench = self._observation.Eval(context)[6:]
+        time = context.get_time()
+        self._draw("force", p_WB, R_WG @ wrench[:3] / _NEWTONS_PER_METRE, time)
+        self._draw("torque", p_WB, R_WG @ wrench[3:] / _NEWTON_METRES_PER_METRE, time)
+        self._way.append(p_WB)
+        if len(self._way) > 1:
+            self._meshcat.SetLine("path", np.array(self._way).T, 3.0, _PATH)
+        return EventStatus.Succeeded()
+
+    def _draw(
+        self, name: str, p_WB: np.ndarray, arrow_W: np.ndarray, time: float
+    ) -> None:
+        """Stretches the cylinder `name` from the bolt along the arrow."""
+        length = float(np.linalg.norm(arrow_W))
+        visible = length > 1e-3
+        self._meshcat.SetProperty(f"wrench/{name}", "visible", visible, time)
+        if not visible:
+            return
+        R = RotationMatrix.MakeFromOneVector(arrow_W / length, axis_index=2)
+        X_WArrow = RigidTransform(R, p_WB + arrow_W / 2)
+        self._meshcat.SetTransform(f"wrench/{name}", X_WArrow, time)
+        self._meshcat.SetProperty(
+            f"wrench/{name}/<object>", "scale", [1.0, length, 1.0], time
+        )

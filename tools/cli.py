@@ -1,0 +1,105 @@
+"""What the command-line programs share."""
+
+import argparse
+import importlib
+import importlib.metadata
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.policies import SCRIPTED, make_policy
+from drake_disasm.systems.policy import Policy
+
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+
+
+def run(main: Callable[[Sequence[str]], int]) -> None:
+    """Calls a program's main and exits; bad input is one line and status 2."""
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except DisasmError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(EXIT_BAD_INPUT)
+    except KeyboardInterrupt:
+        print("interrupted; what was finished is kept", file=sys.stderr)
+        sys.exit(EXIT_INTERRUPTED)
+
+
+def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds --scenario and --set."""
+    parser.add_argument(
+        "--scenario",
+        default="removal",
+        metavar="NAME|FILE",
+        help="a shipped scenario (removal, removal_turned, sliding) or a YAML file "
+        "(default: removal)",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        dest="overrides",
+        help="override one field, e.g. lock.clearance=0.0003, effects.0.ry=0.02 or "
+        "'effects=[!SensorBias {fx: 0.5}]'; repeatable",
+    )
+
+
+def named_policy(name: str) -> Policy:
+    """Returns a scripted policy, or the callable of `package.module:name`.
+
+    Raises:
+        DisasmError: there is none of that name.
+    """
+    if ":" not in name:
+        return make_policy(name)
+    module, _, attribute = name.partition(":")
+    try:
+        policy = getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise DisasmError(
+            f"policy {name}: {error}; write {'|'.join(SCRIPTED)} or module:callable"
+        ) from None
+    if not callable(policy):
+        raise DisasmError(f"policy {name}: is not callable; it maps (12,) to (6,)")
+    return policy
+
+
+def provenance(program: str, arguments: Sequence[str], seed: int) -> dict[str, Any]:
+    """Returns where a result is from, as plain data for a log's header."""
+    packages = ("drake", "numpy", "drake_disasm")
+    return {
+        "program": program,
+        "command": " ".join(["python", f"tools/{program}.py", *arguments]),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "seed": seed,
+        "versions": {name: _version(name) for name in packages},
+        "commit": _commit(),
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def _commit() -> str:
+    """Returns the checkout's commit, marked if the tree is not clean."""
+    folder = Path(__file__).resolve().parent
+    try:
+        return subprocess.run(
+            ["git", "describe", "--always", "--dirty", "--abbrev=12"],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"

@@ -1,0 +1,196 @@
+"""Runs the task in simulation and shows it in Meshcat.
+
+One scenario file gives one Drake diagram: an iiwa slides a bolt along a door-chain
+groove under hydroelastic contact. Watch it in the browser page whose address is
+printed, record it as a log, or save a page that plays offline.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import cli
+from tqdm import tqdm
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.scenario import Scenario, load_scenario, scenario_to_mapping
+from drake_disasm.stations import MODELS
+from drake_disasm.task.episode import (
+    EpisodeRecorder,
+    EpisodeSummary,
+    run_episode,
+    summary_table,
+)
+from drake_disasm.task.simulation import TaskSimulation
+from drake_disasm.visualization import MeshcatView, start_meshcat
+from sysid.logs import LogHeader, LogWriter, flat_columns
+
+_EXAMPLES = """examples:
+  python tools/simulate.py                              the default, in Meshcat
+  python tools/simulate.py --policy straight --scenario removal_turned
+  python tools/simulate.py --model twin --no-meshcat --episodes 10 --record out/log
+  python tools/simulate.py --set lock.clearance=0.0002 --set contact.friction=0.3
+  python tools/simulate.py --html out/removal.html      a page that plays offline
+"""
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    parser = argparse.ArgumentParser(
+        prog="simulate.py",
+        description=__doc__,
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    cli.add_scenario_arguments(parser)
+    add = parser.add_argument
+    add(
+        "--policy",
+        default="admittance",
+        metavar="NAME",
+        help="straight, admittance, or module:callable from (12,) to (6,) "
+        "(default: admittance)",
+    )
+    add(
+        "--model",
+        default="cell",
+        choices=sorted(MODELS),
+        help="the whole cell, or the twin: bolt and groove alone (default: cell)",
+    )
+    add("--episodes", type=_positive, default=1, metavar="N", help="(default: 1)")
+    add(
+        "--seed",
+        type=int,
+        default=0,
+        help="of the first episode; the next ones count on (default: 0)",
+    )
+    add("--record", type=Path, metavar="DIR", help="write a log into an empty folder")
+    add(
+        "--html",
+        type=Path,
+        metavar="FILE",
+        help="save the last episode as a page that plays offline",
+    )
+    add("--no-meshcat", action="store_true", help="run without a view, at full speed")
+    add(
+        "--meshcat-host",
+        default="localhost",
+        metavar="HOST",
+        help="address that the page listens on; '*' for all (default: localhost)",
+    )
+    add(
+        "--realtime-rate",
+        type=float,
+        metavar="X",
+        help="1 is real time, 0 full speed (default: 1 if somebody watches, else 0)",
+    )
+    return parser.parse_args(arguments)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the program; returns its exit status."""
+    args = parse(arguments)
+    scenario = load_scenario(args.scenario, args.overrides)
+    policy = cli.named_policy(args.policy)
+    writer = _open_log(args, arguments, scenario) if args.record else None
+    view = _open_view(args)
+    simulation = TaskSimulation(scenario, args.model, policy, [view] if view else [])
+    simulation.simulator.set_target_realtime_rate(_rate(args))
+    summaries: list[EpisodeSummary] = []
+    try:
+        for seed in range(args.seed, args.seed + args.episodes):
+            summaries.append(_run_one(simulation, seed, writer, view))
+    finally:
+        if summaries:
+            print(summary_table(summaries))
+    _finish(args, view)
+    return 0
+
+
+def _run_one(
+    simulation: TaskSimulation,
+    seed: int,
+    writer: LogWriter | None,
+    view: MeshcatView | None,
+) -> EpisodeSummary:
+    """Runs, shows and records one episode; a policy's error keeps its rows so far."""
+    recorder = EpisodeRecorder(simulation) if writer else None
+    if view:
+        view.begin_episode()
+    steps = simulation.scenario.task.steps
+    with tqdm(total=steps, desc=f"seed {seed}", unit="step", leave=False) as bar:
+        try:
+            summary = run_episode(simulation, seed, recorder, lambda s: _show(bar, s))
+        except DisasmError:
+            _keep(writer, recorder)
+            raise
+    if view:
+        view.end_episode()
+    _keep(writer, recorder)
+    return summary
+
+
+def _show(bar: tqdm, summary: EpisodeSummary) -> None:
+    force = f"{summary.max_force:.1f} N"
+    bar.set_postfix(reward=f"{summary.reward:.1f}", max_F=force, refresh=False)
+    bar.update()
+
+
+def _keep(writer: LogWriter | None, recorder: EpisodeRecorder | None) -> None:
+    if writer and recorder and recorder.steps:
+        writer.write_episode(flat_columns("transitions", recorder.columns()))
+
+
+def _open_log(
+    args: argparse.Namespace, arguments: Sequence[str], scenario: Scenario
+) -> LogWriter:
+    joints = tuple(f"iiwa_joint_{i}" for i in range(1, 8))
+    origin = {"simulated": True, "model": args.model, "policy": args.policy}
+    header = LogHeader(
+        kind="transitions",
+        task=scenario.name,
+        provenance=cli.provenance("simulate", arguments, args.seed) | origin,
+        period=scenario.task.period,
+        joints=joints if args.model == "cell" else (),
+        scenario=scenario_to_mapping(scenario),
+    )
+    return LogWriter(args.record, header)
+
+
+def _open_view(args: argparse.Namespace) -> MeshcatView | None:
+    """Returns the view that was asked for; --html needs one, though unwatched."""
+    if args.no_meshcat and not args.html:
+        return None
+    view = MeshcatView(start_meshcat(args.meshcat_host), record=bool(args.html))
+    if not args.no_meshcat:
+        print(f"watch at {view.meshcat.web_url()}", flush=True)
+    return view
+
+
+def _rate(args: argparse.Namespace) -> float:
+    if args.realtime_rate is not None:
+        return args.realtime_rate
+    return 0.0 if args.no_meshcat or not sys.stdout.isatty() else 1.0
+
+
+def _finish(args: argparse.Namespace, view: MeshcatView | None) -> None:
+    """Saves the page; leaves the live one up while somebody sits at the terminal."""
+    if args.record:
+        print(f"log: {args.record}")
+    if view and args.html:
+        view.save_html(args.html)
+        print(f"page: {args.html}")
+    if view and not args.no_meshcat and sys.stdin.isatty():
+        input("press Enter to close the page ")
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError("must be at least 1")
+    return value
+
+
+if __name__ == "__main__":
+    cli.run(main)
