@@ -275,7 +275,8 @@ def _refuse_untagged(scenario: Scenario) -> None:
         if isinstance(effect, Untagged):
             names = ", ".join(effect.__name__ for effect in EFFECTS)
             raise DisasmError(
-                f"effects.{number}: has no name; write `- !Name {{...}}`, one of {names}"
+                f"effects.{number}: has no name; write `- !Name {{...}}`, "
+                f"with one of {names}"
             )
 
 

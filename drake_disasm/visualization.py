@@ -20,8 +20,9 @@ from drake_disasm.spatial import pose_from_vector
 from drake_disasm.task.simulation import Observer, TaskSimulation
 
 _FRAME_PERIOD = 1.0 / 32.0  # s
-_NEWTONS_PER_METRE = 100.0  # of an arrow's length
+_NEWTONS_PER_METRE = 150.0  # of the wrench arrow's length
 _NEWTON_METRES_PER_METRE = 5.0
+_CONTACT_NEWTONS_PER_METRE = 1000.0  # the pads press with 60 N
 _FORCE, _TORQUE = Rgba(0.85, 0.1, 0.1), Rgba(0.1, 0.3, 0.9)
 _PATH = Rgba(0.05, 0.55, 0.15)
 
@@ -68,7 +69,7 @@ class MeshcatView(Observer):
             query,
             self.meshcat,
             ContactVisualizerParams(
-                newtons_per_meter=_NEWTONS_PER_METRE,
+                newtons_per_meter=_CONTACT_NEWTONS_PER_METRE,
                 newton_meters_per_meter=_NEWTON_METRES_PER_METRE,
                 force_threshold=0.1,
                 moment_threshold=0.1,
@@ -98,7 +99,7 @@ class MeshcatView(Observer):
     def look_closely(self, X_WG: RigidTransform) -> None:
         """Puts the camera at the groove."""
         p_WG = X_WG.translation() + np.array([0.03, 0.0, 0.01])
-        self.meshcat.SetCameraPose(p_WG + np.array([0.06, -0.17, 0.10]), p_WG)
+        self.meshcat.SetCameraPose(p_WG + np.array([0.125, -0.065, 0.045]), p_WG)
 
     def begin_episode(self) -> None:
         """Clears the path; starts recording if asked to."""

@@ -1,0 +1,60 @@
+# Set-up and the main jobs. Each target sets up .venv by itself when it has to.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+ARGS ?=
+PIP := $(BIN)/python -m pip install --quiet --constraint constraints.txt
+# One thread per process: parallel work is done by processes.
+export OMP_NUM_THREADS ?= 1
+
+.PHONY: help simulate test test-all lint format benchmark check-install clean
+.DEFAULT_GOAL := help
+
+help:  ## Show this list
+	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*## /\t/' | expand -t 16
+
+simulate: $(VENV)/.run  ## Run the task in Meshcat (ARGS="--policy straight ...")
+	$(BIN)/python tools/simulate.py $(ARGS)
+
+test: $(VENV)/.dev  ## Run the tests, without the slow proofs
+	$(BIN)/python -m pytest -n 2 -m "not slow" $(ARGS)
+
+test-all: $(VENV)/.dev  ## Run every test
+	$(BIN)/python -m pytest -n 2 $(ARGS)
+
+lint: $(VENV)/.dev  ## Check style and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(VENV)/.dev  ## Put the code in shape
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+benchmark: $(VENV)/.dev  ## Measure speed (ARGS="--only cell_reset_ms ...")
+	$(BIN)/python tools/benchmark.py $(ARGS)
+
+check-install: $(VENV)/.dev  ## Install into an empty environment, import elsewhere
+	rm -rf build/empty && $(PYTHON) -m venv build/empty
+	build/empty/bin/python -m pip install --quiet --constraint constraints.txt .
+	cd / && $(CURDIR)/build/empty/bin/python -c "import drake_disasm, sysid.logs; \
+	from drake_disasm.scenario import load_scenario; \
+	from drake_disasm.stations import make_station; \
+	from drake_disasm.resources import models_dir; \
+	make_station('cell', load_scenario('removal')); print('installed:', models_dir())"
+
+clean:  ## Remove what was built
+	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache
+
+$(BIN)/python:
+	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and \
+	'error: Python 3.11 or newer is needed; set PYTHON=python3.11')"
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.run: pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) --editable .
+	@touch $@
+
+$(VENV)/.dev: pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) --editable ".[dev]"
+	@touch $@ $(VENV)/.run

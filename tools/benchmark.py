@@ -1,0 +1,252 @@
+"""Measures speed and memory, each figure in this run on this machine.
+
+Prints one table: the figure, what it is compared with in the same run, and their
+ratio. Figures are medians of repeats, in a process of one thread. It is a
+measurement, not a test: nothing here passes or fails.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import cli
+import numpy as np
+import psutil
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource, DiscreteTimeIntegrator
+from tqdm import tqdm
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.policies import make_policy
+from drake_disasm.quantity import closest
+from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.stations import TwinStation
+from drake_disasm.task.mdp import Outcome
+from drake_disasm.task.simulation import TaskSimulation, copy_state
+
+_REPEATS = 5
+_SCENARIO = "removal_turned"  # the bolt is in contact nearly all the time
+_POLICY = "admittance"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One row.
+
+    Attributes:
+        key: the design's fixed name.
+        value: as measured.
+        unit: of the value.
+        reference: what it is compared with.
+        ratio: value over reference (or the other way, as `reference` says).
+    """
+
+    key: str
+    value: float
+    unit: str
+    reference: str = ""
+    ratio: float | None = None
+
+
+def _episode(simulation: TaskSimulation, seed: int) -> tuple[float, int]:
+    """Returns the wall time [s] and steps of one episode, without its reset."""
+    simulation.reset(seed)
+    start, steps = time.perf_counter(), 0
+    outcome = Outcome.RUNNING
+    while outcome is Outcome.RUNNING:
+        outcome, steps = simulation.step().outcome, steps + 1
+    return time.perf_counter() - start, steps
+
+
+def measure_speed(model: str) -> Iterator[Figure]:
+    """Yields real-time factor and steps per second of a model."""
+    simulation = _simulation(model)
+    _episode(simulation, 0)  # warms up
+    runs = [_episode(simulation, seed) for seed in range(_REPEATS)]
+    per_step = statistics.median(wall / steps for wall, steps in runs)
+    period = simulation.scenario.task.period
+    yield Figure(
+        f"{model}_real_time_factor",
+        period / per_step,
+        "1",
+        "real time",
+        period / per_step,
+    )
+    yield Figure(f"{model}_steps_per_s", 1.0 / per_step, "1/s", "10 Hz", 0.1 / per_step)
+
+
+def measure_reset(model: str) -> Iterator[Figure]:
+    """Yields the cost of a reset in place, beside building the diagram anew."""
+    simulation = _simulation(model)
+    simulation.reset(0)
+    reset = _median_time(lambda: simulation.reset(1), 50)
+    build = _median_time(lambda: _simulation(model).reset(0), _REPEATS)
+    yield Figure(
+        f"{model}_reset_ms", 1e3 * reset, "ms", "building and settling", reset / build
+    )
+
+
+def measure_python_share() -> Iterator[Figure]:
+    """Yields the share of a twin step that Drake alone would not need.
+
+    The reference replays the episode's commanded rates through the same station
+    with Drake's C++ systems only: the same motion and contact, no Python at all.
+    """
+    simulation = _simulation("twin")
+    runs = [_episode(simulation, 0) for _ in range(_REPEATS)]
+    whole = statistics.median(wall / steps for wall, steps in runs)
+    rates = _commanded_rates(simulation)
+    replays = [_replay(simulation.scenario, rates) for _ in range(_REPEATS)]
+    drake = statistics.median(replays) / len(rates)
+    yield Figure(
+        "twin_python_share", 1.0 - drake / whole, "1", "Drake alone", drake / whole
+    )
+
+
+def _commanded_rates(simulation: TaskSimulation) -> list[np.ndarray]:
+    """Returns the commanded rate (6,) of each period of an episode."""
+    simulation.reset(0)
+    rates, outcome = [], Outcome.RUNNING
+    while outcome is Outcome.RUNNING:
+        outcome = simulation.step().outcome
+        rates.append(simulation.evaluate(simulation.pose_target, "velocity").copy())
+    return rates
+
+
+def _replay(scenario: Scenario, rates: list[np.ndarray]) -> float:
+    """Returns the wall time [s] that Drake alone takes for the same motion."""
+    builder = DiagramBuilder()
+    station = builder.AddNamedSystem("station", TwinStation(scenario))
+    source = builder.AddNamedSystem("rate", ConstantVectorSource(np.zeros(6)))
+    motion = builder.AddNamedSystem(
+        "motion", DiscreteTimeIntegrator(6, station.time_step)
+    )
+    rate = source.get_output_port()
+    builder.Connect(rate, motion.get_input_port())
+    builder.Connect(motion.get_output_port(), station.GetInputPort("bolt.position"))
+    builder.Connect(rate, station.GetInputPort("bolt.velocity"))
+    simulator = Simulator(builder.Build())
+    root = simulator.get_mutable_context()
+    mine = station.GetMyMutableContextFromRoot(root)
+    station.set_effects(mine, scenario.effects)
+    copy_state(station.settled(scenario.effects), mine)
+    simulator.Initialize()
+    value = source.get_mutable_source_value(source.GetMyMutableContextFromRoot(root))
+    start = time.perf_counter()
+    for k, commanded in enumerate(rates):
+        value.SetFromVector(commanded)
+        simulator.AdvanceTo((k + 1) * scenario.task.period)
+    return time.perf_counter() - start
+
+
+def measure_memory() -> Iterator[Figure]:
+    """Yields the peak memory of simulate.py, beside importing Drake alone."""
+    program = str(Path(__file__).with_name("simulate.py"))
+    peak = _peak_mib([sys.executable, program, "--no-meshcat"])
+    bare = _peak_mib([sys.executable, "-c", "import pydrake.all"])
+    yield Figure("peak_mib_simulate", peak, "MiB", "import pydrake.all", peak / bare)
+
+
+def _peak_mib(command: list[str]) -> float:
+    """Returns the greatest resident memory of a process [MiB]."""
+    with subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        watched, peak = psutil.Process(process.pid), 0
+        while process.poll() is None:
+            try:
+                memory = watched.memory_info()
+            except psutil.NoSuchProcess:
+                break
+            peak = max(peak, memory.rss)
+            time.sleep(0.01)
+    if process.returncode:
+        raise DisasmError(f"{' '.join(command)} failed; run it by hand to see why")
+    return peak / 2**20
+
+
+def _simulation(model: str) -> TaskSimulation:
+    return TaskSimulation(load_scenario(_SCENARIO), model, make_policy(_POLICY))
+
+
+def _median_time(work: Callable[[], object], repeats: int) -> float:
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return statistics.median(times)
+
+
+#: Which keys each measurement gives, in the order of the table.
+MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
+    ("cell_real_time_factor", "cell_steps_per_s"): lambda: measure_speed("cell"),
+    ("twin_real_time_factor", "twin_steps_per_s"): lambda: measure_speed("twin"),
+    ("twin_python_share",): measure_python_share,
+    ("cell_reset_ms",): lambda: measure_reset("cell"),
+    ("twin_reset_ms",): lambda: measure_reset("twin"),
+    ("peak_mib_simulate",): measure_memory,
+}
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    keys = [key for group in MEASUREMENTS for key in group]
+    parser = argparse.ArgumentParser(
+        prog="benchmark.py",
+        description=__doc__,
+        epilog=f"keys: {', '.join(keys)}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--only", nargs="+", metavar="KEY", help="run a part")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write figures")
+    args = parser.parse_args(arguments)
+    for key in args.only or []:
+        if key not in keys:
+            raise DisasmError(f"--only {key}: no such figure; {closest(key, keys)}")
+    return args
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the program; returns its exit status."""
+    args = parse(arguments)
+    wanted = set(args.only) if args.only else {k for g in MEASUREMENTS for k in g}
+    groups = {g: m for g, m in MEASUREMENTS.items() if wanted & set(g)}
+    figures: list[Figure] = []
+    for measure in tqdm(groups.values(), unit="group", leave=False):
+        figures += [figure for figure in measure() if figure.key in wanted]
+    print(table(figures))
+    if args.json:
+        _write_json(args.json, figures)
+    return 0
+
+
+def table(figures: list[Figure]) -> str:
+    """Returns the figures as a table for a terminal."""
+    lines = [f"{'figure':26} {'value':>10} {'unit':5} {'ratio':>8}  compared with"]
+    for f in figures:
+        ratio = "" if f.ratio is None else f"{f.ratio:8.3g}"
+        lines.append(f"{f.key:26} {f.value:10.4g} {f.unit:5} {ratio:>8}  {f.reference}")
+    return "\n".join(lines)
+
+
+def _write_json(path: Path, figures: list[Figure]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.tmp")
+    text = json.dumps({f.key: f.value for f in figures}, indent=2)
+    temporary.write_text(text + "\n")
+    temporary.replace(path)
+
+
+if __name__ == "__main__":
+    cli.run(main)
