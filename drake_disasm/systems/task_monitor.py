@@ -4,9 +4,9 @@ import numpy as np
 from pydrake.systems.framework import (
     BasicVector,
     Context,
-    DiscreteValues,
     EventStatus,
     LeafSystem,
+    State,
 )
 
 from drake_disasm.scenario import TaskConfig
@@ -18,6 +18,8 @@ class TaskMonitor(LeafSystem):
 
     Read at the end of a period, before its updates, `reward_terms` (in the order
     of REWARD_TERMS) and `outcome` (an `Outcome`) are those of the step just done.
+    The update is an unrestricted one, like the policy's, so that both use the one
+    evaluation of the observation.
 
     @system
     name: TaskMonitor
@@ -39,7 +41,7 @@ class TaskMonitor(LeafSystem):
         self._observation = self.DeclareVectorInputPort("observation", 12)
         self._before = self.DeclareDiscreteState(12)
         self._steps = self.DeclareDiscreteState(1)
-        self.DeclarePeriodicDiscreteUpdateEvent(task.period, 0.0, self._update)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(task.period, 0.0, self._update)
         inputs = {self._observation.ticket(), self.xd_ticket()}
         self.DeclareVectorOutputPort(
             "reward_terms",
@@ -51,10 +53,11 @@ class TaskMonitor(LeafSystem):
             "outcome", 1, self._calc_outcome, prerequisites_of_calc=inputs
         )
 
-    def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
+    def _update(self, context: Context, state: State) -> EventStatus:
         steps = context.get_discrete_state(self._steps).value()
-        state.set_value(self._before, self._observation.Eval(context))
-        state.set_value(self._steps, steps + 1.0)
+        values = state.get_mutable_discrete_state()
+        values.set_value(self._before, self._observation.Eval(context))
+        values.set_value(self._steps, steps + 1.0)
         return EventStatus.Succeeded()
 
     def _calc_reward(self, context: Context, output: BasicVector) -> None:

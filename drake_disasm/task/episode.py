@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +66,7 @@ class EpisodeRecorder:
 
     def __init__(self, simulation: TaskSimulation) -> None:
         self._simulation = simulation
-        self._rows: list[dict[str, np.ndarray]] = []
+        self._rows: list[dict[str, Any]] = []
 
     def measure(self) -> None:
         """Opens a row with what is measured now."""

@@ -1,0 +1,37 @@
+"""tools/benchmark.py: its keys and its files, not its figures."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.tools.programs import ROOT
+
+
+def _benchmark(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, str(ROOT / "tools/benchmark.py"), *arguments],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+def test_only_and_json(tmp_path: Path) -> None:
+    file = tmp_path / "figures.json"
+    keys = ["twin_reset_ms", "twin_steps_per_s", "twin_python_share"]
+    done = _benchmark("--only", *keys, "--json", str(file))
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(file.read_text())
+    assert set(figures) == set(keys)
+    assert figures["twin_reset_ms"] > 0.0
+    assert 0.0 < figures["twin_python_share"] < 1.0
+    assert all(key in done.stdout for key in keys)
+
+
+def test_unknown_key_is_one_line() -> None:
+    done = _benchmark("--only", "twin_reset")
+    assert done.returncode == 2
+    assert "error: --only twin_reset: no such figure" in done.stderr
+    assert "twin_reset_ms" in done.stderr

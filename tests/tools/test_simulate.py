@@ -1,0 +1,179 @@
+"""tools/simulate.py: what it prints and writes, and how it refuses bad input."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from drake_disasm.scenario import load_scenario, scenario_from_mapping
+from sysid.logs import read_log
+from tests.tools.programs import ROOT, Runner
+
+TWIN = ("--model", "twin")
+
+
+def test_default_run_takes_the_bolt_out(simulate: Runner) -> None:
+    done = simulate()
+    assert done.returncode == 0, done.stderr
+    assert "success (the bolt is out)" in done.stdout
+    assert "1 of 1 episodes succeeded" in done.stdout
+
+
+def test_straight_jams_on_the_turned_groove(simulate: Runner) -> None:
+    done = simulate("--scenario", "removal_turned", "--policy", "straight")
+    assert done.returncode == 0, done.stderr
+    assert "force limit" in done.stdout
+    assert "0 of 1 episodes succeeded" in done.stdout
+
+
+def test_record_writes_a_log_that_describes_itself(
+    simulate: Runner, tmp_path: Path
+) -> None:
+    done = simulate(
+        *TWIN, "--scenario", "removal_turned", "--episodes", "2", "--record", "log"
+    )
+    assert done.returncode == 0, done.stderr
+    log = read_log(tmp_path / "log")
+    assert len(log.episodes) == 2
+    assert all(70 < episode.rows <= 101 for episode in log.episodes)
+    scenario = scenario_from_mapping(dict(log.header.scenario or {}))
+    assert scenario == load_scenario("removal_turned")
+    last = log.episodes[0]
+    assert last["terminated"][-1] and not last["truncated"][-1]
+
+
+def test_same_seed_gives_the_same_log(simulate: Runner, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        assert simulate(*TWIN, "--record", name, "--seed", "3").returncode == 0
+    hashes = {read_log(tmp_path / name).data_hash for name in ("a", "b")}
+    assert len(hashes) == 1
+
+
+def _scenario_file(folder: Path, text: str) -> str:
+    (folder / "mine.yaml").write_text(text)
+    return "mine.yaml"
+
+
+BAD_INPUT = {
+    "unknown key": (
+        "lock: {clearence: 0.0004}",
+        ["mine.yaml", "clearence", "clearance"],
+    ),
+    "zero clearance": (
+        "lock: {clearance: 0}",
+        ["mine.yaml", "lock.clearance", "0.0001"],
+    ),
+    "no such effect": (
+        "effects: [!GrooveFiction {coefficient: 0.1}]",
+        ["mine.yaml", "GrooveFiction", "GrooveFriction"],
+    ),
+    "missing model": (
+        "arm: {model: package://disasm_models/iiwa15/iiwa15.urdf}",
+        ["iiwa15.urdf", "missing", "model"],
+    ),
+    "not YAML": ("lock: {clearance", ["mine.yaml", "line 1", "not YAML"]),
+}
+
+
+@pytest.mark.parametrize("name", BAD_INPUT)
+def test_bad_scenario_is_one_line(simulate: Runner, tmp_path: Path, name: str) -> None:
+    text, words = BAD_INPUT[name]
+    done = simulate("--scenario", _scenario_file(tmp_path, text))
+    _assert_one_line(done, words)
+
+
+def _assert_one_line(done: subprocess.CompletedProcess[str], words: list[str]) -> None:
+    assert done.returncode == 2
+    lines = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
+    assert len(lines) == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    assert all(word in lines[0] for word in words), lines[0]
+
+
+def test_full_output_folder_is_refused(simulate: Runner, tmp_path: Path) -> None:
+    (tmp_path / "log").mkdir()
+    (tmp_path / "log/notes.txt").write_text("mine")
+    _assert_one_line(simulate(*TWIN, "--record", "log"), ["log", "empty"])
+    assert [p.name for p in (tmp_path / "log").iterdir()] == ["notes.txt"]
+
+
+def test_missing_scenario_and_policy_suggest_a_name(simulate: Runner) -> None:
+    _assert_one_line(simulate("--scenario", "remval"), ["remval", "'removal'"])
+    _assert_one_line(simulate("--policy", "strait"), ["strait", "'straight'"])
+
+
+BAD_POLICIES = {
+    "nan": ("a[0] = np.nan", ["finite"]),
+    "size": ("a = a[:5]", ["(5,)", "6 numbers"]),
+}
+
+
+@pytest.mark.parametrize("name", BAD_POLICIES)
+def test_bad_policy_stops_the_episode_and_keeps_the_log(
+    simulate: Runner, tmp_path: Path, name: str
+) -> None:
+    spoil, words = BAD_POLICIES[name]
+    (tmp_path / "mine.py").write_text(
+        "import numpy as np\n"
+        "def act(s):\n"
+        "    a = np.array([1e-3, 0, 0, 0, 0, 0])\n"
+        f"    if s[0] > 5e-3: {spoil}\n"
+        "    return a\n"
+    )
+    done = simulate(*TWIN, "--policy", "mine:act", "--record", "log")
+    _assert_one_line(done, words)
+    (episode,) = read_log(tmp_path / "log").episodes
+    assert 5 <= episode.rows <= 8
+    assert not episode["terminated"].any() and not episode["truncated"].any()
+
+
+def _start_long_run(folder: Path) -> subprocess.Popen[str]:
+    arguments = ["--no-meshcat", *TWIN, "--episodes", "1000", "--record", "log"]
+    process = subprocess.Popen(
+        [sys.executable, str(ROOT / "tools/simulate.py"), *arguments],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    deadline = time.monotonic() + 60
+    while len(list(folder.glob("log/episode_*.parquet"))) < 3:
+        assert process.poll() is None and time.monotonic() < deadline
+        time.sleep(0.02)
+    return process
+
+
+def test_kill_loses_the_running_episode_alone(tmp_path: Path) -> None:
+    process = _start_long_run(tmp_path)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    log = read_log(tmp_path / "log")
+    assert len(log.episodes) >= 3
+    assert all(episode["terminated"][-1] for episode in log.episodes)
+
+
+def test_interrupt_prints_what_was_done(tmp_path: Path) -> None:
+    process = _start_long_run(tmp_path)
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "episodes succeeded" in output
+    assert len(read_log(tmp_path / "log").episodes) >= 3
+
+
+def test_help_teaches(simulate: Runner) -> None:
+    done = simulate("--help")
+    assert done.returncode == 0
+    for word in (
+        "--scenario",
+        "--set",
+        "--record",
+        "--html",
+        "examples:",
+        "admittance",
+    ):
+        assert word in done.stdout
