@@ -48,10 +48,13 @@ class MeshcatView(Observer):
     Args:
         meshcat: the server.
         record: whether to keep every frame for `save_html`.
+        close_up: whether to look at the groove rather than at the whole cell.
     """
 
-    def __init__(self, meshcat: Meshcat, record: bool = False) -> None:
-        self.meshcat, self._record = meshcat, record
+    def __init__(
+        self, meshcat: Meshcat, record: bool = False, close_up: bool = False
+    ) -> None:
+        self.meshcat, self._record, self._close_up = meshcat, record, close_up
 
     def connect(self, builder: DiagramBuilder, simulation: TaskSimulation) -> None:
         """Adds Drake's visualisers and the wrench's."""
@@ -87,19 +90,15 @@ class MeshcatView(Observer):
         self._look_at(station.X_WG)
 
     def _look_at(self, X_WG: RigidTransform) -> None:
-        """Puts the camera where both the arm and the lock are seen."""
-        p_WG = X_WG.translation()
+        """Puts the camera where arm and lock are seen, or at the groove."""
+        A = X_WG.translation()
         self.meshcat.SetProperty("/Background", "top_color", [0.82, 0.88, 0.94])
         self.meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.98, 0.99])
-        self.meshcat.SetProperty("/Grid", "visible", True)
-        self.meshcat.SetCameraPose(
-            p_WG + np.array([0.55, -0.80, 0.42]), p_WG + np.array([-0.22, 0.0, 0.18])
-        )
-
-    def look_closely(self, X_WG: RigidTransform) -> None:
-        """Puts the camera at the groove."""
-        p_WG = X_WG.translation() + np.array([0.03, 0.0, 0.01])
-        self.meshcat.SetCameraPose(p_WG + np.array([0.125, -0.065, 0.045]), p_WG)
+        if self._close_up:
+            eye, target = [0.135, -0.06, 0.05], [0.03, 0.0, 0.01]
+        else:
+            eye, target = [0.50, -0.68, 0.40], [-0.22, 0.0, 0.16]
+        self.meshcat.SetCameraPose(A + np.array(eye), A + np.array(target))
 
     def begin_episode(self) -> None:
         """Clears the path; starts recording if asked to."""

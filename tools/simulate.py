@@ -73,6 +73,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         help="save the last episode as a page that plays offline",
     )
     add("--no-meshcat", action="store_true", help="run without a view, at full speed")
+    add("--close-up", action="store_true", help="look at the groove, not at the cell")
     add(
         "--meshcat-host",
         default="localhost",
@@ -162,7 +163,8 @@ def _open_view(args: argparse.Namespace) -> MeshcatView | None:
     """Returns the view that was asked for; --html needs one, though unwatched."""
     if args.no_meshcat and not args.html:
         return None
-    view = MeshcatView(start_meshcat(args.meshcat_host), record=bool(args.html))
+    meshcat = start_meshcat(args.meshcat_host)
+    view = MeshcatView(meshcat, record=bool(args.html), close_up=args.close_up)
     if not args.no_meshcat:
         print(f"watch at {view.meshcat.web_url()}", flush=True)
     return view
