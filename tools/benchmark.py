@@ -27,11 +27,11 @@ from pydrake.systems.primitives import ConstantVectorSource, DiscreteTimeIntegra
 from tqdm import tqdm
 
 from drake_disasm.errors import DisasmError
+from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.quantity import closest
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import TwinStation
-from drake_disasm.task.mdp import Outcome
 from drake_disasm.task.simulation import TaskSimulation, copy_state
 
 _REPEATS = 5

@@ -9,8 +9,8 @@ from pydrake.systems.framework import (
     State,
 )
 
+from drake_disasm.mdp import REWARD_TERMS, BoltState, outcome, reward_terms
 from drake_disasm.scenario import TaskConfig
-from drake_disasm.task.mdp import REWARD_TERMS, BoltState, outcome, reward_terms
 
 
 class TaskMonitor(LeafSystem):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from drake_disasm.task.mdp import BoltState, Outcome
+from drake_disasm.mdp import BoltState, Outcome
 from drake_disasm.task.simulation import StepResult, TaskSimulation
 
 _MM = 1000.0

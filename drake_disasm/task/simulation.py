@@ -22,6 +22,7 @@ from pydrake.systems.primitives import (
 
 from drake_disasm.effects import Effect
 from drake_disasm.lock import lift_needed
+from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations import CellStation, make_station
 from drake_disasm.systems.imprecision import ImprecisionNoise
@@ -29,7 +30,6 @@ from drake_disasm.systems.observation import Mounting, ObservationProcessor
 from drake_disasm.systems.policy import Policy, PolicySystem
 from drake_disasm.systems.pose_target import PoseTarget
 from drake_disasm.systems.task_monitor import TaskMonitor
-from drake_disasm.task.mdp import REWARD_TERMS, Outcome, action_bounds
 
 
 @dataclasses.dataclass(frozen=True)
