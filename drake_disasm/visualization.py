@@ -95,7 +95,7 @@ class MeshcatView(Observer):
         self.meshcat.SetProperty("/Background", "top_color", [0.82, 0.88, 0.94])
         self.meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.98, 0.99])
         if self._close_up:
-            eye, target = [0.135, -0.06, 0.05], [0.03, 0.0, 0.01]
+            eye, target = [0.115, -0.055, 0.055], [0.025, 0.0, 0.025]
         else:
             eye, target = [0.50, -0.68, 0.40], [-0.22, 0.0, 0.16]
         self.meshcat.SetCameraPose(A + np.array(eye), A + np.array(target))
