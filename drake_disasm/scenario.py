@@ -265,6 +265,7 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     try:
         check(scenario)
         _refuse_untagged(scenario)
+        _refuse_broken_periods(scenario)
     except DisasmError as error:
         raise DisasmError(f"{path}: {error}") from None
     return scenario
@@ -277,6 +278,21 @@ def _refuse_untagged(scenario: Scenario) -> None:
             raise DisasmError(
                 f"effects.{number}: has no name; write `- !Name {{...}}`, "
                 f"with one of {names}"
+            )
+
+
+def _refuse_broken_periods(scenario: Scenario) -> None:
+    steps = {
+        "simulation.cell_time_step": scenario.simulation.cell_time_step,
+        "simulation.twin_time_step": scenario.simulation.twin_time_step,
+        "arm.control_period": scenario.arm.control_period,
+    }
+    for name, step in steps.items():
+        count = scenario.task.period / step
+        if abs(count - round(count)) > 1e-6:
+            raise DisasmError(
+                f"{name}: task.period ({scenario.task.period:g} s) is not a whole "
+                f"number of {step:g} s; give a divisor of it"
             )
 
 

@@ -32,6 +32,7 @@ from drake_disasm.policies import make_policy
 from drake_disasm.quantity import closest
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import TwinStation
+from drake_disasm.systems.timing import boundary
 from drake_disasm.task.simulation import TaskSimulation, copy_state
 
 _REPEATS = 5
@@ -145,7 +146,7 @@ def _replay(scenario: Scenario, rates: list[np.ndarray]) -> float:
     start = time.perf_counter()
     for k, commanded in enumerate(rates):
         value.SetFromVector(commanded)
-        simulator.AdvanceTo((k + 1) * scenario.task.period)
+        simulator.AdvanceTo(boundary(k + 1, scenario.task.period))
     return time.perf_counter() - start
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
 from drake_disasm.errors import DisasmError
+from drake_disasm.systems.timing import SAMPLING_DELAY
 
 #: Observation (12,) to action (6,), both in the groove's nominal frame.
 Policy = Callable[[np.ndarray], np.ndarray]
@@ -39,7 +40,9 @@ class PolicySystem(LeafSystem):
         self._observation = self.DeclareVectorInputPort("observation", 12)
         action = self.DeclareDiscreteState(6)
         self._action = action
-        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(
+            period, SAMPLING_DELAY, self._update
+        )
         self.DeclareStateOutputPort("action", action)
 
     def _update(self, context: Context, state: State) -> EventStatus:

@@ -11,6 +11,7 @@ from pydrake.systems.framework import (
 
 from drake_disasm.mdp import REWARD_TERMS, BoltState, outcome, reward_terms
 from drake_disasm.scenario import TaskConfig
+from drake_disasm.systems.timing import SAMPLING_DELAY
 
 
 class TaskMonitor(LeafSystem):
@@ -18,8 +19,8 @@ class TaskMonitor(LeafSystem):
 
     Read at the end of a period, before its updates, `reward_terms` (in the order
     of REWARD_TERMS) and `outcome` (an `Outcome`) are those of the step just done.
-    The update is an unrestricted one, like the policy's, so that both use the one
-    evaluation of the observation.
+    The update is an unrestricted one, like the policy's, so that both see the same
+    observation: Drake carries those out before discrete ones.
 
     @system
     name: TaskMonitor
@@ -41,7 +42,9 @@ class TaskMonitor(LeafSystem):
         self._observation = self.DeclareVectorInputPort("observation", 12)
         self._before = self.DeclareDiscreteState(12)
         self._steps = self.DeclareDiscreteState(1)
-        self.DeclarePeriodicUnrestrictedUpdateEvent(task.period, 0.0, self._update)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(
+            task.period, SAMPLING_DELAY, self._update
+        )
         inputs = {self._observation.ticket(), self.xd_ticket()}
         self.DeclareVectorOutputPort(
             "reward_terms",

@@ -73,7 +73,7 @@ class EpisodeRecorder:
         simulation, station = self._simulation, self._simulation.station
         self._rows.append(
             {
-                "time": np.float64(simulation.context.get_time()),
+                "time": np.float64(simulation.time),
                 "X_GB_measured": simulation.evaluate(simulation.processor, "X_GB"),
                 "X_GB_commanded": simulation.evaluate(
                     simulation.pose_target, "X_GB_commanded"

@@ -30,6 +30,7 @@ from drake_disasm.systems.observation import Mounting, ObservationProcessor
 from drake_disasm.systems.policy import Policy, PolicySystem
 from drake_disasm.systems.pose_target import PoseTarget
 from drake_disasm.systems.task_monitor import TaskMonitor
+from drake_disasm.systems.timing import boundary
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,6 +58,9 @@ class TaskSimulation:
 
     Without a policy the diagram's `action` input is fed by `step(action)`, as an
     environment for learning does; with one, `step()` lets it act.
+
+    Attributes:
+        steps: taken in the running episode.
 
     Args:
         scenario: what the diagram denotes.
@@ -86,7 +90,7 @@ class TaskSimulation:
         self.context = self.simulator.get_mutable_context()
         self._start: Context | None = None
         self._effects: list[Effect] | None = None
-        self._steps = 0
+        self.steps = 0
 
     def reset(self, seed: int, effects: Sequence[Effect] | None = None) -> np.ndarray:
         """Starts an episode in place and returns its first observation (12,).
@@ -107,8 +111,9 @@ class TaskSimulation:
             )
         if self.policy_system and hasattr(self.policy_system.policy, "reset"):
             self.policy_system.policy.reset()
-        self._steps = 0
+        self.steps = 0
         self.simulator.Initialize()
+        self.simulator.AdvanceTo(boundary(0, self.scenario.task.period))
         return self.observation()
 
     def step(self, action: np.ndarray | None = None) -> StepResult:
@@ -122,8 +127,8 @@ class TaskSimulation:
             self._action_source.get_mutable_source_value(
                 self._action_source.GetMyMutableContextFromRoot(self.context)
             ).SetFromVector(clipped)
-        self._steps += 1
-        self.simulator.AdvanceTo(self._steps * self.scenario.task.period)
+        self.steps += 1
+        self.simulator.AdvanceTo(boundary(self.steps, self.scenario.task.period))
         terms = self.monitor.GetOutputPort("reward_terms").Eval(self._monitor_context)
         code = self.monitor.GetOutputPort("outcome").Eval(self._monitor_context)
         named = dict(zip(REWARD_TERMS, terms.tolist(), strict=True))
@@ -132,6 +137,11 @@ class TaskSimulation:
     def observation(self) -> np.ndarray:
         """Returns the present state (12,)."""
         return self.processor.GetOutputPort("observation").Eval(self._processor_context)
+
+    @property
+    def time(self) -> float:
+        """Time since the episode began [s]."""
+        return self.steps * self.scenario.task.period
 
     def action(self) -> np.ndarray:
         """Returns the action (6,) held now, before imprecision."""

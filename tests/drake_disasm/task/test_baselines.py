@@ -1,0 +1,61 @@
+"""What the two scripted policies do on turned grooves."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.effects import GroovePose
+from drake_disasm.mdp import Outcome
+from drake_disasm.policies import make_policy
+from drake_disasm.scenario import load_scenario
+from drake_disasm.task.episode import EpisodeSummary, run_episode
+from drake_disasm.task.simulation import TaskSimulation
+
+ANGLES_DEG = (0.0, 2.0, -2.0, 4.0, -4.0)
+F_MAX = 20.0  # N
+
+
+def _episodes(
+    model: str, policy: str, angle_deg: float, seeds: range
+) -> list[EpisodeSummary]:
+    scenario = load_scenario("removal")
+    scenario.effects = [GroovePose(ry=np.deg2rad(angle_deg))]
+    simulation = TaskSimulation(scenario, model, make_policy(policy))
+    return [run_episode(simulation, seed) for seed in seeds]
+
+
+def _assert_removed(summaries: list[EpisodeSummary]) -> None:
+    for summary in summaries:
+        assert summary.outcome is Outcome.SUCCESS
+        assert summary.bolt_is_out
+        assert summary.max_force < F_MAX
+
+
+def _assert_jammed(summaries: list[EpisodeSummary], travel: float) -> None:
+    for summary in summaries:
+        assert summary.outcome is Outcome.FORCE_LIMIT
+        assert summary.travel < travel
+        assert not summary.bolt_is_out
+
+
+@pytest.mark.parametrize("angle_deg", ANGLES_DEG)
+def test_admittance_removes_the_bolt_in_the_twin(angle_deg: float) -> None:
+    _assert_removed(_episodes("twin", "admittance", angle_deg, range(2)))
+
+
+@pytest.mark.parametrize("angle_deg", (0.0, 4.0))
+def test_admittance_removes_the_bolt_in_the_cell(angle_deg: float) -> None:
+    _assert_removed(_episodes("cell", "admittance", angle_deg, range(1)))
+
+
+@pytest.mark.parametrize("model", ("cell", "twin"))
+@pytest.mark.parametrize("angle_deg", (2.0, -4.0))
+def test_straight_jams_before_the_end(model: str, angle_deg: float) -> None:
+    _assert_jammed(_episodes(model, "straight", angle_deg, range(1)), 0.055)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("angle_deg", ANGLES_DEG)
+def test_ten_seeds_in_the_cell(angle_deg: float) -> None:
+    _assert_removed(_episodes("cell", "admittance", angle_deg, range(10)))
+    straight = _episodes("cell", "straight", angle_deg, range(10))
+    _assert_jammed(straight, 0.055 if angle_deg else 0.062)
