@@ -7,7 +7,7 @@ printed, record it as a log, or save a page that plays offline.
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cli
@@ -44,7 +44,12 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     cli.add_scenario_arguments(parser)
-    add = parser.add_argument
+    _add_run_arguments(parser.add_argument)
+    _add_view_arguments(parser.add_argument)
+    return parser.parse_args(arguments)
+
+
+def _add_run_arguments(add: Callable[..., object]) -> None:
     add(
         "--policy",
         default="admittance",
@@ -66,6 +71,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         help="of the first episode; the next ones count on (default: 0)",
     )
     add("--record", type=Path, metavar="DIR", help="write a log into an empty folder")
+
+
+def _add_view_arguments(add: Callable[..., object]) -> None:
     add(
         "--html",
         type=Path,
@@ -86,7 +94,6 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         metavar="X",
         help="1 is real time, 0 full speed (default: 1 if somebody watches, else 0)",
     )
-    return parser.parse_args(arguments)
 
 
 def main(arguments: Sequence[str]) -> int:
