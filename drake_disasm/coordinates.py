@@ -23,6 +23,7 @@ from drake_disasm.errors import DisasmError
 from drake_disasm.scenario import ArmConfig
 from drake_disasm.tool import add_model
 
+_TOLERANCE = 1e-5  # m, of inverse kinematics
 _SOLUTION = DifferentialInverseKinematicsStatus.kSolutionFound
 
 
@@ -98,11 +99,14 @@ class ArmCoordinates(Coordinates):
                 self._parameters,
             )
             if result.status != _SOLUTION:
-                raise DisasmError(
-                    f"the arm can't follow the command (differential IK: "
-                    f"{result.status.name}); move the lock by placement.p_WG"
-                )
+                break
             q = q + self._parameters.get_time_step() * result.joint_velocities
+        miss = np.linalg.norm(self.pose(q).translation() - X_GB.translation())
+        if miss > _TOLERANCE:
+            raise DisasmError(
+                f"the arm can't follow the command within its limits (off by "
+                f"{1e3 * miss:.2f} mm); move the lock by placement.p_WG"
+            )
         return q
 
     def start(self, X_GB: RigidTransform) -> np.ndarray:

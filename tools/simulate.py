@@ -63,7 +63,13 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
         choices=sorted(MODELS),
         help="the whole cell, or the twin: bolt and groove alone (default: cell)",
     )
-    add("--episodes", type=_positive, default=1, metavar="N", help="(default: 1)")
+    add(
+        "--episodes",
+        type=_positive,
+        default=1,
+        metavar="N",
+        help="how many (default: 1)",
+    )
     add(
         "--seed",
         type=int,

@@ -1,0 +1,127 @@
+"""The task's diagram: in-place resets, seeds, and stepping with and without policy."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.effects import GroovePose, SensorBias
+from drake_disasm.mdp import Outcome
+from drake_disasm.policies import make_policy
+from drake_disasm.scenario import load_scenario
+from drake_disasm.task.episode import EpisodeRecorder, run_episode, summary_table
+from drake_disasm.task.simulation import TaskSimulation
+
+TURNED = [GroovePose(ry=0.03)]
+
+
+@pytest.fixture(scope="module", params=["cell", "twin"])
+def simulation(request: pytest.FixtureRequest) -> TaskSimulation:
+    """A simulation that moves straight against a turned groove, with noise."""
+    scenario = load_scenario("removal", ["imprecision=1e-4"])
+    return TaskSimulation(scenario, request.param, make_policy("straight"))
+
+
+def _observations(simulation: TaskSimulation, seed: int, steps: int = 12) -> np.ndarray:
+    first = simulation.reset(seed, TURNED)
+    return np.array([first, *(simulation.step().observation for _ in range(steps))])
+
+
+def test_same_seed_same_bits_after_other_episodes(simulation: TaskSimulation) -> None:
+    before = _observations(simulation, 3)
+    simulation.reset(4, [SensorBias(fx=1.0)])
+    simulation.step()
+    np.testing.assert_array_equal(_observations(simulation, 3), before)
+
+
+def test_a_rebuilt_diagram_gives_the_same_bits(simulation: TaskSimulation) -> None:
+    again = TaskSimulation(
+        simulation.scenario, simulation.model, make_policy("straight")
+    )
+    np.testing.assert_array_equal(_observations(again, 3), _observations(simulation, 3))
+
+
+def test_another_seed_differs(simulation: TaskSimulation) -> None:
+    first, second = _observations(simulation, 1), _observations(simulation, 2)
+    assert np.all(np.any(first != second, axis=1))
+
+
+def test_actions_from_outside_equal_a_policys(simulation: TaskSimulation) -> None:
+    open_loop = TaskSimulation(simulation.scenario, simulation.model)
+    open_loop.reset(3, TURNED)
+    action = make_policy("straight")(np.zeros(12))
+    stepped = [open_loop.step(action).observation for _ in range(12)]
+    np.testing.assert_array_equal(stepped, _observations(simulation, 3)[1:])
+
+
+def test_every_period_holds_the_same_number_of_plant_steps() -> None:
+    """In free motion each step after the first moves the bolt by the same way."""
+    simulation = TaskSimulation(
+        load_scenario("removal", ["ft_sensor.noise=[0,0,0,0,0,0]"]), "twin"
+    )
+    x = [simulation.reset(0)[0]]
+    for _ in range(40):
+        x.append(simulation.step(np.array([1e-3, 0, 0, 0, 0, 0])).observation[0])
+    np.testing.assert_allclose(np.diff(x)[5:], 1e-3, rtol=1e-6)
+
+
+def test_rewards_telescope(simulation: TaskSimulation) -> None:
+    """The sum of the progress terms is the whole way: no step counts twice."""
+    first = simulation.reset(5, TURNED)
+    results = [simulation.step() for _ in range(12)]
+    progress = sum(result.reward_terms["progress"] for result in results)
+    way_mm = 1e3 * (results[-1].observation[0] - first[0])
+    assert progress == pytest.approx(1.6 * way_mm, rel=1e-12)
+
+
+def test_step_limit_truncates() -> None:
+    scenario = load_scenario("removal", ["task.steps=4"])
+    simulation = TaskSimulation(scenario, "twin", make_policy("straight"))
+    summary = run_episode(simulation, 0)
+    assert (summary.steps, summary.outcome) == (4, Outcome.STEP_LIMIT)
+    assert summary.outcome.truncated and not summary.outcome.terminated
+
+
+def test_a_policys_own_state_is_reset() -> None:
+    class Counting:
+        calls = 0
+
+        def reset(self) -> None:
+            self.calls = 0
+
+        def __call__(self, observation: np.ndarray) -> np.ndarray:
+            self.calls += 1
+            return np.zeros(6)
+
+    policy = Counting()
+    simulation = TaskSimulation(load_scenario("removal"), "twin", policy)
+    for _ in range(2):
+        simulation.reset(0)
+        assert policy.calls == 0
+        simulation.step()
+
+
+def test_recorder_has_minaris_layout() -> None:
+    scenario = load_scenario("removal", ["task.steps=5", "imprecision=1e-4"])
+    simulation = TaskSimulation(scenario, "cell", make_policy("straight"))
+    recorder = EpisodeRecorder(simulation)
+    run_episode(simulation, 0, recorder)
+    columns = recorder.columns()
+    assert recorder.steps == 5
+    assert {len(values) for values in columns.values()} == {6}
+    np.testing.assert_allclose(columns["time"], 0.1 * np.arange(6))
+    np.testing.assert_array_equal(columns["action"][:5, 0], 1e-3)
+    np.testing.assert_array_equal(columns["action"][5], 0.0)
+    moved = np.diff(columns["X_GB_commanded"][:, :3], axis=0)
+    np.testing.assert_allclose(moved, columns["action_executed"][:5, :3], atol=1e-15)
+    assert columns["truncated"].tolist() == [False] * 5 + [True]
+    assert columns["q"].shape == (6, 7)
+
+
+def test_summary_table_has_a_row_per_episode() -> None:
+    simulation = TaskSimulation(
+        load_scenario("sliding"), "twin", make_policy("straight")
+    )
+    summaries = [run_episode(simulation, seed) for seed in range(2)]
+    lines = summary_table(summaries).splitlines()
+    assert len(lines) == 5
+    assert lines[-1] == "2 of 2 episodes succeeded"
+    assert all("success" in line for line in lines[2:4])

@@ -1,0 +1,118 @@
+"""Scenarios: strict, checked, overridable, and each refusal in one line."""
+
+from pathlib import Path
+
+import pytest
+
+from drake_disasm.effects import GrooveFriction, GroovePose
+from drake_disasm.errors import DisasmError
+from drake_disasm.resources import models_dir
+from drake_disasm.scenario import (
+    Scenario,
+    dump_scenario,
+    load_scenario,
+    scenario_from_mapping,
+    scenario_to_mapping,
+)
+from drake_disasm.stations import CellStation
+
+SHIPPED = sorted(path.stem for path in (models_dir() / "scenarios").glob("*.yaml"))
+
+
+def test_the_three_of_the_issue_are_shipped() -> None:
+    assert {"sliding", "removal", "removal_turned"} <= set(SHIPPED)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_round_trips(name: str, tmp_path: Path) -> None:
+    scenario = load_scenario(name)
+    (tmp_path / "dump.yaml").write_text(dump_scenario(scenario))
+    assert load_scenario(str(tmp_path / "dump.yaml")) == scenario
+    assert scenario_from_mapping(scenario_to_mapping(scenario)) == scenario
+
+
+def test_chapters_differ_as_the_thesis_says() -> None:
+    sliding, removal = load_scenario("sliding").task, load_scenario("removal").task
+    assert (sliding.success, removal.success) == ("travelled", "removed")
+    ours = sliding.reward
+    assert [ours.w_dis, ours.w_f, ours.w_t, ours.w_y] == [0.6, 0.2, 0.2, 0.0]
+    assert [ours.f_max, ours.t_max, sliding.steps] == [30.0, 5.0, 100]
+    ours = removal.reward
+    assert [ours.w_dis, ours.w_f, ours.w_t, ours.w_y] == [1.6, 0.3, 0.3, 5.0]
+    assert [ours.f_max, ours.t_max, removal.steps] == [20.0, 5.0, 100]
+
+
+def test_overrides() -> None:
+    scenario = load_scenario(
+        "removal_turned",
+        ["lock.clearance=3e-4", "effects.0.ry=0.01", "gripper.hold=weld"],
+    )
+    assert scenario.lock.clearance == 3e-4
+    assert scenario.effects == [GroovePose(ry=0.01)]
+    assert scenario.gripper.hold == "weld"
+    replaced = load_scenario("removal", ["effects=[!GrooveFriction {coefficient: 1}]"])
+    assert replaced.effects == [GrooveFriction(coefficient=1.0)]
+
+
+BAD = {
+    "lock: {clearence: 1e-4}": ["line 1", "'clearence'", "'clearance'"],
+    "lock: {clearance: 0}": ["lock.clearance", "0.0001 to 0.001"],
+    "lock: {clearance: abc}": ["line 1", "'abc'", "number"],
+    "lock: {clearance: .nan}": ["lock.clearance", "nan"],
+    "lock: {clearance: [1]}": ["wrong shape", "clearance"],
+    "lock: 3": ["wrong shape"],
+    "name: a\neffects: [!GroovePos {ry: 1}]": ["line 2", "'GroovePos'", "'GroovePose'"],
+    "effects: [!GroovePose {ry: 1}]": ["effects.0.ry", "-0.2 to 0.2"],
+    "effects: [{}]": ["effects.0", "no name", "GroovePose"],
+    "arm: {posture: [1, 2]}": ["arm.posture", "2 values", "7"],
+    "gripper: {hold: glue}": ["gripper.hold", "'glue'", "friction"],
+    "simulation: {cell_time_step: 0.003}": ["cell_time_step", "divisor"],
+    "lock: {clearance": ["line 1", "not YAML"],
+    "": ["is empty"],
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_bad_file_is_one_line(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(text)
+    with pytest.raises(DisasmError) as caught:
+        load_scenario(str(file))
+    message = str(caught.value)
+    assert message.count("\n") == 0
+    assert str(file) in message
+    assert all(word in message for word in BAD[text]), message
+
+
+BAD_SETS = {
+    "lock.clearance": "key=value",
+    "lock.clearance=x": "number",
+    "lock.clearnce=1": "'clearance'",
+    "effects.0.ry=0.1": "lists 0 effects",
+}
+
+
+@pytest.mark.parametrize("override", BAD_SETS)
+def test_bad_override_is_one_line(override: str) -> None:
+    with pytest.raises(DisasmError, match=BAD_SETS[override]) as caught:
+        load_scenario("removal", [override])
+    assert "\n" not in str(caught.value)
+    assert override in str(caught.value)
+
+
+def test_missing_scenario_suggests_a_name() -> None:
+    with pytest.raises(DisasmError, match=r"remval.*'removal'"):
+        load_scenario("remval")
+
+
+@pytest.mark.parametrize("part", ["arm", "gripper", "ft_sensor"])
+def test_missing_model_names_file_and_key(part: str) -> None:
+    url = "package://disasm_models/nothing.urdf"
+    scenario = load_scenario("removal", [f"{part}.model={url}"])
+    with pytest.raises(DisasmError, match=r"nothing\.urdf is missing.*`model`"):
+        CellStation(scenario)
+
+
+def test_defaults_are_valid(tmp_path: Path) -> None:
+    (tmp_path / "s.yaml").write_text("name: removal")
+    assert load_scenario(str(tmp_path / "s.yaml")) == Scenario()
