@@ -69,25 +69,27 @@ class LockConfig:
         0.001, "m", "keyhole width minus head diameter", low=2e-4, high=5e-3
     )
     grip_size: list[float] = quantity(
-        [0.018, 0.030, 0.012], "m", "bolt's grip along x, y, z", low=0.004, high=0.05
+        [0.024, 0.030, 0.012], "m", "bolt's grip along x, y, z", low=0.004, high=0.05
     )
     grip_standoff: float = quantity(
-        0.006, "m", "gap between plate and grip", low=0.001, high=0.05
+        0.003, "m", "gap between plate and grip", low=0.001, high=0.05
     )
-    bolt_mass: float = quantity(0.060, "kg", "of the bolt", low=0.001, high=1.0)
+    bolt_mass: float = quantity(
+        0.2, "kg", "of the bolt and its chain", low=0.001, high=1.0
+    )
 
 
 @dataclasses.dataclass
 class ContactConfig:
-    """Hydroelastic contact: the bolt is rigid, the groove compliant."""
+    """Hydroelastic contact: the groove is rigid, the bolt's neck and head yield."""
 
     modulus: float = quantity(
-        1e9, "Pa", "hydroelastic modulus of the groove", low=1e6, high=1e11
+        4e9, "Pa", "hydroelastic modulus of the bolt", low=1e6, high=1e11
     )
     dissipation: float = quantity(20.0, "s/m", "Hunt-Crossley", low=0.0, high=500.0)
     friction: float = quantity(0.2, "1", "Coulomb, static = dynamic", low=0, high=2)
     resolution: float = quantity(
-        0.0008, "m", "edge length on the bolt's rigid mesh", low=1e-4, high=5e-3
+        0.0008, "m", "edge length on the bolt's mesh", low=1e-4, high=5e-3
     )
 
 
@@ -126,7 +128,7 @@ class GripperConfig:
     )
     grip_force: float = quantity(60.0, "N", "on each pad", low=10.0, high=125.0)
     fingertip_gap: float = quantity(
-        0.003, "m", "between fingertips and plate", low=0.001, high=0.05
+        0.0015, "m", "between fingertips and plate", low=0.001, high=0.05
     )
     finger_stiffness: float = quantity(
         3e4, "N/m", "of each finger about its commanded place", low=1e3, high=1e6
@@ -168,7 +170,7 @@ class TwinConfig:
     """
 
     stiffness: list[float] = quantity(
-        [12e3, 15e3, 14e3, 330.0, 98.0, 2000.0], "N/m, N m/rad", "",
+        [16.6e3, 15.4e3, 13.4e3, 410.0, 280.0, 2000.0], "N/m, N m/rad", "",
         low=1.0, high=1e7,
     )  # fmt: skip
     damping_ratio: float = quantity(1.0, "1", "of each axis", low=0.1, high=10.0)

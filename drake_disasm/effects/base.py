@@ -30,7 +30,7 @@ class Environment:
     Attributes:
         X_GnG: pose of the true groove frame in the groove's nominal frame.
         friction: Coulomb coefficient between bolt and groove (static = dynamic).
-        modulus: hydroelastic modulus of the groove [Pa].
+        modulus: hydroelastic modulus of the bolt's neck and head [Pa].
         dissipation: Hunt-Crossley dissipation of the contact [s/m].
     """
 

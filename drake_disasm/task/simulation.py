@@ -1,9 +1,9 @@
 """One diagram from a scenario, and stepping it by the MDP's period.
 
 ```
-policy -> imprecision -> pose target -> integrator -> station -> observation
-  ^                                                                   |
-  +-------------------------------------------------------------------+
+policy -> imprecision -> pose target -> motion -> station -> observation
+  ^                                                               |
+  +---------------------------------------------------------------+
 ```
 """
 
@@ -15,8 +15,10 @@ from pydrake.common import RandomDistribution, RandomGenerator
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import (
+    Adder,
     ConstantVectorSource,
     DiscreteTimeIntegrator,
+    Gain,
     RandomSource,
 )
 
@@ -213,21 +215,26 @@ class TaskSimulation:
         )
 
     def _add_motion(self, builder: DiagramBuilder) -> None:
-        """Adds the integrator from velocity to the station's position command."""
-        station = self.station
-        period = (
-            self.scenario.arm.control_period
-            if isinstance(station, CellStation)
-            else station.time_step
-        )
+        """Adds the way from velocity to the station's position command.
+
+        The command is where the station is to be at the end of its control period:
+        the integral so far plus one period's way. Without that lead the motion
+        would lag by a period, and so depend on its length.
+        """
+        station, connect = self.station, builder.Connect
+        size, period = len(station.start), self._control_period()
         velocity = self.pose_target.GetOutputPort("velocity")
         self._integrator = builder.AddNamedSystem(
-            "motion", DiscreteTimeIntegrator(len(station.start), period)
+            "motion", DiscreteTimeIntegrator(size, period)
         )
-        builder.Connect(velocity, self._integrator.get_input_port())
-        builder.Connect(
-            self._integrator.get_output_port(),
-            station.GetInputPort(f"{station.arm}.position"),
+        lead = builder.AddNamedSystem("lead", Gain(period, size))
+        command = builder.AddNamedSystem("position_command", Adder(2, size))
+        connect(velocity, self._integrator.get_input_port())
+        connect(velocity, lead.get_input_port())
+        connect(self._integrator.get_output_port(), command.get_input_port(0))
+        connect(lead.get_output_port(), command.get_input_port(1))
+        connect(
+            command.get_output_port(), station.GetInputPort(f"{station.arm}.position")
         )
         if station.has_velocity_input:
             builder.Connect(velocity, station.GetInputPort(f"{station.arm}.velocity"))
@@ -238,6 +245,11 @@ class TaskSimulation:
             builder.Connect(
                 grip.get_output_port(), station.GetInputPort("gripper.position")
             )
+
+    def _control_period(self) -> float:
+        if isinstance(self.station, CellStation):
+            return self.scenario.arm.control_period
+        return self.station.time_step
 
     def _add_policy(self, builder: DiagramBuilder, policy: Policy | None) -> None:
         self.policy_system: PolicySystem | None = None

@@ -25,7 +25,7 @@ def test_hanging_tool_reads_its_weight(
 
 
 def test_cell_payload_is_the_vendors(cell: CellStation) -> None:
-    assert cell.payload_mass == pytest.approx(0.347 + 1.025 + 0.060)
+    assert cell.payload_mass == pytest.approx(0.347 + 1.025 + 0.200)
 
 
 def test_no_data_before_the_first_step(cell: CellStation) -> None:

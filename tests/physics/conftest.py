@@ -1,0 +1,13 @@
+"""The cell, built once."""
+
+import pytest
+
+from drake_disasm.scenario import load_scenario
+from drake_disasm.stations import CellStation
+from tests.physics.measurements import QUIET
+
+
+@pytest.fixture(scope="session")
+def cell() -> CellStation:
+    """The default cell without sensor noise."""
+    return CellStation(load_scenario("removal", [QUIET]))

@@ -1,0 +1,197 @@
+"""What the physics tests and docs/physics.md measure.
+
+`python -m tests.physics.measurements` prints every table of docs/physics.md.
+"""
+
+import time
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import ExternallyAppliedSpatialForce
+from pydrake.systems.analysis import Simulator
+
+from drake_disasm.effects import GroovePose
+from drake_disasm.mdp import Outcome
+from drake_disasm.policies import make_policy
+from drake_disasm.scenario import load_scenario
+from drake_disasm.spatial import rotation_vector
+from drake_disasm.stations import CellStation
+from drake_disasm.task.simulation import TaskSimulation
+
+QUIET = "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"
+AWAY = GroovePose(y=-0.01)  # the groove drops away from the bolt
+
+
+def quiet(scenario: str = "removal", *overrides: str) -> TaskSimulation:
+    """Returns a twin without noise or policy."""
+    return TaskSimulation(load_scenario(scenario, [QUIET, *overrides]), "twin")
+
+
+def action(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> np.ndarray:
+    """Returns a translation (6,) [m]."""
+    return np.array([x, y, z, 0.0, 0.0, 0.0])
+
+
+def play(force: float, *overrides: str) -> float:
+    """Returns how far the neck moves across the slot between +force and -force [m]."""
+    simulation = quiet("removal", *overrides)
+    ends = []
+    for sign in (1.0, -1.0):
+        simulation.reset(0)
+        simulation.step(action(x=3e-3))
+        state = simulation.step(action(z=sign * 4e-5)).observation
+        while abs(state[8]) < force:
+            state = simulation.step(action(z=sign * 1e-5)).observation
+        ends.append(state[2])
+    return ends[0] - ends[1]
+
+
+def sliding(mu: float, offset: float) -> tuple[float, float]:
+    """Returns mean normal and friction force [N] of a bolt sliding along a lip.
+
+    Args:
+        mu: Coulomb coefficient.
+        offset: commanded sideways position, beyond the play [m].
+    """
+    simulation = quiet("removal", f"contact.friction={mu}")
+    simulation.reset(0)
+    simulation.step(action(z=offset))
+    states = [simulation.step(action(x=1e-3)).observation for _ in range(30)]
+    steady = np.array(states)[15:]
+    return float(abs(steady[:, 8]).mean()), float(-steady[:, 6].mean())
+
+
+def episode(
+    model: str, policy: str, *overrides: str, scenario: str = "removal_turned"
+) -> dict[str, float]:
+    """Returns end pose [m], force peaks [N] and speed of a noise-free episode.
+
+    `slide` is the greatest force before the bolt meets stop B (x < 59 mm).
+    """
+    loaded = load_scenario(scenario, [QUIET, *overrides])
+    simulation = TaskSimulation(loaded, model, make_policy(policy))
+    simulation.reset(0)
+    states, result, start = [], None, time.perf_counter()
+    while result is None or result.outcome is Outcome.RUNNING:
+        result = simulation.step()
+        states.append(result.observation)
+    wall = time.perf_counter() - start
+    s = np.array(states)
+    force = np.linalg.norm(s[:, 6:9], axis=1)
+    return {
+        "x": s[-1, 0],
+        "y": s[-1, 1],
+        "z": s[-1, 2],
+        "travel": s[:, 0].max(),
+        "slide": force[s[:, 0] < 0.059].max(),
+        "peak": force.max(),
+        "steps": simulation.steps,
+        "rate": simulation.time / wall,
+    }
+
+
+def pushed(
+    station: CellStation, wrench_G: Sequence[float], duration: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns true and measured displacement (6,) of a bolt pushed in free space.
+
+    Args:
+        station: the cell.
+        wrench_G: [f; tau] on the bolt at Bo in G, from the start on.
+        duration: how long [s].
+    """
+    simulator = Simulator(station)
+    context = simulator.get_mutable_context()
+    station.set_effects(context, [AWAY])
+    station._place_at_start(context)
+    station._fix_commands(context)
+    R_WG, w = station.X_WG.rotation().matrix(), np.array(wrench_G)
+    force = ExternallyAppliedSpatialForce()
+    force.body_index = station.lock.bolt.index()
+    force.p_BoBq_B = np.zeros(3)
+    force.F_Bq_W = SpatialForce(R_WG @ w[3:], R_WG @ w[:3])
+    port = station.GetInputPort("applied_spatial_force")
+    port.FixValue(context, Value[list[ExternallyAppliedSpatialForce]]([force]))
+    simulator.Initialize()
+    simulator.AdvanceTo(duration)
+    measured = station.GetOutputPort("iiwa.position_measured").Eval(context)
+    poses = (
+        station.GetOutputPort("bolt_pose").Eval(context),
+        station.coordinates.pose(measured),
+    )
+    return tuple(_vector(X) for X in poses)  # type: ignore[return-value]
+
+
+def _vector(X: RigidTransform) -> np.ndarray:
+    return np.concatenate([X.translation(), rotation_vector(X.rotation())])
+
+
+def stiffness(station: CellStation, loads: Sequence[float]) -> np.ndarray:
+    """Returns load over displacement along each axis, (6, 2): bolt, measured pose."""
+    rest = pushed(station, np.zeros(6), 0.6)
+    table = np.zeros((6, 2))
+    for axis, load in enumerate(loads):
+        moved = pushed(station, load * np.eye(6)[axis], 0.6)
+        table[axis] = [load / (moved[i] - rest[i])[axis] for i in range(2)]
+    return table
+
+
+def stated_stiffness(station: CellStation) -> np.ndarray:
+    """Returns the stiffness per axis (6,) that the joints' springs amount to."""
+    K = station.coordinates.stiffness(  # type: ignore[attr-defined]
+        np.array(station.scenario.arm.stiffness), station.start
+    )
+    return 1.0 / np.diag(np.linalg.inv(K))
+
+
+def _lines() -> Iterator[str]:
+    yield "play of the neck at 1 N (mm): nominal, measured, excess %"
+    for clearance in (1e-4, 2e-4, 4e-4, 1e-3):
+        found = play(1.0, f"lock.clearance={clearance}")
+        excess = 100 * (found / clearance - 1)
+        yield f"  {1e3 * clearance:.1f} {1e3 * found:.4f} {excess:+.1f}"
+    yield "play at 0.4 mm nominal for other meshes and moduli"
+    for setting in (
+        "contact.resolution=0.003",
+        "contact.resolution=0.0016",
+        "contact.resolution=0.0008",
+        "contact.resolution=0.0004",
+        "contact.modulus=1e8",
+        "contact.modulus=1e10",
+    ):
+        yield f"  {setting} {1e3 * play(1.0, setting):.4f}"
+    yield "friction: mu, normal N, friction N, ratio"
+    for mu in (0.1, 0.2, 0.4):
+        for offset in (4e-4, 1e-3):
+            normal, friction = sliding(mu, offset)
+            yield f"  {mu} {normal:.3f} {friction:.3f} {friction / normal:.4f}"
+    for model, steps in (
+        ("twin", (0.00125, 0.0025, 0.005, 0.01)),
+        ("cell", (0.000625, 0.00125, 0.0025, 0.005)),
+    ):
+        for policy in ("admittance", "straight"):
+            yield f"time step of the {model}, {policy} on the turned groove"
+            for step in steps:
+                run = episode(model, policy, f"simulation.{model}_time_step={step}")
+                yield f"  {1e3 * step:.3f} ms  " + "  ".join(
+                    f"{k} {1e3 * v:.4f}"
+                    if k in "xyz" or k == "travel"
+                    else f"{k} {v:.3f}"
+                    for k, v in run.items()
+                )
+    station = CellStation(load_scenario("removal", [QUIET]))
+    yield "stiffness per axis: stated, measured pose, bolt"
+    stated = stated_stiffness(station)
+    for axis, row in enumerate(stiffness(station, [5, 5, 5, 0.1, 0.1, 0.02])):
+        yield f"  {'xyzuvw'[axis]} {stated[axis]:.0f} {row[1]:.0f} {row[0]:.0f}"
+    yield "creep under a steady 1 N along x (mm): after 1, 5, 10 s"
+    bolt = [pushed(station, [1, 0, 0, 0, 0, 0], t)[0][0] for t in (1.0, 5.0, 10.0)]
+    yield "  " + " ".join(f"{1e3 * x:.4f}" for x in bolt)
+
+
+if __name__ == "__main__":
+    for line in _lines():
+        print(line, flush=True)
