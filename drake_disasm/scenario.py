@@ -36,7 +36,7 @@ class SimulationConfig:
     """How the MultibodyPlant is discretised (how chosen: docs/physics.md)."""
 
     cell_time_step: float = quantity(0.0025, "s", "of the cell", low=1e-4, high=0.02)
-    twin_time_step: float = quantity(0.005, "s", "of the twin", low=1e-4, high=0.02)
+    twin_time_step: float = quantity(0.01, "s", "of the twin", low=1e-4, high=0.02)
     stiction_tolerance: float = quantity(
         1e-5, "m/s", "creep at which friction is full", low=1e-7, high=1e-2
     )

@@ -1,5 +1,7 @@
 """Rotation vectors, and wrenches in the vendor's order [f; tau]."""
 
+import math
+
 import numpy as np
 from pydrake.common.eigen_geometry import AngleAxis, Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
@@ -8,10 +10,10 @@ from pydrake.multibody.math import SpatialForce
 
 def rotation_from_vector(vector: np.ndarray) -> RotationMatrix:
     """Returns Exp(vector): a turn about `vector` (3,) by its length [rad]."""
-    angle = float(np.linalg.norm(vector))
+    angle = math.sqrt(vector @ vector)
     if angle == 0.0:
         return RotationMatrix()
-    return RotationMatrix(AngleAxis(angle, np.asarray(vector) / angle))
+    return RotationMatrix(AngleAxis(angle, vector / angle))
 
 
 def rotation_vector(R: RotationMatrix) -> np.ndarray:
@@ -60,5 +62,5 @@ def pose_to_vector(X: RigidTransform) -> np.ndarray:
 
 def pose_from_vector(vector: np.ndarray) -> RigidTransform:
     """Returns the pose of [x, y, z, qw, qx, qy, qz] (7,)."""
-    wxyz = vector[3:] / np.linalg.norm(vector[3:])
-    return RigidTransform(Quaternion(wxyz), vector[:3])
+    wxyz = vector[3:]
+    return RigidTransform(Quaternion(wxyz / math.sqrt(wxyz @ wxyz)), vector[:3])

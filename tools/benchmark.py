@@ -23,7 +23,12 @@ import numpy as np
 import psutil
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, DiscreteTimeIntegrator
+from pydrake.systems.primitives import (
+    Adder,
+    ConstantVectorSource,
+    DiscreteTimeIntegrator,
+    Gain,
+)
 from tqdm import tqdm
 
 from drake_disasm.errors import DisasmError
@@ -132,9 +137,14 @@ def _replay(scenario: Scenario, rates: list[np.ndarray]) -> float:
     motion = builder.AddNamedSystem(
         "motion", DiscreteTimeIntegrator(6, station.time_step)
     )
+    lead = builder.AddNamedSystem("lead", Gain(station.time_step, 6))
+    command = builder.AddNamedSystem("command", Adder(2, 6))
     rate = source.get_output_port()
     builder.Connect(rate, motion.get_input_port())
-    builder.Connect(motion.get_output_port(), station.GetInputPort("bolt.position"))
+    builder.Connect(rate, lead.get_input_port())
+    builder.Connect(motion.get_output_port(), command.get_input_port(0))
+    builder.Connect(lead.get_output_port(), command.get_input_port(1))
+    builder.Connect(command.get_output_port(), station.GetInputPort("bolt.position"))
     builder.Connect(rate, station.GetInputPort("bolt.velocity"))
     simulator = Simulator(builder.Build())
     root = simulator.get_mutable_context()

@@ -65,6 +65,7 @@ class ForceTorqueSensor(LeafSystem):
         self._declare_outputs()
 
     def _declare_outputs(self) -> None:
+        # Not the time: between two plant steps the sensor has no new sample.
         reaction = self._reaction.ticket()
         self.DeclareVectorOutputPort(
             "wrench",
@@ -75,7 +76,6 @@ class ForceTorqueSensor(LeafSystem):
                 self._poses.ticket(),
                 self._noise_port.ticket(),
                 self.all_parameters_ticket(),
-                self.time_ticket(),
             },
         )
         self.DeclareVectorOutputPort(
@@ -121,5 +121,7 @@ class ForceTorqueSensor(LeafSystem):
 
 def quantise(values: np.ndarray, quantum: np.ndarray) -> np.ndarray:
     """Returns values rounded to whole multiples; a zero quantum leaves them."""
+    if quantum.all():
+        return np.rint(values / quantum) * quantum
     step = np.where(quantum > 0.0, quantum, 1.0)
-    return np.where(quantum > 0.0, np.round(values / step) * step, values)
+    return np.where(quantum > 0.0, np.rint(values / step) * step, values)

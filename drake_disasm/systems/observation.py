@@ -1,6 +1,7 @@
 """From sensor readings to the state that the agent sees (thesis 4.2.4)."""
 
 import dataclasses
+import functools
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
@@ -13,6 +14,8 @@ from drake_disasm.spatial import (
     shift_and_express,
     weight_wrench,
 )
+
+_ZERO = np.zeros(3)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,10 +35,14 @@ class Mounting:
     p_SoScm_S: np.ndarray
     g_W: np.ndarray
 
-    def weight(self, R_GB: RotationMatrix) -> np.ndarray:
+    @functools.cached_property
+    def X_BS(self) -> RigidTransform:
+        """The sensor in the bolt's frame."""
+        return self.X_SB.inverse()
+
+    def weight(self, R_GS: RotationMatrix) -> np.ndarray:
         """Returns the payload's own load on the sensor, (6,) [f; tau] at So in S."""
-        R_WS = self.R_WG @ R_GB @ self.X_SB.rotation().inverse()
-        return weight_wrench(self.mass, self.p_SoScm_S, R_WS, self.g_W)
+        return weight_wrench(self.mass, self.p_SoScm_S, self.R_WG @ R_GS, self.g_W)
 
 
 def contact_wrench(
@@ -53,9 +60,8 @@ def contact_wrench(
         R_GB: measured orientation of the bolt.
         mounting: geometry and payload.
     """
-    load = reading - offset - mounting.weight(R_GB)
-    X_BS = mounting.X_SB.inverse()
-    X_GS = RigidTransform(R_GB @ X_BS.rotation(), R_GB @ X_BS.translation())
+    X_GS = RigidTransform(R_GB, _ZERO) @ mounting.X_BS
+    load = reading - offset - mounting.weight(X_GS.rotation())
     return shift_and_express(load, X_GS)
 
 
@@ -74,7 +80,7 @@ def small_angle_contact_wrench(
         reading, R_GB, mounting: as in `contact_wrench`.
         tare: (6,) the reading at zeroing.
     """
-    R_BS = mounting.X_SB.rotation().inverse().matrix()
+    R_BS = mounting.X_BS.rotation().matrix()
     f, t = R_BS @ (reading - tare)[:3], R_BS @ (reading - tare)[3:]
     alpha, _, gamma = RollPitchYaw(R_GB).vector()
     G = mounting.mass * np.linalg.norm(mounting.g_W)
@@ -141,7 +147,7 @@ class ObservationProcessor(LeafSystem):
         """Zeroes the sensor: `reading` (6,) was taken at the start, X_GB = identity."""
         offset = reading
         if self._exact:
-            offset = reading - self._mounting.weight(RotationMatrix())
+            offset = reading - self._mounting.weight(self._mounting.X_BS.rotation())
         context.get_mutable_numeric_parameter(self._offset).SetFromVector(offset)
 
     def _calc_observation(self, context: Context, output: BasicVector) -> None:

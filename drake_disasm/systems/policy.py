@@ -3,10 +3,11 @@
 from collections.abc import Callable
 
 import numpy as np
-from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
+from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
 
 from drake_disasm.errors import DisasmError
-from drake_disasm.systems.timing import SAMPLING_DELAY
+from drake_disasm.systems.imprecision import clamped
+from drake_disasm.systems.timing import POLICY_DELAY
 
 #: Observation (12,) to action (6,), both in the groove's nominal frame.
 Policy = Callable[[np.ndarray], np.ndarray]
@@ -14,10 +15,6 @@ Policy = Callable[[np.ndarray], np.ndarray]
 
 class PolicySystem(LeafSystem):
     """Asks a policy for an action at the MDP's period and holds it.
-
-    The update is an unrestricted one because Drake carries those out before the
-    discrete updates of the same instant: the pose target then moves by the action
-    that belongs to this observation, without a period's delay.
 
     @system
     name: PolicySystem
@@ -40,14 +37,12 @@ class PolicySystem(LeafSystem):
         self._observation = self.DeclareVectorInputPort("observation", 12)
         action = self.DeclareDiscreteState(6)
         self._action = action
-        self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period, SAMPLING_DELAY, self._update
-        )
+        self.DeclarePeriodicDiscreteUpdateEvent(period, POLICY_DELAY, self._update)
         self.DeclareStateOutputPort("action", action)
 
-    def _update(self, context: Context, state: State) -> EventStatus:
+    def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
         action = ask(self.policy, self._observation.Eval(context), self._bounds)
-        state.get_mutable_discrete_state().set_value(self._action, action)
+        state.set_value(self._action, action)
         return EventStatus.Succeeded()
 
 
@@ -63,9 +58,9 @@ def ask(policy: Policy, observation: np.ndarray, bounds: np.ndarray) -> np.ndarr
             f"the policy returned shape {action.shape}; return 6 numbers "
             "[dx dy dz du dv dw] in m and rad"
         )
-    if not np.all(np.isfinite(action)):
+    if not np.isfinite(action).all():
         raise DisasmError(
             f"the policy returned {action}; an action must be finite (NaN in its "
             "weights or in its input?)"
         )
-    return np.clip(action, -bounds, bounds)
+    return clamped(action, bounds)

@@ -16,7 +16,7 @@ from drake_disasm.spatial import (
     pose_to_vector,
     rotation_from_vector,
 )
-from drake_disasm.systems.timing import SAMPLING_DELAY
+from drake_disasm.systems.timing import MOTION_DELAY
 
 
 class PoseTarget(LeafSystem):
@@ -55,7 +55,7 @@ class PoseTarget(LeafSystem):
         self._to = self.DeclareDiscreteState(start)
         self._pose = self.DeclareDiscreteState(pose)
         self._executed = self.DeclareDiscreteState(6)
-        self.DeclarePeriodicDiscreteUpdateEvent(period, SAMPLING_DELAY, self._update)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, MOTION_DELAY, self._update)
         ticket = {self.xd_ticket()}
         self.DeclareVectorOutputPort(
             "velocity", len(start), self._calc_velocity, prerequisites_of_calc=ticket

@@ -4,14 +4,14 @@ import numpy as np
 from pydrake.systems.framework import (
     BasicVector,
     Context,
+    DiscreteValues,
     EventStatus,
     LeafSystem,
-    State,
 )
 
 from drake_disasm.mdp import REWARD_TERMS, BoltState, outcome, reward_terms
 from drake_disasm.scenario import TaskConfig
-from drake_disasm.systems.timing import SAMPLING_DELAY
+from drake_disasm.systems.timing import POLICY_DELAY
 
 
 class TaskMonitor(LeafSystem):
@@ -19,8 +19,6 @@ class TaskMonitor(LeafSystem):
 
     Read at the end of a period, before its updates, `reward_terms` (in the order
     of REWARD_TERMS) and `outcome` (an `Outcome`) are those of the step just done.
-    The update is an unrestricted one, like the policy's, so that both see the same
-    observation: Drake carries those out before discrete ones.
 
     @system
     name: TaskMonitor
@@ -42,9 +40,7 @@ class TaskMonitor(LeafSystem):
         self._observation = self.DeclareVectorInputPort("observation", 12)
         self._before = self.DeclareDiscreteState(12)
         self._steps = self.DeclareDiscreteState(1)
-        self.DeclarePeriodicUnrestrictedUpdateEvent(
-            task.period, SAMPLING_DELAY, self._update
-        )
+        self.DeclarePeriodicDiscreteUpdateEvent(task.period, POLICY_DELAY, self._update)
         inputs = {self._observation.ticket(), self.xd_ticket()}
         self.DeclareVectorOutputPort(
             "reward_terms",
@@ -56,11 +52,10 @@ class TaskMonitor(LeafSystem):
             "outcome", 1, self._calc_outcome, prerequisites_of_calc=inputs
         )
 
-    def _update(self, context: Context, state: State) -> EventStatus:
+    def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
         steps = context.get_discrete_state(self._steps).value()
-        values = state.get_mutable_discrete_state()
-        values.set_value(self._before, self._observation.Eval(context))
-        values.set_value(self._steps, steps + 1.0)
+        state.set_value(self._before, self._observation.Eval(context))
+        state.set_value(self._steps, steps + 1.0)
         return EventStatus.Succeeded()
 
     def _calc_reward(self, context: Context, output: BasicVector) -> None:

@@ -1,15 +1,24 @@
-"""When the MDP's systems act within a period."""
+"""When the MDP's systems act within a period.
 
-#: The MDP's systems act this long after each multiple of the period [s]. The plant
-#: steps at those multiples too, but k * 0.1 and 40 k * 0.0025 differ in the last bit
-#: for some k, so without the delay some periods would hold a plant step more than
-#: others. It is far above rounding and far below a plant step.
-SAMPLING_DELAY = 1e-6
+The plant steps at every multiple of the period, and k * 0.1 and 40 k * 0.0025 differ in
+the last bit for some k. Acting a little later than the multiple, far more than rounding
+and far less than a plant step, gives every period the same number of plant steps. The
+motion acts after the policy, so that it moves by the action that belongs to this
+period's observation.
+"""
+
+#: Policy and task monitor act this long after each multiple of the period [s].
+POLICY_DELAY = 1e-6
+
+#: The pose target takes up the policy's action this long after it [s].
+MOTION_DELAY = 2e-6
 
 
 def boundary(steps: int, period: float) -> float:
-    """Returns the time [s] between the plant's last step and the MDP's next act.
+    """Returns the time [s] at which the policy acts after `steps` periods.
 
-    What is read there is what the policy will see, and the last step's reward.
+    A simulator advanced to it has made the plant's last step and not yet asked the
+    policy: what is read there is what the policy will see, and the last step's
+    reward. The arithmetic is Drake's own for a periodic event, to the last bit.
     """
-    return steps * period + SAMPLING_DELAY / 2
+    return POLICY_DELAY + steps * period

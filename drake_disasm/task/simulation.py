@@ -13,7 +13,13 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.common import RandomDistribution, RandomGenerator
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import (
+    Context,
+    Diagram,
+    DiagramBuilder,
+    LeafSystem,
+    OutputPort,
+)
 from pydrake.systems.primitives import (
     Adder,
     ConstantVectorSource,
@@ -27,7 +33,7 @@ from drake_disasm.lock import lift_needed
 from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations import CellStation, make_station
-from drake_disasm.systems.imprecision import ImprecisionNoise
+from drake_disasm.systems.imprecision import ImprecisionNoise, clamped
 from drake_disasm.systems.observation import Mounting, ObservationProcessor
 from drake_disasm.systems.policy import Policy, PolicySystem
 from drake_disasm.systems.pose_target import PoseTarget
@@ -90,6 +96,7 @@ class TaskSimulation:
         self.diagram.set_name(f"{scenario.name}_{model}")
         self.simulator = Simulator(self.diagram)
         self.context = self.simulator.get_mutable_context()
+        self._ports: dict[tuple[int, str], tuple[OutputPort, Context]] = {}
         self._start: Context | None = None
         self._effects: list[Effect] | None = None
         self.steps = 0
@@ -125,20 +132,24 @@ class TaskSimulation:
             action: (6,) for a diagram without a policy; clipped to the bounds.
         """
         if action is not None:
-            clipped = np.clip(action, -self.bounds, self.bounds)
-            self._action_source.get_mutable_source_value(
-                self._action_source.GetMyMutableContextFromRoot(self.context)
-            ).SetFromVector(clipped)
+            self._set_action(action)
         self.steps += 1
         self.simulator.AdvanceTo(boundary(self.steps, self.scenario.task.period))
-        terms = self.monitor.GetOutputPort("reward_terms").Eval(self._monitor_context)
-        code = self.monitor.GetOutputPort("outcome").Eval(self._monitor_context)
+        terms = self.evaluate(self.monitor, "reward_terms")
+        code = self.evaluate(self.monitor, "outcome")
         named = dict(zip(REWARD_TERMS, terms.tolist(), strict=True))
         return StepResult(self.observation(), named, Outcome(int(code[0])))
 
+    def _set_action(self, action: np.ndarray) -> None:
+        if self._action_source is None:
+            raise ValueError("this diagram's policy chooses the actions")
+        context = self._action_source.GetMyMutableContextFromRoot(self.context)
+        value = self._action_source.get_mutable_source_value(context)
+        value.SetFromVector(clamped(action, self.bounds))
+
     def observation(self) -> np.ndarray:
         """Returns the present state (12,)."""
-        return self.processor.GetOutputPort("observation").Eval(self._processor_context)
+        return self.evaluate(self.processor, "observation")
 
     @property
     def time(self) -> float:
@@ -158,8 +169,12 @@ class TaskSimulation:
 
     def evaluate(self, system: Diagram | LeafSystem, port: str) -> np.ndarray:
         """Returns the present value of a system's output port."""
-        context = system.GetMyContextFromRoot(self.context)
-        return system.GetOutputPort(port).Eval(context)
+        key = (id(system), port)
+        if key not in self._ports:
+            context = system.GetMyContextFromRoot(self.context)
+            self._ports[key] = (system.GetOutputPort(port), context)
+        output, context = self._ports[key]
+        return output.Eval(context)
 
     def bolt_is_out(self) -> bool:
         """Returns whether the bolt truly is out, which only a simulation knows."""
@@ -253,6 +268,7 @@ class TaskSimulation:
 
     def _add_policy(self, builder: DiagramBuilder, policy: Policy | None) -> None:
         self.policy_system: PolicySystem | None = None
+        self._action_source: ConstantVectorSource | None = None
         if policy is None:
             self._action_source = builder.AddNamedSystem(
                 "action", ConstantVectorSource(np.zeros(6))
@@ -283,14 +299,6 @@ class TaskSimulation:
             self.station.reading_at_zeroing(settled),
         )
         return root
-
-    @property
-    def _monitor_context(self) -> Context:
-        return self.monitor.GetMyContextFromRoot(self.context)
-
-    @property
-    def _processor_context(self) -> Context:
-        return self.processor.GetMyContextFromRoot(self.context)
 
 
 def copy_state(source: Context, target: Context) -> None:

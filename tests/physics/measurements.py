@@ -169,7 +169,7 @@ def _lines() -> Iterator[str]:
             normal, friction = sliding(mu, offset)
             yield f"  {mu} {normal:.3f} {friction:.3f} {friction / normal:.4f}"
     for model, steps in (
-        ("twin", (0.00125, 0.0025, 0.005, 0.01)),
+        ("twin", (0.0025, 0.005, 0.01, 0.02)),
         ("cell", (0.000625, 0.00125, 0.0025, 0.005)),
     ):
         for policy in ("admittance", "straight"):

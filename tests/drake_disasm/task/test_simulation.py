@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import LeafSystem
 
 from drake_disasm.effects import GroovePose, SensorBias
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
+from drake_disasm.systems.timing import POLICY_DELAY, boundary
 from drake_disasm.task.episode import EpisodeRecorder, run_episode, summary_table
 from drake_disasm.task.simulation import TaskSimulation
 
@@ -70,6 +73,25 @@ def test_rewards_telescope(simulation: TaskSimulation) -> None:
     progress = sum(result.reward_terms["progress"] for result in results)
     way_mm = 1e3 * (results[-1].observation[0] - first[0])
     assert progress == pytest.approx(1.6 * way_mm, rel=1e-12)
+
+
+@pytest.mark.parametrize("period", [0.1, 0.05, 0.3, 0.07])
+def test_drake_agrees_on_when_the_policy_acts(period: float) -> None:
+    """Nothing is left over between a period's end and the next one's start."""
+    times: list[float] = []
+
+    class Watch(LeafSystem):
+        def __init__(self) -> None:
+            super().__init__()
+            self.DeclarePeriodicPublishEvent(
+                period, POLICY_DELAY, lambda context: times.append(context.get_time())
+            )
+
+    simulator = Simulator(Watch())
+    simulator.Initialize()
+    simulator.AdvanceTo(2000 * period)
+    assert times == [boundary(k, period) for k in range(len(times))]
+    assert len(times) == 2000
 
 
 def test_step_limit_truncates() -> None:
