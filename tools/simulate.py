@@ -32,6 +32,7 @@ _EXAMPLES = """examples:
   python tools/simulate.py --model twin --no-meshcat --episodes 10 --record out/log
   python tools/simulate.py --set lock.clearance=0.0002 --set contact.friction=0.3
   python tools/simulate.py --html out/removal.html      a page that plays offline
+  python tools/simulate.py --no-meshcat --episodes 100 --record out/log --resume
 """
 
 
@@ -77,6 +78,11 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
         help="of the first episode; the next ones count on (default: 0)",
     )
     add("--record", type=Path, metavar="DIR", help="write a log into an empty folder")
+    add(
+        "--resume",
+        action="store_true",
+        help="with --record: go on with the log in the folder, which was interrupted",
+    )
 
 
 def _add_view_arguments(add: Callable[..., object]) -> None:
@@ -105,6 +111,8 @@ def _add_view_arguments(add: Callable[..., object]) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
+    if args.resume and not args.record:
+        raise DisasmError("--resume: say which log by --record DIR")
     scenario = load_scenario(args.scenario, args.overrides)
     policy = cli.named_policy(args.policy)
     writer = _open_log(args, arguments, scenario) if args.record else None
@@ -113,7 +121,8 @@ def main(arguments: Sequence[str]) -> int:
     simulation.simulator.set_target_realtime_rate(_rate(args))
     summaries: list[EpisodeSummary] = []
     try:
-        for seed in range(args.seed, args.seed + args.episodes):
+        done = writer.next_number if writer else 0
+        for seed in range(args.seed + done, args.seed + args.episodes):
             summaries.append(_run_one(simulation, seed, writer, view))
     finally:
         if summaries:
@@ -169,7 +178,7 @@ def _open_log(
         joints=joints if args.model == "cell" else (),
         scenario=scenario_to_mapping(scenario),
     )
-    return LogWriter(args.record, header)
+    return LogWriter(args.record, header, resume=args.resume)
 
 
 def _open_view(args: argparse.Namespace) -> MeshcatView | None:

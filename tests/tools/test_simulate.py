@@ -165,6 +165,18 @@ def test_interrupt_prints_what_was_done(tmp_path: Path) -> None:
     assert len(read_log(tmp_path / "log").episodes) >= 3
 
 
+def test_resume_ends_with_the_same_episodes(simulate: Runner, tmp_path: Path) -> None:
+    run = (*TWIN, "--policy", "straight", "--episodes")
+    assert simulate(*run, "3", "--record", "whole").returncode == 0
+    assert simulate(*run, "1", "--record", "broken").returncode == 0
+    done = simulate(*run, "3", "--record", "broken", "--resume")
+    assert done.returncode == 0, done.stderr
+    assert "0 of 2 episodes" in done.stdout
+    whole, broken = (read_log(tmp_path / name) for name in ("whole", "broken"))
+    assert broken.data_hash == whole.data_hash
+    _assert_one_line(simulate("--resume"), ["--resume", "--record"])
+
+
 def test_help_teaches(simulate: Runner) -> None:
     done = simulate("--help")
     assert done.returncode == 0
