@@ -20,8 +20,8 @@ from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable
 from pydrake.solvers import Solve
 
 from drake_disasm.errors import DisasmError
+from drake_disasm.models import add_arm
 from drake_disasm.scenario import ArmConfig
-from drake_disasm.tool import add_model
 
 _TOLERANCE = 1e-5  # m, of inverse kinematics
 _SOLUTION = DifferentialInverseKinematicsStatus.kSolutionFound
@@ -177,9 +177,7 @@ def _arm_alone(
     arm: ArmConfig, X_FB: RigidTransform
 ) -> tuple[MultibodyPlant, FixedOffsetFrame]:
     plant = MultibodyPlant(0.0)
-    instance = add_model(plant, arm.model)
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0", instance))
-    flange = plant.GetFrameByName("iiwa_link_ee", instance)
+    _, flange = add_arm(plant, arm.model)
     frame_B = plant.AddFrame(FixedOffsetFrame("bolt", flange, X_FB))
     plant.Finalize()
     return plant, frame_B

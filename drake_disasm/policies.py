@@ -41,8 +41,11 @@ class Admittance:
         lift: force at which it stands still along y [N].
         lift_speed: greatest step along y [m].
         lifted: rise from which on it keeps lifting [m].
-        compliance: step per force [m/N], across and along.
-        rotation: step per torque [rad/(N m)].
+        yield_compliance: step per force across the motion [m/N]. Times the arm's
+            stiffness it must stay below 1, or the yielding overshoots.
+        push_compliance: step per force along x while pushing [m/N].
+        lift_compliance: step per force along y while lifting [m/N].
+        rotation_compliance: step per torque [rad/(N m)].
     """
 
     speed: float = 0.0008
@@ -51,19 +54,22 @@ class Admittance:
     lift: float = 8.0
     lift_speed: float = 0.0015
     lifted: float = 0.0008
-    compliance: float = 2.5e-5
-    rotation: float = 1.5e-3
+    yield_compliance: float = 2.5e-5
+    push_compliance: float = 7.5e-5
+    lift_compliance: float = 2e-4
+    rotation_compliance: float = 1.5e-3
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
         """Returns the action (6,) for an observation (12,)."""
         y, f, t = observation[1], observation[6:9], observation[9:12]
-        yielding = np.concatenate([self.compliance * f, self.rotation * t])
-        out = y > self.lifted
-        if not out:
-            yielding[0] = min(self.speed, self.compliance * 3 * (self.push + f[0]))
-        if out or f[0] < -self.stop:
-            yielding[1] = min(self.lift_speed, self.compliance * 8 * (self.lift + f[1]))
-        return yielding
+        move, turn = self.yield_compliance * f, self.rotation_compliance * t
+        lifting = y > self.lifted
+        if not lifting:
+            move[0] = min(self.speed, self.push_compliance * (self.push + f[0]))
+        if lifting or f[0] < -self.stop:
+            lift = self.lift_compliance * (self.lift + f[1])
+            move[1] = min(self.lift_speed, lift)
+        return np.concatenate([move, turn])
 
 
 #: The policies that can be named.

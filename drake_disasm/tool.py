@@ -8,7 +8,6 @@ from typing import Self
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     Frame,
@@ -17,9 +16,8 @@ from pydrake.multibody.tree import (
     WeldJoint,
 )
 
-from drake_disasm.errors import DisasmError
 from drake_disasm.lock import bolt_inertia, lip_height
-from drake_disasm.resources import model_path, package_map
+from drake_disasm.models import add_model
 from drake_disasm.scenario import Scenario
 
 FINGERS = ("left_finger_joint", "right_finger_joint")
@@ -103,22 +101,6 @@ def add_tool(plant: MultibodyPlant, frame_F: Frame, scenario: Scenario) -> ToolM
     )
     frame_T = plant.GetFrameByName("tcp", gripper)
     return ToolModels(joint, frame_S, frame_T, sensor, gripper)
-
-
-def add_model(plant: MultibodyPlant, url: str) -> ModelInstanceIndex:
-    """Adds the one model of a file to the plant.
-
-    Raises:
-        DisasmError: the file is missing or is not a model.
-    """
-    path = model_path(url)
-    parser = Parser(plant)
-    parser.package_map().AddMap(package_map())
-    try:
-        return parser.AddModels(str(path))[0]
-    except RuntimeError as error:
-        reason = " ".join(str(error).split())
-        raise DisasmError(f"model file {url} can't be read: {reason}") from None
 
 
 def grasp_pose(scenario: Scenario) -> RigidTransform:

@@ -17,7 +17,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, EventStatus, Leaf
 
 from drake_disasm.errors import DisasmError
 from drake_disasm.spatial import pose_from_vector
-from drake_disasm.task.simulation import Observer, TaskSimulation
+from drake_disasm.task.simulation import TaskSimulation
 
 _FRAME_PERIOD = 1.0 / 32.0  # s
 _NEWTONS_PER_METRE = 150.0  # of the wrench arrow's length
@@ -42,8 +42,10 @@ def start_meshcat(host: str = "localhost") -> Meshcat:
         raise DisasmError(f"Meshcat can't listen on {host}: {error}") from None
 
 
-class MeshcatView(Observer):
+class MeshcatView:
     """Shows robot, lock, contact forces, the wrench on the bolt and its path.
+
+    An observer of a TaskSimulation.
 
     Args:
         meshcat: the server.

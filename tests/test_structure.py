@@ -12,7 +12,7 @@ FLOORS = (
     {"errors", "quantity", "resources", "spatial"},
     {"effects"},
     {"scenario", "ports"},
-    {"mdp", "lock", "devices"},
+    {"mdp", "lock", "devices", "models"},
     {"tool"},
     {"coordinates"},
     {"systems"},

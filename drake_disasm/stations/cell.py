@@ -5,7 +5,6 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     Frame,
-    ModelInstanceIndex,
     PdControllerGains,
 )
 from pydrake.systems.controllers import InverseDynamics
@@ -19,10 +18,11 @@ from pydrake.systems.primitives import (
 
 from drake_disasm.coordinates import ArmCoordinates
 from drake_disasm.lock import add_lock, plate_bottom
+from drake_disasm.models import add_arm, add_model
 from drake_disasm.ports import CELL_PORTS
-from drake_disasm.scenario import ArmConfig, Scenario
+from drake_disasm.scenario import Scenario
 from drake_disasm.stations.simulated import SimulatedStation, export
-from drake_disasm.tool import FINGERS, Tool, add_model, add_tool, grasp_pose
+from drake_disasm.tool import FINGERS, Tool, add_tool, grasp_pose
 
 _BENCH = "package://disasm_models/bench/bench.urdf"
 _ARM_INERTIA = 4.0  # kg m^2, of a joint with its rotor, for the damping ratio
@@ -88,7 +88,7 @@ class CellStation(SimulatedStation):
             config.arm, self.X_WG, self.tool.X_FB, config.task.period
         )
         self.start = self.coordinates.start(RigidTransform())
-        self.iiwa, flange = add_arm(plant, config.arm)
+        self.iiwa, flange = add_arm(plant, config.arm.model)
         self.tool_models = add_tool(plant, flange, config)
         self.lock = add_lock(plant, frame_Gn, config.lock, config.contact)
         self._add_bench(frame_Gn)
@@ -166,7 +166,7 @@ class CellStation(SimulatedStation):
     def _add_gravity_compensation(self, builder: DiagramBuilder) -> None:
         """Adds what the controller's own model of arm and tool says of gravity."""
         plant = MultibodyPlant(0.0)
-        _, flange = add_arm(plant, self.scenario.arm)
+        _, flange = add_arm(plant, self.scenario.arm.model)
         load = plant.AddRigidBody("tool", plant.AddModelInstance("tool"), self.tool.M_F)
         plant.WeldFrames(flange, load.body_frame())
         plant.Finalize()
@@ -232,13 +232,6 @@ class CellStation(SimulatedStation):
         """
         pressed = self.scenario.lock.grip_size[2] - 2.0 * _PAD_INDENTATION
         return max(self.grip_command, pressed)
-
-
-def add_arm(plant: MultibodyPlant, arm: ArmConfig) -> tuple[ModelInstanceIndex, Frame]:
-    """Adds the arm on the world's origin; returns its instance and flange frame."""
-    instance = add_model(plant, arm.model)
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0", instance))
-    return instance, plant.GetFrameByName("iiwa_link_ee", instance)
 
 
 def _set_spring(plant: MultibodyPlant, index: int, k: float, d: float) -> None:

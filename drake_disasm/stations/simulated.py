@@ -171,16 +171,24 @@ class SimulatedStation(Station):
             [e for e in effects if isinstance(e, SensorEffect)],
         )
 
-    def settled(self, effects: Sequence[Effect]) -> Context:
-        """Returns a Context of this station alone: bolt gripped at A, at rest."""
+    def at_start(self, effects: Sequence[Effect]) -> Simulator:
+        """Returns a simulator of this station alone, commanded to stay at A.
+
+        Its Context is at time zero; `Initialize` it after any further change.
+        """
         simulator = Simulator(self)
         context = simulator.get_mutable_context()
         self.set_effects(context, effects)
         self._place_at_start(context)
         self._fix_commands(context)
+        return simulator
+
+    def settled(self, effects: Sequence[Effect]) -> Context:
+        """Returns a Context of this station alone: bolt gripped at A, at rest."""
+        simulator = self.at_start(effects)
         simulator.Initialize()
         simulator.AdvanceTo(self.settling_time)
-        return context
+        return simulator.get_mutable_context()
 
     def reading_at_zeroing(self, context: Context) -> np.ndarray:
         """Returns what the sensor reads, noise averaged away, (6,) [f; tau] in S."""
@@ -197,8 +205,7 @@ class SimulatedStation(Station):
         return self.GetMutableSubsystemContext(part, context)
 
     def _place_at_start(self, context: Context) -> None:
-        """Puts the plant's state where an episode starts."""
-        raise AssertionError("each station places its own bodies")
+        """Puts the plant's state where an episode starts, if not at its zeros."""
 
     def _fix_commands(self, context: Context) -> None:
         """Commands the start, for a station that stands alone."""

@@ -134,9 +134,6 @@ class TwinStation(SimulatedStation):
         super()._fix_commands(context)
         self.GetInputPort("bolt.velocity").FixValue(context, np.zeros(6))
 
-    def _place_at_start(self, context: Context) -> None:
-        """At the joints' zeros B coincides with Gn already."""
-
 
 def _axis_joint(axis: int, parent: Frame, child: Frame) -> Joint:
     kind = PrismaticJoint if axis < 3 else RevoluteJoint

@@ -9,6 +9,7 @@ policy -> imprecision -> pose target -> motion -> station -> observation
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from pydrake.common import RandomDistribution, RandomGenerator
@@ -74,8 +75,8 @@ class TaskSimulation:
         scenario: what the diagram denotes.
         model: "cell" or "twin".
         policy: observation (12,) to action (6,), or None.
-        observers: LeafSystems to add (visualisers); each `connect(builder, self)`
-            is called before the diagram is built.
+        observers: what watches it (a view); each one's `connect(builder, self)` is
+            called before the diagram is built.
     """
 
     def __init__(
@@ -313,9 +314,8 @@ def copy_state(source: Context, target: Context) -> None:
         values.get_mutable_value(i).SetFrom(source.get_abstract_state().get_value(i))
 
 
-class Observer:
+class Observer(Protocol):
     """Something that watches the diagram: adds itself before it is built."""
 
     def connect(self, builder: DiagramBuilder, simulation: TaskSimulation) -> None:
         """Adds systems to the builder and connects them to the simulation's."""
-        raise AssertionError("each observer connects itself")

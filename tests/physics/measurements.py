@@ -11,7 +11,6 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
-from pydrake.systems.analysis import Simulator
 
 from drake_disasm.effects import GroovePose
 from drake_disasm.mdp import Outcome
@@ -103,11 +102,8 @@ def pushed(
         wrench_G: [f; tau] on the bolt at Bo in G, from the start on.
         duration: how long [s].
     """
-    simulator = Simulator(station)
+    simulator = station.at_start([AWAY])
     context = simulator.get_mutable_context()
-    station.set_effects(context, [AWAY])
-    station._place_at_start(context)
-    station._fix_commands(context)
     R_WG, w = station.X_WG.rotation().matrix(), np.array(wrench_G)
     force = ExternallyAppliedSpatialForce()
     force.body_index = station.lock.bolt.index()
