@@ -57,8 +57,8 @@ class Lock:
         groove, bolt: bodies whose frames are G and B.
         frame: the frame that the groove is welded to; its pose in Gn is a
             parameter of the plant's Context.
-        groove_ids, bolt_ids: collision geometries of groove, and of the bolt's
-            neck and head.
+        groove_ids: collision geometries of the groove.
+        bolt_ids: collision geometries of the bolt's "neck" and "head".
         resolution: edge length on the bolt's mesh [m].
         nominal: the environment that the scenario denotes before effects.
     """
@@ -68,7 +68,7 @@ class Lock:
     bolt: RigidBody
     frame: FixedOffsetFrame
     groove_ids: tuple[GeometryId, ...]
-    bolt_ids: tuple[GeometryId, ...]
+    bolt_ids: dict[str, GeometryId]
     resolution: float
     nominal: Environment
 
@@ -110,7 +110,11 @@ def add_lock(
     """Adds groove (welded to a movable frame in Gn) and bolt (free) to the plant."""
     frame = plant.AddFrame(FixedOffsetFrame("groove_pose", frame_Gn, RigidTransform()))
     nominal = Environment(
-        RigidTransform(), contact.friction, contact.modulus, contact.dissipation
+        X_GnG=RigidTransform(),
+        friction=contact.friction,
+        modulus=contact.modulus,
+        head_modulus=contact.head_modulus,
+        dissipation=contact.dissipation,
     )
     groove = plant.AddRigidBody(
         "groove", plant.AddModelInstance("lock"), _groove_inertia(lock)
@@ -136,39 +140,48 @@ def set_environment(
     """Writes the environment into plant's and scene graph's Contexts."""
     lock.frame.SetPoseInParentFrame(plant_context, environment.X_GnG)
     source = lock.groove.GetParentPlant().get_source_id()
-    groove, bolt = _materials(environment, lock.resolution)
-    for ids, properties in ((lock.groove_ids, groove), (lock.bolt_ids, bolt)):
-        for geometry_id in ids:
-            scene_graph.AssignRole(
-                scene_graph_context,
-                source,
-                geometry_id,
-                properties,
-                RoleAssign.kReplace,
-            )
-
-
-def _materials(
-    environment: Environment, resolution: float
-) -> tuple[ProximityProperties, ProximityProperties]:
-    """Returns the contact properties of the groove and of the bolt's neck and head."""
-    mu = CoulombFriction(environment.friction, environment.friction)
-    groove, bolt = ProximityProperties(), ProximityProperties()
-    for properties in (groove, bolt):
-        AddContactMaterial(
-            dissipation=environment.dissipation, friction=mu, properties=properties
+    materials = _bolt_materials(environment, lock.resolution)
+    groove = _groove_material(environment)
+    changes = [(geometry_id, groove) for geometry_id in lock.groove_ids]
+    changes += [(lock.bolt_ids[name], materials[name]) for name in materials]
+    for geometry_id, properties in changes:
+        scene_graph.AssignRole(
+            scene_graph_context, source, geometry_id, properties, RoleAssign.kReplace
         )
-    AddRigidHydroelasticProperties(resolution_hint=1.0, properties=groove)
-    AddCompliantHydroelasticProperties(
-        resolution_hint=resolution,
-        hydroelastic_modulus=environment.modulus,
-        properties=bolt,
+
+
+def _surface(environment: Environment) -> ProximityProperties:
+    """Returns what the surfaces of groove, neck and head have in common."""
+    properties = ProximityProperties()
+    AddContactMaterial(
+        dissipation=environment.dissipation,
+        friction=CoulombFriction(environment.friction, environment.friction),
+        properties=properties,
     )
-    for properties in (groove, bolt):
-        # Speculative contact within a margin would be a quarter of the play here,
-        # and it changes nothing but the speed (docs/physics.md).
-        properties.AddProperty("hydroelastic", "margin", 0.0)
-    return groove, bolt
+    # Speculative contact within a margin would be a quarter of the play here, and it
+    # changes nothing but the speed (docs/physics.md).
+    properties.AddProperty("hydroelastic", "margin", 0.0)
+    return properties
+
+
+def _groove_material(environment: Environment) -> ProximityProperties:
+    properties = _surface(environment)
+    AddRigidHydroelasticProperties(resolution_hint=1.0, properties=properties)
+    return properties
+
+
+def _bolt_materials(
+    environment: Environment, resolution: float
+) -> dict[str, ProximityProperties]:
+    """Returns the materials of neck and head by name.
+
+    The head may be much softer and coarser than the neck: it touches with flat faces
+    or where there is room, and only the neck's place in the slot asks for precision.
+    """
+    neck, head = _surface(environment), _surface(environment)
+    AddCompliantHydroelasticProperties(resolution, environment.modulus, neck)
+    AddCompliantHydroelasticProperties(2 * resolution, environment.head_modulus, head)
+    return {"neck": neck, "head": head}
 
 
 def groove_boxes(lock: LockConfig) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -205,7 +218,7 @@ def groove_boxes(lock: LockConfig) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 def _add_groove_geometry(
     plant: MultibodyPlant, body: RigidBody, lock: LockConfig, nominal: Environment
 ) -> tuple[GeometryId, ...]:
-    properties, _ = _materials(nominal, 1.0)
+    properties = _groove_material(nominal)
     ids = []
     for name, (low, high) in groove_boxes(lock).items():
         X_GP, shape = RigidTransform((low + high) / 2), Box(*(high - low))
@@ -220,16 +233,18 @@ def _add_bolt_geometry(
     lock: LockConfig,
     resolution: float,
     nominal: Environment,
-) -> tuple[GeometryId, ...]:
-    _, properties = _materials(nominal, resolution)
-    ids = []
+) -> dict[str, GeometryId]:
+    """Returns the collision geometries of neck and head by name."""
+    materials = _bolt_materials(nominal, resolution)
+    materials["grip"] = _grip_material(nominal)
+    ids = {}
     for name, X_BP, shape in _bolt_parts(lock):
         plant.RegisterVisualGeometry(body, X_BP, shape, f"{name}_visual", _STEEL)
-        part = properties if name != "grip" else _grip_material(nominal)
-        part_id = plant.RegisterCollisionGeometry(body, X_BP, shape, name, part)
-        if name != "grip":
-            ids.append(part_id)
-    return tuple(ids)
+        ids[name] = plant.RegisterCollisionGeometry(
+            body, X_BP, shape, name, materials[name]
+        )
+    del ids["grip"]
+    return ids
 
 
 def _bolt_parts(lock: LockConfig) -> list[tuple[str, RigidTransform, Shape]]:

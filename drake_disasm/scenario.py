@@ -36,7 +36,7 @@ class SimulationConfig:
     """How the MultibodyPlant is discretised (how chosen: docs/physics.md)."""
 
     cell_time_step: float = quantity(0.0025, "s", "of the cell", low=1e-4, high=0.02)
-    twin_time_step: float = quantity(0.01, "s", "of the twin", low=1e-4, high=0.02)
+    twin_time_step: float = quantity(0.005, "s", "of the twin", low=1e-4, high=0.02)
     stiction_tolerance: float = quantity(
         1e-5, "m/s", "creep at which friction is full", low=1e-7, high=1e-2
     )
@@ -84,7 +84,10 @@ class ContactConfig:
     """Hydroelastic contact: the groove is rigid, the bolt's neck and head yield."""
 
     modulus: float = quantity(
-        4e9, "Pa", "hydroelastic modulus of the bolt", low=1e6, high=1e11
+        4e9, "Pa", "hydroelastic modulus of the bolt's neck", low=1e6, high=1e11
+    )
+    head_modulus: float = quantity(
+        4e7, "Pa", "hydroelastic modulus of the bolt's head", low=1e5, high=1e11
     )
     dissipation: float = quantity(20.0, "s/m", "Hunt-Crossley", low=0.0, high=500.0)
     friction: float = quantity(0.2, "1", "Coulomb, static = dynamic", low=0, high=2)

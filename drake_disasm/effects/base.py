@@ -30,13 +30,14 @@ class Environment:
     Attributes:
         X_GnG: pose of the true groove frame in the groove's nominal frame.
         friction: Coulomb coefficient between bolt and groove (static = dynamic).
-        modulus: hydroelastic modulus of the bolt's neck and head [Pa].
+        modulus, head_modulus: hydroelastic moduli of the bolt's neck and head [Pa].
         dissipation: Hunt-Crossley dissipation of the contact [s/m].
     """
 
     X_GnG: RigidTransform
     friction: float
     modulus: float
+    head_modulus: float
     dissipation: float
 
 

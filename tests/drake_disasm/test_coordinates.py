@@ -57,3 +57,16 @@ def test_a_motion_beyond_the_limits_is_one_line(cell: CellStation) -> None:
     assert isinstance(cell.coordinates, ArmCoordinates)
     with pytest.raises(DisasmError, match=r"can't follow.*placement\.p_WG"):
         cell.coordinates.solve(RigidTransform([0.9, 0.5, 0.0]), cell.start)
+
+
+def test_a_turn_beyond_the_joints_limits_is_one_line(cell: CellStation) -> None:
+    """The bolt's place alone could be kept: the orientation must not be lost."""
+    X_GB = RigidTransform([0.0, 0.05, 0.0])
+    assert isinstance(cell.coordinates, ArmCoordinates)
+    q = cell.coordinates.start(X_GB)
+    with pytest.raises(DisasmError, match=r"can't follow"):
+        for _ in range(100):  # a degree at a time, until joint 6 is at its end
+            turned = RollPitchYaw(0, 0, np.deg2rad(1)).ToRotationMatrix()
+            X_GB = RigidTransform(turned @ X_GB.rotation(), X_GB.translation())
+            q = cell.coordinates.solve(X_GB, q)
+            assert _error(X_GB, cell.coordinates.pose(q))[1] < 1e-3

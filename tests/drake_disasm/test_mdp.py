@@ -76,3 +76,24 @@ def test_terminated_and_truncated_are_told_apart() -> None:
     assert ends.pop(Outcome.RUNNING) == (False, False)
     assert ends.pop(Outcome.STEP_LIMIT) == (False, True)
     assert set(ends.values()) == {(True, False)}
+
+
+def test_reward_is_that_of_equation_4_3() -> None:
+    """2 mm on and 3 mm up beyond 55 mm, at 8 N and 1 N m."""
+    task = load_scenario("removal").task
+    terms = reward_terms(_state(56, 1), _state(58, 4, f=8, t=1), task)
+    expected = {"progress": 1.6 * 2, "force": -0.12, "torque": -0.06, "lift": 5.0 * 3}
+    assert terms == pytest.approx(expected)
+
+
+def test_limits_are_passed_only_when_exceeded(task: TaskConfig) -> None:
+    f, t = task.reward.f_max, task.reward.t_max
+    assert outcome(_state(f=f, t=t), 5, task, LIFT) is Outcome.RUNNING
+
+
+def test_state_is_read_in_the_order_of_the_observation() -> None:
+    state = BoltState.from_vector(np.arange(12.0))
+    np.testing.assert_array_equal(state.p, [0, 1, 2])
+    np.testing.assert_array_equal(state.r, [3, 4, 5])
+    assert state.force == pytest.approx(np.sqrt(36 + 49 + 64))
+    assert state.torque == pytest.approx(np.sqrt(81 + 100 + 121))

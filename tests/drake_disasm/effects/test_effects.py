@@ -25,7 +25,7 @@ from drake_disasm.task.simulation import TaskSimulation
 
 G_W = np.array([0.0, 0.0, -9.81])
 ORIENTATIONS = [(0, 0, 0), (np.pi, 0, 0), (0.3, -0.8, 2.0), (np.pi / 2, 0, 0)]
-ENVIRONMENT = Environment(RigidTransform([0.001, 0, 0]), 0.2, 1e9, 20.0)
+ENVIRONMENT = Environment(RigidTransform([0.001, 0, 0]), 0.2, 1e9, 1e8, 20.0)
 
 
 def _sensing(rpy: tuple[float, float, float], time: float = 1.0) -> Sensing:

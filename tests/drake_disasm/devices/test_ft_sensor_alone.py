@@ -1,0 +1,176 @@
+"""The sensor system by itself: made-up reactions in, readings out."""
+
+import numpy as np
+import pytest
+from pydrake.common import RandomGenerator
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.tree import BodyIndex, JointIndex
+from pydrake.systems.framework import Context
+
+from drake_disasm.devices.ft_sensor import ForceTorqueSensor, quantise
+from drake_disasm.effects import PayloadError, Sensing, SensorBias, SensorEffect
+from drake_disasm.ports import Health
+from drake_disasm.scenario import SensorConfig, load_scenario
+from drake_disasm.task.simulation import TaskSimulation
+
+G_W = np.array([0.0, 0.0, -9.81])
+LOAD = np.array([1.0, -2.0, 3.0, 0.1, -0.2, 0.3])  # [f; tau] on the sensor, in S
+R_BODY_S = RollPitchYaw(0.1, 0.2, 0.3).ToRotationMatrix()
+R_W_BODY = RollPitchYaw(-0.5, 0.4, 1.0).ToRotationMatrix()
+JOINT, BODY = 2, 1
+
+
+def _sensor(
+    noise: float = 0.0, quantum: float = 0.0, load: np.ndarray = LOAD
+) -> tuple[ForceTorqueSensor, Context]:
+    """A sensor at joint 2 and body 1, whose reaction is minus the load."""
+    config = SensorConfig(noise=[noise] * 6, quantum=[quantum] * 6)
+    X_BodyS = RigidTransform(R_BODY_S, [1, 2, 3])
+    sensor = ForceTorqueSensor(config, JointIndex(JOINT), BodyIndex(BODY), X_BodyS, G_W)
+    context = sensor.CreateDefaultContext()
+    other = SpatialForce(tau=[9, 9, 9], f=[9, 9, 9])
+    reaction = SpatialForce(tau=-load[3:], f=-load[:3])
+    forces = Value[list[SpatialForce]]([other, other, reaction])
+    poses = Value[list[RigidTransform]]([RigidTransform(), RigidTransform(R_W_BODY)])
+    sensor.GetInputPort("reaction_forces").FixValue(context, forces)
+    sensor.GetInputPort("body_poses").FixValue(context, poses)
+    sensor.GetInputPort("noise").FixValue(context, np.array([1, 2, 3, -1, -2, -3.0]))
+    return sensor, context
+
+
+def _reading(sensor: ForceTorqueSensor, context: Context) -> np.ndarray:
+    return sensor.GetOutputPort("wrench").Eval(context)
+
+
+def test_reads_minus_the_reaction_forces_first() -> None:
+    np.testing.assert_array_equal(_reading(*_sensor()), LOAD)
+
+
+def test_noise_is_scaled_and_added() -> None:
+    expected = LOAD + 0.1 * np.array([1, 2, 3, -1, -2, -3])
+    np.testing.assert_allclose(_reading(*_sensor(noise=0.1)), expected)
+
+
+def test_zeroing_averages_noise_and_counts_away() -> None:
+    sensor, context = _sensor(noise=0.1, quantum=0.5)
+    np.testing.assert_array_equal(sensor.reading_at_zeroing(context), LOAD)
+
+
+@pytest.mark.parametrize("quantum", [0.3, 0.07])
+def test_reading_is_the_nearest_whole_count(quantum: float) -> None:
+    reading = _reading(*_sensor(quantum=quantum))
+    assert np.abs(reading - LOAD).max() <= quantum / 2 + 1e-12
+    counts = reading / quantum
+    np.testing.assert_allclose(counts, np.round(counts), atol=1e-12)
+
+
+def test_quantise_leaves_channels_without_a_quantum() -> None:
+    values = np.array([0.123, 0.123, -0.5])
+    quantum = np.array([0.0, 0.1, 0.2])
+    np.testing.assert_allclose(quantise(values, quantum), [0.123, 0.1, -0.4])
+
+
+@pytest.mark.parametrize(
+    ("load", "health"),
+    [(np.zeros(6), Health.NO_DATA), (LOAD, Health.READY), (np.eye(6)[4], Health.READY)],
+)
+def test_health(load: np.ndarray, health: Health) -> None:
+    sensor, context = _sensor(load=load)
+    assert sensor.GetOutputPort("health").Eval(context)[0] == health
+
+
+def test_effects_see_the_sensors_own_orientation() -> None:
+    sensor, context = _sensor()
+    sensor.set_effects(context, [PayloadError(mass=0.5, cz=0.05)])
+    g_S = (R_W_BODY @ R_BODY_S).matrix().T @ G_W
+    expected = LOAD + np.concatenate([0.5 * g_S, np.cross([0, 0, 0.05], g_S)])
+    np.testing.assert_allclose(_reading(sensor, context), expected, atol=1e-14)
+
+
+class _Doubling(SensorEffect):
+    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+        return 2.0 * wrench_S
+
+
+def test_effects_act_in_their_order() -> None:
+    sensor, context = _sensor()
+    bias = SensorBias(fx=1.0)
+    sensor.set_effects(context, [bias, _Doubling()])
+    assert _reading(sensor, context)[0] == 2.0 * (LOAD[0] + 1.0)
+    sensor.set_effects(context, [_Doubling(), bias])
+    assert _reading(sensor, context)[0] == 2.0 * LOAD[0] + 1.0
+
+
+def test_zeroing_sees_only_what_is_present_then() -> None:
+    sensor, context = _sensor()
+    sensor.set_effects(context, [SensorBias(fx=1.0), PayloadError(mass=0.5)])
+    g_S = (R_W_BODY @ R_BODY_S).matrix().T @ G_W
+    expected = LOAD + np.concatenate([0.5 * g_S, np.zeros(3)])
+    np.testing.assert_allclose(sensor.reading_at_zeroing(context), expected, atol=1e-14)
+
+
+def test_effects_belong_to_the_context() -> None:
+    """Two Contexts of one sensor, as two episodes side by side have."""
+    sensor, biased = _sensor()
+    clean = biased.Clone()
+    sensor.set_effects(biased, [SensorBias(fx=1.0)])
+    np.testing.assert_array_equal(_reading(sensor, clean), LOAD)
+    assert _reading(sensor, biased)[0] == LOAD[0] + 1.0
+
+
+def test_time_is_that_of_the_context() -> None:
+    sensor, context = _sensor()
+    context.SetTime(1.25)
+    assert sensor.GetOutputPort("time_measured").Eval(context)[0] == 1.25
+
+
+@pytest.fixture(scope="module")
+def noisy() -> tuple[TaskSimulation, np.ndarray]:
+    """A twin at rest without counts, and 3000 of its readings at the period."""
+    simulation = TaskSimulation(
+        load_scenario("removal", ["ft_sensor.quantum=[0, 0, 0, 0, 0, 0]"]), "twin"
+    )
+    source = simulation.station.sensor_noise
+    generator, readings = RandomGenerator(5), []
+    for _ in range(3000):
+        simulation.reset(0) if not readings else None
+        mine = source.GetMyMutableContextFromRoot(simulation.context)
+        source.SetRandomContext(mine, generator)
+        readings.append(simulation.evaluate(simulation.station, "ft_sensor.wrench"))
+    return simulation, np.array(readings)
+
+
+def test_noise_variance_passes_chi_square(
+    noisy: tuple[TaskSimulation, np.ndarray],
+) -> None:
+    """(n - 1) s^2 / sigma^2 is chi-square: n - 1 +- 4 sqrt(2 (n - 1))."""
+    simulation, readings = noisy
+    sigma = np.array(simulation.scenario.ft_sensor.noise)
+    n = len(readings)
+    statistic = (n - 1) * readings.var(axis=0, ddof=1) / sigma**2
+    assert np.all(np.abs(statistic - (n - 1)) < 4.0 * np.sqrt(2.0 * (n - 1)))
+
+
+def test_noise_has_no_mean(noisy: tuple[TaskSimulation, np.ndarray]) -> None:
+    simulation, readings = noisy
+    sigma = np.array(simulation.scenario.ft_sensor.noise)
+    context = simulation.station.GetMyMutableContextFromRoot(simulation.context)
+    mean = readings.mean(axis=0) - simulation.station.reading_at_zeroing(context)
+    assert np.all(np.abs(mean) < 4.0 * sigma / np.sqrt(len(readings)))
+
+
+def test_noise_is_held_between_samples() -> None:
+    """A new draw every `ft_sensor.period`, here twice per step of the MDP."""
+    simulation = TaskSimulation(
+        load_scenario("removal", ["ft_sensor.period=0.05"]), "twin"
+    )
+    simulation.reset(0)
+    noise, station = simulation.station.sensor_noise, simulation.station
+    draws = []
+    for k in range(1, 21):
+        simulation.simulator.AdvanceTo(0.01 * k + 0.002)
+        draws.append(simulation.evaluate(noise, noise.get_output_port().get_name())[0])
+    assert len(set(draws)) == 5  # samples at 0, 0.05, 0.10, 0.15, 0.20
+    assert simulation.evaluate(station, "ft_sensor.health")[0] == Health.READY

@@ -1,0 +1,157 @@
+"""Effects in running episodes, against what their equations say of the observation."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from drake_disasm.effects import (
+    Effect,
+    EnvironmentEffect,
+    GrooveFriction,
+    GroovePose,
+    PayloadError,
+    SensorBias,
+)
+from drake_disasm.policies import make_policy
+from drake_disasm.scenario import load_scenario
+from drake_disasm.spatial import (
+    pose_from_vector,
+    rotation_vector,
+    shift_and_express,
+    weight_wrench,
+)
+from drake_disasm.task.simulation import TaskSimulation
+from tests.drake_disasm.conftest import QUIET
+
+COUNTLESS = "ft_sensor.quantum=[0, 0, 0, 0, 0, 0]"
+TURN = np.array([0, 0, 0, 0.010, -0.012, 0.015])
+BIAS = np.array([0.5, -1.0, 2.0, 0.1, 0.2, -0.3])
+
+
+@pytest.fixture(scope="module", params=["cell", "twin"])
+def simulation(request: pytest.FixtureRequest) -> TaskSimulation:
+    """A simulation without noise and counts, open to actions."""
+    scenario = load_scenario("removal", [QUIET, COUNTLESS])
+    return TaskSimulation(scenario, request.param)
+
+
+def _turned(
+    simulation: TaskSimulation, effects: list[Effect]
+) -> tuple[np.ndarray, RigidTransform]:
+    """Returns wrench and measured pose at rest, turned by TURN in free air."""
+    simulation.reset(0, effects)
+    simulation.step(TURN)
+    for _ in range(5):
+        result = simulation.step(np.zeros(6))
+    vector = simulation.evaluate(simulation.processor, "X_GB")
+    return result.observation[6:], pose_from_vector(vector)
+
+
+def _sensor_in_g(simulation: TaskSimulation, X_GB: RigidTransform) -> RigidTransform:
+    """Returns orientation of S in G, with So seen from Bo."""
+    return RigidTransform(X_GB.rotation()) @ simulation.station.X_SB.inverse()
+
+
+def test_bias_is_seen_from_the_bolt(simulation: TaskSimulation) -> None:
+    without, _ = _turned(simulation, [])
+    biased, X_GB = _turned(simulation, [SensorBias(*BIAS)])
+    expected = shift_and_express(BIAS, _sensor_in_g(simulation, X_GB))
+    np.testing.assert_allclose(biased - without, expected, atol=1e-9)
+
+
+def test_payload_error_shows_once_the_sensor_turns(simulation: TaskSimulation) -> None:
+    """Zeroing hides it upright; turned, the weight's change is what is seen."""
+    mass, first_moment = 0.4, np.array([0.004, -0.008, 0.05])
+    effect = PayloadError(mass, *first_moment)
+    without, _ = _turned(simulation, [])
+    wrong, X_GB = _turned(simulation, [effect])
+    X_GS = _sensor_in_g(simulation, X_GB)
+    R_WG, g_W = simulation.station.X_WG.rotation(), np.array([0, 0, -9.81])
+    R_GS0 = simulation.station.X_SB.rotation().inverse()
+    loads = [
+        weight_wrench(mass, first_moment / mass, R_WG @ R, g_W)
+        for R in (X_GS.rotation(), R_GS0)
+    ]
+    expected = shift_and_express(loads[0] - loads[1], X_GS)
+    assert np.abs(expected).max() > 0.02
+    np.testing.assert_allclose(wrong - without, expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("effect", [SensorBias(*BIAS), PayloadError(0.4, 0.01)])
+def test_sensor_effects_do_not_touch_the_motion(
+    effect: Effect, simulation: TaskSimulation
+) -> None:
+    _, nominal = _turned(simulation, [])
+    _, X_GB = _turned(simulation, [effect])
+    assert X_GB.IsExactlyEqualTo(nominal)
+
+
+@pytest.mark.parametrize("coefficient", [-0.2, -0.1, 0.15, 0.3])
+def test_friction_shows_in_the_twins_sliding_force(coefficient: float) -> None:
+    """Pressed against a lip and slid: Fx = -(mu + coefficient) |Fz|, to 2 %."""
+    simulation = TaskSimulation(load_scenario("removal", [QUIET, COUNTLESS]), "twin")
+    simulation.reset(0, [GrooveFriction(coefficient)])
+    simulation.step(np.array([0, 0, 8e-4, 0, 0, 0]))
+    for _ in range(15):
+        result = simulation.step(np.array([1e-3, 0, 0, 0, 0, 0]))
+    fx, _, fz = result.observation[6:9]
+    assert abs(fz) > 3.0
+    assert -fx / abs(fz) == pytest.approx(0.2 + coefficient, rel=0.02, abs=0.002)
+
+
+def test_environment_effects_add_up_in_their_order() -> None:
+    simulation = TaskSimulation(load_scenario("removal"), "twin")
+    effects = [GroovePose(ry=0.1), GroovePose(x=0.001), GrooveFriction(0.1)]
+    station = simulation.station
+    context = station.CreateDefaultContext()
+    station.set_effects(context, effects)
+    expected = [0.001 * np.cos(0.1), 0, -0.001 * np.sin(0.1)]
+    X_GnG = station.true_groove_pose(context)
+    np.testing.assert_allclose(X_GnG.translation(), expected, atol=1e-15)
+    environment = station.lock.nominal
+    for effect in effects:
+        assert isinstance(effect, EnvironmentEffect)
+        environment = effect.apply(environment)
+    assert environment.friction == pytest.approx(0.3)
+
+
+def test_apply_leaves_its_input_alone() -> None:
+    """Pure: the nominal environment is the same after any effect."""
+    nominal = TaskSimulation(load_scenario("removal"), "twin").station.lock.nominal
+    before = dataclasses.replace(nominal)
+    GrooveFriction(0.5).apply(nominal)
+    GroovePose(ry=0.1, y=0.001).apply(nominal)
+    assert nominal.friction == before.friction
+    assert nominal.X_GnG.IsExactlyIdentity()
+
+
+def _true_ry(simulation: TaskSimulation) -> float:
+    context = simulation.station.GetMyMutableContextFromRoot(simulation.context)
+    return rotation_vector(simulation.station.true_groove_pose(context).rotation())[1]
+
+
+def test_effects_changed_in_place_are_seen_by_the_next_reset() -> None:
+    """As an optimiser does that writes its parameters into the same objects."""
+    simulation = TaskSimulation(load_scenario("removal_turned"), "twin")
+    simulation.reset(0)
+    simulation.scenario.effects[0].ry = -0.03
+    simulation.reset(0)
+    assert _true_ry(simulation) == pytest.approx(-0.03)
+    effect = GroovePose(ry=0.01)
+    simulation.reset(0, [effect])
+    effect.ry = 0.02
+    simulation.reset(0, [effect])
+    assert _true_ry(simulation) == pytest.approx(0.02)
+
+
+def test_effects_of_one_episode_do_not_stay() -> None:
+    simulation = TaskSimulation(
+        load_scenario("removal"), "twin", make_policy("straight")
+    )
+    first = simulation.reset(1)
+    simulation.reset(1, [GroovePose(ry=0.05), SensorBias(fx=1.0)])
+    assert _true_ry(simulation) == pytest.approx(0.05)
+    np.testing.assert_array_equal(simulation.reset(1), first)
+    assert _true_ry(simulation) == 0.0

@@ -1,0 +1,96 @@
+"""The cell's own outputs at rest, against statics."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.ports import Health
+from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.stations import CellStation
+from tests.drake_disasm.conftest import QUIET
+
+PORTS = ("position_commanded", "position_measured")
+
+
+@pytest.fixture(scope="module", params=["friction", "weld"])
+def held(request: pytest.FixtureRequest) -> CellStation:
+    """The cell with its bolt held in either way."""
+    return CellStation(
+        load_scenario("removal", [QUIET, f"gripper.hold={request.param}"])
+    )
+
+
+def _rest(station: CellStation, *ports: str) -> list[np.ndarray]:
+    context = station.settled([])
+    return [station.GetOutputPort(port).Eval(context) for port in ports]
+
+
+def test_arm_stands_where_it_is_commanded(held: CellStation) -> None:
+    commanded, measured = _rest(held, *(f"iiwa.{port}" for port in PORTS))
+    np.testing.assert_array_equal(commanded, held.start)
+    np.testing.assert_allclose(measured, held.start, atol=1e-6)
+
+
+def test_measured_torque_carries_the_weight(held: CellStation) -> None:
+    """At rest: minus the gravity torque of arm, tool and bolt."""
+    plant, context = held.plant, held.settled([])
+    plant_context = held.part_context(plant, context)
+    gravity = plant.CalcGravityGeneralizedForces(plant_context)
+    expected = -plant.GetVelocitiesFromArray(held.iiwa, gravity)
+    if held.scenario.gripper.hold == "friction":  # there the bolt is a body apart
+        p_WB = held.X_WG.translation()
+        expected = expected + _joint_torque(held, p_WB, 0.2 * 9.81)
+    measured = held.GetOutputPort("iiwa.torque_measured").Eval(context)
+    np.testing.assert_allclose(measured, expected, atol=5e-3)
+
+
+def _joint_torque(station: CellStation, p_W: np.ndarray, weight: float) -> np.ndarray:
+    """Torque that carries a weight at p_W (its place along z does not matter)."""
+    plant = station.plant
+    context = station.part_context(plant, station.settled([]))
+    torques = []
+    for index in plant.GetJointIndices(station.iiwa):
+        joint = plant.get_joint(index)
+        if joint.num_velocities() != 1:
+            continue
+        X_WJ = joint.frame_on_child().CalcPoseInWorld(context)
+        axis_W = X_WJ.rotation() @ joint.revolute_axis()
+        lever = p_W - X_WJ.translation()
+        torques.append(axis_W @ np.cross(lever, [0, 0, weight]))
+    return np.array(torques)
+
+
+def test_no_external_torque_at_rest(held: CellStation) -> None:
+    """Nothing touches the tool, and the bolt is part of it, however it is held."""
+    (external,) = _rest(held, "iiwa.torque_external")
+    np.testing.assert_allclose(external, 0.0, atol=0.05)
+
+
+def test_pads_stand_at_the_grips_width() -> None:
+    station = CellStation(load_scenario("removal", [QUIET]))
+    (state,) = _rest(station, "gripper.state_measured")
+    np.testing.assert_allclose(state, [0.012, 0.0], atol=1e-4)
+
+
+@pytest.mark.parametrize("device", ["iiwa", "gripper", "ft_sensor"])
+def test_devices_are_ready_and_their_samples_new(
+    device: str, cell: CellStation
+) -> None:
+    health, time = _rest(cell, f"{device}.health", f"{device}.time_measured")
+    assert health[0] == Health.READY
+    assert time[0] == pytest.approx(cell.settling_time)
+
+
+@pytest.mark.parametrize("force", [30.0, 90.0])
+def test_pads_press_with_the_grip_force(force: float) -> None:
+    scenario: Scenario = load_scenario(
+        "removal", [QUIET, f"gripper.grip_force={force}"]
+    )
+    station = CellStation(scenario)
+    context = station.settled([])
+    contacts = station.GetOutputPort("contact_results").Eval(context)
+    across = [
+        abs(contacts.hydroelastic_contact_info(i).F_Ac_W().translational()[1])
+        for i in range(contacts.num_hydroelastic_contacts())
+    ]
+    assert len(across) == 2
+    np.testing.assert_allclose(across, force, rtol=0.02)

@@ -1,0 +1,122 @@
+"""The processor as a system, and the small-angle form in closed form."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+from drake_disasm.coordinates import BoltCoordinates
+from drake_disasm.spatial import (
+    pose_to_vector,
+    rotation_vector,
+    shift_and_express,
+    weight_wrench,
+)
+from drake_disasm.systems.observation import (
+    Mounting,
+    ObservationProcessor,
+    small_angle_contact_wrench,
+)
+
+G_W = np.array([0.0, 0.0, -9.81])
+R_WG = RollPitchYaw(np.pi / 2, 0.0, -0.7).ToRotationMatrix()
+R_SB = RotationMatrix(np.array([[-1.0, 0, 0], [0, 0, -1.0], [0, -1.0, 0]]))
+G, L1, L2 = 10.06, 0.07, 0.26
+UPRIGHT = Mounting(
+    RigidTransform(R_SB, [0, 0, L2]), R_WG, G / 9.81, np.array([0, 0, L1]), G_W
+)
+ASKEW = Mounting(
+    RigidTransform(RollPitchYaw(0.4, -0.3, 2.0), [0.1, -0.2, 0.3]),
+    R_WG,
+    1.7,
+    np.array([0.02, -0.05, 0.1]),
+    G_W,
+)
+
+
+def _weight(mounting: Mounting, R_GB: RotationMatrix) -> np.ndarray:
+    R_WS = mounting.R_WG @ R_GB @ mounting.X_SB.rotation().inverse()
+    return weight_wrench(mounting.mass, mounting.p_SoScm_S, R_WS, G_W)
+
+
+def _observe(
+    variant: str,
+    mounting: Mounting,
+    coordinates: np.ndarray,
+    reading: np.ndarray,
+    at_zeroing: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns observation and pose of a processor that has been zeroed."""
+    processor = ObservationProcessor(BoltCoordinates(), mounting, variant)
+    context = processor.CreateDefaultContext()
+    processor.zero(context, at_zeroing)
+    processor.GetInputPort("position_measured").FixValue(context, coordinates)
+    processor.GetInputPort("wrench").FixValue(context, reading)
+    outputs = [
+        processor.GetOutputPort(n).Eval(context) for n in ("observation", "X_GB")
+    ]
+    return outputs[0], outputs[1]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_recovers_contact_through_offset_and_weight(seed: int) -> None:
+    """The offset is whatever the reading at the start had beside the weight."""
+    generator = np.random.default_rng(seed)
+    q = np.concatenate([generator.normal(size=3), generator.uniform(-1.2, 1.2, 3)])
+    X_GB = BoltCoordinates().pose(q)
+    wrench, offset = generator.normal(size=(2, 6))
+    X_SG = (RigidTransform(X_GB.rotation()) @ ASKEW.X_SB.inverse()).inverse()
+    contact_S = shift_and_express(wrench, X_SG)
+    reading = contact_S + _weight(ASKEW, X_GB.rotation()) + offset
+    at_zeroing = _weight(ASKEW, RotationMatrix()) + offset
+    observation, pose = _observe("exact", ASKEW, q, reading, at_zeroing)
+    np.testing.assert_allclose(observation[6:], wrench, atol=1e-12)
+    np.testing.assert_array_equal(observation[:3], q[:3])
+    expected = rotation_vector(X_GB.rotation())
+    np.testing.assert_allclose(observation[3:6], expected, atol=1e-15)
+    np.testing.assert_allclose(pose, pose_to_vector(X_GB), atol=1e-15)
+
+
+@pytest.mark.parametrize("variant", ["exact", "small_angle"])
+def test_reads_nothing_where_it_was_zeroed(variant: str) -> None:
+    offset = np.array([1, 2, 3, 0.1, 0.2, 0.3])
+    reading = _weight(UPRIGHT, RotationMatrix()) + offset
+    observation, _ = _observe(variant, UPRIGHT, np.zeros(6), reading, reading)
+    np.testing.assert_allclose(observation, 0.0, atol=1e-13)
+
+
+def test_small_angle_variant_reports_roll_pitch_yaw() -> None:
+    q = np.array([0, 0, 0, 0.3, -0.2, 0.1])  # yaw, pitch, roll
+    observation, _ = _observe("small_angle", UPRIGHT, q, np.zeros(6), np.zeros(6))
+    np.testing.assert_allclose(observation[3:6], [0.1, -0.2, 0.3], atol=1e-14)
+
+
+def _free_error(alpha: float, gamma: float) -> np.ndarray:
+    """What the thesis's form reads in free air, where nothing touches the bolt."""
+    R_GB = RollPitchYaw(alpha, 0.0, gamma).ToRotationMatrix()
+    tare, reading = _weight(UPRIGHT, RotationMatrix()), _weight(UPRIGHT, R_GB)
+    return small_angle_contact_wrench(reading, tare, R_GB, UPRIGHT)
+
+
+@pytest.mark.parametrize("degrees", [0.5, 2.0, 10.0, 30.0, -30.0])
+def test_small_angle_form_is_exact_about_one_axis(degrees: float) -> None:
+    """Equation 4.6 keeps sine and cosine: only two rotations at once are too much."""
+    angle = np.deg2rad(degrees)
+    np.testing.assert_allclose(_free_error(angle, 0.0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(_free_error(0.0, angle), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("a_deg", [1.0, 5.0, 30.0, -30.0])
+@pytest.mark.parametrize("c_deg", [1.0, 5.0, 30.0])
+def test_small_angle_form_departs_in_closed_form(a_deg: float, c_deg: float) -> None:
+    """Gravity in B is G [-sin c, 1 - cos c cos a, cos c sin a] after zeroing; eq. 4.6
+    has G [-sin c, 2 - cos a - cos c, sin a]: third order, 0.7 N at 30 degrees."""
+    a, c = np.deg2rad(a_deg), np.deg2rad(c_deg)
+    found = _free_error(a, c)
+    fy = -G * (1 - np.cos(a)) * (1 - np.cos(c))
+    fz = -G * np.sin(a) * (1 - np.cos(c))
+    np.testing.assert_allclose(found[:3], [0, fy, fz], atol=1e-12)
+    # Torque: the lever l1 of gravity, and the shift to the bolt, act on fz alone.
+    assert found[3] == pytest.approx(fz * (L2 - L1), abs=1e-12)
+    np.testing.assert_allclose(found[4:], 0.0, atol=1e-12)
+    bound = G * max(abs(a), abs(c)) ** 3 / 2
+    assert np.abs(found[:3]).max() <= bound

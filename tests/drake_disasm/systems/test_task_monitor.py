@@ -1,0 +1,85 @@
+"""The monitor compares this period's observation with the last one's."""
+
+import itertools
+
+import numpy as np
+import pytest
+from pydrake.systems.framework import Context
+
+from drake_disasm.mdp import REWARD_TERMS, BoltState, Outcome, outcome, reward_terms
+from drake_disasm.scenario import TaskConfig
+from drake_disasm.systems.task_monitor import TaskMonitor
+
+LIFT = 0.007
+TASK = TaskConfig(steps=3)
+
+
+def _monitor() -> tuple[TaskMonitor, Context]:
+    monitor = TaskMonitor(TASK, LIFT)
+    return monitor, monitor.CreateDefaultContext()
+
+
+def _observe(monitor: TaskMonitor, context: Context, observation: np.ndarray) -> None:
+    monitor.get_input_port().FixValue(context, observation)
+
+
+def _period(monitor: TaskMonitor, context: Context) -> None:
+    values = monitor.EvalUniquePeriodicDiscreteUpdate(context)
+    context.get_mutable_discrete_state().SetFrom(values)
+
+
+def _outcome(monitor: TaskMonitor, context: Context) -> Outcome:
+    return Outcome(int(monitor.GetOutputPort("outcome").Eval(context)[0]))
+
+
+def _walk(seed: int, steps: int) -> np.ndarray:
+    """Observations whose forces stay below the limits."""
+    return np.random.default_rng(seed).uniform(-0.001, 0.001, (steps, 12))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_terms_are_those_of_the_last_step_alone(seed: int) -> None:
+    monitor, context = _monitor()
+    walk = _walk(seed, 4)
+    _observe(monitor, context, walk[0])
+    for before, after in itertools.pairwise(walk):
+        _period(monitor, context)
+        _observe(monitor, context, after)
+        terms = monitor.GetOutputPort("reward_terms").Eval(context)
+        expected = reward_terms(
+            BoltState.from_vector(before), BoltState.from_vector(after), TASK
+        )
+        np.testing.assert_array_equal(terms, [expected[n] for n in REWARD_TERMS])
+
+
+def test_steps_are_counted_and_limited() -> None:
+    monitor, context = _monitor()
+    _observe(monitor, context, np.zeros(12))
+    seen = []
+    for _ in range(4):
+        seen.append(_outcome(monitor, context))
+        _period(monitor, context)
+    assert seen == [Outcome.RUNNING] * 3 + [Outcome.STEP_LIMIT]
+
+
+@pytest.mark.parametrize(
+    ("index", "value", "expected"),
+    [
+        (6, 20.1, Outcome.FORCE_LIMIT),
+        (8, -20.1, Outcome.FORCE_LIMIT),
+        (11, -5.1, Outcome.TORQUE_LIMIT),
+        (1, 0.0071, Outcome.SUCCESS),
+        (1, 0.0069, Outcome.RUNNING),
+        (6, 19.9, Outcome.RUNNING),
+    ],
+)
+def test_outcome_follows_the_observation(
+    index: int, value: float, expected: Outcome
+) -> None:
+    monitor, context = _monitor()
+    observation = np.zeros(12)
+    observation[index] = value
+    _observe(monitor, context, observation)
+    assert _outcome(monitor, context) is expected
+    state = BoltState.from_vector(observation)
+    assert outcome(state, 0, TASK, LIFT) is expected

@@ -1,0 +1,60 @@
+"""An episode's summary and table, by hand."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.mdp import Outcome
+from drake_disasm.task.episode import EpisodeSummary, summary_table
+from drake_disasm.task.simulation import StepResult
+
+
+def _result(
+    p_mm: list[float], f: list[float], t: float, outcome: Outcome = Outcome.RUNNING
+) -> StepResult:
+    observation = np.concatenate([np.array(p_mm) / 1e3, np.zeros(3), f, [0, 0, t]])
+    terms = {"progress": p_mm[0], "force": -1.0, "torque": -0.5, "lift": 0.0}
+    return StepResult(observation, terms, outcome)
+
+
+@pytest.fixture
+def summary() -> EpisodeSummary:
+    """Three steps: forwards, farther and up, back; the last at the force limit."""
+    summary = EpisodeSummary(seed=7)
+    summary.add(_result([1, 0, 0], [3, 4, 0], 0.1))
+    summary.add(_result([5, 2, 0], [0, 0, -1], -0.4))
+    summary.add(_result([2, 1, 0], [0, 24, 7], 0.2, Outcome.FORCE_LIMIT))
+    return summary
+
+
+def test_reward_is_the_sum_of_its_terms() -> None:
+    result = _result([3, 0, 0], [0, 0, 0], 0.0)
+    assert result.reward == pytest.approx(3 - 1.0 - 0.5)
+
+
+def test_terms_add_up_by_name(summary: EpisodeSummary) -> None:
+    expected = {"progress": 8.0, "force": -3.0, "torque": -1.5, "lift": 0.0}
+    assert summary.reward_terms == pytest.approx(expected)
+    assert summary.reward == pytest.approx(3.5)
+
+
+def test_greatest_and_mean_values(summary: EpisodeSummary) -> None:
+    assert summary.steps == 3
+    assert summary.travel == pytest.approx(0.005)
+    assert summary.rise == pytest.approx(0.002)
+    assert summary.max_force == pytest.approx(25.0)
+    assert summary.mean_force == pytest.approx((5 + 1 + 25) / 3)
+    assert summary.max_torque == pytest.approx(0.4)
+    assert summary.outcome is Outcome.FORCE_LIMIT
+
+
+def test_table_says_what_the_summary_does(summary: EpisodeSummary) -> None:
+    header, units, row, total = summary_table([summary]).splitlines()
+    assert "outcome" in header and "mm" in units
+    assert row.split()[:4] == ["0", "7", "3", "3.50"]
+    assert row.endswith("force limit")
+    assert total == "0 of 1 episodes succeeded"
+
+
+def test_a_bolt_that_is_out_is_said(summary: EpisodeSummary) -> None:
+    summary.bolt_is_out = True
+    assert "(the bolt is out)" in summary_table([summary])

@@ -1,0 +1,93 @@
+"""The scripted policies: what they answer to hand-made observations."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.mdp import action_bounds
+from drake_disasm.policies import SCRIPTED, Admittance, Straight, make_policy
+from drake_disasm.scenario import TaskConfig
+
+
+def _observation(y: float = 0.0, **wrench: float) -> np.ndarray:
+    names = ("fx", "fy", "fz", "tx", "ty", "tz")
+    return np.array([0, y, 0, 0, 0, 0, *(wrench.get(name, 0.0) for name in names)])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_straight_answers_the_same_to_anything(seed: int) -> None:
+    observation = np.random.default_rng(seed).normal(size=12)
+    expected = [0.002, 0, 0, 0, 0, 0]
+    np.testing.assert_array_equal(Straight(0.002)(observation), expected)
+
+
+def test_admittance_goes_along_x_when_nothing_resists() -> None:
+    policy = Admittance()
+    np.testing.assert_allclose(policy(_observation()), [policy.speed, 0, 0, 0, 0, 0])
+
+
+@pytest.mark.parametrize("axis", ["fy", "fz", "tx", "ty", "tz"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_admittance_yields_in_the_direction_of_the_wrench(
+    axis: str, sign: float
+) -> None:
+    """Across the motion: the axis that is pushed moves the pushed way, alone."""
+    policy, index = Admittance(), ("fx", "fy", "fz", "tx", "ty", "tz").index(axis)
+    action = policy(_observation(**{axis: sign * 2.0}))
+    compliance = policy.yield_compliance if index < 3 else policy.rotation_compliance
+    expected = np.array([policy.speed, 0, 0, 0, 0, 0])
+    expected[index] = compliance * sign * 2.0
+    np.testing.assert_allclose(action, expected)
+
+
+def test_admittance_slows_down_and_stands_still_at_its_push() -> None:
+    policy = Admittance()
+    steps = [policy(_observation(fx=-f))[0] for f in (0.0, 5.0, policy.push, 14.0)]
+    assert steps[0] == policy.speed
+    assert steps[1] == pytest.approx(policy.push_compliance * (policy.push - 5.0))
+    assert steps[2] == pytest.approx(0.0)
+    assert steps[3] < 0.0
+
+
+@pytest.mark.parametrize(
+    ("fx", "y", "lifts"),
+    [(-5.9, 0.0, False), (-6.1, 0.0, True), (6.1, 0.0, False), (0.0, 0.001, True)],
+)
+def test_admittance_lifts_only_when_stopped_or_lifted(
+    fx: float, y: float, lifts: bool
+) -> None:
+    assert bool(Admittance()(_observation(y, fx=fx))[1] > 0.0) is lifts
+
+
+def test_admittance_lifts_with_bounded_force() -> None:
+    policy = Admittance()
+    up = [policy(_observation(0.001, fy=-f))[1] for f in (0.0, policy.lift, 10.0)]
+    assert up[0] == pytest.approx(min(policy.lift_speed, 8.0 * policy.lift_compliance))
+    assert up[1] == pytest.approx(0.0)
+    assert up[2] < 0.0
+
+
+def test_admittance_does_not_push_on_while_lifting() -> None:
+    policy = Admittance()
+    action = policy(_observation(0.001, fx=-3.0))
+    assert action[0] == pytest.approx(policy.yield_compliance * -3.0)
+
+
+@pytest.mark.parametrize("name", SCRIPTED)
+def test_policies_do_not_change_their_observation(name: str) -> None:
+    observation = np.random.default_rng(0).normal(size=12)
+    before = observation.copy()
+    action = make_policy(name)(observation)
+    np.testing.assert_array_equal(observation, before)
+    assert action.shape == (6,)
+
+
+@pytest.mark.parametrize("name", SCRIPTED)
+def test_unhindered_step_is_within_the_bounds(name: str) -> None:
+    action = make_policy(name)(_observation())
+    assert np.all(np.abs(action) <= action_bounds(TaskConfig()))
+
+
+def test_unknown_policy_suggests_a_name() -> None:
+    with pytest.raises(DisasmError, match=r"'admitance'.*'admittance'"):
+        make_policy("admitance")

@@ -1,0 +1,137 @@
+"""More ways to get a scenario wrong: one line with file, key and remedy for each."""
+
+from pathlib import Path
+
+import pytest
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.scenario import load_scenario
+
+
+def _refusal(file: Path) -> str:
+    with pytest.raises(DisasmError) as caught:
+        load_scenario(str(file))
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith(str(file))
+    return message.removeprefix(str(file))
+
+
+NAMED = {
+    "task: {steps: 1.5}": "steps",
+    "task: {steps: true}": "steps",
+    "task: {steps: many}": "many",
+    "lock: {clearance: true}": "clearance",
+    "lock: {clearance: 0.3 mm}": "0.3 mm",
+    "lock: {clearance: .inf}": "lock.clearance",
+    "lock: {clearance: }": "clearance",
+    "arm: {posture: [0, 0, 0, 0, 0, 0, .nan]}": "arm.posture",
+    "arm: {posture: []}": "arm.posture",
+    "ft_sensor: {noise: [-1, 0, 0, 0, 0, 0]}": "ft_sensor.noise",
+    "gripper: {hold: yes}": "hold",
+    "name: 3": "name",
+    "effects: [!SensorBias {fx: .nan}]": "effects.0.fx",
+    "effects: [!SensorBias {}, !SensorBias {fx: 51}]": "effects.1.fx",
+    "effects: [!SensorBias {f_x: 1}]": "'f_x'",
+    "effects: [!SensorBias {fx: abc}]": "'abc'",
+    "effects: [!Untagged {}]": "effects.0",
+    "task: {period: 0.1234}": "task.period",
+    "lock: *nothing": "nothing",
+    "name: a\n---\nname: b": "line 2",
+    "lock:\n\tclearance: 1": "line 2",
+    "# only a comment": "empty",
+    "name: !!python/object/apply:os.getcwd []": "line 1",
+}
+
+
+@pytest.mark.parametrize("text", NAMED)
+def test_what_is_wrong_is_named(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(text)
+    assert NAMED[text] in _refusal(file)
+
+
+EMPTY_OR_SCALAR = {"lock:": "lock", "lock: 3": "lock", "effects:": "effects"}
+
+
+@pytest.mark.parametrize("text", EMPTY_OR_SCALAR)
+def test_a_section_without_content_is_named(text: str, tmp_path: Path) -> None:
+    """As when everything below it has been commented out."""
+    file = tmp_path / "mine.yaml"
+    file.write_text(text)
+    assert EMPTY_OR_SCALAR[text] in _refusal(file)
+
+
+def test_not_text_is_one_line(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_bytes(b"\xff\xfe\x00name")
+    _refusal(file)
+
+
+@pytest.mark.parametrize("text", ["1: 2", "? \n: 3", "lock: {1: 2}"])
+def test_a_key_that_is_no_word_is_one_line(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(text)
+    _refusal(file)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "lock: {clearance: 0.0003, clearance: 0.0005}",
+        "lock: {clearance: 0.0003}\nlock: {travel: 0.05}",
+    ],
+)
+def test_a_key_given_twice_is_refused(text: str, tmp_path: Path) -> None:
+    """Else the first is ignored without a word (YAML 1.2 asks for unique keys)."""
+    file = tmp_path / "mine.yaml"
+    file.write_text(text)
+    _refusal(file)
+
+
+def test_a_key_in_the_wrong_section_is_sent_to_the_right_one(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("clearance: 0.0003")
+    message = _refusal(file)
+    assert "lock" in message, message
+
+
+def test_the_line_is_that_of_the_wrong_key(tmp_path: Path) -> None:
+    """Not of the first key of that name, which is right where it is."""
+    file = tmp_path / "mine.yaml"
+    file.write_text("lock: {clearance: 0.0003}\ncontact:\n  clearance: 0.0003\n")
+    assert "line 3" in _refusal(file)
+
+
+@pytest.mark.parametrize(
+    "override",
+    ["", "=", "=3", "lock", "lock=", "lock.clearance=", "lock..clearance=3",
+     "lock.clearance={", "lock.clearance.x=3", "task.reward=3", "effects=3",
+     "effects.0=3", "effects.-1.ry=1", "effects.5.ry=0", "effects.0.rq=1",
+     "effects.0.ry=", "effects.0.ry=abc", "effects.².ry=0.1", "nothing.x=1"],
+)  # fmt: skip
+def test_bad_override_is_one_line(override: str) -> None:
+    with pytest.raises(DisasmError) as caught:
+        load_scenario("removal_turned", [override])
+    message = str(caught.value)
+    assert f"--set {override}" in message and "\n" not in message
+
+
+@pytest.mark.parametrize("override", ["effects.0.ry=0.5", "lock.clearance=0"])
+def test_override_out_of_range_names_key_and_range(override: str) -> None:
+    key = override.split("=")[0]
+    with pytest.raises(DisasmError, match=rf"{key}: .* out of range; give a value"):
+        load_scenario("removal_turned", [override])
+
+
+def test_later_overrides_win() -> None:
+    overrides = ["lock.clearance=2e-4", "lock={clearance: 3e-4, travel: 0.05}"]
+    scenario = load_scenario("removal", overrides)
+    assert (scenario.lock.clearance, scenario.lock.travel) == (3e-4, 0.05)
+
+
+def test_override_leaves_the_rest_of_its_section() -> None:
+    scenario = load_scenario("sliding", ["task.reward.w_f=0.25"])
+    assert scenario.task.reward.w_f == 0.25
+    assert scenario.task.reward.w_dis == 0.6
+    assert scenario.task.success == "travelled"
