@@ -22,8 +22,10 @@ from pydrake.solvers import Solve
 from drake_disasm.errors import DisasmError
 from drake_disasm.models import add_arm
 from drake_disasm.scenario import ArmConfig
+from drake_disasm.spatial import rotation_vector
 
 _TOLERANCE = 1e-5  # m, of inverse kinematics
+_TURN_TOLERANCE = 1e-4  # rad, of the same
 _SOLUTION = DifferentialInverseKinematicsStatus.kSolutionFound
 
 
@@ -101,13 +103,19 @@ class ArmCoordinates(Coordinates):
             if result.status != _SOLUTION:
                 break
             q = q + self._parameters.get_time_step() * result.joint_velocities
-        miss = np.linalg.norm(self.pose(q).translation() - X_GB.translation())
-        if miss > _TOLERANCE:
+        self._refuse_a_miss(X_GB, self.pose(q))
+        return q
+
+    def _refuse_a_miss(self, wanted: RigidTransform, reached: RigidTransform) -> None:
+        miss = np.linalg.norm(reached.translation() - wanted.translation())
+        R = wanted.rotation().inverse() @ reached.rotation()
+        turn = np.linalg.norm(rotation_vector(R))
+        if miss > _TOLERANCE or turn > _TURN_TOLERANCE:
             raise DisasmError(
                 f"the arm can't follow the command within its limits (off by "
-                f"{1e3 * miss:.2f} mm); move the lock by placement.p_WG"
+                f"{1e3 * miss:.2f} mm and {np.rad2deg(turn):.2f} degrees); "
+                "move the lock by placement.p_WG"
             )
-        return q
 
     def start(self, X_GB: RigidTransform) -> np.ndarray:
         """Returns joint angles for a pose, as near the preferred posture as can be.

@@ -140,7 +140,7 @@ def set_environment(
     """Writes the environment into plant's and scene graph's Contexts."""
     lock.frame.SetPoseInParentFrame(plant_context, environment.X_GnG)
     source = lock.groove.GetParentPlant().get_source_id()
-    materials = _bolt_materials(environment, lock.resolution)
+    materials = _bolt_materials(environment, lock.config, lock.resolution)
     groove = _groove_material(environment)
     changes = [(geometry_id, groove) for geometry_id in lock.groove_ids]
     changes += [(lock.bolt_ids[name], materials[name]) for name in materials]
@@ -171,7 +171,7 @@ def _groove_material(environment: Environment) -> ProximityProperties:
 
 
 def _bolt_materials(
-    environment: Environment, resolution: float
+    environment: Environment, lock: LockConfig, resolution: float
 ) -> dict[str, ProximityProperties]:
     """Returns the materials of neck and head by name.
 
@@ -179,9 +179,22 @@ def _bolt_materials(
     or where there is room, and only the neck's place in the slot asks for precision.
     """
     neck, head = _surface(environment), _surface(environment)
-    AddCompliantHydroelasticProperties(resolution, environment.modulus, neck)
-    AddCompliantHydroelasticProperties(2 * resolution, environment.head_modulus, head)
+    neck_edge = facet_length(lock.neck_diameter, resolution)
+    head_edge = facet_length(lock.head_diameter, 2 * resolution)
+    AddCompliantHydroelasticProperties(neck_edge, environment.modulus, neck)
+    AddCompliantHydroelasticProperties(head_edge, environment.head_modulus, head)
     return {"neck": neck, "head": head}
+
+
+def facet_length(diameter: float, resolution: float) -> float:
+    """Returns the edge length [m] that gives a cylinder a multiple of four facets.
+
+    So vertices lie on the axis across the slot, where the play is measured: with a
+    facet's middle there instead the neck would be thinner. Drake rounds the number
+    of facets up, hence an edge slightly longer than the exact one.
+    """
+    facets = 4 * int(np.ceil(np.pi * diameter / (4 * resolution) - 1e-9))
+    return np.pi * diameter / facets * (1 + 1e-6)
 
 
 def groove_boxes(lock: LockConfig) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -235,7 +248,7 @@ def _add_bolt_geometry(
     nominal: Environment,
 ) -> dict[str, GeometryId]:
     """Returns the collision geometries of neck and head by name."""
-    materials = _bolt_materials(nominal, resolution)
+    materials = _bolt_materials(nominal, lock, resolution)
     materials["grip"] = _grip_material(nominal)
     ids = {}
     for name, X_BP, shape in _bolt_parts(lock):

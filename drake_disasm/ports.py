@@ -60,7 +60,7 @@ CELL_PORTS: tuple[Port, ...] = (
     Port("iiwa.velocity_estimated", 7, "rad/s", "joints 1 to 7"),
     Port("iiwa.torque_commanded", 7, "N m", "joints 1 to 7"),
     Port("iiwa.torque_measured", 7, "N m", "joints 1 to 7"),
-    Port("iiwa.torque_external", 7, "N m", "joints 1 to 7"),
+    Port("iiwa.torque_external", 7, "N m", "joints 1 to 7; bolt part of the tool"),
     Port("gripper.state_measured", 2, "m, m/s", "opening and its rate"),
     Port("ft_sensor.wrench", 6, "N, N m", _WRENCH_FRAME),
     *_device("iiwa"),

@@ -17,7 +17,7 @@ from pydrake.multibody.tree import (
 )
 
 from drake_disasm.lock import bolt_inertia, lip_height
-from drake_disasm.models import add_model
+from drake_disasm.models import add_model, model_frame
 from drake_disasm.scenario import Scenario
 
 FINGERS = ("left_finger_joint", "right_finger_joint")
@@ -90,16 +90,23 @@ class ToolModels:
 
 
 def add_tool(plant: MultibodyPlant, frame_F: Frame, scenario: Scenario) -> ToolModels:
-    """Adds the sensor to the flange and the gripper to the sensor."""
-    sensor = add_model(plant, scenario.ft_sensor.model)
-    frame_S = plant.GetFrameByName("sensor", sensor)
-    joint = plant.WeldFrames(frame_F, plant.GetFrameByName("hex_e", sensor))
-    gripper = add_model(plant, scenario.gripper.model)
-    plant.WeldFrames(
-        plant.GetFrameByName("tool_side", sensor),
-        plant.GetFrameByName("gripper_base", gripper),
-    )
-    frame_T = plant.GetFrameByName("tcp", gripper)
+    """Adds the sensor to the flange and the gripper to the sensor.
+
+    The sensor's link, its origin on the robot-side face, sits on F. The weld's child
+    frame is S, so the joint's reaction is what is sensed there.
+
+    Raises:
+        DisasmError: a model file is missing or is of another device.
+    """
+    url = scenario.ft_sensor.model
+    sensor = add_model(plant, url)
+    frame_S = model_frame(plant, sensor, "sensor", url)
+    joint = plant.WeldFrames(frame_F, frame_S, frame_S.GetFixedPoseInBodyFrame())
+    tool_side = model_frame(plant, sensor, "tool_side", url)
+    url = scenario.gripper.model
+    gripper = add_model(plant, url)
+    plant.WeldFrames(tool_side, model_frame(plant, gripper, "gripper_base", url))
+    frame_T = model_frame(plant, gripper, "tcp", url)
     return ToolModels(joint, frame_S, frame_T, sensor, gripper)
 
 

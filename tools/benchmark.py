@@ -37,8 +37,8 @@ from drake_disasm.policies import make_policy
 from drake_disasm.quantity import closest
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import TwinStation
-from drake_disasm.systems.timing import boundary
 from drake_disasm.task.simulation import TaskSimulation, copy_state
+from drake_disasm.timing import boundary
 
 _REPEATS = 5
 _SCENARIO = "removal_turned"  # the bolt is in contact nearly all the time

@@ -13,6 +13,7 @@ from drake_disasm.effects import Sensing, SensorEffect
 from drake_disasm.ports import Health
 from drake_disasm.scenario import SensorConfig
 from drake_disasm.spatial import wrench_from_spatial_force
+from drake_disasm.timing import newest_step
 
 
 class ForceTorqueSensor(LeafSystem):
@@ -40,6 +41,7 @@ class ForceTorqueSensor(LeafSystem):
         joint: the joint whose reaction is read, its child frame being S.
         body: a body that S is fixed to, and X_BodyS its pose there.
         g_W: gravity (3,) [m/s^2].
+        time_step: of the plant whose reaction is read [s].
     """
 
     def __init__(
@@ -49,11 +51,13 @@ class ForceTorqueSensor(LeafSystem):
         body: BodyIndex,
         X_BodyS: RigidTransform,
         g_W: np.ndarray,
+        time_step: float,
     ) -> None:
         super().__init__()
         self._noise, self._quantum = np.array(config.noise), np.array(config.quantum)
         self._joint, self._body = int(joint), int(body)
         self._R_BodyS, self._g_W = X_BodyS.rotation(), g_W
+        self._time_step = time_step
         self._effects = self.DeclareAbstractParameter(Value[object](()))
         self._reaction = self.DeclareAbstractInputPort(
             "reaction_forces", Value[list[SpatialForce]]()
@@ -65,7 +69,8 @@ class ForceTorqueSensor(LeafSystem):
         self._declare_outputs()
 
     def _declare_outputs(self) -> None:
-        # Not the time: between two plant steps the sensor has no new sample.
+        # Not the time: between two plant steps the sensor has no new sample, and
+        # what depends on time takes that of the newest step.
         reaction = self._reaction.ticket()
         self.DeclareVectorOutputPort(
             "wrench",
@@ -89,24 +94,30 @@ class ForceTorqueSensor(LeafSystem):
         parameter.set_value(tuple(effects))
 
     def reading_at_zeroing(self, context: Context) -> np.ndarray:
-        """Returns the noise-free mean (6,) of readings that zeroing averages."""
+        """Returns the noise-free mean (6,) of readings that zeroing averages.
+
+        Whenever it is taken, zeroing is time 0 for the effects: the episode begins.
+        """
         effects = [e for e in self._get_effects(context) if e.present_at_zeroing]
-        return self._through(context, effects)
+        return self._through(context, effects, time=0.0)
 
     def _get_effects(self, context: Context) -> Sequence[SensorEffect]:
         return context.get_abstract_parameter(self._effects).get_value()
 
-    def _through(self, context: Context, effects: Sequence[SensorEffect]) -> np.ndarray:
+    def _through(
+        self, context: Context, effects: Sequence[SensorEffect], time: float
+    ) -> np.ndarray:
         wrench = -wrench_from_spatial_force(self._reaction.Eval(context)[self._joint])
         if effects:
             R_WBody = self._poses.Eval(context)[self._body].rotation()
-            sensing = Sensing(context.get_time(), R_WBody @ self._R_BodyS, self._g_W)
+            sensing = Sensing(time, R_WBody @ self._R_BodyS, self._g_W)
             for effect in effects:
                 wrench = effect.apply(wrench, sensing)
         return wrench
 
     def _calc_wrench(self, context: Context, output: BasicVector) -> None:
-        wrench = self._through(context, self._get_effects(context))
+        effects = self._get_effects(context)
+        wrench = self._through(context, effects, self._sample_time(context))
         wrench = wrench + self._noise * self._noise_port.Eval(context)
         output.SetFromVector(quantise(wrench, self._quantum))
 
@@ -116,7 +127,10 @@ class ForceTorqueSensor(LeafSystem):
         output.SetFromVector([Health.READY if stepped else Health.NO_DATA])
 
     def _calc_time(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector([context.get_time()])
+        output.SetFromVector([self._sample_time(context)])
+
+    def _sample_time(self, context: Context) -> float:
+        return newest_step(context.get_time(), self._time_step)
 
 
 def quantise(values: np.ndarray, quantum: np.ndarray) -> np.ndarray:

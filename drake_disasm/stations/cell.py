@@ -4,12 +4,15 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
+    BodyIndex,
     Frame,
     PdControllerGains,
+    SpatialInertia,
 )
 from pydrake.systems.controllers import InverseDynamics
-from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import (
+    Adder,
     Demultiplexer,
     MatrixGain,
     PassThrough,
@@ -17,7 +20,7 @@ from pydrake.systems.primitives import (
 )
 
 from drake_disasm.coordinates import ArmCoordinates
-from drake_disasm.lock import add_lock, plate_bottom
+from drake_disasm.lock import add_lock, bolt_inertia, plate_bottom
 from drake_disasm.models import add_arm, add_model
 from drake_disasm.ports import CELL_PORTS
 from drake_disasm.scenario import Scenario
@@ -72,8 +75,7 @@ class CellStation(SimulatedStation):
     settling_time = 0.5
 
     def __init__(self, scenario: Scenario) -> None:
-        super().__init__()
-        self.scenario = scenario
+        super().__init__(scenario)
         self.tool = Tool.from_models(scenario)
         self.X_SB = self.tool.X_SB
         self.payload_mass, self.p_SoScm_S = self.tool.mass, self.tool.p_SoScm_S
@@ -155,9 +157,7 @@ class CellStation(SimulatedStation):
             "velocity_estimated": state.get_output_port(1),
             "torque_commanded": torque,
             "torque_measured": torque,
-            "torque_external": plant.get_generalized_contact_forces_output_port(
-                self.iiwa
-            ),
+            "torque_external": self._external_torque(builder),
         }
         for quantity, port in outputs.items():
             export(builder, port, f"iiwa.{quantity}")
@@ -182,6 +182,34 @@ class CellStation(SimulatedStation):
             compensation.get_output_port(),
             self.plant.get_actuation_input_port(self.iiwa),
         )
+
+    def _external_torque(self, builder: DiagramBuilder) -> OutputPort:
+        """Returns the port of what pushes on the arm, the bolt being part of its tool.
+
+        Held by friction the bolt is a body apart: its weight comes as a contact
+        force on the fingers and is taken off here, as the robot's tool data would.
+        """
+        contact = self.plant.get_generalized_contact_forces_output_port(self.iiwa)
+        if self.scenario.gripper.hold == "weld":
+            return contact
+        X_FB, plant = self.tool.X_FB, self._controller_plant
+        context = plant.CreateDefaultContext()
+        for i in range(1, plant.num_bodies()):  # 0 is the world
+            body = plant.get_body(BodyIndex(i))
+            body.SetSpatialInertiaInBodyFrame(context, SpatialInertia.Zero())
+        M_B = bolt_inertia(self.scenario.lock).ReExpress(X_FB.rotation())
+        load = plant.GetBodyByName("tool")
+        load.SetSpatialInertiaInBodyFrame(context, M_B.Shift(-X_FB.translation()))
+        carried = builder.AddNamedSystem(
+            "iiwa_bolt_weight",
+            InverseDynamics(plant, InverseDynamics.kGravityCompensation, context),
+        )
+        external = builder.AddNamedSystem("iiwa_torque_external", Adder(2, 7))
+        state = self.plant.get_state_output_port(self.iiwa)
+        builder.Connect(state, carried.get_input_port(0))
+        builder.Connect(contact, external.get_input_port(0))
+        builder.Connect(carried.get_output_port(), external.get_input_port(1))
+        return external.get_output_port()
 
     def _wire_gripper(self, builder: DiagramBuilder) -> None:
         plant, gripper = self.plant, self.tool_models.gripper

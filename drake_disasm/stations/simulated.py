@@ -30,7 +30,8 @@ from drake_disasm.devices.ft_sensor import ForceTorqueSensor
 from drake_disasm.effects import Effect, EnvironmentEffect, SensorEffect
 from drake_disasm.lock import Lock, set_environment
 from drake_disasm.ports import Health, Port, check_ports
-from drake_disasm.scenario import PlacementConfig, Scenario
+from drake_disasm.scenario import PlacementConfig, Scenario, validate
+from drake_disasm.timing import newest_step
 
 
 class Station(Diagram):
@@ -79,6 +80,11 @@ class SimulatedStation(Station):
     sensor: ForceTorqueSensor
     sensor_noise: RandomSource
 
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__()
+        validate(scenario)
+        self.scenario = scenario
+
     def _add_plant(self, builder: DiagramBuilder, time_step: float) -> Frame:
         """Adds plant and scene graph; returns the groove's nominal frame."""
         self.time_step = time_step
@@ -105,6 +111,7 @@ class SimulatedStation(Station):
                 frame_S.body().index(),
                 frame_S.GetFixedPoseInBodyFrame(),
                 plant.gravity_field().gravity_vector(),
+                self.time_step,
             ),
         )
         self.sensor_noise = builder.AddNamedSystem(
@@ -130,7 +137,7 @@ class SimulatedStation(Station):
         ready = builder.AddNamedSystem(
             f"{name}_health", ConstantVectorSource([float(Health.READY)])
         )
-        clock = builder.AddNamedSystem(f"{name}_clock", _Clock())
+        clock = builder.AddNamedSystem(f"{name}_clock", _Clock(self.time_step))
         export(builder, ready.get_output_port(), f"{name}.health")
         export(builder, clock.get_output_port(), f"{name}.time_measured")
 
@@ -213,7 +220,7 @@ class SimulatedStation(Station):
 
 
 class _Clock(LeafSystem):
-    """Puts out the time of the newest sample, which in simulation is now.
+    """Puts out the time of the newest sample: the plant's newest step.
 
     @system
     name: Clock
@@ -222,14 +229,15 @@ class _Clock(LeafSystem):
     @endsystem
     """
 
-    def __init__(self) -> None:
+    def __init__(self, time_step: float) -> None:
         super().__init__()
+        self._time_step = time_step
         self.DeclareVectorOutputPort(
             "time", 1, self._calc, prerequisites_of_calc={self.time_ticket()}
         )
 
     def _calc(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector([context.get_time()])
+        output.SetFromVector([newest_step(context.get_time(), self._time_step)])
 
 
 class _BodyPose(LeafSystem):

@@ -62,8 +62,7 @@ class TwinStation(SimulatedStation):
     settling_time = 0.05
 
     def __init__(self, scenario: Scenario) -> None:
-        super().__init__()
-        self.scenario = scenario
+        super().__init__(scenario)
         self.X_SB = Tool.from_models(scenario).X_SB
         self.coordinates, self.start = BoltCoordinates(), np.zeros(6)
         builder = DiagramBuilder()

@@ -16,7 +16,7 @@ from drake_disasm.spatial import (
     pose_to_vector,
     rotation_from_vector,
 )
-from drake_disasm.systems.timing import MOTION_DELAY
+from drake_disasm.timing import MOTION_DELAY
 
 
 class PoseTarget(LeafSystem):

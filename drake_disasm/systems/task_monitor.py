@@ -11,7 +11,7 @@ from pydrake.systems.framework import (
 
 from drake_disasm.mdp import REWARD_TERMS, BoltState, outcome, reward_terms
 from drake_disasm.scenario import TaskConfig
-from drake_disasm.systems.timing import POLICY_DELAY
+from drake_disasm.timing import POLICY_DELAY
 
 
 class TaskMonitor(LeafSystem):

@@ -7,6 +7,7 @@ policy -> imprecision -> pose target -> motion -> station -> observation
 ```
 """
 
+import copy
 import dataclasses
 from collections.abc import Sequence
 from typing import Protocol
@@ -39,7 +40,7 @@ from drake_disasm.systems.observation import Mounting, ObservationProcessor
 from drake_disasm.systems.policy import Policy, PolicySystem
 from drake_disasm.systems.pose_target import PoseTarget
 from drake_disasm.systems.task_monitor import TaskMonitor
-from drake_disasm.systems.timing import boundary
+from drake_disasm.timing import boundary
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,7 +110,10 @@ class TaskSimulation:
             seed: of sensor noise and imprecision.
             effects: instead of the scenario's; a change settles the station anew.
         """
-        wanted = list(self.scenario.effects if effects is None else effects)
+        # A copy, so that a later change to the same objects is noticed.
+        wanted = copy.deepcopy(
+            list(self.scenario.effects if effects is None else effects)
+        )
         if self._start is None or wanted != self._effects:
             self._start, self._effects = self._starting_context(wanted), wanted
         self.context.SetTimeStateAndParametersFrom(self._start)

@@ -9,6 +9,7 @@ import pytest
 from drake_disasm.errors import DisasmError
 from drake_disasm.lock import (
     bolt_inertia,
+    facet_length,
     groove_boxes,
     head_top,
     lift_needed,
@@ -80,6 +81,17 @@ def test_bolt_weighs_what_the_scenario_says() -> None:
     middle = lock.lip_thickness / 2 + lock.grip_standoff + lock.grip_size[1] / 2
     np.testing.assert_allclose(M_B.get_com(), [0, middle, 0])
     assert M_B.IsPhysicallyValid()
+
+
+@pytest.mark.parametrize("diameter", [0.002, 0.005, 0.0073, 0.02])
+@pytest.mark.parametrize("resolution", [1e-4, 0.8e-3, 1.6e-3, 5e-3])
+def test_facets_are_a_multiple_of_four(diameter: float, resolution: float) -> None:
+    """By Drake's count: the circumference over the hint, rounded up."""
+    edge = facet_length(diameter, resolution)
+    facets = np.ceil(np.pi * diameter / edge)
+    assert facets % 4 == 0
+    assert edge <= resolution * (1 + 1e-5)
+    assert facets < np.pi * diameter / resolution + 4
 
 
 @pytest.mark.parametrize(

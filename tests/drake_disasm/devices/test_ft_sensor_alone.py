@@ -1,5 +1,7 @@
 """The sensor system by itself: made-up reactions in, readings out."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from pydrake.common import RandomGenerator
@@ -28,7 +30,8 @@ def _sensor(
     """A sensor at joint 2 and body 1, whose reaction is minus the load."""
     config = SensorConfig(noise=[noise] * 6, quantum=[quantum] * 6)
     X_BodyS = RigidTransform(R_BODY_S, [1, 2, 3])
-    sensor = ForceTorqueSensor(config, JointIndex(JOINT), BodyIndex(BODY), X_BodyS, G_W)
+    joint, body = JointIndex(JOINT), BodyIndex(BODY)
+    sensor = ForceTorqueSensor(config, joint, body, X_BodyS, G_W, time_step=0.25)
     context = sensor.CreateDefaultContext()
     other = SpatialForce(tau=[9, 9, 9], f=[9, 9, 9])
     reaction = SpatialForce(tau=-load[3:], f=-load[:3])
@@ -120,10 +123,28 @@ def test_effects_belong_to_the_context() -> None:
     assert _reading(sensor, biased)[0] == LOAD[0] + 1.0
 
 
-def test_time_is_that_of_the_context() -> None:
+@pytest.mark.parametrize(("now", "sampled"), [(1.25, 1.25), (1.30, 1.25), (1.5, 1.5)])
+def test_time_is_that_of_the_newest_step(now: float, sampled: float) -> None:
     sensor, context = _sensor()
-    context.SetTime(1.25)
-    assert sensor.GetOutputPort("time_measured").Eval(context)[0] == 1.25
+    context.SetTime(now)
+    assert sensor.GetOutputPort("time_measured").Eval(context)[0] == sampled
+
+
+@dataclasses.dataclass
+class _Drift(SensorEffect):
+    """A reading that grows with time, which no shipped effect does yet."""
+
+    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+        return wrench_S + sensing.time
+
+
+def test_an_effect_may_depend_on_time() -> None:
+    """Its time is that of the sample, and zero when the sensor is zeroed."""
+    sensor, context = _sensor()
+    sensor.set_effects(context, [_Drift()])
+    context.SetTime(1.30)
+    np.testing.assert_array_equal(_reading(sensor, context), LOAD + 1.25)
+    np.testing.assert_array_equal(sensor.reading_at_zeroing(context), LOAD)
 
 
 @pytest.fixture(scope="module")

@@ -80,7 +80,7 @@ def test_vanishes_at_null_bit_for_bit(
 
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_shows_away_from_null(effect: type[Effect], without: np.ndarray) -> None:
-    values = {f.name: 0.004 for f in dataclasses.fields(effect)}  # type: ignore[arg-type]
+    values = {f.name: 5e-4 for f in dataclasses.fields(effect)}  # type: ignore[arg-type]
     with_effect = _trajectory([effect(**values)], 20)
     assert not np.allclose(with_effect, without, atol=1e-6)
 

@@ -7,6 +7,8 @@ motion acts after the policy, so that it moves by the action that belongs to thi
 period's observation.
 """
 
+import numpy as np
+
 #: Policy and task monitor act this long after each multiple of the period [s].
 POLICY_DELAY = 1e-6
 
@@ -22,3 +24,8 @@ def boundary(steps: int, period: float) -> float:
     reward. The arithmetic is Drake's own for a periodic event, to the last bit.
     """
     return POLICY_DELAY + steps * period
+
+
+def newest_step(time: float, time_step: float) -> float:
+    """Returns when a discrete plant made its newest step [s]."""
+    return float(np.floor(time / time_step + 1e-6)) * time_step

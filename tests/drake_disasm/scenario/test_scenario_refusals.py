@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from drake_disasm.errors import DisasmError
-from drake_disasm.scenario import load_scenario
+from drake_disasm.scenario import load_scenario, scenario_from_mapping
+from drake_disasm.stations import make_station
 
 
 def _refusal(file: Path) -> str:
@@ -122,6 +123,42 @@ def test_override_out_of_range_names_key_and_range(override: str) -> None:
     key = override.split("=")[0]
     with pytest.raises(DisasmError, match=rf"{key}: .* out of range; give a value"):
         load_scenario("removal_turned", [override])
+
+
+IMPOSSIBLE = {
+    "lock.head_diameter=0.0053": "lock.head_diameter: .* slips through the slot",
+    "lock.neck_diameter=0.012": "lock.head_diameter: .* slips through the slot",
+    "lock={head_diameter: 0.03, travel: 0.03}": "lock.travel: .* no lips",
+    "lock.travel=0.05": "task.travel_success: .* never reached",
+}
+
+
+@pytest.mark.parametrize("override", IMPOSSIBLE)
+def test_what_cannot_be_is_refused(override: str) -> None:
+    with pytest.raises(DisasmError, match=IMPOSSIBLE[override]) as caught:
+        load_scenario("sliding", [override])
+    assert override in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_scenario_made_in_code_is_checked_too() -> None:
+    scenario = load_scenario("removal")
+    scenario.lock.clearance = 0.0
+    with pytest.raises(DisasmError, match=r"lock\.clearance"):
+        make_station("twin", scenario)
+
+
+@pytest.mark.parametrize(
+    "mapping",
+    [
+        {"lock": {"clearance": -1}},
+        {"effects": [{"effect": "Magic"}]},
+        {"effects": [{"fx": 1.0}]},
+        {"colour": "red"},
+    ],
+)
+def test_a_logs_scenario_is_checked_too(mapping: dict) -> None:
+    with pytest.raises(DisasmError, match=r"scenario of the log: "):
+        scenario_from_mapping(mapping)
 
 
 def test_later_overrides_win() -> None:

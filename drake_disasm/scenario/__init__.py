@@ -1,0 +1,50 @@
+"""Scenarios: typed YAML files that each denote one diagram.
+
+`load_scenario` reads a file (strictly: an unknown key is an error), applies
+overrides such as `lock.clearance=0.0003`, and checks every value against its
+bounds and against the others. All values are SI.
+"""
+
+from drake_disasm.scenario.files import (
+    dump_scenario,
+    load_scenario,
+    scenario_from_mapping,
+    scenario_path,
+    scenario_to_mapping,
+)
+from drake_disasm.scenario.schema import (
+    ArmConfig,
+    ContactConfig,
+    GripperConfig,
+    LockConfig,
+    ObservationConfig,
+    PlacementConfig,
+    RewardConfig,
+    Scenario,
+    SensorConfig,
+    SimulationConfig,
+    TaskConfig,
+    TwinConfig,
+)
+from drake_disasm.scenario.validity import validate
+
+__all__ = [
+    "ArmConfig",
+    "ContactConfig",
+    "GripperConfig",
+    "LockConfig",
+    "ObservationConfig",
+    "PlacementConfig",
+    "RewardConfig",
+    "Scenario",
+    "SensorConfig",
+    "SimulationConfig",
+    "TaskConfig",
+    "TwinConfig",
+    "dump_scenario",
+    "load_scenario",
+    "scenario_from_mapping",
+    "scenario_path",
+    "scenario_to_mapping",
+    "validate",
+]

@@ -1,0 +1,130 @@
+"""Scenarios from files and command lines, and back to text."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydrake.common.yaml import yaml_dump_typed
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.quantity import check, closest
+from drake_disasm.resources import models_dir
+from drake_disasm.scenario.schema import Scenario
+from drake_disasm.scenario.strict_yaml import parse
+from drake_disasm.scenario.validity import validate
+
+
+def scenario_path(name: str) -> Path:
+    """Returns the file of a shipped scenario's name, or the path as given.
+
+    Raises:
+        DisasmError: neither a shipped scenario nor a file.
+    """
+    shipped = models_dir() / "scenarios"
+    for path in (Path(name), shipped / f"{name}.yaml"):
+        if path.is_file():
+            return path
+    names = sorted(p.stem for p in shipped.glob("*.yaml"))
+    raise DisasmError(f"scenario {name}: no such file; {closest(name, names)}")
+
+
+def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
+    """Returns the scenario of a file or shipped name, with `key=value` overrides.
+
+    Raises:
+        DisasmError: missing file, unknown key, bad value; says which and where.
+    """
+    path = scenario_path(name)
+    scenario = parse(_read(path), Scenario(), str(path))
+    _checked(check, scenario, str(path))
+    for override in overrides:
+        scenario = _override(scenario, override)
+        _checked(check, scenario, f"--set {override}")
+    _checked(validate, scenario, " with --set ".join([str(path), *overrides]))
+    return scenario
+
+
+def dump_scenario(scenario: Scenario) -> str:
+    """Returns the scenario as YAML text that `load_scenario` reads back."""
+    return yaml_dump_typed(scenario, schema=Scenario)
+
+
+def scenario_to_mapping(scenario: Scenario) -> dict[str, Any]:
+    """Returns the scenario as plain data, for a log's header.
+
+    An effect is a mapping of its parameters with its name under `effect`.
+    """
+    mapping = dataclasses.asdict(scenario)
+    mapping["effects"] = [
+        {"effect": type(effect).__name__, **dataclasses.asdict(effect)}
+        for effect in scenario.effects
+    ]
+    return mapping
+
+
+def scenario_from_mapping(mapping: dict[str, Any]) -> Scenario:
+    """Returns the scenario of what `scenario_to_mapping` gave.
+
+    Raises:
+        DisasmError: unknown key or effect, bad value.
+    """
+    source = "scenario of the log"
+    plain = {key: value for key, value in mapping.items() if key != "effects"}
+    lines = [yaml.safe_dump(plain) if plain else "", "effects:"]
+    for effect in mapping.get("effects", []):
+        values = {key: value for key, value in effect.items() if key != "effect"}
+        flow = yaml.safe_dump(values, default_flow_style=True, width=10**6).strip()
+        lines.append(f"- !{effect.get('effect')} {flow}")
+    if len(lines) == 2:
+        lines[1] = "effects: []"
+    scenario = parse("\n".join(lines), Scenario(), source, line_numbers=False)
+    _checked(validate, scenario, source)
+    return scenario
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise DisasmError(f"{path}: is not text in UTF-8; save it as such") from None
+    except OSError as error:
+        raise DisasmError(f"{path}: can't be read ({error.strerror})") from None
+
+
+def _checked(
+    checker: Callable[[Scenario], None], scenario: Scenario, source: str
+) -> None:
+    try:
+        checker(scenario)
+    except DisasmError as error:
+        raise DisasmError(f"{source}: {error}") from None
+
+
+def _override(scenario: Scenario, override: str) -> Scenario:
+    key, separator, value = override.partition("=")
+    if not separator or not key:
+        raise DisasmError(f"--set {override}: write it as key=value")
+    keys = key.strip().split(".")
+    if keys[0] == "effects" and len(keys) > 1:
+        return _override_effect(scenario, keys[1:], value, override)
+    text = value
+    for part in reversed(keys):
+        text = f"{{{part}: {text}}}"
+    return parse(text, scenario, f"--set {override}", line_numbers=False)
+
+
+def _override_effect(
+    scenario: Scenario, keys: list[str], value: str, override: str
+) -> Scenario:
+    source, effects = f"--set {override}", list(scenario.effects)
+    number = int(keys[0]) if keys[0].isdecimal() else len(effects)
+    if len(keys) != 2 or number >= len(effects):
+        raise DisasmError(
+            f"{source}: the scenario lists {len(effects)} effects; "
+            "write effects.NUMBER.parameter=value, counting from 0"
+        )
+    text = f"{{{keys[1]}: {value}}}"
+    effects[number] = parse(text, effects[number], source, line_numbers=False)
+    return dataclasses.replace(scenario, effects=effects)

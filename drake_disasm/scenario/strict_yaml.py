@@ -1,0 +1,159 @@
+"""Strict YAML: every key, shape and word is checked, and named when it is wrong.
+
+Drake's own reader does the conversion. The walk before it is there for the message:
+which key, in which line, and what to write instead.
+"""
+
+import dataclasses
+import typing
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import yaml
+from pydrake.common.yaml import yaml_load_typed
+
+from drake_disasm.effects import EFFECTS
+from drake_disasm.errors import DisasmError
+from drake_disasm.quantity import closest
+from drake_disasm.scenario.schema import Scenario
+
+_MODEL = "see models/scenarios/removal.yaml"
+_NUMBERS: dict[type, Callable[[str], object]] = {int: int, float: float}
+_EFFECTS = {effect.__name__: effect for effect in EFFECTS}
+
+
+class _NodeError(Exception):
+    """Something wrong at a node."""
+
+    def __init__(self, node: yaml.Node, message: str) -> None:
+        super().__init__(message)
+        self.line = node.start_mark.line + 1
+
+
+def parse(text: str, defaults: Any, source: str, *, line_numbers: bool = True) -> Any:
+    """Returns `defaults`, a dataclass, overlaid with YAML text.
+
+    Args:
+        text: a YAML mapping.
+        defaults: what holds where the text is silent.
+        source: where the text is from, for messages.
+        line_numbers: whether lines mean something to whoever wrote the text.
+
+    Raises:
+        DisasmError: in one line, what is wrong and what to write instead.
+    """
+    try:
+        root = yaml.compose(text)
+        if root is None:
+            raise DisasmError(f"{source}: is empty; {_MODEL}")
+        _check_section(root, type(defaults), "")
+        return yaml_load_typed(data=text, schema=type(defaults), defaults=defaults)
+    except _NodeError as error:
+        line = f"line {error.line}: " if line_numbers else ""
+        raise DisasmError(f"{source}: {line}{error}") from None
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f"line {mark.line + 1}: " if mark and line_numbers else ""
+        problem = getattr(error, "problem", None) or " ".join(str(error).split())
+        raise DisasmError(f"{source}: {line}not YAML ({problem})") from None
+    except (RuntimeError, ValueError, TypeError, AssertionError) as error:
+        reason = " ".join(str(error).split())
+        raise DisasmError(
+            f"{source}: a value has the wrong shape ({reason}); {_MODEL}"
+        ) from None
+
+
+def _check_section(node: yaml.Node, schema: type, path: str) -> None:
+    """Checks a mapping that stands for a dataclass, and what is below it."""
+    if not isinstance(node, yaml.MappingNode):
+        here = f"{path}: is empty or no section" if path else "is no mapping of keys"
+        raise _NodeError(
+            node, f"{here}; write key: value pairs below it, or leave it out"
+        )
+    fields = {field.name: field for field in dataclasses.fields(schema)}
+    seen: set[str] = set()
+    for key, value in node.value:
+        name = key.value if isinstance(key, yaml.ScalarNode) else ""
+        if name not in fields:
+            raise _NodeError(key, _unknown(name, schema, path))
+        if name in seen:
+            raise _NodeError(key, f"key '{_join(path, name)}' is given twice; keep one")
+        seen.add(name)
+        _check_value(value, fields[name], _join(path, name))
+
+
+def _check_value(node: yaml.Node, field: dataclasses.Field, path: str) -> None:
+    if isinstance(field.type, type) and dataclasses.is_dataclass(field.type):
+        _check_section(node, field.type, path)
+    elif path == "effects":
+        _check_effects(node)
+    elif typing.get_origin(field.type) is list:
+        if not isinstance(node, yaml.SequenceNode):
+            raise _NodeError(node, f"{path}: has the wrong shape; write [a, b, ...]")
+        for item in node.value:
+            _check_scalar(item, float, path, field.metadata)
+    else:
+        _check_scalar(node, typing.cast(type, field.type), path, field.metadata)
+
+
+def _check_scalar(node: yaml.Node, kind: type, path: str, metadata: Any) -> None:
+    """Checks that a number or a word stands where one is meant."""
+    unit = metadata.get("unit", "")
+    wanted = f"a number in {unit}" if kind in _NUMBERS else "a word"
+    if kind is int:
+        wanted = "a whole number"
+    if not isinstance(node, yaml.ScalarNode) or node.value == "":
+        raise _NodeError(node, f"{path}: has the wrong shape; give {wanted}")
+    try:
+        _NUMBERS.get(kind, str)(
+            node.value.replace(".inf", "inf").replace(".nan", "nan")
+        )
+    except ValueError:
+        raise _NodeError(
+            node, f"{path}: '{node.value}' is not a number; give {wanted}"
+        ) from None
+
+
+def _check_effects(node: yaml.Node) -> None:
+    if not isinstance(node, yaml.SequenceNode):
+        raise _NodeError(
+            node, "effects: is no list; write [] or lines of `- !Name {...}`"
+        )
+    names = list(_EFFECTS)
+    for number, item in enumerate(node.value):
+        path, name = f"effects.{number}", item.tag.removeprefix("!")
+        if not item.tag.startswith("!"):
+            raise _NodeError(
+                item,
+                f"{path}: has no name; write `- !Name {{...}}`, with one of "
+                + ", ".join(names),
+            )
+        if name not in _EFFECTS:
+            raise _NodeError(
+                item, f"{path}: effect '{name}' does not exist; {closest(name, names)}"
+            )
+        _check_section(item, _EFFECTS[name], path)
+
+
+def _unknown(name: str, schema: type, path: str) -> str:
+    """Returns the message for a key that does not belong here."""
+    if not name:
+        return f"{path or 'a key'}: a key must be a word; {_MODEL}"
+    elsewhere = [known for known in _all_paths(Scenario) if known.endswith(f".{name}")]
+    if elsewhere:
+        remedy = f"it belongs to {' or '.join(p.rpartition('.')[0] for p in elsewhere)}"
+    else:
+        remedy = closest(name, [field.name for field in dataclasses.fields(schema)])
+    place = f" in {path}" if path else ""
+    return f"unknown key '{name}'{place}; {remedy}"
+
+
+def _all_paths(schema: type, path: str = "") -> Iterator[str]:
+    for field in dataclasses.fields(schema):
+        yield _join(path, field.name)
+        if isinstance(field.type, type) and dataclasses.is_dataclass(field.type):
+            yield from _all_paths(field.type, _join(path, field.name))
+
+
+def _join(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name

@@ -1,0 +1,72 @@
+"""Whether a scenario can be: values in their bounds, and fitting one another."""
+
+from drake_disasm.effects import EFFECTS
+from drake_disasm.errors import DisasmError
+from drake_disasm.quantity import check
+from drake_disasm.scenario.schema import LockConfig, Scenario, Untagged
+
+
+def validate(scenario: Scenario) -> None:
+    """Checks a scenario, however it was made.
+
+    Raises:
+        DisasmError: names the first field that is out of bounds or does not fit
+            another, and the remedy.
+    """
+    check(scenario)
+    _refuse_untagged(scenario)
+    _refuse_broken_periods(scenario)
+    _refuse_impossible_lock(scenario.lock)
+    _refuse_unreachable_end(scenario)
+
+
+def _refuse_untagged(scenario: Scenario) -> None:
+    for number, effect in enumerate(scenario.effects):
+        if isinstance(effect, Untagged):
+            names = ", ".join(effect.__name__ for effect in EFFECTS)
+            raise DisasmError(
+                f"effects.{number}: has no name; write `- !Name {{...}}`, "
+                f"with one of {names}"
+            )
+
+
+def _refuse_broken_periods(scenario: Scenario) -> None:
+    steps = {
+        "simulation.cell_time_step": scenario.simulation.cell_time_step,
+        "simulation.twin_time_step": scenario.simulation.twin_time_step,
+        "arm.control_period": scenario.arm.control_period,
+    }
+    for name, step in steps.items():
+        count = scenario.task.period / step
+        if abs(count - round(count)) > 1e-6:
+            raise DisasmError(
+                f"{name}: task.period ({scenario.task.period:g} s) is not a whole "
+                f"number of {step:g} s; give a divisor of it"
+            )
+
+
+def _refuse_impossible_lock(lock: LockConfig) -> None:
+    """A head that the lips do not hold is no lock, and it must fit its own hole."""
+    slot = lock.neck_diameter + lock.clearance
+    if lock.head_diameter <= slot:
+        raise DisasmError(
+            f"lock.head_diameter: a head of {lock.head_diameter:g} m slips through the "
+            f"slot of {slot:g} m (lock.neck_diameter + lock.clearance); make it wider"
+        )
+    hole = lock.head_diameter + lock.keyhole_clearance
+    if lock.travel <= hole:
+        raise DisasmError(
+            f"lock.travel: {lock.travel:g} m leave no lips between A and a keyhole of "
+            f"{hole:g} m; give more than that"
+        )
+
+
+def _refuse_unreachable_end(scenario: Scenario) -> None:
+    task, lock = scenario.task, scenario.lock
+    end = lock.travel + lock.keyhole_clearance / 2
+    if task.success == "travelled" and task.travel_success >= end:
+        raise DisasmError(
+            f"task.travel_success: the groove ends after {end:g} m (lock.travel and "
+            f"half of lock.keyhole_clearance), {task.travel_success:g} m is never "
+            "reached; give less"
+        )
