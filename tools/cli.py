@@ -3,11 +3,13 @@
 import argparse
 import importlib
 import importlib.metadata
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 from drake_disasm.errors import DisasmError
@@ -18,8 +20,33 @@ EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 
 
+class _Interrupt:
+    """Remembers Ctrl-C, since a KeyboardInterrupt can get lost on its way.
+
+    Python raises it wherever it happens to be; in a callback that some library calls
+    from C++, or in a finaliser, it is printed or dropped there and the run goes on.
+    """
+
+    pressed = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        self.pressed = True
+        signal.default_int_handler(number, frame)
+
+
+_interrupt = _Interrupt()
+
+
+def stop_if_interrupted() -> None:
+    """Raises KeyboardInterrupt once more if Ctrl-C was pressed; call it in a loop."""
+    if _interrupt.pressed:
+        raise KeyboardInterrupt
+
+
 def run(main: Callable[[Sequence[str]], int]) -> None:
     """Calls a program's main and exits; bad input is one line and status 2."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _interrupt)
     try:
         sys.exit(main(sys.argv[1:]))
     except DisasmError as error:

@@ -138,6 +138,7 @@ def _run_one(
     view: MeshcatView | None,
 ) -> EpisodeSummary:
     """Runs, shows and records one episode; a policy's error keeps its rows so far."""
+    cli.stop_if_interrupted()
     recorder = EpisodeRecorder(simulation) if writer else None
     if view:
         view.begin_episode()
@@ -155,6 +156,7 @@ def _run_one(
 
 
 def _show(bar: tqdm, summary: EpisodeSummary) -> None:
+    cli.stop_if_interrupted()
     force = f"{summary.max_force:.1f} N"
     bar.set_postfix(reward=f"{summary.reward:.1f}", max_F=force, refresh=False)
     bar.update()
