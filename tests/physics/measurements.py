@@ -171,6 +171,12 @@ def stated_stiffness(station: CellStation) -> np.ndarray:
 
 
 def _lines() -> Iterator[str]:
+    yield from _contact_lines()
+    yield from _time_step_lines()
+    yield from _arm_lines()
+
+
+def _contact_lines() -> Iterator[str]:
     yield "play of the neck at 1 N (mm): nominal, measured, excess %"
     for clearance in (1e-4, 2e-4, 4e-4, 1e-3):
         found = play(1.0, f"lock.clearance={clearance}")
@@ -191,6 +197,9 @@ def _lines() -> Iterator[str]:
         for offset in (4e-4, 1e-3):
             normal, friction = sliding(mu, offset)
             yield f"  {mu} {normal:.3f} {friction:.3f} {friction / normal:.4f}"
+
+
+def _time_step_lines() -> Iterator[str]:
     for model, steps in (
         ("twin", (0.0025, 0.005, 0.01, 0.02)),
         ("cell", (0.000625, 0.00125, 0.0025, 0.005)),
@@ -208,6 +217,9 @@ def _lines() -> Iterator[str]:
     yield "replayed noisy actions: twin's step ms, force error N (50, 95, 99 %)"
     for step, error in replay_errors((0.0025, 0.005, 0.01, 0.02), 0.00125).items():
         yield f"  {1e3 * step:.1f} " + " ".join(f"{e:.3f}" for e in error)
+
+
+def _arm_lines() -> Iterator[str]:
     station = CellStation(load_scenario("removal", [QUIET]))
     yield "stiffness per axis: stated, measured pose, bolt"
     stated = stated_stiffness(station)
