@@ -18,6 +18,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, EventStatus, Leaf
 from drake_disasm.errors import DisasmError
 from drake_disasm.spatial import pose_from_vector
 from drake_disasm.task.simulation import TaskSimulation
+from drake_disasm.writing import make_folder, write_atomically
 
 _FRAME_PERIOD = 1.0 / 32.0  # s
 _NEWTONS_PER_METRE = 150.0  # of the wrench arrow's length
@@ -116,11 +117,14 @@ class MeshcatView:
             self.meshcat.PublishRecording()
 
     def save_html(self, path: Path) -> None:
-        """Writes a page that plays the recording without a server."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.name}.tmp")
-        temporary.write_text(self.meshcat.StaticHtml())
-        temporary.replace(path)
+        """Writes a page that plays the recording without a server.
+
+        Raises:
+            DisasmError: it can't be written there.
+        """
+        page = self.meshcat.StaticHtml().encode()
+        make_folder(path.parent)
+        write_atomically(path, lambda stream: stream.write(page))
 
 
 class WrenchVisualizer(LeafSystem):

@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[1]
 
 #: Rooms of drake_disasm from the ground up; a module imports from its own or lower.
 FLOORS = (
-    {"errors", "quantity", "resources", "spatial", "timing"},
+    {"errors", "quantity", "resources", "spatial", "timing", "writing"},
     {"effects"},
     {"scenario", "ports"},
     {"mdp", "lock", "devices", "models"},

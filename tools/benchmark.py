@@ -23,12 +23,7 @@ import numpy as np
 import psutil
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import (
-    Adder,
-    ConstantVectorSource,
-    DiscreteTimeIntegrator,
-    Gain,
-)
+from pydrake.systems.primitives import ConstantVectorSource
 from tqdm import tqdm
 
 from drake_disasm.errors import DisasmError
@@ -37,8 +32,9 @@ from drake_disasm.policies import make_policy
 from drake_disasm.quantity import closest
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import TwinStation
-from drake_disasm.task.simulation import TaskSimulation, copy_state
+from drake_disasm.task.simulation import TaskSimulation, add_motion, copy_state
 from drake_disasm.timing import boundary
+from drake_disasm.writing import make_folder, write_atomically
 
 _REPEATS = 5
 _SCENARIO = "removal_turned"  # the bolt is in contact nearly all the time
@@ -134,18 +130,7 @@ def _replay(scenario: Scenario, rates: list[np.ndarray]) -> float:
     builder = DiagramBuilder()
     station = builder.AddNamedSystem("station", TwinStation(scenario))
     source = builder.AddNamedSystem("rate", ConstantVectorSource(np.zeros(6)))
-    motion = builder.AddNamedSystem(
-        "motion", DiscreteTimeIntegrator(6, station.time_step)
-    )
-    lead = builder.AddNamedSystem("lead", Gain(station.time_step, 6))
-    command = builder.AddNamedSystem("command", Adder(2, 6))
-    rate = source.get_output_port()
-    builder.Connect(rate, motion.get_input_port())
-    builder.Connect(rate, lead.get_input_port())
-    builder.Connect(motion.get_output_port(), command.get_input_port(0))
-    builder.Connect(lead.get_output_port(), command.get_input_port(1))
-    builder.Connect(command.get_output_port(), station.GetInputPort("bolt.position"))
-    builder.Connect(rate, station.GetInputPort("bolt.velocity"))
+    add_motion(builder, source.get_output_port(), station)
     simulator = Simulator(builder.Build())
     root = simulator.get_mutable_context()
     mine = station.GetMyMutableContextFromRoot(root)
@@ -252,11 +237,9 @@ def table(figures: list[Figure]) -> str:
 
 
 def _write_json(path: Path, figures: list[Figure]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.tmp")
-    text = json.dumps({f.key: f.value for f in figures}, indent=2)
-    temporary.write_text(text + "\n")
-    temporary.replace(path)
+    text = json.dumps({f.key: f.value for f in figures}, indent=2) + "\n"
+    make_folder(path.parent)
+    write_atomically(path, lambda stream: stream.write(text.encode()))
 
 
 if __name__ == "__main__":

@@ -24,6 +24,7 @@ from drake_disasm.task.episode import (
 )
 from drake_disasm.task.simulation import TaskSimulation
 from drake_disasm.visualization import MeshcatView, start_meshcat
+from drake_disasm.writing import make_folder
 from sysid.logs import LogHeader, LogWriter, flat_columns
 
 _EXAMPLES = """examples:
@@ -116,6 +117,8 @@ def main(arguments: Sequence[str]) -> int:
     scenario = load_scenario(args.scenario, args.overrides)
     policy = cli.named_policy(args.policy)
     writer = _open_log(args, arguments, scenario) if args.record else None
+    if args.html:
+        make_folder(args.html.parent)
     view = _open_view(args)
     simulation = TaskSimulation(scenario, args.model, policy, [view] if view else [])
     simulation.simulator.set_target_realtime_rate(_rate(args))

@@ -24,7 +24,7 @@ from drake_disasm.lock import add_lock, bolt_inertia, plate_bottom
 from drake_disasm.models import add_arm, add_model
 from drake_disasm.ports import CELL_PORTS
 from drake_disasm.scenario import Scenario
-from drake_disasm.stations.simulated import SimulatedStation, export
+from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.tool import FINGERS, Tool, add_tool, grasp_pose
 
 _BENCH = "package://disasm_models/bench/bench.urdf"
@@ -72,10 +72,13 @@ class CellStation(SimulatedStation):
     table = CELL_PORTS
     arm = "iiwa"
     has_velocity_input = False
+    grip_command: float
     settling_time = 0.5
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__(scenario)
+        self.control_period = scenario.arm.control_period
+        self.grip_command = _grip_command(scenario)
         self.tool = Tool.from_models(scenario)
         self.X_SB = self.tool.X_SB
         self.payload_mass, self.p_SoScm_S = self.tool.mass, self.tool.p_SoScm_S
@@ -160,7 +163,7 @@ class CellStation(SimulatedStation):
             "torque_external": self._external_torque(builder),
         }
         for quantity, port in outputs.items():
-            export(builder, port, f"iiwa.{quantity}")
+            builder.ExportOutput(port, f"iiwa.{quantity}")
         self._add_ready_device(builder, "iiwa")
 
     def _add_gravity_compensation(self, builder: DiagramBuilder) -> None:
@@ -222,20 +225,8 @@ class CellStation(SimulatedStation):
         sums = np.array([[1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
         opening = builder.AddNamedSystem("gripper_opening", MatrixGain(D=sums))
         builder.Connect(plant.get_state_output_port(gripper), opening.get_input_port())
-        export(builder, opening.get_output_port(), "gripper.state_measured")
+        builder.ExportOutput(opening.get_output_port(), "gripper.state_measured")
         self._add_ready_device(builder, "gripper")
-
-    @property
-    def grip_command(self) -> float:
-        """The opening [m] to command so that the pads press with the grip force.
-
-        Fingers yield like springs (the real drive is self-locking), so they are
-        sent to a place inside the grip. A welded bolt is only touched.
-        """
-        gripper, width = self.scenario.gripper, self.scenario.lock.grip_size[2]
-        if gripper.hold == "weld":
-            return width + 0.002
-        return width - 2.0 * gripper.grip_force / gripper.finger_stiffness
 
     def _fix_commands(self, context: Context) -> None:
         super()._fix_commands(context)
@@ -260,6 +251,18 @@ class CellStation(SimulatedStation):
         """
         pressed = self.scenario.lock.grip_size[2] - 2.0 * _PAD_INDENTATION
         return max(self.grip_command, pressed)
+
+
+def _grip_command(scenario: Scenario) -> float:
+    """Returns the opening [m] to command so that the pads press with the grip force.
+
+    Fingers yield like springs (the real drive is self-locking), so they are
+    sent to a place inside the grip. A welded bolt is only touched.
+    """
+    gripper, width = scenario.gripper, scenario.lock.grip_size[2]
+    if gripper.hold == "weld":
+        return width + 0.002
+    return width - 2.0 * gripper.grip_force / gripper.finger_stiffness
 
 
 def _set_spring(plant: MultibodyPlant, index: int, k: float, d: float) -> None:

@@ -20,7 +20,6 @@ from pydrake.systems.framework import (
     Diagram,
     DiagramBuilder,
     LeafSystem,
-    OutputPort,
     System,
 )
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
@@ -42,6 +41,8 @@ class Station(Diagram):
         table: its port table.
         arm: the device whose position is commanded ("iiwa", or "bolt").
         has_velocity_input: whether `<arm>.velocity` is an input as well.
+        control_period: at which `<arm>.position` is read [s].
+        grip_command: what to send to `gripper.position` [m]; None has no gripper.
         coordinates: maps the arm's coordinates to X_GB and back.
         start: the coordinates (n,) at which an episode starts, X_GB = identity.
         X_SB: the bolt in the sensor frame, as grasped.
@@ -53,6 +54,8 @@ class Station(Diagram):
     table: tuple[Port, ...]
     arm: str
     has_velocity_input: bool
+    control_period: float
+    grip_command: float | None = None
     coordinates: Coordinates
     start: np.ndarray
     X_SB: RigidTransform
@@ -97,7 +100,8 @@ class SimulatedStation(Station):
         )
         self.plant, self.scene_graph = AddMultibodyPlant(config, builder)
         self.X_WG = nominal_groove_pose(self.scenario.placement)
-        return add_fixed_frame(self.plant, "groove_nominal", self.X_WG)
+        world = self.plant.world_frame()
+        return self.plant.AddFrame(FixedOffsetFrame("groove_nominal", world, self.X_WG))
 
     def _add_sensor(
         self, builder: DiagramBuilder, joint: WeldJoint, frame_S: Frame
@@ -128,8 +132,8 @@ class SimulatedStation(Station):
         )
         connect(self.sensor_noise.get_output_port(), self.sensor.GetInputPort("noise"))
         for quantity in ("wrench", "health", "time_measured"):
-            export(
-                builder, self.sensor.GetOutputPort(quantity), f"ft_sensor.{quantity}"
+            builder.ExportOutput(
+                self.sensor.GetOutputPort(quantity), f"ft_sensor.{quantity}"
             )
 
     def _add_ready_device(self, builder: DiagramBuilder, name: str) -> None:
@@ -138,8 +142,8 @@ class SimulatedStation(Station):
             f"{name}_health", ConstantVectorSource([float(Health.READY)])
         )
         clock = builder.AddNamedSystem(f"{name}_clock", _Clock(self.time_step))
-        export(builder, ready.get_output_port(), f"{name}.health")
-        export(builder, clock.get_output_port(), f"{name}.time_measured")
+        builder.ExportOutput(ready.get_output_port(), f"{name}.health")
+        builder.ExportOutput(clock.get_output_port(), f"{name}.time_measured")
 
     def _finish(self, builder: DiagramBuilder, bolt: RigidBody) -> None:
         """Exports the simulation's own ports, builds, and checks the table."""
@@ -148,12 +152,12 @@ class SimulatedStation(Station):
             "bolt_pose", _BodyPose(int(bolt.index()), self.X_WG)
         )
         builder.Connect(plant.get_body_poses_output_port(), truth.get_input_port())
-        export(builder, truth.get_output_port(), "bolt_pose")
-        export(builder, plant.get_contact_results_output_port(), "contact_results")
+        builder.ExportOutput(truth.get_output_port(), "bolt_pose")
+        builder.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
         builder.ExportInput(
             plant.get_applied_spatial_force_input_port(), "applied_spatial_force"
         )
-        export(builder, self.scene_graph.get_query_output_port(), "query_object")
+        builder.ExportOutput(self.scene_graph.get_query_output_port(), "query_object")
         builder.BuildInto(self)
         check_ports(self, self.table)
 
@@ -275,13 +279,3 @@ def nominal_groove_pose(placement: PlacementConfig) -> RigidTransform:
     """Returns X_WGn: x along the groove at `yaw`, y up, z across."""
     R = RollPitchYaw(np.pi / 2, 0.0, placement.yaw).ToRotationMatrix()
     return RigidTransform(R, placement.p_WG)
-
-
-def add_fixed_frame(plant: MultibodyPlant, name: str, X_WP: RigidTransform) -> Frame:
-    """Adds a frame P to the world."""
-    return plant.AddFrame(FixedOffsetFrame(name, plant.world_frame(), X_WP))
-
-
-def export(builder: DiagramBuilder, port: OutputPort, name: str) -> None:
-    """Exports an output port under a station's port name."""
-    builder.ExportOutput(port, name)

@@ -22,7 +22,7 @@ from drake_disasm.coordinates import BoltCoordinates
 from drake_disasm.lock import add_lock
 from drake_disasm.ports import TWIN_PORTS
 from drake_disasm.scenario import Scenario
-from drake_disasm.stations.simulated import SimulatedStation, export
+from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.tool import Tool
 
 _AXES = np.eye(3)
@@ -63,6 +63,7 @@ class TwinStation(SimulatedStation):
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__(scenario)
+        self.control_period = scenario.simulation.twin_time_step
         self.X_SB = Tool.from_models(scenario).X_SB
         self.coordinates, self.start = BoltCoordinates(), np.zeros(6)
         builder = DiagramBuilder()
@@ -127,7 +128,7 @@ class TwinStation(SimulatedStation):
         connect(desired.get_output_port(), plant.get_desired_state_input_port(instance))
         connect(carried.get_output_port(), plant.get_actuation_input_port(instance))
         connect(plant.get_state_output_port(instance), measured.get_input_port())
-        export(builder, measured.get_output_port(0), "bolt.position_measured")
+        builder.ExportOutput(measured.get_output_port(0), "bolt.position_measured")
 
     def _fix_commands(self, context: Context) -> None:
         super()._fix_commands(context)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from drake_disasm.mdp import BoltState, Outcome
+from drake_disasm.mdp import REWARD_TERMS, BoltState, Outcome
 from drake_disasm.task.simulation import StepResult, TaskSimulation
 
 _MM = 1000.0
@@ -149,8 +149,9 @@ def run_episode(
 
 
 _HEADER = (
-    "episode seed  steps   reward progress    force   torque     lift "
-    "  travel     rise  max F mean F   max T  outcome"
+    "episode seed  steps   reward "
+    + " ".join(f"{name:>8}" for name in REWARD_TERMS)
+    + "   travel     rise  max F mean F   max T  outcome"
 )
 _UNITS = (
     "                                                                  "
@@ -168,9 +169,7 @@ def summary_table(summaries: list[EpisodeSummary]) -> str:
 
 
 def _table_row(number: int, s: EpisodeSummary) -> str:
-    terms = [
-        s.reward_terms.get(n, 0.0) for n in ("progress", "force", "torque", "lift")
-    ]
+    terms = [s.reward_terms.get(name, 0.0) for name in REWARD_TERMS]
     out = " (the bolt is out)" if s.bolt_is_out else ""
     return (
         f"{number:7d} {s.seed:4d} {s.steps:6d} {s.reward:8.2f} "

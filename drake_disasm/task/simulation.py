@@ -34,7 +34,7 @@ from drake_disasm.effects import Effect
 from drake_disasm.lock import lift_needed
 from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
 from drake_disasm.scenario import Scenario
-from drake_disasm.stations import CellStation, make_station
+from drake_disasm.stations import Station, make_station
 from drake_disasm.systems.imprecision import ImprecisionNoise, clamped
 from drake_disasm.systems.observation import Mounting, ObservationProcessor
 from drake_disasm.systems.policy import Policy, PolicySystem
@@ -168,7 +168,7 @@ class TaskSimulation:
 
     def joint_positions(self) -> np.ndarray:
         """Returns the arm's measured joint angles (7,); the twin has none, (0,)."""
-        if not isinstance(self.station, CellStation):
+        if self.station.arm != "iiwa":
             return np.zeros(0)
         return self.evaluate(self.station, "iiwa.position_measured")
 
@@ -218,7 +218,11 @@ class TaskSimulation:
         connect(self.processor.get_output_port(0), self.monitor.get_input_port())
         connect(noise.get_output_port(), self.imprecision.GetInputPort("noise"))
         connect(self.imprecision.get_output_port(), self.pose_target.get_input_port())
-        self._add_motion(builder)
+        velocity = self.pose_target.GetOutputPort("velocity")
+        self._integrator = add_motion(builder, velocity, station)
+        if station.grip_command is not None:
+            grip = add("grip", ConstantVectorSource([station.grip_command]))
+            connect(grip.get_output_port(), station.GetInputPort("gripper.position"))
         self._add_policy(builder, policy)
 
     def _make_processor(self) -> ObservationProcessor:
@@ -233,43 +237,6 @@ class TaskSimulation:
         return ObservationProcessor(
             station.coordinates, mounting, self.scenario.observation.variant
         )
-
-    def _add_motion(self, builder: DiagramBuilder) -> None:
-        """Adds the way from velocity to the station's position command.
-
-        The command is where the station is to be at the end of its control period:
-        the integral so far plus one period's way. Without that lead the motion
-        would lag by a period, and so depend on its length.
-        """
-        station, connect = self.station, builder.Connect
-        size, period = len(station.start), self._control_period()
-        velocity = self.pose_target.GetOutputPort("velocity")
-        self._integrator = builder.AddNamedSystem(
-            "motion", DiscreteTimeIntegrator(size, period)
-        )
-        lead = builder.AddNamedSystem("lead", Gain(period, size))
-        command = builder.AddNamedSystem("position_command", Adder(2, size))
-        connect(velocity, self._integrator.get_input_port())
-        connect(velocity, lead.get_input_port())
-        connect(self._integrator.get_output_port(), command.get_input_port(0))
-        connect(lead.get_output_port(), command.get_input_port(1))
-        connect(
-            command.get_output_port(), station.GetInputPort(f"{station.arm}.position")
-        )
-        if station.has_velocity_input:
-            builder.Connect(velocity, station.GetInputPort(f"{station.arm}.velocity"))
-        if isinstance(station, CellStation):
-            grip = builder.AddNamedSystem(
-                "grip", ConstantVectorSource([station.grip_command])
-            )
-            builder.Connect(
-                grip.get_output_port(), station.GetInputPort("gripper.position")
-            )
-
-    def _control_period(self) -> float:
-        if isinstance(self.station, CellStation):
-            return self.scenario.arm.control_period
-        return self.station.time_step
 
     def _add_policy(self, builder: DiagramBuilder, policy: Policy | None) -> None:
         self.policy_system: PolicySystem | None = None
@@ -304,6 +271,38 @@ class TaskSimulation:
             self.station.reading_at_zeroing(settled),
         )
         return root
+
+
+def add_motion(
+    builder: DiagramBuilder, velocity: OutputPort, station: Station
+) -> DiscreteTimeIntegrator:
+    """Adds the way from a velocity to the station's position command.
+
+    The command is where the station is to be at the end of its control period:
+    the integral so far plus one period's way. Without that lead the motion
+    would lag by a period, and so depend on its length.
+
+    Args:
+        builder: of the diagram that holds the station.
+        velocity: rate of the station's coordinates, a port of size n.
+        station: what is moved.
+
+    Returns:
+        The integrator; its state is to begin at the station's start.
+    """
+    connect = builder.Connect
+    size, period = len(station.start), station.control_period
+    motion = builder.AddNamedSystem("motion", DiscreteTimeIntegrator(size, period))
+    lead = builder.AddNamedSystem("lead", Gain(period, size))
+    command = builder.AddNamedSystem("position_command", Adder(2, size))
+    connect(velocity, motion.get_input_port())
+    connect(velocity, lead.get_input_port())
+    connect(motion.get_output_port(), command.get_input_port(0))
+    connect(lead.get_output_port(), command.get_input_port(1))
+    connect(command.get_output_port(), station.GetInputPort(f"{station.arm}.position"))
+    if station.has_velocity_input:
+        connect(velocity, station.GetInputPort(f"{station.arm}.velocity"))
+    return motion
 
 
 def copy_state(source: Context, target: Context) -> None:

@@ -1,11 +1,7 @@
-"""The files of a log: names of episodes, and writing whole or not at all."""
+"""The files of a log: names of episodes, and what a killed writer leaves."""
 
-import contextlib
-import os
 import re
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import IO, Any
 
 from sysid.logs.refusal import refusal
 
@@ -52,66 +48,9 @@ def is_empty(folder: Path) -> bool:
     return all(_TEMPORARY.fullmatch(path.name) for path in folder.iterdir())
 
 
-def make_folder(folder: Path) -> None:
-    """Makes a folder and its parents, if they are not there."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise refusal(
-            folder, f"no such folder can be made ({error.strerror})", "name another"
-        ) from error
-
-
 def read_bytes(path: Path, remedy: str) -> bytes:
     """The content of a file, or a refusal with this remedy."""
     try:
         return path.read_bytes()
     except OSError as error:
         raise refusal(path, f"cannot be read ({error.strerror})", remedy) from error
-
-
-def write_atomically(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
-    """Writes a file whole or not at all.
-
-    The content goes to a hidden temporary file in the same folder, reaches the disk,
-    and takes the file's name in one step.
-
-    Args:
-        path: the file.
-        write: writes the content to the stream that it is given.
-
-    Raises:
-        DisasmError: the system refuses to write.
-    """
-    temporary = path.with_name(f".{path.name}.tmp")
-    try:
-        with _removed_on_failure(temporary):
-            with temporary.open("wb") as stream:
-                write(stream)
-                stream.flush()
-                os.fsync(stream.fileno())
-            os.replace(temporary, path)
-        _sync_folder(path.parent)
-    except OSError as error:
-        raise refusal(
-            path,
-            f"cannot be written ({error.strerror})",
-            "check the disk's space and the folder's permissions",
-        ) from error
-
-
-@contextlib.contextmanager
-def _removed_on_failure(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except BaseException:
-        path.unlink(missing_ok=True)
-        raise
-
-
-def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -8,7 +8,8 @@ from typing import Any
 
 import yaml
 
-from sysid.logs.files import read_bytes, write_atomically
+from drake_disasm.writing import write_atomically
+from sysid.logs.files import read_bytes
 from sysid.logs.refusal import did_you_mean, quoted, refusal
 from sysid.logs.schema import KINDS, SCHEMA, SI_UNITS, UNIT_SPELLINGS, Kind, Rule
 

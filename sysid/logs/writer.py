@@ -7,15 +7,14 @@ from typing import Any, Self
 
 from numpy.typing import ArrayLike, NDArray
 
+from drake_disasm.writing import make_folder, write_atomically
 from sysid.logs.checks import check_values
 from sysid.logs.columns import arrange_names
 from sysid.logs.files import (
     episode_files,
     episode_path,
     is_empty,
-    make_folder,
     read_bytes,
-    write_atomically,
 )
 from sysid.logs.header import LogHeader, as_read, read_header, write_header
 from sysid.logs.reader import check_same_names

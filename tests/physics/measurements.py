@@ -19,8 +19,8 @@ from drake_disasm.scenario import load_scenario
 from drake_disasm.spatial import rotation_vector
 from drake_disasm.stations import CellStation
 from drake_disasm.task.simulation import TaskSimulation
+from tests.drake_disasm.conftest import QUIET
 
-QUIET = "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"
 AWAY = GroovePose(y=-0.01)  # the groove drops away from the bolt
 
 

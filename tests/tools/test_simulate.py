@@ -101,6 +101,15 @@ def test_full_output_folder_is_refused(simulate: Runner, tmp_path: Path) -> None
     assert [p.name for p in (tmp_path / "log").iterdir()] == ["notes.txt"]
 
 
+def test_page_that_cannot_be_written_is_refused_before_the_run(
+    simulate: Runner, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("no folder")
+    done = simulate(*TWIN, "--html", "file/page.html")
+    _assert_one_line(done, ["file", "no such folder"])
+    assert "episode" not in done.stdout
+
+
 def test_missing_scenario_and_policy_suggest_a_name(simulate: Runner) -> None:
     _assert_one_line(simulate("--scenario", "remval"), ["remval", "'removal'"])
     _assert_one_line(simulate("--policy", "strait"), ["strait", "'straight'"])
