@@ -16,7 +16,7 @@ from drake_disasm.effects import GroovePose
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
-from drake_disasm.spatial import rotation_vector
+from drake_disasm.spatial import rotation_from_vector, rotation_vector
 from drake_disasm.stations import CellStation
 from drake_disasm.task.simulation import TaskSimulation
 from tests.drake_disasm.conftest import QUIET
@@ -34,17 +34,31 @@ def action(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> np.ndarray:
     return np.array([x, y, z, 0.0, 0.0, 0.0])
 
 
-def play(force: float, *overrides: str) -> float:
-    """Returns how far the neck moves across the slot between +force and -force [m]."""
+def play(force: float, *overrides: str, ry: float = 0.0) -> float:
+    """Returns how far the neck moves across the slot between +force and -force [m].
+
+    Args:
+        force: across the slot [N].
+        overrides: of the scenario.
+        ry: by which the groove is turned [rad].
+    """
     simulation = quiet("removal", *overrides)
+    R_GnG = rotation_from_vector(np.array([0.0, ry, 0.0]))
+
+    def move(x: float, z: float) -> tuple[float, float]:
+        """Moves along and across the groove; returns z and f_z in G."""
+        s = simulation.step(action(*(R_GnG @ np.array([x, 0.0, z])))).observation
+        R_GGn = R_GnG.inverse()
+        return (R_GGn @ s[:3])[2], (R_GGn @ s[6:9])[2]
+
     ends = []
     for sign in (1.0, -1.0):
-        simulation.reset(0)
-        simulation.step(action(x=3e-3))
-        state = simulation.step(action(z=sign * 4e-5)).observation
-        while abs(state[8]) < force:
-            state = simulation.step(action(z=sign * 1e-5)).observation
-        ends.append(state[2])
+        simulation.reset(0, [GroovePose(ry=ry)])
+        move(3e-3, 0.0)
+        z, f_z = move(0.0, sign * 4e-5)
+        while abs(f_z) < force:
+            z, f_z = move(0.0, sign * 1e-5)
+        ends.append(z)
     return ends[0] - ends[1]
 
 
@@ -92,7 +106,9 @@ def episode(
     }
 
 
-def replay_errors(steps: Sequence[float], reference: float) -> dict[float, np.ndarray]:
+def replay_errors(
+    steps: Sequence[float], reference: float, *overrides: str
+) -> dict[float, np.ndarray]:
     """Returns median and 95 and 99 % quantile (3,) of the force error [N] per step.
 
     The error is that of noisy actions replayed at coarser time steps.
@@ -101,7 +117,7 @@ def replay_errors(steps: Sequence[float], reference: float) -> dict[float, np.nd
     run at the reference step; the other steps get the same actions, open loop.
     """
     twins = {
-        step: quiet("removal", f"simulation.twin_time_step={step}")
+        step: quiet("removal", f"simulation.twin_time_step={step}", *overrides)
         for step in (reference, *steps)
     }
     policy, random = make_policy("admittance"), np.random.default_rng(0)
@@ -182,6 +198,13 @@ def _contact_lines() -> Iterator[str]:
         found = play(1.0, f"lock.clearance={clearance}")
         excess = 100 * (found / clearance - 1)
         yield f"  {1e3 * clearance:.1f} {1e3 * found:.4f} {excess:+.1f}"
+    yield "play on a turned groove: degrees, nominal mm, excess %"
+    for degrees in (2.0, 4.0):
+        for clearance in (1e-4, 4e-4):
+            override = f"lock.clearance={clearance}"
+            found = play(1.0, override, ry=np.deg2rad(degrees))
+            excess = 100 * (found / clearance - 1)
+            yield f"  {degrees} {1e3 * clearance:.1f} {excess:+.1f}"
     yield "play at 0.4 mm nominal for other meshes and moduli"
     for setting in (
         "contact.resolution=0.003",
@@ -214,9 +237,27 @@ def _time_step_lines() -> Iterator[str]:
                     else f"{k} {v:.3f}"
                     for k, v in run.items()
                 )
+    yield "cell away from the shipped settings: change of the peak by half the step, %"
+    for policy, overrides in (
+        ("admittance", ["effects.0.ry=0.0698"]),
+        ("admittance", ["gripper.hold=weld"]),
+        ("admittance", ["effects.0.ry=0.0698", "gripper.hold=weld"]),
+        ("straight", ["lock.clearance=0.001"]),
+        ("straight", ["lock.clearance=0.001", "gripper.hold=weld"]),
+    ):
+        whole, half = (
+            episode("cell", policy, f"simulation.cell_time_step={step}", *overrides)
+            for step in (0.0025, 0.00125)
+        )
+        change = 100 * (half["peak"] / whole["peak"] - 1)
+        yield f"  {policy} {' '.join(overrides)} {change:+.2f}"
     yield "replayed noisy actions: twin's step ms, force error N (50, 95, 99 %)"
-    for step, error in replay_errors((0.0025, 0.005, 0.01, 0.02), 0.00125).items():
-        yield f"  {1e3 * step:.1f} " + " ".join(f"{e:.3f}" for e in error)
+    for modulus in ("4e7", "4e9"):
+        yield f"  head_modulus {modulus}"
+        override = f"contact.head_modulus={modulus}"
+        steps = (0.0025, 0.005, 0.01, 0.02)
+        for step, error in replay_errors(steps, 0.00125, override).items():
+            yield f"  {1e3 * step:.1f} " + " ".join(f"{e:.3f}" for e in error)
 
 
 def _arm_lines() -> Iterator[str]:
