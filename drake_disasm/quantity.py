@@ -55,11 +55,17 @@ def _leaves(config: Any, path: str) -> Iterator[tuple[str, Any, Any]]:
         value = getattr(config, field.name)
         if dataclasses.is_dataclass(value):
             yield from _leaves(value, name)
-        elif isinstance(value, list) and "length" not in field.metadata:
+        elif _is_list_of_sections(field, value):
             for i, item in enumerate(value):
                 yield from _leaves(item, f"{name}.{i}")
         else:
             yield name, value, field.metadata
+
+
+def _is_list_of_sections(field: dataclasses.Field, value: Any) -> bool:
+    if not isinstance(value, list) or "length" in field.metadata:
+        return False
+    return all(dataclasses.is_dataclass(item) for item in value)
 
 
 def _check_leaf(name: str, value: Any, metadata: Any) -> None:

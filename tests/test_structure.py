@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[1]
 
 #: Rooms of drake_disasm from the ground up; a module imports from its own or lower.
 FLOORS = (
-    {"errors", "quantity", "resources", "spatial", "timing", "writing"},
+    {"errors", "quantity", "resources", "spatial", "timing", "writing", "parallel"},
     {"effects"},
     {"scenario", "ports"},
     {"mdp", "lock", "devices", "models"},
@@ -18,7 +18,7 @@ FLOORS = (
     {"systems"},
     {"stations", "policies"},
     {"task"},
-    {"visualization"},
+    {"visualization", "learning"},
 )
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 MODULES = sorted((ROOT / "drake_disasm").rglob("*.py"))

@@ -13,7 +13,15 @@ from types import FrameType
 from typing import Any
 
 from drake_disasm.errors import DisasmError
-from drake_disasm.policies import SCRIPTED, make_policy
+from drake_disasm.policies import (
+    SCRIPTED,
+    find_policy,
+    load_policy,
+    make_policy,
+    shipped_policies,
+)
+from drake_disasm.quantity import closest
+from drake_disasm.scenario import Scenario
 from drake_disasm.systems.policy import Policy
 
 EXIT_BAD_INPUT = 2
@@ -77,13 +85,28 @@ def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def named_policy(name: str) -> Policy:
-    """Returns a scripted policy, or the callable of `package.module:name`.
+def named_policy(name: str, scenario: Scenario) -> Policy:
+    """Returns a scripted or trained policy, or the callable of `package.module:name`.
+
+    Args:
+        name: of a scripted or a shipped policy, a path to an .npz, or a callable.
+        scenario: that it is to act on.
 
     Raises:
-        DisasmError: there is none of that name.
+        DisasmError: there is none of that name, or it does not fit the scenario.
     """
+    path = find_policy(name)
+    if path and name not in SCRIPTED:
+        policy = load_policy(path)
+        policy.check_fits(scenario)
+        return policy
     if ":" not in name:
+        if name not in SCRIPTED:
+            known = [*SCRIPTED, *shipped_policies()]
+            raise DisasmError(
+                f"policy '{name}' does not exist; {closest(name, known)}, or give an "
+                ".npz file or module:callable"
+            )
         return make_policy(name)
     module, _, attribute = name.partition(":")
     try:
@@ -95,6 +118,14 @@ def named_policy(name: str) -> Policy:
     if not callable(policy):
         raise DisasmError(f"policy {name}: is not callable; it maps (12,) to (6,)")
     return policy
+
+
+def positive(text: str) -> int:
+    """Returns a whole number above zero, for an argument's type."""
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError("must be at least 1")
+    return value
 
 
 def provenance(program: str, arguments: Sequence[str], seed: int) -> dict[str, Any]:

@@ -56,7 +56,8 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
         "--policy",
         default="admittance",
         metavar="NAME",
-        help="straight, admittance, or module:callable from (12,) to (6,) "
+        help="a scripted one (straight, admittance), a trained one (a name in "
+        "models/policies, or an .npz file), or module:callable from (12,) to (6,) "
         "(default: admittance)",
     )
     add(
@@ -67,7 +68,7 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
     )
     add(
         "--episodes",
-        type=_positive,
+        type=cli.positive,
         default=1,
         metavar="N",
         help="how many (default: 1)",
@@ -115,13 +116,13 @@ def main(arguments: Sequence[str]) -> int:
     if args.resume and not args.record:
         raise DisasmError("--resume: say which log by --record DIR")
     scenario = load_scenario(args.scenario, args.overrides)
-    policy = cli.named_policy(args.policy)
+    policy = cli.named_policy(args.policy, scenario)
     writer = _open_log(args, arguments, scenario) if args.record else None
     if args.html:
         make_folder(args.html.parent)
     view = _open_view(args)
     simulation = TaskSimulation(scenario, args.model, policy, [view] if view else [])
-    simulation.simulator.set_target_realtime_rate(_rate(args))
+    simulation.set_target_realtime_rate(_rate(args))
     summaries: list[EpisodeSummary] = []
     try:
         done = writer.next_number if writer else 0
@@ -212,13 +213,6 @@ def _finish(args: argparse.Namespace, view: MeshcatView | None) -> None:
         print(f"page: {args.html}")
     if view and not args.no_meshcat and sys.stdin.isatty():
         input("press Enter to close the page ")
-
-
-def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
-    return value
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from drake_disasm.scenario.files import (
     scenario_path,
     scenario_to_mapping,
 )
+from drake_disasm.scenario.randomisation import draw, with_values
 from drake_disasm.scenario.schema import (
     ArmConfig,
     ContactConfig,
@@ -19,6 +20,7 @@ from drake_disasm.scenario.schema import (
     LockConfig,
     ObservationConfig,
     PlacementConfig,
+    Range,
     RewardConfig,
     Scenario,
     SensorConfig,
@@ -35,16 +37,19 @@ __all__ = [
     "LockConfig",
     "ObservationConfig",
     "PlacementConfig",
+    "Range",
     "RewardConfig",
     "Scenario",
     "SensorConfig",
     "SimulationConfig",
     "TaskConfig",
     "TwinConfig",
+    "draw",
     "dump_scenario",
     "load_scenario",
     "scenario_from_mapping",
     "scenario_path",
     "scenario_to_mapping",
     "validate",
+    "with_values",
 ]

@@ -208,8 +208,17 @@ class ObservationConfig:
 
 
 @dataclasses.dataclass
+class Range:
+    """A number that every episode draws anew, uniformly (domain randomisation)."""
+
+    parameter: str = quantity("", "", "path, as `effects.0.ry` or `lock.clearance`")
+    low: float = quantity(0.0, "", "in the parameter's own unit")
+    high: float = quantity(0.0, "", "in the parameter's own unit")
+
+
+@dataclasses.dataclass
 class Scenario:
-    """Everything that denotes one diagram."""
+    """Everything that denotes one diagram, or a family of them."""
 
     name: str = "removal"
     simulation: SimulationConfig = dataclasses.field(default_factory=SimulationConfig)
@@ -226,3 +235,4 @@ class Scenario:
     )
     imprecision: float = quantity(0.0, "m", "psi of algorithm 3.2", low=0.0, high=0.01)
     effects: list[AnyEffect] = dataclasses.field(default_factory=list)
+    randomisation: list[Range] = dataclasses.field(default_factory=list)

@@ -15,7 +15,7 @@ from pydrake.common.yaml import yaml_load_typed
 from drake_disasm.effects import EFFECTS
 from drake_disasm.errors import DisasmError
 from drake_disasm.quantity import closest
-from drake_disasm.scenario.schema import Scenario
+from drake_disasm.scenario.schema import Range, Scenario
 
 _MODEL = "see models/scenarios/removal.yaml"
 _NUMBERS: dict[type, Callable[[str], object]] = {int: int, float: float}
@@ -87,6 +87,8 @@ def _check_value(node: yaml.Node, field: dataclasses.Field, path: str) -> None:
         _check_section(node, field.type, path)
     elif path == "effects":
         _check_effects(node)
+    elif path == "randomisation":
+        _check_ranges(node)
     elif typing.get_origin(field.type) is list:
         if not isinstance(node, yaml.SequenceNode):
             raise _NodeError(node, f"{path}: has the wrong shape; write [a, b, ...]")
@@ -133,6 +135,17 @@ def _check_effects(node: yaml.Node) -> None:
                 item, f"{path}: effect '{name}' does not exist; {closest(name, names)}"
             )
         _check_section(item, _EFFECTS[name], path)
+
+
+def _check_ranges(node: yaml.Node) -> None:
+    if not isinstance(node, yaml.SequenceNode):
+        raise _NodeError(
+            node,
+            "randomisation: is no list; write [] or lines of "
+            "`- {parameter: effects.0.ry, low: -0.03, high: 0.03}`",
+        )
+    for number, item in enumerate(node.value):
+        _check_section(item, Range, f"randomisation.{number}")
 
 
 def _unknown(name: str, schema: type, path: str) -> str:

@@ -3,6 +3,7 @@
 from drake_disasm.effects import EFFECTS
 from drake_disasm.errors import DisasmError
 from drake_disasm.quantity import check
+from drake_disasm.scenario.randomisation import refuse_broken_ranges, with_values
 from drake_disasm.scenario.schema import LockConfig, Scenario, Untagged
 
 
@@ -13,6 +14,22 @@ def validate(scenario: Scenario) -> None:
         DisasmError: names the first field that is out of bounds or does not fit
             another, and the remedy.
     """
+    _validate_one(scenario)
+    refuse_broken_ranges(scenario)
+    for name in ("low", "high") if scenario.randomisation else ():
+        corner = with_values(
+            scenario, {r.parameter: getattr(r, name) for r in scenario.randomisation}
+        )
+        try:
+            _validate_one(corner)
+        except DisasmError as error:
+            raise DisasmError(
+                f"randomisation: with every {name} end, {error}"
+            ) from None
+
+
+def _validate_one(scenario: Scenario) -> None:
+    """Checks one diagram's scenario, whatever its ranges."""
     check(scenario)
     _refuse_untagged(scenario)
     _refuse_broken_periods(scenario)

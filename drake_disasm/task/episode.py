@@ -1,11 +1,12 @@
 """Episodes: running one, recording its rows, summing it up."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from drake_disasm.effects import Effect
 from drake_disasm.mdp import REWARD_TERMS, BoltState, Outcome
 from drake_disasm.task.simulation import StepResult, TaskSimulation
 
@@ -22,7 +23,7 @@ class EpisodeSummary:
         reward_terms: summed by name.
         travel, rise: largest displacement of the bolt along x and y [m].
         max_force, mean_force: on the bolt [N].
-        max_torque: on the bolt [N m].
+        max_torque, mean_torque: on the bolt [N m].
         outcome: how it ended.
         bolt_is_out: whether the bolt truly left the groove (simulation only).
     """
@@ -35,6 +36,7 @@ class EpisodeSummary:
     max_force: float = 0.0
     mean_force: float = 0.0
     max_torque: float = 0.0
+    mean_torque: float = 0.0
     outcome: Outcome = Outcome.RUNNING
     bolt_is_out: bool = False
 
@@ -54,6 +56,7 @@ class EpisodeSummary:
         self.max_force = max(self.max_force, state.force)
         self.max_torque = max(self.max_torque, state.torque)
         self.mean_force += (state.force - self.mean_force) / self.steps
+        self.mean_torque += (state.torque - self.mean_torque) / self.steps
         self.outcome = result.outcome
 
 
@@ -85,6 +88,10 @@ class EpisodeRecorder:
                 "action_executed": np.zeros(6),
                 "terminated": np.False_,
                 "truncated": np.False_,
+            }
+            | {
+                f"extra.{parameter}": np.float64(value)
+                for parameter, value in simulation.drawn.items()
             }
         )
 
@@ -121,6 +128,7 @@ def run_episode(
     seed: int,
     recorder: EpisodeRecorder | None = None,
     on_step: Callable[[EpisodeSummary], None] | None = None,
+    effects: Sequence[Effect] | None = None,
 ) -> EpisodeSummary:
     """Runs one episode of a simulation that has a policy.
 
@@ -129,12 +137,13 @@ def run_episode(
         seed: of the episode.
         recorder: gets every row, if given; up to an error, too.
         on_step: called with the summary so far after each step.
+        effects: instead of the scenario's.
 
     Raises:
         DisasmError: what the policy raised or returned.
     """
     summary = EpisodeSummary(seed)
-    simulation.reset(seed)
+    simulation.reset(seed, effects)
     if recorder:
         recorder.measure()
     while summary.outcome is Outcome.RUNNING:

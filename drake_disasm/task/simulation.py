@@ -33,7 +33,7 @@ from pydrake.systems.primitives import (
 from drake_disasm.effects import Effect
 from drake_disasm.lock import lift_needed
 from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
-from drake_disasm.scenario import Scenario
+from drake_disasm.scenario import Scenario, draw, with_values
 from drake_disasm.stations import Station, make_station
 from drake_disasm.systems.imprecision import ImprecisionNoise, clamped
 from drake_disasm.systems.observation import Mounting, ObservationProcessor
@@ -70,6 +70,8 @@ class TaskSimulation:
     environment for learning does; with one, `step()` lets it act.
 
     Attributes:
+        scenario: as given.
+        drawn: what its ranges drew for the running episode, by parameter.
         steps: taken in the running episode.
 
     Args:
@@ -88,20 +90,36 @@ class TaskSimulation:
         observers: Sequence["Observer"] = (),
     ) -> None:
         self.scenario, self.model = scenario, model
+        self.drawn: dict[str, float] = {}
+        self._policy, self._observers = policy, tuple(observers)
+        self.steps = 0
+        self._rate = 0.0
+        self._build(scenario)
+
+    def _build(self, scenario: Scenario) -> None:
+        """Makes the diagram of a scenario whose ranges are drawn, or left alone."""
+        self._built = scenario
         self.bounds = action_bounds(scenario.task)
         builder = DiagramBuilder()
-        self.station = builder.AddNamedSystem("station", make_station(model, scenario))
-        self._add_systems(builder, policy)
-        for observer in observers:
+        self.station = builder.AddNamedSystem(
+            "station", make_station(self.model, scenario)
+        )
+        self._add_systems(builder, scenario)
+        for observer in self._observers:
             observer.connect(builder, self)
         self.diagram: Diagram = builder.Build()
-        self.diagram.set_name(f"{scenario.name}_{model}")
+        self.diagram.set_name(f"{scenario.name}_{self.model}")
         self.simulator = Simulator(self.diagram)
+        self.simulator.set_target_realtime_rate(self._rate)
         self.context = self.simulator.get_mutable_context()
         self._ports: dict[tuple[int, str], tuple[OutputPort, Context]] = {}
         self._start: Context | None = None
         self._effects: list[Effect] | None = None
-        self.steps = 0
+
+    def set_target_realtime_rate(self, rate: float) -> None:
+        """Slows the simulation down to `rate` times real time; 0 is full speed."""
+        self._rate = rate
+        self.simulator.set_target_realtime_rate(rate)
 
     def reset(self, seed: int, effects: Sequence[Effect] | None = None) -> np.ndarray:
         """Starts an episode in place and returns its first observation (12,).
@@ -109,10 +127,15 @@ class TaskSimulation:
         Args:
             seed: of sensor noise and imprecision.
             effects: instead of the scenario's; a change settles the station anew.
+
+        What the scenario's ranges draw for this seed is in `drawn`. If it concerns
+        effects alone the diagram stays; anything else needs a new one.
         """
+        if self.scenario.randomisation:
+            self._draw(seed)
         # A copy, so that a later change to the same objects is noticed.
         wanted = copy.deepcopy(
-            list(self.scenario.effects if effects is None else effects)
+            list(self._built.effects if effects is None else effects)
         )
         if self._start is None or wanted != self._effects:
             self._start, self._effects = self._starting_context(wanted), wanted
@@ -129,6 +152,15 @@ class TaskSimulation:
         self.simulator.Initialize()
         self.simulator.AdvanceTo(boundary(0, self.scenario.task.period))
         return self.observation()
+
+    def _draw(self, seed: int) -> None:
+        self.drawn = draw(self.scenario, seed)
+        wanted = with_values(self.scenario, self.drawn)
+        if dataclasses.replace(wanted, effects=[]) != dataclasses.replace(
+            self._built, effects=[], randomisation=[]
+        ):
+            self._build(wanted)
+        self._built = wanted
 
     def step(self, action: np.ndarray | None = None) -> StepResult:
         """Advances one period of the MDP.
@@ -188,14 +220,14 @@ class TaskSimulation:
         X_GB = self.station.true_groove_pose(station_context).inverse() @ X_GnB
         return bool(X_GB.translation()[1] >= self._lift_needed)
 
-    def _add_systems(self, builder: DiagramBuilder, policy: Policy | None) -> None:
-        station, task = self.station, self.scenario.task
-        self._lift_needed = lift_needed(self.scenario.lock, task.lift_success)
+    def _add_systems(self, builder: DiagramBuilder, scenario: Scenario) -> None:
+        station, task = self.station, scenario.task
+        self._lift_needed = lift_needed(scenario.lock, task.lift_success)
         add = builder.AddNamedSystem
         self.processor = add("observation_processor", self._make_processor())
         self.monitor = add("task_monitor", TaskMonitor(task, self._lift_needed))
         self.imprecision = add(
-            "imprecision", ImprecisionNoise(self.scenario.imprecision, self.bounds)
+            "imprecision", ImprecisionNoise(scenario.imprecision, self.bounds)
         )
         noise = add(
             "imprecision_noise",
@@ -223,7 +255,7 @@ class TaskSimulation:
         if station.grip_command is not None:
             grip = add("grip", ConstantVectorSource([station.grip_command]))
             connect(grip.get_output_port(), station.GetInputPort("gripper.position"))
-        self._add_policy(builder, policy)
+        self._add_policy(builder, self._policy)
 
     def _make_processor(self) -> ObservationProcessor:
         station = self.station

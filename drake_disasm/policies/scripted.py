@@ -6,7 +6,6 @@ import numpy as np
 
 from drake_disasm.errors import DisasmError
 from drake_disasm.quantity import closest
-from drake_disasm.systems.policy import Policy
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,7 +78,7 @@ SCRIPTED: dict[str, type[Straight] | type[Admittance]] = {
 }
 
 
-def make_policy(name: str) -> Policy:
+def make_policy(name: str) -> Straight | Admittance:
     """Returns the scripted policy of a name.
 
     Raises:

@@ -1,0 +1,65 @@
+"""A training's state on disk: whole, and after every episode."""
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch.utils._pytree import tree_flatten, tree_unflatten
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.learning.agent import Agent
+from drake_disasm.learning.replay import Replay
+from drake_disasm.writing import write_atomically
+
+
+def save_checkpoint(
+    path: Path, agent: Agent, replay: Replay, notes: dict[str, Any]
+) -> None:
+    """Writes an agent, its memory and notes (plain data) whole or not at all.
+
+    Raises:
+        DisasmError: the system refuses to write.
+    """
+    leaves, _ = tree_flatten(agent.state)
+    rows, following = replay.contents()
+    arrays = {f"state_{i:03d}": leaf.numpy() for i, leaf in enumerate(leaves)}
+    own = {"updates": agent.updates, "following": following, "notes": notes}
+    text = np.frombuffer(json.dumps(own).encode(), dtype=np.uint8)
+    write_atomically(path, lambda f: np.savez(f, text=text, replay=rows, **arrays))
+
+
+def load_checkpoint(path: Path, agent: Agent, replay: Replay) -> dict[str, Any]:
+    """Puts an agent and its memory back, and returns the notes.
+
+    Raises:
+        DisasmError: the file is damaged, or of another kind of agent.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        own = json.loads(arrays["text"].tobytes())
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise DisasmError(
+            f"{path}: is no whole checkpoint ({error}); delete it to begin anew"
+        ) from None
+    _restore_state(path, agent, arrays)
+    replay.restore(arrays["replay"], own["following"])
+    agent.updates = own["updates"]
+    return own["notes"]
+
+
+def _restore_state(path: Path, agent: Agent, arrays: dict[str, np.ndarray]) -> None:
+    leaves, structure = tree_flatten(agent.state)
+    found = [arrays.get(f"state_{i:03d}") for i in range(len(leaves))]
+    if any(
+        new is None or new.shape != tuple(old.shape)
+        for new, old in zip(found, leaves, strict=True)
+    ):
+        raise DisasmError(
+            f"{path}: is of an agent with other networks; resume with the "
+            "hyper-parameters that the training began with"
+        )
+    agent.state = tree_unflatten([torch.from_numpy(a) for a in found], structure)

@@ -1,0 +1,42 @@
+"""Transitions of recorded episodes, as an agent remembers them."""
+
+import numpy as np
+
+from drake_disasm.learning.hyperparameters import Hyperparameters
+from drake_disasm.learning.replay import Replay
+from drake_disasm.mdp import BoltState, reward_terms
+from drake_disasm.policies import ActionMap
+from drake_disasm.scenario import TaskConfig
+
+
+def remember(
+    replay: Replay,
+    observations: np.ndarray,
+    actions: np.ndarray,
+    terminated: bool,
+    task: TaskConfig,
+    action_map: ActionMap,
+    config: Hyperparameters,
+) -> None:
+    """Adds one recorded episode to a memory.
+
+    The reward is computed anew from the states, so that a log of any origin and
+    any reward teaches this task. An action that this agent can't choose (beyond
+    its bounds, or its residual's) is cut to the nearest that it can.
+
+    Args:
+        replay: the memory.
+        observations: (T + 1, 12) states [m, rad, N, N m].
+        actions: (T, 6) un-noised actions [m, rad].
+        terminated: whether the task itself ended the episode.
+        task: whose reward counts.
+        action_map: of the agent.
+        config: of the agent; its scales are used.
+    """
+    scaled = observations / np.array(config.observation_scale)
+    states = [BoltState.from_vector(s) for s in observations]
+    for k, action in enumerate(actions):
+        reward = sum(reward_terms(states[k], states[k + 1], task).values())
+        chosen = action_map.from_action(observations[k], action)
+        last = k == len(actions) - 1
+        replay.add(scaled[k], chosen, reward, scaled[k + 1], terminated and last)

@@ -1,0 +1,97 @@
+"""Deterministic validation of a policy (thesis 3.3.3.2)."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from drake_disasm.effects import Effect
+from drake_disasm.learning.statistics import wilson_interval
+from drake_disasm.mdp import Outcome
+from drake_disasm.scenario import Scenario
+from drake_disasm.systems.policy import Policy
+from drake_disasm.task.episode import EpisodeSummary, run_episode
+from drake_disasm.task.simulation import TaskSimulation
+
+
+@dataclasses.dataclass(frozen=True)
+class Evaluation:
+    """What episodes of a policy showed.
+
+    Attributes:
+        episodes: run.
+        successes: of them.
+        success_low, success_high: Wilson's 95 % interval of the rate.
+        truly_out: episodes after which the bolt truly was out (simulation only).
+        performance: mean episodic reward (thesis: P).
+        instability: standard deviation of the episodic reward (table 3.3).
+        mean_force, mean_torque: mean over the episodes of each one's mean [N, N m].
+        peak_force, peak_torque: the largest of all [N, N m].
+        mean_peak_force: mean over the episodes of each one's peak [N].
+        steps: mean length.
+    """
+
+    episodes: int
+    successes: int
+    success_low: float
+    success_high: float
+    truly_out: int
+    performance: float
+    instability: float
+    mean_force: float
+    mean_torque: float
+    peak_force: float
+    peak_torque: float
+    mean_peak_force: float
+    steps: float
+
+
+def evaluate(
+    simulation: TaskSimulation,
+    seeds: Sequence[int],
+    effects: Sequence[Effect] | None = None,
+    on_episode: Callable[[EpisodeSummary], None] | None = None,
+) -> list[EpisodeSummary]:
+    """Runs episodes of a simulation that has a policy.
+
+    Args:
+        simulation: its diagram holds the policy.
+        seeds: one per episode; the same seeds give the same episodes.
+        effects: instead of the scenario's.
+        on_episode: called after each.
+    """
+    summaries = []
+    for seed in seeds:
+        summaries.append(run_episode(simulation, seed, effects=effects))
+        if on_episode:
+            on_episode(summaries[-1])
+    return summaries
+
+
+def validate_policy(
+    policy: Policy, scenario: Scenario, model: str, seeds: Sequence[int]
+) -> "Evaluation":
+    """Returns how a policy does in a diagram of its own, away from any training."""
+    return summed_up(evaluate(TaskSimulation(scenario, model, policy), seeds))
+
+
+def summed_up(summaries: Sequence[EpisodeSummary]) -> Evaluation:
+    """Returns the figures of at least one episode."""
+    rewards = np.array([s.reward for s in summaries])
+    successes = sum(s.outcome is Outcome.SUCCESS for s in summaries)
+    low, high = wilson_interval(successes, len(summaries))
+    return Evaluation(
+        episodes=len(summaries),
+        successes=successes,
+        success_low=low,
+        success_high=high,
+        truly_out=sum(s.bolt_is_out for s in summaries),
+        performance=float(rewards.mean()),
+        instability=float(rewards.std()),
+        mean_force=float(np.mean([s.mean_force for s in summaries])),
+        mean_torque=float(np.mean([s.mean_torque for s in summaries])),
+        peak_force=max(s.max_force for s in summaries),
+        peak_torque=max(s.max_torque for s in summaries),
+        mean_peak_force=float(np.mean([s.max_force for s in summaries])),
+        steps=float(np.mean([s.steps for s in summaries])),
+    )

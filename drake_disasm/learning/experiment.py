@@ -1,0 +1,174 @@
+"""Several seeds of one training, in one folder.
+
+folder/
+  training.json        what is done: scenario, hyper-parameters, provenance
+  seed_000/ ...        one training each (see run.py)
+  summary.json         figures over the seeds that are finished
+  learning_curve.png
+"""
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.learning.hyperparameters import Hyperparameters
+from drake_disasm.learning.run import read_episodes, write_json
+from drake_disasm.learning.statistics import wilson_interval
+from drake_disasm.learning.training import TrainingSpec
+from drake_disasm.scenario import Scenario, scenario_to_mapping
+from drake_disasm.writing import make_folder
+
+
+@dataclasses.dataclass(frozen=True)
+class Experiment:
+    """What all seeds have in common.
+
+    Attributes:
+        scenario, model, config, compiled, threads: as in TrainingSpec.
+        preset: name of what the hyper-parameters began with.
+        validation: greedy episodes after each training.
+        logs: folders to learn from without acting; empty to act.
+        updates: gradient updates on those; 0 for one per transition.
+        demonstrations: folders of logs to mix into each batch.
+        provenance: command, date, versions, commit.
+    """
+
+    scenario: Scenario
+    model: str
+    preset: str
+    config: Hyperparameters
+    compiled: bool = True
+    threads: int = 1
+    validation: int = 10
+    logs: tuple[str, ...] = ()
+    updates: int = 0
+    demonstrations: tuple[str, ...] = ()
+    provenance: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    def spec(self, seed: int) -> TrainingSpec:
+        """Returns one seed's training."""
+        return TrainingSpec(
+            self.scenario, self.model, self.config, seed, self.compiled, self.threads
+        )
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Returns it as plain data."""
+        mapping = {
+            field.name: getattr(self, field.name) for field in dataclasses.fields(self)
+        }
+        mapping["scenario"] = scenario_to_mapping(self.scenario)
+        mapping["config"] = dataclasses.asdict(self.config)
+        return mapping
+
+
+def open_experiment(experiment: Experiment, folder: Path, resume: bool) -> Experiment:
+    """Makes the folder, or finds the same experiment in it, and returns that.
+
+    Raises:
+        DisasmError: the folder holds something and `resume` is false, or it holds
+            another experiment; names the first difference.
+    """
+    make_folder(folder)
+    path = folder / "training.json"
+    wanted = json.loads(json.dumps(experiment.to_mapping()))
+    if not path.exists():
+        if any(folder.iterdir()):
+            raise DisasmError(f"{folder}: is not empty; name a new folder")
+        write_json(path, wanted)
+        return experiment
+    if not resume:
+        raise DisasmError(
+            f"{folder}: holds a training already; add --resume, or name a new folder"
+        )
+    found = _read(path)
+    for key in wanted:
+        if key != "provenance" and found.get(key) != wanted[key]:
+            raise DisasmError(
+                f"{folder}: was begun with another {_difference(found, wanted, key)}; "
+                "resume with the same, or name a new folder"
+            )
+    return dataclasses.replace(experiment, provenance=found["provenance"])
+
+
+def _difference(found: dict[str, Any], wanted: dict[str, Any], key: str) -> str:
+    """Returns the path and both values of the first difference under a key."""
+    old, new = found.get(key), wanted[key]
+    if isinstance(old, dict) and isinstance(new, dict):
+        inner = next(k for k in {**old, **new} if old.get(k) != new.get(k))
+        return f"{key}.{_difference(old, {**new, inner: new.get(inner)}, inner)}"
+    return f"{key} ({old}, not {new})"
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return json.loads(path.read_text())
+    except (OSError, ValueError) as error:
+        raise DisasmError(
+            f"{path}: can't be read ({error}); name a new folder"
+        ) from None
+
+
+def write_summary(folder: Path) -> str:
+    """Writes summary and learning curve of what is finished; returns it as text."""
+    results = [_read(path) for path in sorted(folder.glob("seed_*/result.json"))]
+    if not results:
+        return "no seed is finished yet"
+    summary = _summarised(results)
+    write_json(folder / "summary.json", summary)
+    seeds = [read_episodes(p) for p in sorted(folder.glob("seed_*/episodes.csv"))]
+    if all(len(episodes) > 1 for episodes in seeds):
+        from drake_disasm.learning.learning_curve import plot_learning_curves
+
+        name = _read(folder / "training.json")
+        label = f"{name['config']['algorithm']}, {name['preset']}"
+        plot_learning_curves({label: seeds}, folder / "learning_curve.png")
+    return _table(results, summary)
+
+
+def _summarised(results: list[dict[str, Any]]) -> dict[str, Any]:
+    """Returns success of trainings, first successes, P and validation over seeds."""
+    summary: dict[str, Any] = {"seeds": [r["seed"] for r in results]}
+    if "training" in results[0]:
+        first = [r["first_success"] for r in results]
+        won = sum(f is not None for f in first)
+        summary["trained"] = won
+        summary["trained_interval"] = wilson_interval(won, len(results))
+        summary["first_success"] = first
+        summary["P"] = [r["training"]["performance"] for r in results]
+    for name in ("successes", "performance", "mean_force", "peak_force", "steps"):
+        summary[f"validation_{name}"] = [r["validation"][name] for r in results]
+    summary["validation_episodes"] = results[0]["validation"]["episodes"]
+    return summary
+
+
+def _table(results: list[dict[str, Any]], summary: dict[str, Any]) -> str:
+    """Returns one line per seed and one for all, for a terminal."""
+    lines = [
+        "seed  first success  training P  validation: success   reward  steps  "
+        "mean F  peak F"
+    ]
+    for r in results:
+        v, training = r["validation"], r.get("training", {})
+        first, P = r.get("first_success"), training.get("performance")
+        lines.append(
+            f"{r['seed']:4d}  {'-' if first is None else first:>13}  "
+            f"{'-' if P is None else f'{P:.2f}':>10}  "
+            f"{v['successes']:>10}/{v['episodes']:<8} {v['performance']:8.2f} "
+            f"{v['steps']:6.1f} {v['mean_force']:5.2f} N {v['peak_force']:5.2f} N"
+        )
+    if "trained" in summary:
+        low, high = summary["trained_interval"]
+        lines.append(
+            f"{summary['trained']} of {len(results)} trainings succeeded at least once "
+            f"(95 %: {100 * low:.0f} to {100 * high:.0f} %)"
+        )
+    means = [np.mean(summary["validation_successes"])]
+    lines.append(
+        f"validation: {means[0]:.1f} of {summary['validation_episodes']} episodes "
+        "succeed on average"
+    )
+    return "\n".join(lines)

@@ -1,0 +1,55 @@
+"""From a trained agent to a policy that runs without torch."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from drake_disasm.learning.training import Training
+from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
+from drake_disasm.policies import (
+    LearnedPolicy,
+    Network,
+    PolicyDescription,
+    scenario_hash,
+)
+
+
+def trained_policy(training: Training, provenance: dict[str, Any]) -> LearnedPolicy:
+    """Returns the greedy policy that a training has come to.
+
+    Args:
+        training: at any episode.
+        provenance: command, date, seed, versions, commit.
+    """
+    spec = training.spec
+    task = spec.scenario.task
+    return LearnedPolicy(
+        network=_greedy(training.agent.network()),
+        observation_scale=np.array(spec.config.observation_scale),
+        action_map=training.action_map,
+        description=PolicyDescription(
+            agent=spec.config.algorithm,
+            preset=provenance.get("preset", ""),
+            hyperparameters=dataclasses.asdict(spec.config),
+            scenario_hash=scenario_hash(spec.scenario),
+            model=spec.model,
+            state_names=STATE_NAMES,
+            action_names=ACTION_NAMES,
+            observation_variant=spec.scenario.observation.variant,
+            period=task.period,
+            max_translation=task.max_translation,
+            max_rotation=task.max_rotation,
+            provenance=provenance,
+            evaluation={},
+        ),
+    )
+
+
+def _greedy(network: Network) -> Network:
+    """Returns the network without SAC's log sigmas, which a greedy policy ignores."""
+    count = len(ACTION_NAMES)
+    weights, biases = network.weights, network.biases
+    return Network(
+        (*weights[:-1], weights[-1][:count]), (*biases[:-1], biases[-1][:count])
+    )

@@ -1,0 +1,99 @@
+"""Transitions: their layout in one table, and the memory that is sampled from."""
+
+from typing import NamedTuple
+
+import numpy as np
+from torch import Tensor
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
+
+_STATES, _ACTIONS = len(STATE_NAMES), len(ACTION_NAMES)
+#: Numbers in one transition.
+WIDTH = 2 * _STATES + _ACTIONS + 2
+
+
+class Batch(NamedTuple):
+    """Transitions as the updates see them.
+
+    Attributes:
+        observation, next_observation: (n, 12) scaled.
+        action: (n, 6) in [-1, 1], before imprecision (algorithm 3.2).
+        reward: (n,).
+        terminated: (n,) 1 where the task itself ended, which cuts the bootstrap;
+            0 elsewhere, at a time limit too.
+    """
+
+    observation: Tensor
+    action: Tensor
+    reward: Tensor
+    next_observation: Tensor
+    terminated: Tensor
+
+
+def split(rows: Tensor) -> Batch:
+    """Returns the columns of rows (n, WIDTH)."""
+    s, a = _STATES, _ACTIONS
+    return Batch(
+        rows[:, :s],
+        rows[:, s : s + a],
+        rows[:, s + a],
+        rows[:, s + a + 1 : 2 * s + a + 1],
+        rows[:, 2 * s + a + 1],
+    )
+
+
+class Replay:
+    """A ring of transitions, each one row of float32.
+
+    Attributes:
+        size: transitions held.
+
+    Args:
+        capacity: transitions kept; the oldest gives way.
+    """
+
+    def __init__(self, capacity: int) -> None:
+        self._rows = np.zeros((capacity, WIDTH), dtype=np.float32)
+        self._next = 0
+        self.size = 0
+
+    def add(
+        self,
+        observation: np.ndarray,
+        action: np.ndarray,
+        reward: float,
+        next_observation: np.ndarray,
+        terminated: bool,
+    ) -> None:
+        """Stores one transition; arguments as in `Batch`, without the first axis."""
+        row = self._rows[self._next]
+        row[:_STATES] = observation
+        row[_STATES : _STATES + _ACTIONS] = action
+        row[_STATES + _ACTIONS] = reward
+        row[_STATES + _ACTIONS + 1 : -1] = next_observation
+        row[-1] = terminated
+        self._next = (self._next + 1) % len(self._rows)
+        self.size = min(self.size + 1, len(self._rows))
+
+    def sample(self, count: int, generator: np.random.Generator) -> np.ndarray:
+        """Returns rows (count, WIDTH), drawn with replacement."""
+        return self._rows[generator.integers(self.size, size=count)]
+
+    def contents(self) -> tuple[np.ndarray, int]:
+        """Returns the rows held (size, WIDTH) and where the next one goes."""
+        return self._rows[: self.size], self._next
+
+    def restore(self, rows: np.ndarray, following: int) -> None:
+        """Takes up what `contents` gave.
+
+        Raises:
+            DisasmError: the rows don't fit in here.
+        """
+        if len(rows) > len(self._rows) or rows.shape[1:] != (WIDTH,):
+            raise DisasmError(
+                f"a memory of {rows.shape} does not fit one of {self._rows.shape}; "
+                "resume with the hyper-parameters that the training began with"
+            )
+        self.size, self._next = len(rows), following
+        self._rows[: self.size] = rows

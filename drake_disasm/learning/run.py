@@ -1,0 +1,208 @@
+"""One seed's training in a folder: checkpoint, log, policy, result.
+
+folder/
+  checkpoint.npz   after every episode; what a resumed run goes on from
+  log/             every episode (the caller's writer)
+  episodes.csv     one row per episode
+  policy.npz       what was learned
+  result.json      its figures and its validation; there once all is done
+"""
+
+import contextlib
+import csv
+import dataclasses
+import fcntl
+import io
+import json
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Protocol
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.learning.evaluation import summed_up, validate_policy
+from drake_disasm.learning.policy import trained_policy
+from drake_disasm.learning.training import Purpose, Training, seed_for
+from drake_disasm.mdp import REWARD_TERMS, Outcome
+from drake_disasm.policies import save_policy
+from drake_disasm.task.episode import EpisodeRecorder, EpisodeSummary
+from drake_disasm.writing import make_folder, write_atomically
+
+_PATIENCE = 10.0  # s that a killed run's workers have to notice
+
+
+class EpisodeLog(Protocol):
+    """What takes the rows of each episode."""
+
+    def write(self, number: int, recorder: EpisodeRecorder) -> None:
+        """Writes episode `number`, if it is not there yet."""
+
+
+@dataclasses.dataclass(frozen=True)
+class News:
+    """What a training tells after each episode.
+
+    Attributes:
+        seed: of the training.
+        number: episodes done.
+        summary: of the newest; None where there is none.
+    """
+
+    seed: int
+    number: int
+    summary: EpisodeSummary | None
+
+
+def run_training(
+    training: Training,
+    folder: Path,
+    log: EpisodeLog,
+    provenance: dict[str, Any],
+    validation: int,
+    report: Callable[[News | None], None],
+) -> dict[str, Any]:
+    """Trains to the end, from the folder's checkpoint if there is one.
+
+    Args:
+        training: fresh.
+        folder: of this seed.
+        log: takes each episode before its checkpoint is written.
+        provenance: where the policy is from.
+        validation: greedy episodes at the end.
+        report: gets news after each episode; may raise to stop.
+
+    Returns:
+        What `result.json` says.
+
+    Raises:
+        DisasmError: somebody else is training in the folder; a damaged checkpoint.
+    """
+    make_folder(folder)
+    with _locked(folder):
+        checkpoint = folder / "checkpoint.npz"
+        if checkpoint.exists():
+            training.restore(checkpoint)
+        while len(training.summaries) < training.spec.config.episodes:
+            summary, recorder = training.run_episode()
+            log.write(len(training.summaries) - 1, recorder)
+            training.save(checkpoint)
+            report(News(training.spec.seed, len(training.summaries), summary))
+        return finish(training, folder, provenance, validation)
+
+
+def learn_offline(
+    training: Training,
+    folder: Path,
+    updates: int,
+    provenance: dict[str, Any],
+    validation: int,
+    report: Callable[[News | None], None],
+) -> dict[str, Any]:
+    """Learns from what the training's memory holds, without acting (thesis 3.4.2).
+
+    Args:
+        training: fresh, its memory filled.
+        updates: gradient updates to do, in as many parts as there would be episodes.
+        folder, provenance, validation, report: as in `run_training`.
+    """
+    make_folder(folder)
+    parts = training.spec.config.episodes
+    with _locked(folder):
+        for number in range(parts):
+            begin, end = (updates * i // parts for i in (number, number + 1))
+            training.learn_from_dataset(end - begin, number)
+            report(News(training.spec.seed, number + 1, None))
+        return finish(training, folder, provenance, validation)
+
+
+def finish(
+    training: Training, folder: Path, provenance: dict[str, Any], validation: int
+) -> dict[str, Any]:
+    """Validates what was learned, and writes policy, episodes and result."""
+    spec = training.spec
+    seeds = [seed_for(spec.seed, Purpose.VALIDATION, i) for i in range(validation)]
+    policy = trained_policy(training, provenance)
+    figures = validate_policy(policy, spec.scenario, spec.model, seeds)
+    evaluation = dataclasses.asdict(figures)
+    description = dataclasses.replace(policy.description, evaluation=evaluation)
+    policy = dataclasses.replace(policy, description=description)
+    save_policy(folder / "policy.npz", policy)
+    write_episodes(folder / "episodes.csv", training.summaries)
+    result = _figures(training.summaries) | {
+        "seed": spec.seed,
+        "updates": training.agent.updates,
+        "seconds": training.seconds,
+        "validation": evaluation,
+    }
+    write_json(folder / "result.json", result)
+    return result
+
+
+def _figures(summaries: list[EpisodeSummary]) -> dict[str, Any]:
+    """Returns what the training itself showed; nothing of it for a dataset's."""
+    if not summaries:
+        return {}
+    won = [i for i, s in enumerate(summaries, 1) if s.outcome is Outcome.SUCCESS]
+    return {
+        "training": dataclasses.asdict(summed_up(summaries)),
+        "first_success": won[0] if won else None,
+    }
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Writes plain data as JSON, whole or not at all."""
+    text = json.dumps(content, indent=2) + "\n"
+    write_atomically(path, lambda stream: stream.write(text.encode()))
+
+
+def write_episodes(path: Path, summaries: list[EpisodeSummary]) -> None:
+    """Writes one row per episode as CSV."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    plain = [f.name for f in dataclasses.fields(EpisodeSummary)]
+    plain = [name for name in plain if name not in ("reward_terms", "outcome")]
+    terms = [f"reward.{name}" for name in REWARD_TERMS]
+    writer.writerow(["episode", *plain, "outcome", "reward", *terms])
+    for number, s in enumerate(summaries):
+        row = [number, *(getattr(s, name) for name in plain), s.outcome.label]
+        row += [s.reward, *(s.reward_terms.get(name, 0.0) for name in REWARD_TERMS)]
+        writer.writerow(row)
+    write_atomically(path, lambda stream: stream.write(text.getvalue().encode()))
+
+
+def read_episodes(path: Path) -> list[dict[str, Any]]:
+    """Returns the rows that `write_episodes` wrote, numbers as numbers."""
+    with path.open(newline="") as file:
+        return [
+            {name: _number(text) for name, text in row.items()}
+            for row in csv.DictReader(file)
+        ]
+
+
+def _number(text: str) -> Any:
+    with contextlib.suppress(ValueError):
+        return float(text)
+    return text
+
+
+@contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Holds the folder for this process; the system lets go when it dies."""
+    with (folder / ".lock").open("w") as file:
+        until = time.monotonic() + _PATIENCE
+        while not _try_lock(file):
+            if time.monotonic() > until:
+                raise DisasmError(
+                    f"{folder}: another program is training there; wait for it, or "
+                    "name another folder"
+                )
+            time.sleep(0.1)
+        yield
+
+
+def _try_lock(file: Any) -> bool:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True

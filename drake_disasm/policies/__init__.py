@@ -1,0 +1,37 @@
+"""Policies: scripted ones, and trained ones from files."""
+
+from drake_disasm.policies.files import (
+    find_policy,
+    load_policy,
+    save_policy,
+    scenario_hash,
+    shipped_policies,
+)
+from drake_disasm.policies.network import (
+    ActionMap,
+    LearnedPolicy,
+    Network,
+    PolicyDescription,
+)
+from drake_disasm.policies.scripted import (
+    SCRIPTED,
+    Admittance,
+    Straight,
+    make_policy,
+)
+
+__all__ = [
+    "SCRIPTED",
+    "ActionMap",
+    "Admittance",
+    "LearnedPolicy",
+    "Network",
+    "PolicyDescription",
+    "Straight",
+    "find_policy",
+    "load_policy",
+    "make_policy",
+    "save_policy",
+    "scenario_hash",
+    "shipped_policies",
+]

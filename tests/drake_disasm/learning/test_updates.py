@@ -1,0 +1,216 @@
+"""Each gradient update, held against stable-baselines3's on the same batch."""
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import DDPG, SAC, TD3
+from stable_baselines3.common.type_aliases import ReplayBufferSamples
+
+from drake_disasm.learning.agent import Agent
+from drake_disasm.learning.agent_state import AgentState
+from drake_disasm.learning.environment import DisassemblyEnv
+from drake_disasm.learning.hyperparameters import Hyperparameters, preset
+from drake_disasm.learning.replay import WIDTH, split
+
+_REFERENCES = {"ddpg": DDPG, "td3": TD3, "sac": SAC}
+_UPDATES = 6
+
+
+@pytest.fixture(scope="module")
+def env() -> DisassemblyEnv:
+    return DisassemblyEnv("sliding")
+
+
+def _batches(count: int, size: int = 20) -> Iterator[np.ndarray]:
+    generator = np.random.default_rng(3)
+    for _ in range(count):
+        rows = generator.standard_normal((size, WIDTH)).astype(np.float32)
+        rows[:, 12:18] = np.tanh(rows[:, 12:18])
+        rows[:, -1] = generator.random(size) < 0.2
+        yield rows
+
+
+class _Fed:
+    """A replay buffer of the reference's that gives out the prescribed batches."""
+
+    def __init__(self, batches: list[np.ndarray]) -> None:
+        self._batches = iter(batches)
+
+    def sample(self, size: int, env: Any = None) -> ReplayBufferSamples:
+        b = split(torch.from_numpy(next(self._batches)))
+        column = lambda x: x[:, None]  # noqa: E731
+        return ReplayBufferSamples(
+            b.observation,
+            b.action,
+            b.next_observation,
+            column(b.terminated),
+            column(b.reward),
+        )
+
+
+def _reference(algorithm: str, config: Hyperparameters, env: DisassemblyEnv) -> Any:
+    arguments: dict[str, Any] = {
+        "learning_rate": config.actor_rate,
+        "gamma": config.gamma,
+        "tau": config.tau,
+        "batch_size": config.batch,
+        "learning_starts": 0,
+        "device": "cpu",
+        "policy_kwargs": {
+            "net_arch": list(config.hidden),
+            "optimizer_kwargs": {"eps": config.adam_epsilon},
+        },
+    }
+    if algorithm == "sac":
+        arguments["ent_coef"] = (
+            f"auto_{config.entropy}" if config.adapt_entropy else config.entropy
+        )
+    if algorithm == "td3":
+        arguments |= {
+            "policy_delay": config.policy_delay,
+            "target_policy_noise": config.target_noise,
+            "target_noise_clip": config.target_noise_limit,
+        }
+    return _REFERENCES[algorithm]("MlpPolicy", env, **arguments)
+
+
+def _linear(layers: Any) -> list[Any]:
+    return [m for m in layers if isinstance(m, torch.nn.Linear)]
+
+
+def _copy(modules: list[Any], layers: Any) -> None:
+    for module, layer in zip(modules, layers, strict=True):
+        module.weight.data.copy_(layer["weight"])
+        module.bias.data.copy_(layer["bias"])
+
+
+def _actor_modules(actor: Any, algorithm: str) -> list[Any]:
+    if algorithm != "sac":
+        return _linear(actor.mu)
+    return [*_linear(actor.latent_pi), actor.mu, actor.log_std]
+
+
+def _give(reference: Any, state: AgentState, algorithm: str) -> None:
+    """Copies an agent's parameters into the reference."""
+    actor = state.actor
+    if algorithm == "sac":
+        heads = {k: v.chunk(2) for k, v in actor[-1].items()}
+        halves = [{k: v[i] for k, v in heads.items()} for i in (0, 1)]
+        actor = (*actor[:-1], *halves)
+    _copy(_actor_modules(reference.actor, algorithm), actor)
+    if algorithm != "sac":
+        _copy(_actor_modules(reference.actor_target, algorithm), actor)
+    for i, critic in enumerate(state.critics):
+        for net in (reference.critic, reference.critic_target):
+            _copy(_linear(net.q_networks[i]), critic)
+
+
+def _check(reference: Any, state: AgentState, algorithm: str) -> None:
+    def same(modules: list[Any], layers: Any) -> None:
+        for module, layer in zip(modules, layers, strict=True):
+            for name in ("weight", "bias"):
+                torch.testing.assert_close(
+                    getattr(module, name).data, layer[name], rtol=1e-4, atol=2e-6
+                )
+
+    modules = _actor_modules(reference.actor, algorithm)
+    if algorithm == "sac":
+        same(modules[:-2], state.actor[:-1])
+        for name in ("weight", "bias"):
+            both = torch.cat([getattr(m, name).data for m in modules[-2:]])
+            torch.testing.assert_close(
+                both, state.actor[-1][name], rtol=1e-4, atol=2e-6
+            )
+    else:
+        same(modules, state.actor)
+        same(_actor_modules(reference.actor_target, algorithm), state.target_actor)
+    for i in range(len(state.critics)):
+        same(_linear(reference.critic.q_networks[i]), state.critics[i])
+        same(_linear(reference.critic_target.q_networks[i]), state.target_critics[i])
+
+
+def _train_reference(reference: Any, batches: list[np.ndarray]) -> None:
+    reference.replay_buffer = _Fed(batches)
+    reference._setup_learn(1)
+    reference.train(len(batches), reference.batch_size)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "changes"),
+    [
+        ("ddpg", {}),
+        ("td3", {"target_noise": 0.0}),
+        ("sac", {}),
+        ("sac", {"adapt_entropy": True}),
+    ],
+)
+def test_updates_are_those_of_stable_baselines3(
+    algorithm: str,
+    changes: dict[str, Any],
+    env: DisassemblyEnv,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    config = dataclasses.replace(
+        preset("chapter3", algorithm), tau=0.3, batch=20, **changes
+    )
+    agent = Agent(config, seed=1, compiled=False)
+    reference = _reference(algorithm, config, env)
+    _give(reference, agent.state, algorithm)
+    noise = np.zeros((20, 12), np.float32)
+    monkeypatch.setattr(agent, "_noise", lambda *_: torch.from_numpy(noise[:, :6]))
+    if algorithm == "sac":
+        # The same noise for both: the reference draws it inside `rsample`.
+        noise[:] = np.random.default_rng(5).standard_normal((20, 12))
+        draws = [torch.from_numpy(noise[:, :6]), torch.from_numpy(noise[:, 6:])]
+        calls = iter(range(10**6))
+        monkeypatch.setattr(
+            torch.distributions.Normal,
+            "rsample",
+            lambda self, shape=None: (
+                self.loc + self.scale * draws[next(calls) % len(draws)]
+            ),
+        )
+        monkeypatch.setattr(agent, "_noise", lambda *_: torch.from_numpy(noise))
+    batches = list(_batches(_UPDATES))
+    for rows in batches:
+        agent.learn(rows, np.random.default_rng(0))
+    _train_reference(reference, batches)
+    _check(reference, agent.state, algorithm)
+    if config.adapt_entropy:
+        assert float(agent.state.log_entropy) == pytest.approx(
+            float(reference.log_ent_coef), abs=1e-6
+        )
+
+
+@pytest.mark.parametrize("algorithm", ["ddpg", "td3", "sac"])
+def test_a_compiled_update_is_the_same_law(algorithm: str) -> None:
+    config = dataclasses.replace(
+        preset("chapter3", algorithm), layer_norm=True, hidden=[16], critics=2
+    )
+    agents = [Agent(config, seed=1, compiled=c) for c in (False, True)]
+    for rows in _batches(4):
+        for agent in agents:
+            agent.learn(rows, np.random.default_rng(7))
+    leaves = [torch.utils._pytree.tree_leaves(agent.state) for agent in agents]
+    for eager, compiled in zip(*leaves, strict=True):
+        torch.testing.assert_close(eager, compiled, rtol=1e-3, atol=1e-5)
+
+
+def test_termination_cuts_the_bootstrap_and_nothing_else_does() -> None:
+    """With a discount of 1 and targets that differ, only `terminated` matters."""
+    config = dataclasses.replace(preset("chapter3"), batch=20)
+    rows = next(iter(_batches(1)))
+    other = rows.copy()
+    other[:, 19:31] += 5.0  # other next states
+    for terminated, equal in ((1.0, True), (0.0, False)):
+        rows[:, -1] = other[:, -1] = terminated
+        critics = []
+        for batch in (rows, other):
+            agent = Agent(config, seed=1, compiled=False)
+            agent.learn(batch, np.random.default_rng(0))
+            critics.append(agent.state.critics[0][0]["weight"])
+        assert torch.equal(*critics) is equal

@@ -1,0 +1,204 @@
+"""Validates policies: N episodes each, without exploration, at what you choose.
+
+Prints one line per policy and setting: P (mean episodic reward), instability (its
+standard deviation), success with Wilson's 95 % interval, and the forces on the bolt.
+The same seeds give the same episodes. It touches no training.
+"""
+
+import argparse
+import dataclasses
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import cli
+from tqdm import tqdm
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.learning.evaluation import Evaluation, evaluate, summed_up
+from drake_disasm.parallel import run_jobs
+from drake_disasm.scenario import load_scenario
+from drake_disasm.stations import MODELS
+from drake_disasm.task.simulation import TaskSimulation
+from drake_disasm.writing import make_folder, write_atomically
+
+_EXAMPLES = """examples:
+  python tools/evaluate.py --policy admittance straight --model cell --episodes 10
+  python tools/evaluate.py --policy out/sliding/seed_000/policy.npz \\
+      --scenario sliding --model twin --sweep imprecision=0,0.0001,0.0003,0.0005
+  python tools/evaluate.py --policy removal_randomised admittance \\
+      --scenario removal_turned --sweep effects.0.ry=-0.0698,-0.0349,0,0.0349,0.0698
+  python tools/evaluate.py --policy admittance --set 'effects=[!SensorBias {fx: 2}]'
+"""
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """One line of the table.
+
+    Attributes:
+        policy: its name, as on the command line.
+        setting: what the sweep sets, as key=value; or nothing.
+        scenario: name or file.
+        overrides: all of them.
+        model: "cell" or "twin".
+        seeds: of the episodes.
+    """
+
+    policy: str
+    setting: str
+    scenario: str
+    overrides: tuple[str, ...]
+    model: str
+    seeds: range
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    parser = argparse.ArgumentParser(
+        prog="evaluate.py",
+        description=__doc__,
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    cli.add_scenario_arguments(parser)
+    add = parser.add_argument
+    add(
+        "--policy",
+        nargs="+",
+        required=True,
+        metavar="NAME",
+        help="scripted or shipped names, .npz files, or module:callable",
+    )
+    add(
+        "--model",
+        default="cell",
+        choices=sorted(MODELS),
+        help="(default: cell)",
+    )
+    add(
+        "--psi",
+        type=float,
+        metavar="M",
+        help="imprecision of the robot [m], e.g. 0.0003 (default: the scenario's)",
+    )
+    add(
+        "--sweep",
+        metavar="KEY=V1,V2,...",
+        help="one line for each value of a field of the scenario",
+    )
+    add("--episodes", type=cli.positive, default=10, metavar="N", help="(default: 10)")
+    add(
+        "--seed",
+        type=int,
+        default=0,
+        help="of the first episode; the next ones count on (default: 0)",
+    )
+    add("--workers", type=cli.positive, metavar="N", help="(default: one per core)")
+    add("--json", type=Path, metavar="FILE", help="also write the figures")
+    return parser.parse_args(arguments)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the program; returns its exit status."""
+    args = parse(arguments)
+    rows = list(_rows(args))
+    for row in rows:  # whatever is wrong is said before anything runs
+        cli.named_policy(row.policy, load_scenario(row.scenario, row.overrides))
+    found: dict[Row, Evaluation] = {}
+    total = len(rows) * args.episodes
+    try:
+        with tqdm(total=total, unit="episode", leave=False) as bar:
+            found.update(
+                run_jobs(_run, rows, args.workers or os.cpu_count() or 1, _shown(bar))
+            )
+    finally:
+        ordered = {row: found[row] for row in rows if row in found}
+        if ordered:
+            print(table(ordered))
+    if args.json:
+        _write_json(args.json, ordered, cli.provenance("evaluate", arguments, args.seed))
+    return 0
+
+
+def _shown(bar: tqdm) -> Callable[[Any], None]:
+    def show(_: Any) -> None:
+        cli.stop_if_interrupted()
+        bar.update()
+
+    return show
+
+
+def _rows(args: argparse.Namespace) -> Iterator[Row]:
+    overrides = list(args.overrides)
+    if args.psi is not None:
+        overrides.append(f"imprecision={args.psi}")
+    for setting in _settings(args.sweep):
+        for policy in args.policy:
+            yield Row(
+                policy,
+                setting,
+                args.scenario,
+                (*overrides, *([setting] if setting else [])),
+                args.model,
+                range(args.seed, args.seed + args.episodes),
+            )
+
+
+def _settings(sweep: str | None) -> list[str]:
+    if not sweep:
+        return [""]
+    key, separator, values = sweep.partition("=")
+    if not separator or not values:
+        raise DisasmError(f"--sweep {sweep}: write it as key=value,value,...")
+    return [f"{key}={value}" for value in values.split(",")]
+
+
+def _run(row: Row, report: Callable[[Any], None]) -> Evaluation:
+    """Returns one row's figures, in whatever process."""
+    scenario = load_scenario(row.scenario, row.overrides)
+    policy = cli.named_policy(row.policy, scenario)
+    simulation = TaskSimulation(scenario, row.model, policy)
+    return summed_up(evaluate(simulation, row.seeds, on_episode=lambda _: report(1)))
+
+
+def table(found: dict[Row, Evaluation]) -> str:
+    """Returns the figures as a table for a terminal."""
+    width = max(12, *(len(_name(row)) for row in found))
+    lines = [
+        f"{'policy':{width}}      P  instab.  success         (95 %)   out  steps  "
+        "mean F  mean peak  peak F  mean T  peak T"
+    ]
+    for row, e in found.items():
+        low, high = 100 * e.success_low, 100 * e.success_high
+        lines.append(
+            f"{_name(row):{width}} {e.performance:6.1f} {e.instability:8.2f}  "
+            f"{e.successes:3d}/{e.episodes:<3d}  ({low:3.0f} to {high:3.0f} %)  "
+            f"{e.truly_out:4d} {e.steps:6.1f} {e.mean_force:5.2f} N "
+            f"{e.mean_peak_force:8.2f} N {e.peak_force:5.2f} N {e.mean_torque:7.3f} "
+            f"{e.peak_torque:7.3f}"
+        )
+    return "\n".join(lines)
+
+
+def _name(row: Row) -> str:
+    return f"{row.policy}  {row.setting}".strip()
+
+
+def _write_json(path: Path, found: dict[Row, Evaluation], origin: dict) -> None:
+    rows = [
+        {"policy": row.policy, "setting": row.setting, "model": row.model}
+        | dataclasses.asdict(figures)
+        for row, figures in found.items()
+    ]
+    text = json.dumps({"provenance": origin, "rows": rows}, indent=2) + "\n"
+    make_folder(path.parent)
+    write_atomically(path, lambda stream: stream.write(text.encode()))
+
+
+if __name__ == "__main__":
+    cli.run(main)

@@ -1,0 +1,97 @@
+"""One seed of tools/train.py, in whatever process it runs."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from drake_disasm.learning.dataset import remember
+from drake_disasm.learning.experiment import Experiment
+from drake_disasm.learning.replay import Replay
+from drake_disasm.learning.run import News, learn_offline, run_training
+from drake_disasm.learning.training import Training, action_map
+from drake_disasm.scenario import scenario_to_mapping
+from drake_disasm.task.episode import EpisodeRecorder
+from sysid.logs import LogHeader, LogWriter, flat_columns, read_logs
+from sysid.logs.transitions import observations
+
+_JOINTS = tuple(f"iiwa_joint_{i}" for i in range(1, 8))
+
+
+@dataclasses.dataclass(frozen=True)
+class SeedJob:
+    """What a worker is asked for.
+
+    Attributes:
+        experiment: what all seeds have in common.
+        seed: this one's.
+        folder: this one's.
+    """
+
+    experiment: Experiment
+    seed: int
+    folder: Path
+
+
+class _Log:
+    """Writes each episode to the seed's log, once."""
+
+    def __init__(self, job: SeedJob) -> None:
+        experiment = job.experiment
+        origin = {"simulated": True, "model": experiment.model, "seed": job.seed}
+        header = LogHeader(
+            kind="transitions",
+            task=experiment.scenario.name,
+            provenance=experiment.provenance | origin,
+            period=experiment.scenario.task.period,
+            joints=_JOINTS if experiment.model == "cell" else (),
+            scenario=scenario_to_mapping(experiment.scenario),
+        )
+        self._writer = LogWriter(job.folder / "log", header, resume=True)
+
+    def write(self, number: int, recorder: EpisodeRecorder) -> None:
+        """Writes the episode, unless a killed run had come as far as this."""
+        if number >= self._writer.next_number:
+            self._writer.write_episode(flat_columns("transitions", recorder.columns()))
+
+
+def train_seed(job: SeedJob, report: Callable[[News | None], None]) -> dict[str, Any]:
+    """Trains one seed to its end and returns its result."""
+    experiment = job.experiment
+    finished = job.folder / "result.json"
+    if finished.exists():
+        report(News(job.seed, experiment.config.episodes, None))
+        return {}
+    provenance = experiment.provenance | {
+        "seed": job.seed,
+        "preset": experiment.preset,
+    }
+    demonstrations = _memory(experiment, experiment.demonstrations)
+    training = Training(experiment.spec(job.seed), demonstrations)
+    end = (provenance, experiment.validation, report)
+    if experiment.logs:
+        training.replay = _memory(experiment, experiment.logs)
+        updates = experiment.updates or training.replay.size
+        return learn_offline(training, job.folder, updates, *end)
+    return run_training(training, job.folder, _Log(job), *end)
+
+
+def _memory(experiment: Experiment, folders: Sequence[str]) -> Replay:
+    """Returns a memory that holds all transitions of some logs, if there are any."""
+    task, config = experiment.scenario.task, experiment.config
+    if not folders:
+        return Replay(1)
+    episodes = [e for log in read_logs(folders) for e in log.episodes]
+    replay = Replay(sum(episode.rows - 1 for episode in episodes))
+    actions = action_map(experiment.scenario, config)
+    for episode in episodes:
+        remember(
+            replay,
+            observations(episode),
+            episode["action"][:-1],
+            bool(episode["terminated"][-1]),
+            task,
+            actions,
+            config,
+        )
+    return replay

@@ -1,0 +1,231 @@
+"""Trains a policy by trial and error on the twin or the cell, or from logs alone.
+
+Each seed is a training of its own, in a process of its own. Everything goes into one
+folder: per seed the log of all episodes, a checkpoint after each of them, the policy
+and its validation; over the seeds a learning curve and a summary. A run that was
+interrupted or killed goes on with --resume, bit for bit.
+"""
+
+import argparse
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # processes work in parallel, not threads
+
+import cli
+from seed_job import SeedJob, train_seed
+from tqdm import tqdm
+
+from drake_disasm.learning.experiment import (
+    Experiment,
+    open_experiment,
+    write_summary,
+)
+from drake_disasm.learning.hyperparameters import (
+    ALGORITHMS,
+    PRESETS,
+    override,
+    preset,
+)
+from drake_disasm.learning.run import News
+from drake_disasm.mdp import Outcome
+from drake_disasm.parallel import run_jobs
+from drake_disasm.scenario import load_scenario
+from drake_disasm.stations import MODELS
+
+_EXAMPLES = """examples:
+  python tools/train.py --out out/first --episodes 30          a first look
+  python tools/train.py --agent ddpg --preset chapter3 --scenario sliding \\
+      --psi 0.0003 --seeds 10 --out out/sliding                the thesis's chapter 3
+  python tools/train.py --scenario removal_randomised --out out/randomised
+  python tools/train.py --agent sac --preset chapter4 --out out/sac \\
+      --hyper layer_norm=true 'hidden=[64, 64]'
+  python tools/train.py --from-logs out/sliding/seed_*/log --scenario sliding \\
+      --preset chapter3 --out out/offline                      without acting
+  python tools/train.py ... --out out/sliding --resume         go on after Ctrl-C
+"""
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    parser = argparse.ArgumentParser(
+        prog="train.py",
+        description=__doc__,
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    cli.add_scenario_arguments(parser)
+    _add_task_arguments(parser.add_argument)
+    _add_agent_arguments(parser.add_argument)
+    _add_run_arguments(parser.add_argument)
+    return parser.parse_args(arguments)
+
+
+def _add_task_arguments(add: Callable[..., object]) -> None:
+    add(
+        "--model",
+        default="twin",
+        choices=sorted(MODELS),
+        help="what it learns on: the twin is six times faster (default: twin)",
+    )
+    add(
+        "--psi",
+        type=float,
+        metavar="M",
+        help="imprecision of the robot [m], e.g. 0.0003 (default: the scenario's)",
+    )
+
+
+def _add_agent_arguments(add: Callable[..., object]) -> None:
+    add(
+        "--preset",
+        default="best",
+        choices=list(PRESETS),
+        help="hyper-parameters: the thesis's chapters, or our best (default: best)",
+    )
+    add(
+        "--agent",
+        choices=ALGORITHMS,
+        default="",
+        help="algorithm (default: ddpg; of the preset best: sac)",
+    )
+    add("--episodes", type=int, metavar="N", help="per seed (default: the preset's)")
+    add(
+        "--hyper",
+        nargs="+",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change hyper-parameters; drake_disasm/learning/hyperparameters.py "
+        "lists them with their units",
+    )
+    add(
+        "--from-logs",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="DIR",
+        help="learn from these logs alone, without acting",
+    )
+    add(
+        "--updates",
+        type=cli.positive,
+        metavar="N",
+        help="with --from-logs: gradient updates (default: one per transition)",
+    )
+    add(
+        "--demonstrations",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="DIR",
+        help="logs to mix into each batch; their share is the hyper-parameter "
+        "demonstrations",
+    )
+
+
+def _add_run_arguments(add: Callable[..., object]) -> None:
+    add("--out", type=Path, required=True, metavar="DIR", help="folder for all of it")
+    add(
+        "--seeds",
+        type=cli.positive,
+        default=1,
+        metavar="N",
+        help="how many trainings (default: 1)",
+    )
+    add("--first-seed", type=int, default=0, metavar="S", help="(default: 0)")
+    add(
+        "--validation",
+        type=cli.positive,
+        default=10,
+        metavar="N",
+        help="greedy episodes after each training (default: 10)",
+    )
+    add(
+        "--workers",
+        type=cli.positive,
+        metavar="N",
+        help="seeds at a time (default: one per core)",
+    )
+    add(
+        "--threads",
+        type=cli.positive,
+        default=1,
+        metavar="N",
+        help="of the updates of each seed; 2 pays for one seed with large batches "
+        "(default: 1)",
+    )
+    add("--eager", action="store_true", help="don't compile the updates")
+    add("--resume", action="store_true", help="go on with what is in --out")
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the program; returns its exit status."""
+    args = parse(arguments)
+    experiment = _experiment(args, arguments)
+    open_experiment(experiment, args.out, args.resume)
+    seeds = range(args.first_seed, args.first_seed + args.seeds)
+    jobs = [SeedJob(experiment, seed, args.out / f"seed_{seed:03d}") for seed in seeds]
+    try:
+        _train(jobs, args.workers or os.cpu_count() or 1)
+    finally:
+        print(write_summary(args.out))
+    print(f"all of it: {args.out}")
+    return 0
+
+
+def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experiment:
+    overrides = list(args.overrides)
+    if args.psi is not None:
+        overrides.append(f"imprecision={args.psi}")
+    changes = list(args.hyper)
+    if args.episodes is not None:
+        changes.append(f"episodes={args.episodes}")
+    return Experiment(
+        scenario=load_scenario(args.scenario, overrides),
+        model=args.model,
+        preset=args.preset,
+        config=override(preset(args.preset, args.agent), changes),
+        compiled=not args.eager,
+        threads=args.threads,
+        validation=args.validation,
+        logs=tuple(str(path) for path in args.from_logs),
+        updates=args.updates or 0,
+        demonstrations=tuple(str(path) for path in args.demonstrations),
+        provenance=cli.provenance("train", arguments, args.first_seed),
+    )
+
+
+def _train(jobs: list[SeedJob], workers: int) -> None:
+    total = sum(job.experiment.config.episodes for job in jobs)
+    with tqdm(total=total, unit="episode") as bar:
+        for _ in run_jobs(train_seed, jobs, workers, _Progress(bar)):
+            pass
+
+
+class _Progress:
+    """A bar over all seeds' episodes, with the latest rewards and successes."""
+
+    def __init__(self, bar: tqdm) -> None:
+        self._bar = bar
+        self._done: dict[int, int] = {}
+        self._rewards: list[float] = []
+        self._successes: list[bool] = []
+
+    def __call__(self, news: News) -> None:
+        cli.stop_if_interrupted()
+        self._done[news.seed] = news.number
+        if news.summary is not None:
+            self._rewards.append(news.summary.reward)
+            self._successes.append(news.summary.outcome is Outcome.SUCCESS)
+            recent = self._successes[-20:]
+            self._bar.set_postfix(
+                reward=f"{sum(self._rewards[-20:]) / len(recent):.1f}",
+                success=f"{sum(recent)}/{len(recent)}",
+                refresh=False,
+            )
+        self._bar.update(sum(self._done.values()) - self._bar.n)
+
+
+if __name__ == "__main__":
+    cli.run(main)
