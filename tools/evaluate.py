@@ -121,7 +121,9 @@ def main(arguments: Sequence[str]) -> int:
         if ordered:
             print(table(ordered))
     if args.json:
-        _write_json(args.json, ordered, cli.provenance("evaluate", arguments, args.seed))
+        _write_json(
+            args.json, ordered, cli.provenance("evaluate", arguments, args.seed)
+        )
     return 0
 
 

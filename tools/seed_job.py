@@ -67,20 +67,20 @@ def train_seed(job: SeedJob, report: Callable[[News | None], None]) -> dict[str,
         "preset": experiment.preset,
     }
     demonstrations = _memory(experiment, experiment.demonstrations)
-    training = Training(experiment.spec(job.seed), demonstrations)
+    dataset = _memory(experiment, experiment.logs)
+    training = Training(experiment.spec(job.seed), demonstrations, dataset)
     end = (provenance, experiment.validation, report)
-    if experiment.logs:
-        training.replay = _memory(experiment, experiment.logs)
-        updates = experiment.updates or training.replay.size
+    if dataset:
+        updates = experiment.updates or dataset.size
         return learn_offline(training, job.folder, updates, *end)
     return run_training(training, job.folder, _Log(job), *end)
 
 
-def _memory(experiment: Experiment, folders: Sequence[str]) -> Replay:
+def _memory(experiment: Experiment, folders: Sequence[str]) -> Replay | None:
     """Returns a memory that holds all transitions of some logs, if there are any."""
     task, config = experiment.scenario.task, experiment.config
     if not folders:
-        return Replay(1)
+        return None
     episodes = [e for log in read_logs(folders) for e in log.episodes]
     replay = Replay(sum(episode.rows - 1 for episode in episodes))
     actions = action_map(experiment.scenario, config)

@@ -163,7 +163,7 @@ def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
     experiment = _experiment(args, arguments)
-    open_experiment(experiment, args.out, args.resume)
+    experiment = open_experiment(experiment, args.out, args.resume)
     seeds = range(args.first_seed, args.first_seed + args.seeds)
     jobs = [SeedJob(experiment, seed, args.out / f"seed_{seed:03d}") for seed in seeds]
     try:

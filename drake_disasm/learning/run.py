@@ -101,17 +101,23 @@ def learn_offline(
     """Learns from what the training's memory holds, without acting (thesis 3.4.2).
 
     Args:
-        training: fresh, its memory filled.
-        updates: gradient updates to do, in as many parts as there would be episodes.
+        training: fresh, with its dataset.
+        updates: gradient updates to do, in as many rounds as there would be episodes.
         folder, provenance, validation, report: as in `run_training`.
     """
     make_folder(folder)
     parts = training.spec.config.episodes
     with _locked(folder):
-        for number in range(parts):
-            begin, end = (updates * i // parts for i in (number, number + 1))
-            training.learn_from_dataset(end - begin, number)
-            report(News(training.spec.seed, number + 1, None))
+        checkpoint = folder / "checkpoint.npz"
+        if checkpoint.exists():
+            training.restore(checkpoint)
+        while training.rounds < parts:
+            done, next_ = (
+                updates * i // parts for i in (training.rounds, training.rounds + 1)
+            )
+            training.run_round(next_ - done)
+            training.save(checkpoint)
+            report(News(training.spec.seed, training.rounds, None))
         return finish(training, folder, provenance, validation)
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 
 from drake_disasm.errors import DisasmError
 from drake_disasm.learning.agent import Agent
@@ -74,16 +75,21 @@ class Training:
         agent: the learner.
         replay: its memory.
         summaries: of the episodes done.
+        rounds: done on a dataset.
         seconds: spent in "simulation", "updates" and "saving", over all resumptions.
 
     Args:
         spec: what to do.
         demonstrations: transitions to mix into each batch, or None.
+        dataset: transitions to learn from without acting, or None.
     """
 
-    def __init__(self, spec: TrainingSpec, demonstrations: Replay | None = None):
-        import torch
-
+    def __init__(
+        self,
+        spec: TrainingSpec,
+        demonstrations: Replay | None = None,
+        dataset: Replay | None = None,
+    ) -> None:
         torch.set_num_threads(spec.threads)
         self.spec, config = spec, spec.config
         if config.demonstrations and not (demonstrations and demonstrations.size):
@@ -95,8 +101,10 @@ class Training:
         self.agent = Agent(
             config, seed_for(spec.seed, Purpose.PARAMETERS), spec.compiled
         )
-        self.replay = Replay(config.replay)
+        self.replay = dataset or Replay(config.replay)
+        self._acts = dataset is None
         self.summaries: list[EpisodeSummary] = []
+        self.rounds = 0
         self.seconds = {"simulation": 0.0, "updates": 0.0, "saving": 0.0}
         self.action_map = action_map(spec.scenario, config)
         self._demonstrations = demonstrations
@@ -108,19 +116,24 @@ class Training:
         Raises:
             DisasmError: it is damaged or of another agent.
         """
-        notes = load_checkpoint(path, self.agent, self.replay)
+        notes = load_checkpoint(path, self.agent, self._own_memory())
         self.summaries = [_summary(row) for row in notes["episodes"]]
-        self.seconds = notes["seconds"]
+        self.rounds, self.seconds = notes["rounds"], notes["seconds"]
 
     def save(self, path: Path) -> None:
         """Writes a checkpoint from which `restore` goes on bit for bit."""
         began = time.perf_counter()
         notes = {
             "episodes": [dataclasses.asdict(s) for s in self.summaries],
+            "rounds": self.rounds,
             "seconds": self.seconds,
         }
-        save_checkpoint(path, self.agent, self.replay, notes)
+        save_checkpoint(path, self.agent, self._own_memory(), notes)
         self.seconds["saving"] += time.perf_counter() - began
+
+    def _own_memory(self) -> Replay:
+        """Returns what a checkpoint is to hold; a dataset is on disk already."""
+        return self.replay if self._acts else Replay(1)
 
     def run_episode(self) -> tuple[EpisodeSummary, EpisodeRecorder]:
         """Plays one episode, and learns as the schedule says."""
@@ -129,6 +142,7 @@ class Training:
         explore = self._generator(Purpose.EXPLORATION, number)
         updates = self._generator(Purpose.UPDATES, number)
         sigma = self._sigma(number)
+        per_step = self.spec.config.updates_per_step
         learning = number >= self.spec.config.warmup_episodes
         every_step = learning and self.spec.config.schedule == "every_step"
         network = self.agent.network()
@@ -142,19 +156,20 @@ class Training:
             recorder.acted(self.env.result)
             summary.add(self.env.result)
             if every_step:
-                self._learn(1, updates)
+                self._learn(per_step, updates)
                 network = self.agent.network()
         if learning and not every_step:
-            self._learn(summary.steps, updates)
+            self._learn(summary.steps * per_step, updates)
         summary.bolt_is_out = self.env.simulation.bolt_is_out()
         self.summaries.append(summary)
         spent = self.seconds["updates"] - before
         self.seconds["simulation"] += time.perf_counter() - began - spent
         return summary, recorder
 
-    def learn_from_dataset(self, updates: int, number: int) -> None:
-        """Does updates on what the memory holds, without acting."""
-        self._learn(updates, self._generator(Purpose.UPDATES, number), per_step=1)
+    def run_round(self, updates: int) -> None:
+        """Does updates on what the memory holds, without acting (thesis 3.4.2)."""
+        self._learn(updates, self._generator(Purpose.UPDATES, self.rounds))
+        self.rounds += 1
 
     def _step(
         self,
@@ -171,11 +186,9 @@ class Training:
         self.replay.add(scaled, chosen, reward, following / self._scale, terminated)
         return following
 
-    def _learn(
-        self, steps: int, generator: np.random.Generator, per_step: int | None = None
-    ) -> None:
+    def _learn(self, updates: int, generator: np.random.Generator) -> None:
         began = time.perf_counter()
-        for _ in range(steps * (per_step or self.spec.config.updates_per_step)):
+        for _ in range(updates):
             self.agent.learn(self._batch(generator), generator)
         self.seconds["updates"] += time.perf_counter() - began
 

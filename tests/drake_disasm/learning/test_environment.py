@@ -1,0 +1,107 @@
+"""The environment, as Gymnasium and stable-baselines3 see it."""
+
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from stable_baselines3 import DDPG
+
+from drake_disasm.effects import GroovePose
+from drake_disasm.errors import DisasmError
+from drake_disasm.learning.environment import IDS, DisassemblyEnv
+from drake_disasm.mdp import REWARD_TERMS
+from drake_disasm.scenario import load_scenario
+
+
+@pytest.fixture(scope="module")
+def env() -> DisassemblyEnv:
+    return DisassemblyEnv("removal")
+
+
+def _push(env: DisassemblyEnv) -> tuple[bool, bool, dict, int]:
+    """Pushes along +x until the episode ends."""
+    for steps in range(1, 200):
+        _, _, terminated, truncated, info = env.step(np.array([1e-3, 0, 0, 0, 0, 0]))
+        if terminated or truncated:
+            return terminated, truncated, info, steps
+    raise AssertionError("the episode does not end")
+
+
+@pytest.mark.parametrize("model", ["twin", "cell"])
+def test_gymnasium_approves(model: str) -> None:
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*infinity.*")
+        check_env(DisassemblyEnv("removal", model))
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_every_id_makes_its_scenario(name: str) -> None:
+    env = gymnasium.make(name, model="twin")
+    assert isinstance(env.unwrapped, DisassemblyEnv)
+    assert env.unwrapped.simulation.scenario.name == IDS[name]
+    assert env.spec is not None and env.spec.max_episode_steps is None
+
+
+def test_stable_baselines3_trains_on_it_as_it_stands() -> None:
+    env = gymnasium.make("drake_disasm/Sliding-v0")
+    agent = DDPG("MlpPolicy", env, learning_starts=0, batch_size=8, device="cpu")
+    agent.learn(12)
+    action, _ = agent.predict(env.reset(seed=0)[0], deterministic=True)
+    assert env.action_space.contains(action)
+
+
+def test_a_jam_terminates_and_a_time_limit_truncates(env: DisassemblyEnv) -> None:
+    env.reset(seed=1, options={"effects": [GroovePose(ry=0.1)]})
+    terminated, truncated, info, _ = _push(env)
+    assert (terminated, truncated) == (True, False)
+    assert info["outcome"] == "force limit" and not info["is_success"]
+    short = DisassemblyEnv(load_scenario("removal", ["task.steps=3"]))
+    short.reset(seed=1)
+    terminated, truncated, info, steps = _push(short)
+    assert (terminated, truncated, steps) == (False, True, 3)
+    assert info["outcome"] == "step limit"
+
+
+def test_success_terminates() -> None:
+    env = DisassemblyEnv(load_scenario("sliding", ["task.travel_success=0.003"]))
+    env.reset(seed=1)
+    terminated, truncated, info, _ = _push(env)
+    assert (terminated, truncated, info["is_success"]) == (True, False, True)
+
+
+def test_info_carries_terms_and_wrench(env: DisassemblyEnv) -> None:
+    env.reset(seed=4)
+    observation, reward, _, _, info = env.step(np.array([1e-3, 0, 0, 0, 0, 0]))
+    assert tuple(info["reward_terms"]) == REWARD_TERMS
+    assert reward == pytest.approx(sum(info["reward_terms"].values()))
+    np.testing.assert_allclose(info["wrench"], observation[6:], rtol=1e-6)
+
+
+def test_the_diagram_is_built_once_and_seeds_repeat(env: DisassemblyEnv) -> None:
+    diagram = env.simulation.diagram
+    runs = []
+    for _ in range(2):
+        first, _ = env.reset(seed=9)
+        second = env.step(np.array([1e-3, 0, 0, 0, 0, 0]))[0]
+        runs.append(np.concatenate([first, second]))
+    assert env.simulation.diagram is diagram
+    np.testing.assert_array_equal(*runs)
+
+
+def test_episodes_without_a_seed_differ(env: DisassemblyEnv) -> None:
+    env.reset(seed=9)
+    assert not np.array_equal(env.reset()[0], env.reset()[0])
+
+
+@pytest.mark.parametrize("action", [np.zeros(5), np.array([np.nan, 0, 0, 0, 0, 0])])
+def test_a_bad_action_is_refused(env: DisassemblyEnv, action: np.ndarray) -> None:
+    env.reset(seed=0)
+    with pytest.raises(DisasmError, match="give 6 finite numbers"):
+        env.step(action)
+
+
+def test_an_unknown_option_is_refused(env: DisassemblyEnv) -> None:
+    with pytest.raises(DisasmError, match="option 'speed' is not known"):
+        env.reset(options={"speed": 1})

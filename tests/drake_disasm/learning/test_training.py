@@ -1,0 +1,235 @@
+"""Training: schedules, what is remembered, and going on bit for bit."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from torch.utils._pytree import tree_leaves
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.learning.dataset import remember
+from drake_disasm.learning.evaluation import validate_policy
+from drake_disasm.learning.hyperparameters import preset
+from drake_disasm.learning.policy import trained_policy
+from drake_disasm.learning.replay import Replay
+from drake_disasm.learning.training import Training, TrainingSpec, action_map
+from drake_disasm.policies import Admittance
+from drake_disasm.scenario import load_scenario
+
+SCENARIO = load_scenario("sliding", ["imprecision=0.0003", "task.steps=6"])
+
+
+def _training(
+    algorithm: str = "ddpg", memories: dict[str, Replay] | None = None, **changes: Any
+) -> Training:
+    small = {"hidden": [8], "batch": 16, "exploration": 0.0003} | changes
+    config = dataclasses.replace(preset("chapter3", algorithm), **small)
+    spec = TrainingSpec(SCENARIO, "twin", config, seed=5, compiled=False)
+    return Training(spec, **(memories or {}))
+
+
+def _bits(training: Training) -> list[np.ndarray]:
+    leaves = [leaf.numpy() for leaf in tree_leaves(training.agent.state)]
+    return [*leaves, training.replay.contents()[0]]
+
+
+def _demonstrations(training_map: Any, config: Any) -> Replay:
+    memory = Replay(50)
+    observations = np.random.default_rng(0).normal(size=(51, 12)) * 1e-3
+    actions = np.zeros((50, 6))
+    remember(memory, observations, actions, True, SCENARIO.task, training_map, config)
+    return memory
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "changes"),
+    [
+        ("ddpg", {}),
+        ("ddpg", {"schedule": "every_step", "updates_per_step": 2}),
+        ("td3", {"layer_norm": True}),
+        ("sac", {"base": "admittance", "adapt_entropy": True}),
+    ],
+)
+def test_a_restored_training_goes_on_bit_for_bit(
+    algorithm: str, changes: dict[str, Any], tmp_path: Path
+) -> None:
+    whole = _training(algorithm, **changes)
+    for _ in range(4):
+        whole.run_episode()
+    first = _training(algorithm, **changes)
+    for _ in range(2):
+        first.run_episode()
+    first.save(tmp_path / "c.npz")
+    second = _training(algorithm, **changes)
+    second.restore(tmp_path / "c.npz")
+    for _ in range(2):
+        second.run_episode()
+    assert second.summaries == whole.summaries
+    for a, b in zip(_bits(whole), _bits(second), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_another_seed_is_another_training() -> None:
+    one, other = _training(), _training()
+    other = Training(dataclasses.replace(other.spec, seed=6))
+    for training in (one, other):
+        training.run_episode()
+    assert one.summaries != other.summaries
+
+
+def test_validation_does_not_disturb_the_training() -> None:
+    calm, watched = _training(), _training()
+    for _ in range(3):
+        calm.run_episode()
+        watched.run_episode()
+        policy = trained_policy(watched, {})
+        validate_policy(policy, SCENARIO, "twin", [1, 2])
+    for a, b in zip(_bits(calm), _bits(watched), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize(
+    ("schedule", "per_step"), [("delayed", 1), ("delayed", 3), ("every_step", 2)]
+)
+def test_updates_are_counted_per_step(schedule: str, per_step: int) -> None:
+    training = _training(schedule=schedule, updates_per_step=per_step)
+    summary, _ = training.run_episode()
+    assert training.agent.updates == per_step * summary.steps
+    assert training.replay.size == summary.steps
+
+
+def test_the_delayed_schedule_acts_with_one_policy_for_an_episode() -> None:
+    """Both schedules begin alike; only `every_step` changes within the episode."""
+    actions = {}
+    for schedule in ("delayed", "every_step"):
+        training = _training(
+            schedule=schedule, actor_rate=0.1, batch=4, exploration=1e-5
+        )
+        training.run_episode()
+        actions[schedule] = training.replay.contents()[0][:, 12:18]
+    np.testing.assert_array_equal(actions["delayed"][0], actions["every_step"][0])
+    assert not np.array_equal(actions["delayed"][-1], actions["every_step"][-1])
+
+
+def test_what_is_remembered_is_the_action_before_imprecision() -> None:
+    training = _training()
+    _, recorder = training.run_episode()
+    columns, rows = recorder.columns(), training.replay.contents()[0]
+    bounds = training.env.simulation.bounds
+    chosen = rows[:, 12:18] * bounds
+    np.testing.assert_allclose(chosen, columns["action"][:-1], atol=1e-8)
+    assert np.abs(chosen - columns["action_executed"][:-1])[:, :3].max() > 1e-5
+
+
+def test_a_time_limit_is_not_remembered_as_an_end() -> None:
+    training = _training("td3", base="admittance", residual=[0.01] * 6)
+    summary, _ = training.run_episode()
+    assert summary.outcome.truncated
+    assert not training.replay.contents()[0][:, -1].any()
+
+
+def test_exploration_shrinks_by_episode_and_without_it_nothing_is_random() -> None:
+    training = _training(exploration=0.003, exploration_decay=0.5)
+    assert [training._sigma(n) for n in range(3)] == pytest.approx([1.0, 0.5, 0.25])
+    calm = _training(exploration=0.0)
+    observation = np.zeros(12)
+    network = calm.agent.network()
+    output = network(observation.astype(np.float32))
+    chosen = calm.agent.explore(output, 0.0, np.random.default_rng(0))
+    np.testing.assert_array_equal(chosen, np.tanh(output))
+
+
+def test_a_residual_begins_as_its_base_policy() -> None:
+    training = _training("sac", base="admittance", residual=[0.1] * 6)
+    policy = trained_policy(training, {})
+    observation = np.random.default_rng(2).normal(size=12) * 1e-3
+    difference = policy(observation) - Admittance()(observation)
+    bounds = training.env.simulation.bounds
+    assert (np.abs(difference) < 0.01 * bounds).all()
+
+
+def test_a_residual_never_exceeds_its_bounds() -> None:
+    training = _training("ddpg", base="admittance", residual=[0.1] * 6)
+    limit = 0.1 * training.env.simulation.bounds
+    for sign in (-1.0, 1.0):
+        action = training.action_map.to_action(np.zeros(12), sign * np.ones(6))
+        assert (np.abs(action - Admittance()(np.zeros(12))) <= limit + 1e-12).all()
+
+
+def test_the_action_map_is_undone_for_demonstrations() -> None:
+    config = dataclasses.replace(preset("best"), residual=[0.5] * 6)
+    actions = action_map(SCENARIO, config)
+    observation, chosen = np.full(12, 1e-3), np.linspace(-0.9, 0.9, 6)
+    action = actions.to_action(observation, chosen)
+    np.testing.assert_allclose(actions.from_action(observation, action), chosen, 1e-5)
+
+
+def test_demonstrations_fill_their_share_of_each_batch() -> None:
+    plain = _training()
+    shown = _demonstrations(plain.action_map, plain.spec.config)
+    shown._rows[:, 18] = 77.0  # a reward that only demonstrations have
+    training = _training(memories={"demonstrations": shown}, demonstrations=0.25)
+    training.run_episode()
+    batch = training._batch(np.random.default_rng(0))
+    assert batch.shape[0] == 16 and (batch[:, 18] == 77.0).sum() == 4
+
+
+def test_demonstrations_that_are_wanted_but_not_named_are_an_error() -> None:
+    with pytest.raises(DisasmError, match="--demonstrations DIR"):
+        _training(demonstrations=0.5)
+
+
+def test_learning_from_a_dataset_alone_resumes_bit_for_bit(tmp_path: Path) -> None:
+    plain = _training()
+    data = _demonstrations(plain.action_map, plain.spec.config)
+    whole = _training(memories={"dataset": data})
+    for _ in range(4):
+        whole.run_round(5)
+    assert whole.agent.updates == 20 and not whole.summaries
+    first = _training(memories={"dataset": data})
+    first.run_round(5)
+    first.run_round(5)
+    first.save(tmp_path / "c.npz")
+    second = _training(memories={"dataset": data})
+    second.restore(tmp_path / "c.npz")
+    assert second.replay.size == data.size
+    for _ in range(2):
+        second.run_round(5)
+    for a, b in zip(_bits(whole), _bits(second), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_dataset_teaches_the_critic_the_value_that_it_holds() -> None:
+    """One state, one action, reward 1, terminated: Q must become 1."""
+    memory = Replay(1)
+    memory.add(np.zeros(12), np.zeros(6), 1.0, np.zeros(12), True)
+    training = _training(memories={"dataset": memory}, critic_rate=0.01)
+    training.run_round(400)
+    from drake_disasm.learning.networks import q_value
+
+    q = q_value(training.agent.state.critics[0], torch.zeros(1, 12), torch.zeros(1, 6))
+    assert float(q) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("damage", ["cut", "empty", "text"])
+def test_a_damaged_checkpoint_is_refused(damage: str, tmp_path: Path) -> None:
+    training, path = _training(), tmp_path / "c.npz"
+    training.run_episode()
+    training.save(path)
+    data = path.read_bytes()
+    path.write_bytes(
+        {"cut": data[: len(data) // 2], "empty": b"", "text": b"hi"}[damage]
+    )
+    with pytest.raises(DisasmError, match="no whole checkpoint"):
+        _training().restore(path)
+
+
+def test_a_checkpoint_of_other_networks_is_refused(tmp_path: Path) -> None:
+    training = _training()
+    training.run_episode()
+    training.save(tmp_path / "c.npz")
+    with pytest.raises(DisasmError, match="other networks"):
+        _training(hidden=[9]).restore(tmp_path / "c.npz")

@@ -1,0 +1,247 @@
+"""Training from the command line: what it leaves behind, and being killed."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drake_disasm.learning.hyperparameters import preset
+from drake_disasm.policies import load_policy
+from drake_disasm.scenario import load_scenario
+from sysid.logs import read_log
+from tests.tools.programs import ROOT
+
+#: A training of seconds: short episodes, a small network, nothing compiled.
+SMALL = [
+    "--scenario=sliding", "--set", "task.steps=8", "--preset=chapter3", "--eager",
+    "--validation=2", "--hyper", "hidden=[8]", "batch=8", "exploration=0.0002",
+]  # fmt: skip
+
+
+def _command(out: Path, *arguments: str) -> list[str]:
+    program = str(ROOT / "tools/train.py")
+    return [sys.executable, program, *SMALL, "--out", str(out), *arguments]
+
+
+def _train(out: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        _command(out, *arguments),
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+        cwd=out.parent,
+    )
+
+
+def _finished(out: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    run = _train(out, *arguments)
+    assert run.returncode == 0, run.stderr
+    return run
+
+
+def _content(folder: Path) -> dict[str, Any]:
+    """Returns everything that two equal trainings must share."""
+    policy = load_policy(folder / "policy.npz")
+    log = read_log(folder / "log")
+    result = json.loads((folder / "result.json").read_text())
+    result.pop("seconds")
+    return {
+        "weights": [w.tobytes() for w in policy.network.weights],
+        "biases": [b.tobytes() for b in policy.network.biases],
+        "episodes": (folder / "episodes.csv").read_bytes(),
+        "log": log.data_hash,
+        "result": result,
+    }
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("train") / "whole"
+    _finished(out, "--episodes=6", "--seeds=2")
+    return out
+
+
+def test_everything_is_left_behind(undisturbed: Path) -> None:
+    for name in ("training.json", "summary.json", "learning_curve.png"):
+        assert (undisturbed / name).stat().st_size > 0
+    for seed in ("seed_000", "seed_001"):
+        assert len(read_log(undisturbed / seed / "log").episodes) == 6
+        policy = load_policy(undisturbed / seed / "policy.npz")
+        assert policy.description.evaluation["episodes"] == 2
+        assert policy.description.provenance["seed"] == int(seed[-1])
+    summary = json.loads((undisturbed / "summary.json").read_text())
+    assert summary["seeds"] == [0, 1] and len(summary["P"]) == 2
+
+
+def test_a_log_holds_what_was_chosen_not_what_was_executed(tmp_path: Path) -> None:
+    _finished(tmp_path / "out", "--episodes=1", "--psi=0.0003")
+    log = read_log(tmp_path / "out/seed_000/log")
+    assert log.header.scenario is not None
+    assert log.header.scenario["imprecision"] == 0.0003
+    episode = log.episodes[0]
+    moved = np.abs(episode["action"] - episode["action_executed"])
+    assert moved[:-1, :3].max() > 1e-5 and moved[:, 3:].max() == 0.0
+
+
+def test_seeds_apart_and_together_are_the_same(
+    undisturbed: Path, tmp_path: Path
+) -> None:
+    """One seed in this process, or two in a pool: the same bits."""
+    _finished(tmp_path / "one", "--episodes=6", "--first-seed=1")
+    assert _content(tmp_path / "one/seed_001") == _content(undisturbed / "seed_001")
+
+
+def test_a_killed_training_goes_on_bit_for_bit(
+    undisturbed: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "killed"
+    process = subprocess.Popen(_command(out, "--episodes=6"), stderr=subprocess.DEVNULL)
+    try:
+        _wait_for(out / "seed_000/log/episode_0001.parquet")
+    finally:
+        process.kill()
+        process.wait()
+    assert not (out / "seed_000/result.json").exists()
+    _finished(out, "--episodes=6", "--resume")
+    assert _content(out / "seed_000") == _content(undisturbed / "seed_000")
+
+
+def _wait_for(path: Path, seconds: float = 60.0) -> None:
+    until = time.monotonic() + seconds
+    while not path.exists():
+        assert time.monotonic() < until, f"{path} never came"
+        time.sleep(0.005)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_twenty_kills_at_random_moments(tmp_path: Path) -> None:
+    """Each restarted run is killed again, until twenty have been."""
+    arguments = ["--episodes=150"]
+    _finished(tmp_path / "whole", *arguments)
+    out, moments = tmp_path / "killed", random.Random(7)
+    for number in range(20):
+        resume = ["--resume"] if (out / "training.json").exists() else []
+        process = subprocess.Popen(
+            _command(out, *arguments, *resume), stderr=subprocess.DEVNULL
+        )
+        _wait_for(out / "training.json")
+        before = _episodes(out)
+        until = time.monotonic() + 60.0
+        while _episodes(out) < before + 2 and time.monotonic() < until:
+            time.sleep(0.002)
+        time.sleep(moments.uniform(0.0, 0.1))
+        assert process.poll() is None, f"finished before kill {number}"
+        process.kill()
+        process.wait()
+    assert not (out / "seed_000/result.json").exists()
+    _finished(out, *arguments, "--resume")
+    assert _content(out / "seed_000") == _content(tmp_path / "whole/seed_000")
+
+
+def _episodes(out: Path) -> int:
+    return len(list(out.glob("seed_000/log/episode_*")))
+
+
+@pytest.mark.parametrize("seeds", [1, 2])
+def test_ctrl_c_keeps_what_is_finished(seeds: int, tmp_path: Path) -> None:
+    out, count = tmp_path / "out", f"--seeds={seeds}"
+    process = subprocess.Popen(
+        _command(out, "--episodes=5000", count),
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    _wait_for(out / "seed_000/log/episode_0001.parquet")
+    os.killpg(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+    assert len(read_log(out / "seed_000/log").episodes) >= 2
+    assert (out / "seed_000/checkpoint.npz").exists()
+
+
+def test_a_pool_whose_parent_dies_stops_by_itself(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = subprocess.Popen(
+        _command(out, "--episodes=5000", "--seeds=2"), stderr=subprocess.DEVNULL
+    )
+    _wait_for(out / "seed_001/log/episode_0001.parquet")
+    process.kill()
+    process.wait()
+    time.sleep(1.0)
+    before = _episodes(out)
+    time.sleep(1.0)
+    assert _episodes(out) == before
+
+
+def test_learning_from_logs_alone(undisturbed: Path, tmp_path: Path) -> None:
+    logs = [str(undisturbed / f"seed_00{i}/log") for i in (0, 1)]
+    out = tmp_path / "offline"
+    _finished(out, "--episodes=5", "--updates=50", "--from-logs", *logs)
+    result = json.loads((out / "seed_000/result.json").read_text())
+    assert result["updates"] == 50 and "training" not in result
+    assert result["validation"]["episodes"] == 2
+    assert not (out / "seed_000/log").exists()
+
+
+def test_demonstrations_are_mixed_in(undisturbed: Path, tmp_path: Path) -> None:
+    out = tmp_path / "shown"
+    logs = str(undisturbed / "seed_000/log")
+    changes = ["--hyper", *SMALL[SMALL.index("--hyper") + 1 :], "demonstrations=0.5"]
+    _finished(out, "--episodes=2", "--demonstrations", logs, *changes)
+    policy = load_policy(out / "seed_000/policy.npz")
+    assert policy.description.hyperparameters["demonstrations"] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--psi=0.3"], "imprecision: 0.3 m is out of range"),
+        (["--hyper", "gama=1"], "did you mean 'gamma'"),
+        (["--from-logs", "nowhere"], "nowhere"),
+        (["--hyper", "demonstrations=0.5"], "--demonstrations DIR"),
+        (["--episodes=0"], "episodes: 0 1 is out of range"),
+    ],
+)
+def test_bad_input_is_one_line(
+    arguments: list[str], message: str, tmp_path: Path
+) -> None:
+    run = _train(tmp_path / "out", *arguments)
+    assert run.returncode == 2
+    assert message in run.stderr and "Traceback" not in run.stderr
+
+
+def test_a_folder_that_is_taken_is_refused(undisturbed: Path) -> None:
+    run = _train(undisturbed, "--episodes=6", "--seeds=2")
+    assert run.returncode == 2 and "add --resume" in run.stderr
+
+
+def test_resuming_with_something_else_names_the_difference(undisturbed: Path) -> None:
+    for arguments, difference in (
+        (["--episodes=7"], "config.episodes (6, not 7)"),
+        (["--episodes=6", "--psi=0.0001"], "scenario.imprecision (0.0, not 0.0001)"),
+    ):
+        run = _train(undisturbed, "--resume", *arguments)
+        assert run.returncode == 2 and difference in run.stderr
+
+
+def test_a_finished_training_resumes_to_nothing(undisturbed: Path) -> None:
+    before = (undisturbed / "seed_000/policy.npz").read_bytes()
+    _finished(undisturbed, "--episodes=6", "--seeds=2", "--resume")
+    assert (undisturbed / "seed_000/policy.npz").read_bytes() == before
+
+
+def test_the_small_training_is_what_it_says() -> None:
+    """The tests above lean on the preset and the scenario being there."""
+    assert preset("chapter3").algorithm == "ddpg"
+    assert load_scenario("sliding").task.success == "travelled"
