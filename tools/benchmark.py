@@ -6,11 +6,13 @@ measurement, not a test: nothing here passes or fails.
 """
 
 import argparse
+import functools
 import json
 import os
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -25,6 +27,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 from tqdm import tqdm
+from update_speed import measure_updates
 
 from drake_disasm.errors import DisasmError
 from drake_disasm.mdp import Outcome
@@ -146,11 +149,35 @@ def _replay(scenario: Scenario, rates: list[np.ndarray]) -> float:
 
 
 def measure_memory() -> Iterator[Figure]:
-    """Yields the peak memory of simulate.py, beside importing Drake alone."""
-    program = str(Path(__file__).with_name("simulate.py"))
-    peak = _peak_mib([sys.executable, program, "--no-meshcat"])
+    """Yields the peak memory of the programs, beside importing what they build on."""
+    tools = Path(__file__).parent
+    peak = _peak_mib([sys.executable, str(tools / "simulate.py"), "--no-meshcat"])
     bare = _peak_mib([sys.executable, "-c", "import pydrake.all"])
     yield Figure("peak_mib_simulate", peak, "MiB", "import pydrake.all", peak / bare)
+    with tempfile.TemporaryDirectory() as folder:
+        training = [
+            "--preset",
+            "chapter4",
+            "--episodes",
+            "20",
+            "--out",
+            f"{folder}/out",
+        ]
+        peak = _peak_mib([sys.executable, str(tools / "train.py"), *training])
+    bare = _peak_mib([sys.executable, "-c", "import torch, pydrake.all"])
+    yield Figure(
+        "peak_mib_train", peak, "MiB", "import torch, pydrake.all", peak / bare
+    )
+
+
+def measure_update_speed(name: str) -> Iterator[Figure]:
+    """Yields DDPG updates per second of a preset, beside stable-baselines3's."""
+    ours, theirs = measure_updates(name)
+    ratio = ours / theirs if theirs else None
+    reference = "stable-baselines3" if theirs else "(stable-baselines3 is not there)"
+    yield Figure(f"updates_per_s_{name}", ours, "1/s", reference, ratio)
+    if ratio:
+        yield Figure(f"updates_ratio_sb3_{name}", ratio, "1", reference, ratio)
 
 
 def _peak_mib(command: list[str]) -> float:
@@ -191,7 +218,13 @@ MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
     ("twin_python_share",): measure_python_share,
     ("cell_reset_ms",): lambda: measure_reset("cell"),
     ("twin_reset_ms",): lambda: measure_reset("twin"),
-    ("peak_mib_simulate",): measure_memory,
+    **{
+        (f"updates_per_s_{name}", f"updates_ratio_sb3_{name}"): functools.partial(
+            measure_update_speed, name
+        )
+        for name in ("chapter3", "chapter4", "chapter5")
+    },
+    ("peak_mib_simulate", "peak_mib_train"): measure_memory,
 }
 
 

@@ -92,10 +92,12 @@ class Agent:
         self.updates += 1
         with_actor = self.updates % self.config.policy_delay == 0
         update = _update(self.config, with_actor, self.compiled)
+        batch, noise = torch.from_numpy(rows), self._noise(len(rows), generator)
+        if len(rows) != self.config.batch:  # merged draws: another number every time
+            for tensor in (batch, noise):
+                torch._dynamo.mark_dynamic(tensor, 0)
         with torch.no_grad():
-            self.state, _ = update(
-                self.state, torch.from_numpy(rows), self._noise(len(rows), generator)
-            )
+            self.state, _ = update(self.state, batch, noise)
 
     def _noise(self, count: int, generator: np.random.Generator) -> Tensor:
         width = 2 * _ACTIONS if self._soft else _ACTIONS
@@ -123,5 +125,5 @@ def _update(config: Hyperparameters, with_actor: bool, compiled: bool) -> _Updat
     if key not in _COMPILED:
         # One graph per agent is meant; torch takes it for a fault from the eighth on.
         torch._dynamo.config.recompile_limit = max(64, 2 * len(_COMPILED))
-        _COMPILED[key] = torch.compile(plain, fullgraph=True, dynamic=False)
+        _COMPILED[key] = torch.compile(plain, fullgraph=True)
     return _COMPILED[key]

@@ -9,8 +9,12 @@ from drake_disasm.errors import DisasmError
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 
 _STATES, _ACTIONS = len(STATE_NAMES), len(ACTION_NAMES)
-#: Numbers in one transition.
-WIDTH = 2 * _STATES + _ACTIONS + 2
+#: Numbers in one transition; the last is its weight in a batch.
+WIDTH = 2 * _STATES + _ACTIONS + 3
+# A row drawn twice is computed once, with twice the weight: the same gradient on fewer
+# rows. It pays where matrix products rule, and costs a look through the draws.
+_MERGED_FROM = 1000  # rows of a batch
+_MERGED_OUT_OF = 64  # rows of the memory
 
 
 class Batch(NamedTuple):
@@ -22,6 +26,7 @@ class Batch(NamedTuple):
         reward: (n,).
         terminated: (n,) 1 where the task itself ended, which cuts the bootstrap;
             0 elsewhere, at a time limit too.
+        weight: (n,) adding up to 1.
     """
 
     observation: Tensor
@@ -29,6 +34,7 @@ class Batch(NamedTuple):
     reward: Tensor
     next_observation: Tensor
     terminated: Tensor
+    weight: Tensor
 
 
 def split(rows: Tensor) -> Batch:
@@ -40,6 +46,7 @@ def split(rows: Tensor) -> Batch:
         rows[:, s + a],
         rows[:, s + a + 1 : 2 * s + a + 1],
         rows[:, 2 * s + a + 1],
+        rows[:, -1] / rows[:, -1].sum(),
     )
 
 
@@ -71,14 +78,24 @@ class Replay:
         row[:_STATES] = observation
         row[_STATES : _STATES + _ACTIONS] = action
         row[_STATES + _ACTIONS] = reward
-        row[_STATES + _ACTIONS + 1 : -1] = next_observation
-        row[-1] = terminated
+        row[_STATES + _ACTIONS + 1 : -2] = next_observation
+        row[-2:] = terminated, 1.0
         self._next = (self._next + 1) % len(self._rows)
         self.size = min(self.size + 1, len(self._rows))
 
     def sample(self, count: int, generator: np.random.Generator) -> np.ndarray:
-        """Returns rows (count, WIDTH), drawn with replacement."""
-        return self._rows[generator.integers(self.size, size=count)]
+        """Returns rows (n, WIDTH) of `count` draws with replacement.
+
+        In large batches equal draws are merged: then n < count, and the weights say
+        how often each row was drawn.
+        """
+        chosen = generator.integers(self.size, size=count)
+        if count < _MERGED_FROM or self.size < _MERGED_OUT_OF:
+            return self._rows[chosen]
+        chosen, times = np.unique(chosen, return_counts=True)
+        rows = self._rows[chosen]
+        rows[:, -1] = times
+        return rows
 
     def contents(self) -> tuple[np.ndarray, int]:
         """Returns the rows held (size, WIDTH) and where the next one goes."""

@@ -5,10 +5,11 @@ Everything that is drawn at random in episode e of seed s comes from
 on nothing else: a resumed training goes on bit for bit.
 """
 
+import contextlib
 import dataclasses
 import enum
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -64,10 +65,6 @@ class TrainingSpec:
     threads: int = 1
 
 
-#: Called after each episode with its number, its summary and its rows.
-OnEpisode = Callable[[int, EpisodeSummary, EpisodeRecorder], None]
-
-
 class Training:
     """One agent that learns on one environment.
 
@@ -109,6 +106,7 @@ class Training:
         self.action_map = action_map(spec.scenario, config)
         self._demonstrations = demonstrations
         self._scale = np.array(config.observation_scale)
+        self._observation = np.zeros(12)
 
     def restore(self, path: Path) -> None:
         """Goes on from a checkpoint.
@@ -122,14 +120,13 @@ class Training:
 
     def save(self, path: Path) -> None:
         """Writes a checkpoint from which `restore` goes on bit for bit."""
-        began = time.perf_counter()
         notes = {
             "episodes": [dataclasses.asdict(s) for s in self.summaries],
             "rounds": self.rounds,
             "seconds": self.seconds,
         }
-        save_checkpoint(path, self.agent, self._own_memory(), notes)
-        self.seconds["saving"] += time.perf_counter() - began
+        with self._clock("saving"):
+            save_checkpoint(path, self.agent, self._own_memory(), notes)
 
     def _own_memory(self) -> Replay:
         """Returns what a checkpoint is to hold; a dataset is on disk already."""
@@ -137,60 +134,57 @@ class Training:
 
     def run_episode(self) -> tuple[EpisodeSummary, EpisodeRecorder]:
         """Plays one episode, and learns as the schedule says."""
-        number = len(self.summaries)
-        began, before = time.perf_counter(), self.seconds["updates"]
-        explore = self._generator(Purpose.EXPLORATION, number)
+        config, number = self.spec.config, len(self.summaries)
+        learning = number >= config.warmup_episodes
+        every_step = learning and config.schedule == "every_step"
         updates = self._generator(Purpose.UPDATES, number)
-        sigma = self._sigma(number)
-        per_step = self.spec.config.updates_per_step
-        learning = number >= self.spec.config.warmup_episodes
-        every_step = learning and self.spec.config.schedule == "every_step"
-        network = self.agent.network()
-        seed = seed_for(self.spec.seed, Purpose.EPISODE, number)
-        summary = EpisodeSummary(seed)
-        observation, _ = self.env.reset(seed=seed)
-        recorder = EpisodeRecorder(self.env.simulation)
-        recorder.measure()
+        explorer = self._explorer(number)
+        summary, recorder = self._begin_episode(number)
         while summary.outcome is Outcome.RUNNING:
-            observation = self._step(observation, network, sigma, explore)
-            recorder.acted(self.env.result)
-            summary.add(self.env.result)
+            self._step(explorer, summary, recorder)
             if every_step:
-                self._learn(per_step, updates)
-                network = self.agent.network()
+                self._learn(config.updates_per_step, updates)
+                explorer.network = self.agent.network()
         if learning and not every_step:
-            self._learn(summary.steps * per_step, updates)
+            self._learn(config.updates_per_step * summary.steps, updates)
         summary.bolt_is_out = self.env.simulation.bolt_is_out()
         self.summaries.append(summary)
-        spent = self.seconds["updates"] - before
-        self.seconds["simulation"] += time.perf_counter() - began - spent
         return summary, recorder
+
+    def _begin_episode(self, number: int) -> tuple[EpisodeSummary, EpisodeRecorder]:
+        seed = seed_for(self.spec.seed, Purpose.EPISODE, number)
+        with self._clock("simulation"):
+            self._observation, _ = self.env.reset(seed=seed)
+            recorder = EpisodeRecorder(self.env.simulation)
+            recorder.measure()
+        return EpisodeSummary(seed), recorder
+
+    def _step(
+        self, explorer: "_Explorer", summary: EpisodeSummary, recorder: EpisodeRecorder
+    ) -> None:
+        """Takes one exploring step and remembers it."""
+        with self._clock("simulation"):
+            before = self._observation
+            scaled = (before / self._scale).astype(np.float32)
+            chosen = self.agent.explore(
+                explorer.network(scaled), explorer.sigma, explorer.generator
+            )
+            action = self.action_map.to_action(before, chosen)
+            after, reward, terminated, _, _ = self.env.step(action)
+            self.replay.add(scaled, chosen, reward, after / self._scale, terminated)
+            self._observation = after
+            recorder.acted(self.env.result)
+            summary.add(self.env.result)
 
     def run_round(self, updates: int) -> None:
         """Does updates on what the memory holds, without acting (thesis 3.4.2)."""
         self._learn(updates, self._generator(Purpose.UPDATES, self.rounds))
         self.rounds += 1
 
-    def _step(
-        self,
-        observation: np.ndarray,
-        network: Network,
-        sigma: float,
-        generator: np.random.Generator,
-    ) -> np.ndarray:
-        """Takes one exploring step, remembers it, and returns what is seen next."""
-        scaled = (observation / self._scale).astype(np.float32)
-        chosen = self.agent.explore(network(scaled), sigma, generator)
-        action = self.action_map.to_action(observation, chosen)
-        following, reward, terminated, _, _ = self.env.step(action)
-        self.replay.add(scaled, chosen, reward, following / self._scale, terminated)
-        return following
-
     def _learn(self, updates: int, generator: np.random.Generator) -> None:
-        began = time.perf_counter()
-        for _ in range(updates):
-            self.agent.learn(self._batch(generator), generator)
-        self.seconds["updates"] += time.perf_counter() - began
+        with self._clock("updates"):
+            for _ in range(updates):
+                self.agent.learn(self._batch(generator), generator)
 
     def _batch(self, generator: np.random.Generator) -> np.ndarray:
         config = self.spec.config
@@ -200,18 +194,34 @@ class Training:
             return rows
         return np.concatenate([rows, self._demonstrations.sample(shown, generator)])
 
-    def _sigma(self, number: int) -> float:
-        """Returns the exploration noise on the choice in [-1, 1].
+    def _explorer(self, number: int) -> "_Explorer":
+        """Returns how episode `number` explores.
 
         The hyper-parameter is in metres of an agent that has the task's whole range;
         rotations, and a residual's smaller range, go in proportion.
         """
         config, task = self.spec.config, self.spec.scenario.task
-        now = config.exploration * config.exploration_decay**number
-        return now / task.max_translation
+        sigma = config.exploration * config.exploration_decay**number
+        generator = self._generator(Purpose.EXPLORATION, number)
+        return _Explorer(self.agent.network(), sigma / task.max_translation, generator)
+
+    @contextlib.contextmanager
+    def _clock(self, name: str) -> Iterator[None]:
+        began = time.perf_counter()
+        yield
+        self.seconds[name] += time.perf_counter() - began
 
     def _generator(self, purpose: Purpose, number: int) -> np.random.Generator:
         return np.random.default_rng(seed_for(self.spec.seed, purpose, number))
+
+
+@dataclasses.dataclass
+class _Explorer:
+    """How an episode is explored: the actor, noise on its choice, and its source."""
+
+    network: Network
+    sigma: float
+    generator: np.random.Generator
 
 
 def action_map(scenario: Scenario, config: Hyperparameters) -> ActionMap:

@@ -59,7 +59,8 @@ def update_deterministic(
 
     def actor_loss(actor: Layers) -> Tensor:
         chosen = torch.tanh(evaluate(actor, batch.observation))
-        return -q_value(state.critics[0], batch.observation, chosen).mean()
+        value = q_value(state.critics[0], batch.observation, chosen)
+        return -(batch.weight * value).sum()
 
     state = _move_actor(state, grad(actor_loss)(state.actor), config)
     return _move_targets(state, config), loss
@@ -91,7 +92,8 @@ def update_soft(
         def actor_loss(actor: Layers) -> _LossAndDensity:
             chosen, density = sample_action(actor, batch.observation, now)
             q = least_q(state.critics, batch.observation, chosen)
-            return (entropy * density - q).mean(), density
+            loss = entropy * density - q
+            return (batch.weight * loss).sum(), (batch.weight * density).sum()
 
         gradient, (_, density) = grad_and_value(actor_loss, has_aux=True)(state.actor)
         if config.adapt_entropy:
@@ -124,14 +126,18 @@ def _fit_critics(
     batch: Batch,
     next_value: Tensor,
     config: Hyperparameters,
-    weight: float,
+    factor: float,
 ) -> tuple[AgentState, Tensor]:
-    """Moves the critics towards y = r + gamma (1 - terminated) next_value."""
+    """Moves the critics towards y = r + gamma (1 - terminated) next_value.
+
+    `factor` is what their mean squared error is multiplied by.
+    """
     y = batch.reward + config.gamma * (1.0 - batch.terminated) * next_value
 
     def loss(critics: Critics) -> Tensor:
         errors = [q_value(c, batch.observation, batch.action) - y for c in critics]
-        return weight * torch.stack([e.square().mean() for e in errors]).sum()
+        squares = torch.stack(errors).square()
+        return factor * (batch.weight * squares).sum()
 
     gradient, value = grad_and_value(loss)(state.critics)
     critics, moments = descend(
@@ -160,8 +166,8 @@ def _move_actor(
 def _move_entropy(
     state: AgentState, log_density: Tensor, config: Hyperparameters
 ) -> AgentState:
-    """Adapts the entropy coefficient until the density's logarithm averages 6."""
-    surplus = -(log_density.detach() - 6.0).mean()
+    """Adapts the entropy coefficient until the mean of log density () is 6."""
+    surplus = 6.0 - log_density.detach()
     log_entropy, moments = descend(
         state.log_entropy,
         surplus,

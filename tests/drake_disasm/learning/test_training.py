@@ -128,12 +128,14 @@ def test_a_time_limit_is_not_remembered_as_an_end() -> None:
     training = _training("td3", base="admittance", residual=[0.01] * 6)
     summary, _ = training.run_episode()
     assert summary.outcome.truncated
-    assert not training.replay.contents()[0][:, -1].any()
+    assert not training.replay.contents()[0][:, -2].any()
 
 
 def test_exploration_shrinks_by_episode_and_without_it_nothing_is_random() -> None:
     training = _training(exploration=0.003, exploration_decay=0.5)
-    assert [training._sigma(n) for n in range(3)] == pytest.approx([1.0, 0.5, 0.25])
+    assert [training._explorer(n).sigma for n in range(3)] == pytest.approx(
+        [1.0, 0.5, 0.25]
+    )
     calm = _training(exploration=0.0)
     observation = np.zeros(12)
     network = calm.agent.network()

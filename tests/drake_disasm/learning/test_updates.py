@@ -30,7 +30,8 @@ def _batches(count: int, size: int = 20) -> Iterator[np.ndarray]:
     for _ in range(count):
         rows = generator.standard_normal((size, WIDTH)).astype(np.float32)
         rows[:, 12:18] = np.tanh(rows[:, 12:18])
-        rows[:, -1] = generator.random(size) < 0.2
+        rows[:, 31] = generator.random(size) < 0.2
+        rows[:, 32] = 1.0
         yield rows
 
 
@@ -207,10 +208,28 @@ def test_termination_cuts_the_bootstrap_and_nothing_else_does() -> None:
     other = rows.copy()
     other[:, 19:31] += 5.0  # other next states
     for terminated, equal in ((1.0, True), (0.0, False)):
-        rows[:, -1] = other[:, -1] = terminated
+        rows[:, 31] = other[:, 31] = terminated
         critics = []
         for batch in (rows, other):
             agent = Agent(config, seed=1, compiled=False)
             agent.learn(batch, np.random.default_rng(0))
             critics.append(agent.state.critics[0][0]["weight"])
         assert torch.equal(*critics) is equal
+
+
+@pytest.mark.parametrize("algorithm", ["ddpg", "sac"])
+def test_merged_draws_give_the_gradient_of_the_repeated_ones(algorithm: str) -> None:
+    """Each row twice, or once with twice the weight, beside one that counts once."""
+    config = dataclasses.replace(preset("chapter3", algorithm), batch=20)
+    merged = next(iter(_batches(1)))
+    merged[:-1, -1] = 2.0
+    repeated = np.concatenate([merged, merged[:-1]])
+    repeated[:, -1] = 1.0
+    agents = []
+    for rows in (merged, repeated):
+        agent = Agent(config, seed=1, compiled=False)
+        agent._noise = lambda count, _: torch.zeros(count, 12 if agent._soft else 6)  # type: ignore[method-assign]  # noqa: B023
+        agent.learn(rows, np.random.default_rng(0))
+        agents.append(torch.utils._pytree.tree_leaves(agent.state))
+    for one, other in zip(*agents, strict=True):
+        torch.testing.assert_close(one, other, rtol=1e-3, atol=1e-6)
