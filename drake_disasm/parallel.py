@@ -112,6 +112,7 @@ def _run(work: Callable[[Any, Report], Any], job: Any) -> Any:
     parent = multiprocessing.parent_process()
 
     def report(item: Any) -> None:
+        """Passes news on, and stops the job if it is to stop."""
         if parent is not None and not parent.is_alive():
             os._exit(1)  # killed: nobody waits for this any more
         if stop.is_set():

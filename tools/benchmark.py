@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import timeit
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +32,7 @@ from update_speed import measure_updates
 
 from drake_disasm.errors import DisasmError
 from drake_disasm.mdp import Outcome
-from drake_disasm.policies import make_policy
+from drake_disasm.policies import ActionMap, LearnedPolicy, Network, make_policy
 from drake_disasm.quantity import closest
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import TwinStation
@@ -42,6 +43,7 @@ from drake_disasm.writing import make_folder, write_atomically
 _REPEATS = 5
 _SCENARIO = "removal_turned"  # the bolt is in contact nearly all the time
 _POLICY = "admittance"
+_WIDTHS = (12, 128, 128, 128, 6)  # of the policy whose inference is timed
 
 
 @dataclass(frozen=True)
@@ -202,6 +204,44 @@ def _simulation(model: str) -> TaskSimulation:
     return TaskSimulation(load_scenario(_SCENARIO), model, make_policy(_POLICY))
 
 
+def measure_inference() -> Iterator[Figure]:
+    """Yields the time of one call of a trained policy, beside torch's network alone."""
+    generator = np.random.default_rng(0)
+    sizes = list(zip(_WIDTHS[1:], _WIDTHS, strict=False))
+    network = Network(
+        tuple(generator.normal(0.0, 0.1, size).astype(np.float32) for size in sizes),
+        tuple(np.zeros(rows, np.float32) for rows, _ in sizes),
+    )
+    policy = LearnedPolicy(network, np.ones(12), ActionMap(np.ones(6)))
+    observation = generator.standard_normal(12)
+    ours = _short_time(lambda: policy(observation))
+    theirs = _torch_inference(network)
+    reference, ratio = ("the network in torch", ours / theirs) if theirs else ("", None)
+    yield Figure("policy_inference_us", 1e6 * ours, "us", reference, ratio)
+
+
+def _torch_inference(network: Network) -> float | None:
+    """Returns the time [s] of the same network in eager torch, if there is torch."""
+    try:
+        import torch
+    except ImportError:
+        return None
+    layers: list[torch.nn.Module] = []
+    for weight, bias in zip(network.weights, network.biases, strict=True):
+        layer = torch.nn.Linear(weight.shape[1], weight.shape[0])
+        values = {"weight": torch.from_numpy(weight), "bias": torch.from_numpy(bias)}
+        layer.load_state_dict(values)
+        layers += [layer, torch.nn.ReLU()]
+    module, x = torch.nn.Sequential(*layers[:-1]), torch.ones(_WIDTHS[0])
+    with torch.inference_mode():
+        return _short_time(lambda: module(x))
+
+
+def _short_time(work: Callable[[], object]) -> float:
+    """Returns the time [s] of what takes microseconds, many at a time."""
+    return statistics.median(timeit.repeat(work, number=1000, repeat=20)) / 1000
+
+
 def _median_time(work: Callable[[], object], repeats: int) -> float:
     times = []
     for _ in range(repeats):
@@ -218,6 +258,7 @@ MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
     ("twin_python_share",): measure_python_share,
     ("cell_reset_ms",): lambda: measure_reset("cell"),
     ("twin_reset_ms",): lambda: measure_reset("twin"),
+    ("policy_inference_us",): measure_inference,
     **{
         (f"updates_per_s_{name}", f"updates_ratio_sb3_{name}"): functools.partial(
             measure_update_speed, name

@@ -95,25 +95,29 @@ def named_policy(name: str, scenario: Scenario) -> Policy:
     Raises:
         DisasmError: there is none of that name, or it does not fit the scenario.
     """
-    path = find_policy(name)
-    if path and name not in SCRIPTED:
+    if name in SCRIPTED:
+        return make_policy(name)
+    if path := find_policy(name):
         policy = load_policy(path)
         policy.check_fits(scenario)
         return policy
-    if ":" not in name:
-        if name not in SCRIPTED:
-            known = [*SCRIPTED, *shipped_policies()]
-            raise DisasmError(
-                f"policy '{name}' does not exist; {closest(name, known)}, or give an "
-                ".npz file or module:callable"
-            )
-        return make_policy(name)
+    if ":" in name:
+        return _imported(name)
+    known = [*SCRIPTED, *shipped_policies()]
+    raise DisasmError(
+        f"policy '{name}' does not exist; {closest(name, known)} or give an .npz file "
+        "or module:callable"
+    )
+
+
+def _imported(name: str) -> Policy:
     module, _, attribute = name.partition(":")
     try:
         policy = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError) as error:
         raise DisasmError(
-            f"policy {name}: {error}; write {'|'.join(SCRIPTED)} or module:callable"
+            f"policy {name}: {error}; write {'|'.join(SCRIPTED)}, an .npz file or "
+            "module:callable"
         ) from None
     if not callable(policy):
         raise DisasmError(f"policy {name}: is not callable; it maps (12,) to (6,)")

@@ -129,6 +129,7 @@ def main(arguments: Sequence[str]) -> int:
 
 def _shown(bar: tqdm) -> Callable[[Any], None]:
     def show(_: Any) -> None:
+        """Moves the bar by one episode."""
         cli.stop_if_interrupted()
         bar.update()
 

@@ -55,6 +55,7 @@ def _ours(name: str) -> Callable[[int], None]:
     replay.restore(rows, 0)
 
     def work(count: int) -> None:
+        """Does so many updates."""
         for _ in range(count):
             agent.learn(replay.sample(config.batch, generator), generator)
 

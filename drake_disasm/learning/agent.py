@@ -5,6 +5,7 @@ import os
 import shutil
 import warnings
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
@@ -23,6 +24,11 @@ from drake_disasm.policies import Network
 
 _ACTIONS = len(ACTION_NAMES)
 _Update = Callable[[AgentState, Tensor, Tensor], tuple[AgentState, Tensor]]
+#: Small networks spend their time between the kernels: less of that, same numbers.
+_OPTIONS: dict[str, str | int | bool | Callable[..., Any]] = {
+    "cpp_wrapper": True,
+    "size_asserts": False,
+}
 #: Compiled updates by everything that they depend on; tracing one takes seconds.
 _COMPILED: dict[tuple[str, bool], _Update] = {}
 
@@ -60,6 +66,13 @@ class Agent:
                 stacklevel=2,
             )
         self._soft = config.algorithm == "sac"
+        self._noise_width = 2 * _ACTIONS if self._soft else _ACTIONS
+        self._calm = not self._soft and config.target_noise == 0.0
+        self._no_noise = torch.zeros(config.batch, self._noise_width)
+        self._updates = {
+            with_actor: _update(config, with_actor, self.compiled)
+            for with_actor in (False, True)
+        }
 
     def network(self) -> Network:
         """Returns a copy of the actor that runs in NumPy: (12,) to (6,), before tanh.
@@ -91,21 +104,18 @@ class Agent:
         """Does one gradient update on transitions (n, WIDTH)."""
         self.updates += 1
         with_actor = self.updates % self.config.policy_delay == 0
-        update = _update(self.config, with_actor, self.compiled)
         batch, noise = torch.from_numpy(rows), self._noise(len(rows), generator)
         if len(rows) != self.config.batch:  # merged draws: another number every time
             for tensor in (batch, noise):
                 torch._dynamo.mark_dynamic(tensor, 0)
         with torch.no_grad():
-            self.state, _ = update(self.state, batch, noise)
+            self.state, _ = self._updates[with_actor](self.state, batch, noise)
 
     def _noise(self, count: int, generator: np.random.Generator) -> Tensor:
-        width = 2 * _ACTIONS if self._soft else _ACTIONS
-        if not self._soft and self.config.target_noise == 0.0:
-            return torch.zeros(count, width)
-        return torch.from_numpy(
-            generator.standard_normal((count, width), dtype=np.float32)
-        )
+        if self._calm:
+            return self._no_noise[:count]
+        shape = (count, self._noise_width)
+        return torch.from_numpy(generator.standard_normal(shape, dtype=np.float32))
 
 
 def as_network(actor: Layers) -> Network:
@@ -125,5 +135,5 @@ def _update(config: Hyperparameters, with_actor: bool, compiled: bool) -> _Updat
     if key not in _COMPILED:
         # One graph per agent is meant; torch takes it for a fault from the eighth on.
         torch._dynamo.config.recompile_limit = max(64, 2 * len(_COMPILED))
-        _COMPILED[key] = torch.compile(plain, fullgraph=True)
+        _COMPILED[key] = torch.compile(plain, fullgraph=True, options=_OPTIONS)
     return _COMPILED[key]

@@ -58,6 +58,7 @@ def update_deterministic(
         return state, loss
 
     def actor_loss(actor: Layers) -> Tensor:
+        """Minus the value of what the actor would do."""
         chosen = torch.tanh(evaluate(actor, batch.observation))
         value = q_value(state.critics[0], batch.observation, chosen)
         return -(batch.weight * value).sum()
@@ -90,6 +91,7 @@ def update_soft(
     if with_actor:
 
         def actor_loss(actor: Layers) -> _LossAndDensity:
+            """Minus value and entropy of what the actor would do; mean log density."""
             chosen, density = sample_action(actor, batch.observation, now)
             q = least_q(state.critics, batch.observation, chosen)
             loss = entropy * density - q
@@ -135,6 +137,7 @@ def _fit_critics(
     y = batch.reward + config.gamma * (1.0 - batch.terminated) * next_value
 
     def loss(critics: Critics) -> Tensor:
+        """Their mean squared error."""
         errors = [q_value(c, batch.observation, batch.action) - y for c in critics]
         squares = torch.stack(errors).square()
         return factor * (batch.weight * squares).sum()

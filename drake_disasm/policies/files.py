@@ -1,10 +1,18 @@
-"""Policy files: one .npz, no pickle, nothing damaged goes unnoticed."""
+"""Policy files.
+
+One .npz holds
+
+    weight_0, bias_0, ...   float32, (out, in) and (out,) of each layer
+    observation_scale       float64, (12,) [m, rad, N, N m]
+    action_scale            float64, (6,) [m, rad]
+    text                    JSON in UTF-8: format, description, base policy
+    sha256                  of all of these, with their names, types and shapes
+"""
 
 import dataclasses
 import hashlib
-import io
 import json
-import zipfile
+import math
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +20,7 @@ import numpy as np
 
 from drake_disasm.errors import DisasmError
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
+from drake_disasm.policies.archive import AGAIN, Arrays, pack, unpack
 from drake_disasm.policies.network import (
     ActionMap,
     LearnedPolicy,
@@ -25,7 +34,6 @@ from drake_disasm.scenario import Scenario, scenario_to_mapping
 from drake_disasm.writing import write_atomically
 
 FORMAT = "drake_disasm/policy/1"
-_DAMAGED = "copy it again, or train anew (tools/train.py)"
 
 
 def scenario_hash(scenario: Scenario) -> str:
@@ -37,21 +45,28 @@ def scenario_hash(scenario: Scenario) -> str:
 def save_policy(path: Path, policy: LearnedPolicy) -> None:
     """Writes a policy; the same policy gives the same bytes.
 
+    Args:
+        path: of the file, ending in .npz.
+        policy: its description holds plain data alone.
+
     Raises:
-        DisasmError: the system refuses to write.
+        DisasmError: `load_policy` would refuse it (NaN in its weights), or the
+            system refuses to write.
     """
-    arrays = _arrays(policy)
-    base = policy.action_map.base
-    text = {
-        "format": FORMAT,
-        "description": dataclasses.asdict(policy.description),
-        "base": _base_to_mapping(base) if base else None,
-    }
-    arrays["text"] = np.frombuffer(
-        json.dumps(text, sort_keys=True).encode(), dtype=np.uint8
-    )
-    arrays["sha256"] = np.frombuffer(_checksum(arrays), dtype=np.uint8)
-    write_atomically(path, lambda stream: stream.write(_zipped(arrays)))
+    arrays, base = _arrays(policy), policy.action_map.base
+    description = dataclasses.asdict(policy.description)
+    try:
+        _check(arrays)
+        _description(description)
+        text = {
+            "format": FORMAT,
+            "description": description,
+            "base": None if base is None else _base_to_mapping(base),
+        }
+    except DisasmError as error:
+        raise DisasmError(f"policy {path}: is not written, it {error}") from None
+    data = pack(arrays, text)
+    write_atomically(path, lambda stream: stream.write(data))
 
 
 def load_policy(path: Path) -> LearnedPolicy:
@@ -60,23 +75,26 @@ def load_policy(path: Path) -> LearnedPolicy:
     Raises:
         DisasmError: no such file, or it is damaged, or not such a policy.
     """
-    arrays = _read(path)
     try:
-        text = _checked_text(arrays)
-        policy = _assembled(arrays, text)
-        _check_shapes(policy)
-    except (DisasmError, KeyError, TypeError, ValueError) as error:
-        what = f"lacks {error}" if isinstance(error, KeyError) else str(error)
-        raise DisasmError(f"{path}: {what}; {_DAMAGED}") from None
-    return policy
+        data = path.read_bytes()
+    except OSError as error:
+        raise DisasmError(
+            f"policy {path}: can't be read ({error.strerror}); check the path, or "
+            f"name a shipped one ({', '.join(shipped_policies()) or 'none yet'})"
+        ) from None
+    try:
+        return _policy(*unpack(data))
+    except DisasmError as error:
+        raise DisasmError(f"policy {path}: {error}") from None
 
 
 def find_policy(name: str) -> Path | None:
     """Returns the file of a shipped policy's name, or of a path to an .npz."""
     if name.endswith(".npz"):
         return Path(name)
-    shipped = models_dir() / "policies" / f"{name}.npz"
-    return shipped if shipped.is_file() else None
+    if name in shipped_policies():
+        return models_dir() / "policies" / f"{name}.npz"
+    return None
 
 
 def shipped_policies() -> list[str]:
@@ -84,113 +102,123 @@ def shipped_policies() -> list[str]:
     return sorted(path.stem for path in (models_dir() / "policies").glob("*.npz"))
 
 
-def _arrays(policy: LearnedPolicy) -> dict[str, np.ndarray]:
+def _arrays(policy: LearnedPolicy) -> Arrays:
     network = policy.network
     arrays = {f"weight_{i}": w for i, w in enumerate(network.weights)}
     arrays |= {f"bias_{i}": b for i, b in enumerate(network.biases)}
-    arrays["observation_scale"] = policy.observation_scale
-    arrays["action_scale"] = policy.action_map.action_scale
+    arrays["observation_scale"] = policy.observation_scale.astype(float)
+    arrays["action_scale"] = policy.action_map.action_scale.astype(float)
     return arrays
 
 
-def _checksum(arrays: dict[str, np.ndarray]) -> bytes:
-    digest = hashlib.sha256()
-    for name in sorted(arrays):
-        values = np.ascontiguousarray(arrays[name])
-        digest.update(f"{name} {values.dtype.str} {values.shape} ".encode())
-        digest.update(values.tobytes())
-    return digest.digest()
-
-
-def _zipped(arrays: dict[str, np.ndarray]) -> bytes:
-    """Returns what np.savez writes, without the time of day."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
-        for name in sorted(arrays):
-            content = io.BytesIO()
-            np.lib.format.write_array(content, arrays[name], allow_pickle=False)
-            entry = zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0))
-            archive.writestr(entry, content.getvalue())
-    return buffer.getvalue()
-
-
-def _read(path: Path) -> dict[str, np.ndarray]:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
+def _policy(arrays: Arrays, text: dict[str, Any]) -> LearnedPolicy:
+    if text.get("format") != FORMAT:
         raise DisasmError(
-            f"policy {path}: can't be read ({error.strerror}); "
-            f"shipped ones: {', '.join(shipped_policies()) or 'none'}"
-        ) from None
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-    except Exception as error:  # a damaged archive can fail in any way
-        raise DisasmError(
-            f"{path}: is no policy file, or damaged ({error}); {_DAMAGED}"
-        ) from None
-
-
-def _checked_text(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    found = arrays.pop("sha256").tobytes()
-    if found != _checksum(arrays):
-        raise DisasmError("is damaged: its checksum does not match")
-    text = json.loads(arrays.pop("text").tobytes())
-    if text["format"] != FORMAT:
-        raise DisasmError(f"has format '{text['format']}', this program reads {FORMAT}")
-    return text
-
-
-def _assembled(arrays: dict[str, np.ndarray], text: dict[str, Any]) -> LearnedPolicy:
-    count = sum(name.startswith("weight_") for name in arrays)
+            f"has format {text.get('format')!r}, this program reads '{FORMAT}'; use "
+            "the version of drake_disasm that wrote it, or train anew"
+        )
+    layers = _check(arrays)
     network = Network(
-        tuple(arrays[f"weight_{i}"].astype(np.float32) for i in range(count)),
-        tuple(arrays[f"bias_{i}"].astype(np.float32) for i in range(count)),
+        tuple(arrays[f"weight_{i}"] for i in range(layers)),
+        tuple(arrays[f"bias_{i}"] for i in range(layers)),
     )
-    values = text["description"]
-    for name in ("state_names", "action_names"):
-        values[name] = tuple(values[name])
-    base = _base_from_mapping(text["base"]) if text["base"] else None
     return LearnedPolicy(
         network,
         arrays["observation_scale"],
-        ActionMap(arrays["action_scale"], base),
-        PolicyDescription(**values),
+        ActionMap(arrays["action_scale"], _base_from_mapping(text.get("base"))),
+        _description(text.get("description")),
     )
 
 
-def _check_shapes(policy: LearnedPolicy) -> None:
-    """Refuses a network whose layers do not chain from states to actions."""
-    inputs = len(STATE_NAMES)
-    for weight, bias in zip(policy.network.weights, policy.network.biases, strict=True):
-        if (
-            weight.ndim != 2
-            or weight.shape[1] != inputs
-            or bias.shape != weight[:, 0].shape
-        ):
-            raise DisasmError(
-                f"has a layer of shape {weight.shape}, {inputs} numbers go into it"
-            )
-        inputs = len(weight)
-    shapes = (policy.observation_scale.shape, policy.action_map.action_scale.shape)
-    if inputs != len(ACTION_NAMES) or shapes != ((12,), (6,)):
-        raise DisasmError(
-            f"maps {shapes[0]} to {inputs} numbers, the task needs 12 to 6"
-        )
-    for name, values in _arrays(policy).items():
+def _check(arrays: Arrays) -> int:
+    """Refuses arrays that are no policy's; returns how many layers there are."""
+    layers = _count_layers(arrays)
+    for name, values in arrays.items():
+        kind = np.dtype(np.float64 if name.endswith("scale") else np.float32)
+        if values.dtype != kind:
+            raise DisasmError(f"has {name} of {values.dtype}, not {kind}; train anew")
         if not np.isfinite(values).all():
-            raise DisasmError(f"has NaN or infinity in {name}")
+            raise DisasmError(f"has NaN or infinity in {name}; train anew")
+    _check_shapes(arrays, layers)
+    if arrays["observation_scale"].min() <= 0.0 or arrays["action_scale"].min() < 0.0:
+        raise DisasmError("has a scale that is zero or negative; train anew")
+    return layers
+
+
+def _count_layers(arrays: Arrays) -> int:
+    """Refuses arrays that lack one or have one too many."""
+    parts = ("weight_", "bias_")
+    counts = [sum(name.startswith(part) for name in arrays) for part in parts]
+    layers = max(1, *counts)
+    wanted = {f"{part}{i}" for part in parts for i in range(layers)}
+    wanted |= {"observation_scale", "action_scale"}
+    for name in sorted(wanted ^ arrays.keys()):
+        verb = "lacks" if name in wanted else "has an unknown"
+        raise DisasmError(f"{verb} array '{name}'; {AGAIN}")
+    return layers
+
+
+def _check_shapes(arrays: Arrays, layers: int) -> None:
+    """Refuses layers that do not chain from states to actions."""
+    states, actions = len(STATE_NAMES), len(ACTION_NAMES)
+    widths = [states, *(arrays[f"bias_{i}"].size for i in range(layers - 1)), actions]
+    wanted: dict[str, tuple[int, ...]] = {
+        "observation_scale": (states,),
+        "action_scale": (actions,),
+    }
+    for i in range(layers):
+        wanted[f"weight_{i}"] = (widths[i + 1], widths[i])
+        wanted[f"bias_{i}"] = (widths[i + 1],)
+    for name, shape in wanted.items():
+        if arrays[name].shape != shape:
+            raise DisasmError(
+                f"has {name} of shape {arrays[name].shape}, {shape} is what leads "
+                f"from {states} states to {actions} actions; train anew"
+            )
+
+
+def _description(values: Any) -> PolicyDescription:
+    default = dataclasses.asdict(PolicyDescription())
+    if not isinstance(values, dict) or values.keys() != default.keys():
+        raise DisasmError(f"has a description with other entries; {AGAIN}")
+    return PolicyDescription(
+        **{name: _like(default[name], values[name], name) for name in default}
+    )
+
+
+def _like(example: Any, value: Any, name: str) -> Any:
+    """Returns a value of the example's type; JSON has lists alone, and 1 for 1.0."""
+    kind = type(example)
+    if (kind, type(value)) in ((tuple, list), (float, int)):
+        return kind(value)
+    if not isinstance(value, kind):
+        raise DisasmError(
+            f"has a description whose {name} is no {kind.__name__}; {AGAIN}"
+        )
+    return value
 
 
 def _base_to_mapping(base: Straight | Admittance) -> dict[str, Any]:
-    name = next(name for name, kind in SCRIPTED.items() if isinstance(base, kind))
-    return {"name": name, "parameters": dataclasses.asdict(base)}
+    for name, kind in SCRIPTED.items():
+        if type(base) is kind:
+            return {"name": name, "parameters": dataclasses.asdict(base)}
+    raise DisasmError(
+        f"has the base {type(base).__name__}; a file can name {', '.join(SCRIPTED)}"
+    )
 
 
-def _base_from_mapping(mapping: dict[str, Any]) -> Straight | Admittance:
-    name = mapping["name"]
+def _base_from_mapping(mapping: Any) -> Straight | Admittance | None:
+    if mapping is None:
+        return None
+    if not isinstance(mapping, dict) or not isinstance(mapping.get("parameters"), dict):
+        raise DisasmError(f"has a base policy without parameters; {AGAIN}")
+    name, parameters = str(mapping.get("name")), mapping["parameters"]
     if name not in SCRIPTED:
-        raise DisasmError(
-            f"needs the base policy '{name}'; {closest(name, list(SCRIPTED))}"
-        )
-    return SCRIPTED[name](**mapping["parameters"])
+        raise DisasmError(f"has base policy '{name}'; {closest(name, list(SCRIPTED))}")
+    known = [field.name for field in dataclasses.fields(SCRIPTED[name])]
+    for key, value in parameters.items():
+        if key not in known:
+            raise DisasmError(f"sets '{key}' of '{name}'; {closest(key, known)}")
+        if type(value) not in (int, float) or not math.isfinite(value):
+            raise DisasmError(f"sets {key} of '{name}' to {value!r}; train anew")
+    return SCRIPTED[name](**parameters)

@@ -21,12 +21,15 @@ def _benchmark(*arguments: str) -> subprocess.CompletedProcess[str]:
 def test_only_and_json(tmp_path: Path) -> None:
     file = tmp_path / "figures.json"
     keys = ["twin_reset_ms", "twin_steps_per_s", "twin_python_share"]
+    keys.append("policy_inference_us")
     done = _benchmark("--only", *keys, "--json", str(file))
     assert done.returncode == 0, done.stderr
     figures = json.loads(file.read_text())
     assert set(figures) == set(keys)
     assert figures["twin_reset_ms"] > 0.0
     assert 0.0 < figures["twin_python_share"] < 1.0
+    assert figures["policy_inference_us"] > 0.0
+    assert "the network in torch" in done.stdout
     assert all(key in done.stdout for key in keys)
 
 

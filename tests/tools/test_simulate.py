@@ -7,8 +7,16 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from drake_disasm.policies import (
+    ActionMap,
+    LearnedPolicy,
+    Network,
+    Straight,
+    save_policy,
+)
 from drake_disasm.scenario import load_scenario, scenario_from_mapping
 from sysid.logs import read_log
 from tests.tools.programs import ROOT, Runner
@@ -113,6 +121,37 @@ def test_page_that_cannot_be_written_is_refused_before_the_run(
 def test_missing_scenario_and_policy_suggest_a_name(simulate: Runner) -> None:
     _assert_one_line(simulate("--scenario", "remval"), ["remval", "'removal'"])
     _assert_one_line(simulate("--policy", "strait"), ["strait", "'straight'"])
+
+
+def _trained(path: Path) -> Path:
+    """Writes a policy that has learned to correct `straight` by nothing at all."""
+    network = Network((np.zeros((6, 12), np.float32),), (np.zeros(6, np.float32),))
+    mapping = ActionMap(np.full(6, 1e-4), Straight())
+    save_policy(path, LearnedPolicy(network, np.ones(12), mapping))
+    return path
+
+
+def test_trained_policy_is_given_as_a_file(simulate: Runner, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    _trained(tmp_path / "out/mine.npz")
+    done = simulate(*TWIN, "--policy", "out/mine.npz", "--record", "a")
+    assert done.returncode == 0, done.stderr
+    assert simulate(*TWIN, "--policy", "straight", "--record", "b").returncode == 0
+    a, b = (read_log(tmp_path / name) for name in ("a", "b"))
+    assert a.data_hash == b.data_hash
+    assert a.header.provenance["policy"] == "out/mine.npz"
+
+
+def test_damaged_or_unfit_policy_is_one_line(simulate: Runner, tmp_path: Path) -> None:
+    run = (*TWIN, "--policy", str(_trained(tmp_path / "mine.npz")))
+    done = simulate(*run, "--set", "task.period=0.2")
+    _assert_one_line(done, ["task.period", "0.1", "0.2"])
+    data = bytearray((tmp_path / "mine.npz").read_bytes())
+    data[len(data) // 2] ^= 1
+    (tmp_path / "mine.npz").write_bytes(data)
+    _assert_one_line(simulate(*run), ["mine.npz", "damaged", "train.py"])
+    done = simulate(*TWIN, "--policy", "none.npz")
+    _assert_one_line(done, ["none.npz", "can't be read"])
 
 
 BAD_POLICIES = {

@@ -1,0 +1,315 @@
+"""Policy files: whole, the same every time, and nothing damaged goes unnoticed."""
+
+import dataclasses
+import io
+import os
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.policies import (
+    ActionMap,
+    LearnedPolicy,
+    Network,
+    Straight,
+    find_policy,
+    load_policy,
+    save_policy,
+    scenario_hash,
+    shipped_policies,
+)
+from drake_disasm.policies.archive import Arrays, pack, unpack
+from drake_disasm.policies.files import FORMAT
+from drake_disasm.resources import models_dir
+from drake_disasm.scenario import load_scenario
+
+MakeNetwork = Callable[..., Network]
+
+
+@pytest.fixture
+def file(policy: LearnedPolicy, tmp_path: Path) -> Path:
+    """The policy as a file."""
+    save_policy(tmp_path / "policy.npz", policy)
+    return tmp_path / "policy.npz"
+
+
+def _contents(policy: LearnedPolicy) -> list[Any]:
+    arrays = (
+        *policy.network.weights,
+        *policy.network.biases,
+        policy.observation_scale,
+        policy.action_map.action_scale,
+    )
+    bits = [(a.dtype.str, a.shape, a.tobytes()) for a in arrays]
+    return [*bits, policy.action_map.base, policy.description]
+
+
+def _refusal(path: Path) -> str:
+    """Returns the one line by which a file is refused."""
+    with pytest.raises(DisasmError) as caught:
+        load_policy(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert str(path) in message
+    assert "; " in message, f"no remedy: {message}"
+    return message
+
+
+def test_round_trip_bit_for_bit(policy: LearnedPolicy, file: Path) -> None:
+    assert _contents(load_policy(file)) == _contents(policy)
+
+
+@pytest.mark.parametrize("base", [None, Straight()])
+@pytest.mark.parametrize("widths", [(12, 6), (12, 128, 128, 128, 6)])
+def test_round_trip_of_other_shapes(
+    make_network: MakeNetwork, tmp_path: Path, widths: tuple, base: Straight | None
+) -> None:
+    policy = LearnedPolicy(
+        make_network(*widths), np.ones(12), ActionMap(np.ones(6), base)
+    )
+    save_policy(tmp_path / "policy.npz", policy)
+    assert _contents(load_policy(tmp_path / "policy.npz")) == _contents(policy)
+
+
+def test_same_policy_same_bytes(policy: LearnedPolicy, file: Path) -> None:
+    """Whatever the time, the name, and the order in which a dict was filled."""
+    turned = dict(reversed(policy.description.hyperparameters.items()))
+    description = dataclasses.replace(policy.description, hyperparameters=turned)
+    other = file.with_name("other.npz")
+    save_policy(other, dataclasses.replace(policy, description=description))
+    assert other.read_bytes() == file.read_bytes()
+    with zipfile.ZipFile(file) as archive:
+        assert {entry.date_time[0] for entry in archive.infolist()} == {1980}
+    save_policy(other, load_policy(file))
+    assert other.read_bytes() == file.read_bytes()
+
+
+def test_numpy_alone_can_read_it(policy: LearnedPolicy, file: Path) -> None:
+    with np.load(file, allow_pickle=False) as arrays:
+        np.testing.assert_array_equal(arrays["weight_0"], policy.network.weights[0])
+        assert FORMAT in arrays["text"].tobytes().decode()
+
+
+def test_whole_numbers_count_as_floats(policy: LearnedPolicy, tmp_path: Path) -> None:
+    """A period of 1 s may be written as an int; the file can be read all the same."""
+    description = dataclasses.replace(policy.description, period=1)
+    whole = dataclasses.replace(policy, description=description)
+    save_policy(tmp_path / "p.npz", whole)
+    assert load_policy(tmp_path / "p.npz").description.period == 1.0
+
+
+def test_flipped_bits_never_go_unnoticed(policy: LearnedPolicy, file: Path) -> None:
+    """A flip in what a zip says of itself may be harmless; then nothing changed."""
+    data, generator = file.read_bytes(), np.random.default_rng(0)
+    expected, refused = _contents(policy), 0
+    for place in generator.integers(len(data), size=200):
+        damaged = bytearray(data)
+        damaged[place] ^= int(generator.integers(1, 256))
+        file.write_bytes(damaged)
+        try:
+            assert _contents(load_policy(file)) == expected
+        except DisasmError as error:
+            assert "\n" not in str(error)
+            refused += 1
+    assert refused > 100
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 0.7, 0.99])
+def test_truncated_file_is_refused(file: Path, share: float) -> None:
+    data = file.read_bytes()
+    file.write_bytes(data[: int(share * len(data))])
+    _refusal(file)
+
+
+@pytest.mark.parametrize("name", ["weight_0", "bias_2", "action_scale", "text"])
+def test_flips_that_the_zip_would_accept_are_refused(file: Path, name: str) -> None:
+    """Whoever rewrites an array with any tool has to know our checksum, too."""
+    with np.load(file) as archive:
+        arrays = dict(archive)
+    arrays[name].view(np.uint8).flat[3] ^= 1
+    np.savez(file, **arrays)
+    assert "checksum" in _refusal(file)
+
+
+def test_other_files_are_refused(file: Path, tmp_path: Path) -> None:
+    file.write_text("a policy")
+    assert "is no .npz file" in _refusal(file)
+    np.save(file.open("wb"), np.ones(3))
+    assert "is no .npz file" in _refusal(file)
+    np.savez(file, weights=np.ones(3))
+    assert "lacks 'sha256'" in _refusal(file)
+    objects = np.array([{"a": 1}], dtype=object)
+    np.savez(file, weight_0=objects)  # as a pickle
+    assert "Object arrays" in _refusal(file)
+    assert "No such file" in _refusal(tmp_path / "missing.npz")
+    assert "directory" in _refusal(tmp_path)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_unreadable_file_is_refused(file: Path) -> None:
+    file.chmod(0)
+    assert "Permission denied" in _refusal(file)
+
+
+Change = Callable[[Arrays, dict[str, Any]], Any]
+
+#: What is done to a file before its checksum is made, and what is said about it.
+BROKEN: dict[str, tuple[Change, list[str]]] = {
+    "format": (
+        lambda a, t: t.update(format="drake_disasm/policy/2"),
+        ["drake_disasm/policy/2", FORMAT],
+    ),
+    "no format": (lambda a, t: t.pop("format"), ["None", FORMAT]),
+    "no weight": (lambda a, t: a.pop("weight_1"), ["lacks", "'weight_1'"]),
+    "no last layer": (lambda a, t: a.pop("bias_2"), ["lacks", "'bias_2'"]),
+    "no layers": (
+        lambda a, t: [a.pop(n) for n in [*a] if "scale" not in n],
+        ["lacks", "'bias_0'"],
+    ),
+    "no scale": (lambda a, t: a.pop("action_scale"), ["lacks", "'action_scale'"]),
+    "stranger": (lambda a, t: a.update(spam=np.ones(1)), ["unknown", "'spam'"]),
+    "no chain": (
+        lambda a, t: a.update(weight_1=np.ones((5, 9), np.float32)),
+        ["weight_1", "(5, 9)", "(5, 7)"],
+    ),
+    "wrong bias": (
+        lambda a, t: a.update(bias_2=np.ones(5, np.float32)),
+        ["bias_2", "(5,)", "(6,)"],
+    ),
+    "flat weight": (
+        lambda a, t: a.update(weight_1=np.ones(35, np.float32)),
+        ["weight_1", "(35,)"],
+    ),
+    "scalar bias": (
+        lambda a, t: a.update(bias_0=np.array(1.0, np.float32)),
+        ["shape", "train anew"],
+    ),
+    "11 inputs": (
+        lambda a, t: a.update(weight_0=np.ones((7, 11), np.float32)),
+        ["weight_0", "(7, 11)", "(7, 12)"],
+    ),
+    "5 outputs": (
+        lambda a, t: a.update(
+            weight_2=np.ones((5, 5), np.float32), bias_2=np.ones(5, np.float32)
+        ),
+        ["(5, 5)", "(6, 5)"],
+    ),
+    "short scale": (
+        lambda a, t: a.update(observation_scale=np.ones(6)),
+        ["observation_scale", "(6,)", "(12,)"],
+    ),
+    "NaN": (
+        lambda a, t: a["weight_1"].__setitem__((0, 0), np.nan),
+        ["NaN", "weight_1"],
+    ),
+    "infinity": (lambda a, t: a["bias_0"].__setitem__(0, np.inf), ["bias_0"]),
+    "zero scale": (
+        lambda a, t: a["observation_scale"].__setitem__(0, 0.0),
+        ["scale", "zero"],
+    ),
+    "negative reach": (
+        lambda a, t: a["action_scale"].__setitem__(0, -1.0),
+        ["scale", "negative"],
+    ),
+    "doubles": (
+        lambda a, t: a.update(weight_0=a["weight_0"].astype(float)),
+        ["weight_0", "float64", "float32"],
+    ),
+    "words": (
+        lambda a, t: a.update(bias_0=np.array(["a"] * 7)),
+        ["bias_0", "float32"],
+    ),
+    "unknown base": (
+        lambda a, t: t["base"].update(name="strait"),
+        ["'strait'", "'straight'"],
+    ),
+    "unknown parameter": (
+        lambda a, t: t["base"].update(parameters={"sped": 1.0}),
+        ["'sped'", "'speed'"],
+    ),
+    "parameter is a word": (
+        lambda a, t: t["base"]["parameters"].update(speed="fast"),
+        ["speed", "'fast'"],
+    ),
+    "parameter is NaN": (
+        lambda a, t: t["base"]["parameters"].update(speed=float("nan")),
+        ["speed", "nan"],
+    ),
+    "no parameters": (lambda a, t: t["base"].pop("parameters"), ["base"]),
+    "base is a word": (lambda a, t: t.update(base="straight"), ["base"]),
+    "no description": (lambda a, t: t.pop("description"), ["description"]),
+    "poor description": (lambda a, t: t["description"].pop("period"), ["description"]),
+    "odd description": (
+        lambda a, t: t["description"].update(period="0.1"),
+        ["description", "period", "float"],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_whole_file_with_broken_content_is_refused(file: Path, name: str) -> None:
+    change, words = BROKEN[name]
+    arrays, text = unpack(file.read_bytes())
+    change(arrays, text)
+    file.write_bytes(pack(arrays, text))
+    message = _refusal(file)
+    assert all(word in message for word in words), message
+
+
+def test_text_that_is_no_mapping_is_refused(file: Path) -> None:
+    arrays, _ = unpack(file.read_bytes())
+    file.write_bytes(pack(arrays, ["a", "list"]))  # type: ignore[arg-type]
+    assert "no mapping" in _refusal(file)
+
+
+def test_broken_policy_is_not_written(policy: LearnedPolicy, file: Path) -> None:
+    """What was there stays, and what `load_policy` would refuse is refused at once."""
+    before = file.read_bytes()
+    policy.network.biases[0][0] = np.nan
+    with pytest.raises(DisasmError, match=r"not written.*NaN.*bias_0"):
+        save_policy(file, policy)
+    strange = ActionMap(np.ones(6), lambda observation: np.zeros(6))  # type: ignore
+    policy.network.biases[0][0] = 0.0
+    with pytest.raises(DisasmError, match="a file can name straight, admittance"):
+        save_policy(file, dataclasses.replace(policy, action_map=strange))
+    assert file.read_bytes() == before
+    assert [path.name for path in file.parent.iterdir()] == [file.name]
+
+
+def test_folder_that_is_not_there_is_refused(
+    policy: LearnedPolicy, tmp_path: Path
+) -> None:
+    with pytest.raises(DisasmError, match="cannot be written"):
+        save_policy(tmp_path / "no/such/policy.npz", policy)
+
+
+def test_two_arrays_of_one_name_are_refused(file: Path) -> None:
+    """The zip's last one wins, and the checksum knows it is another."""
+    data = io.BytesIO(file.read_bytes())
+    with zipfile.ZipFile(data, "a") as archive, pytest.warns(UserWarning):
+        content = io.BytesIO()
+        np.lib.format.write_array(content, np.zeros(7, np.float32))
+        archive.writestr("bias_0.npy", content.getvalue())
+    file.write_bytes(data.getvalue())
+    assert "checksum" in _refusal(file)
+
+
+def test_names_of_policies(tmp_path: Path) -> None:
+    assert find_policy("a/b.npz") == Path("a/b.npz")
+    assert find_policy("no_such_policy") is None
+    assert find_policy("a" * 5000) is None
+    for name in shipped_policies():
+        assert find_policy(name) == models_dir() / f"policies/{name}.npz"
+
+
+def test_scenario_hash_is_of_content() -> None:
+    removal = scenario_hash(load_scenario("removal"))
+    assert removal == scenario_hash(load_scenario("removal"))
+    assert len(removal) == 64
+    for override in ("lock.clearance=0.0003", "effects=[!SensorBias {fx: 0.5}]"):
+        assert removal != scenario_hash(load_scenario("removal", [override]))

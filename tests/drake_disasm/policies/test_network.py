@@ -1,0 +1,209 @@
+"""A trained policy's law, in NumPy as in torch."""
+
+import copy
+import dataclasses
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.mdp import Outcome, action_bounds
+from drake_disasm.policies import (
+    ActionMap,
+    Admittance,
+    LearnedPolicy,
+    Network,
+    Straight,
+    load_policy,
+    save_policy,
+)
+from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.systems.policy import ask
+from drake_disasm.task.episode import run_episode
+from drake_disasm.task.simulation import TaskSimulation
+
+MakeNetwork = Callable[..., Network]
+
+
+@pytest.mark.parametrize(
+    "widths", [(12, 128, 128, 128, 6), (12, 50, 50, 6), (12, 1, 6), (12, 6), (3, 4, 2)]
+)
+def test_network_is_what_torch_computes(
+    make_network: MakeNetwork, widths: tuple[int, ...]
+) -> None:
+    torch = pytest.importorskip("torch")
+    network = make_network(*widths)
+    layers = []
+    for weight, bias in zip(network.weights, network.biases, strict=True):
+        layer = torch.nn.Linear(*weight.shape[::-1])
+        layer.weight.data, layer.bias.data = map(torch.from_numpy, (weight, bias))
+        layers += [layer, torch.nn.ReLU()]
+    module = torch.nn.Sequential(*layers[:-1])
+    for x in np.random.default_rng(1).normal(size=(20, widths[0])).astype(np.float32):
+        with torch.inference_mode():
+            expected = module(torch.from_numpy(x)).numpy()
+        found = network(x)
+        assert found.dtype == np.float32
+        scale = max(1.0, float(np.abs(expected).max()))
+        np.testing.assert_allclose(found, expected, atol=1e-6 * scale, rtol=0)
+
+
+def test_network_remembers_nothing(make_network: MakeNetwork) -> None:
+    """Its working memory is not what it hands out, and no call colours the next."""
+    network = make_network(12, 9, 6)
+    a, b = np.random.default_rng(0).normal(size=(2, 12)).astype(np.float32)
+    first = network(a)
+    kept, given = first.copy(), a.copy()
+    network(np.full(12, np.nan, np.float32))
+    network(b)
+    np.testing.assert_array_equal(first, kept)
+    np.testing.assert_array_equal(network(a), kept)
+    np.testing.assert_array_equal(a, given)
+
+
+@pytest.mark.parametrize(
+    "copied", [copy.deepcopy, copy.copy, lambda n: pickle.loads(pickle.dumps(n))]
+)
+def test_copies_of_a_used_network_work_on_their_own(
+    make_network: MakeNetwork, copied: Callable[[Network], Network]
+) -> None:
+    network = make_network(12, 9, 6)
+    a, b = np.random.default_rng(0).normal(size=(2, 12)).astype(np.float32)
+    expected = network(a), network(b)
+    twin = copied(network)
+    for x, output in zip((a, b), expected, strict=True):
+        network(np.zeros(12, np.float32))
+        np.testing.assert_array_equal(twin(x), output)
+
+
+@pytest.mark.parametrize("base", [None, Straight(), Admittance()])
+def test_policy_is_its_formula(
+    make_network: MakeNetwork, base: Straight | Admittance | None
+) -> None:
+    scale, reach = np.linspace(0.01, 5.0, 12), np.linspace(1e-4, 3e-3, 6)
+    policy = LearnedPolicy(make_network(12, 8, 6), scale, ActionMap(reach, base))
+    for s in np.random.default_rng(2).normal(size=(5, 12)):
+        chosen = np.tanh(policy.network((s / scale).astype(np.float32)))
+        expected = reach * chosen + (0.0 if base is None else base(s))
+        action = policy(s)
+        assert action.dtype == np.float64
+        np.testing.assert_array_equal(action, expected)
+        np.testing.assert_array_equal(policy.normalised(s), chosen)
+        np.testing.assert_array_equal(policy.to_action(s, chosen), expected)
+
+
+@pytest.mark.parametrize("base", [None, Straight(), Admittance()])
+def test_choice_comes_back_from_its_action(base: Straight | Admittance | None) -> None:
+    mapping = ActionMap(np.array([1e-3, 2e-3, 1e-3, 0.01, 0.01, 0.02]), base)
+    generator = np.random.default_rng(3)
+    for _ in range(20):
+        s, chosen = generator.normal(size=12), generator.uniform(-1, 1, 6)
+        back = mapping.from_action(s, mapping.to_action(s, chosen))
+        assert back.dtype == np.float32
+        np.testing.assert_allclose(back, chosen, atol=1e-6)
+
+
+def test_an_action_out_of_reach_becomes_the_nearest_choice() -> None:
+    s = np.zeros(12)
+    mapping = ActionMap(np.array([1e-3, 1e-3, 0.0, 0.1, 0.1, 0.1]), Straight(1e-3))
+    action = np.array([1.0, -1.0, 0.5, 0.0, 0.05, 0.0])
+    np.testing.assert_allclose(mapping.from_action(s, action), [1, -1, 0, 0, 0.5, 0])
+
+
+def test_whoever_asks_clips(make_network: MakeNetwork) -> None:
+    policy = LearnedPolicy(make_network(12, 6), np.ones(12), ActionMap(np.ones(6)))
+    bounds = action_bounds(Scenario().task)
+    observation = np.random.default_rng(0).normal(size=12)
+    assert np.all(np.abs(policy(observation)) > bounds)
+    assert np.all(np.abs(ask(policy, observation, bounds)) <= bounds)
+
+
+def test_policy_runs_in_the_diagram(policy: LearnedPolicy) -> None:
+    """On the twin: its correction of `straight` is too small to spoil the slide."""
+    scenario = load_scenario("sliding")
+    policy.check_fits(scenario)
+    summary = run_episode(TaskSimulation(scenario, "twin", policy), seed=1)
+    assert summary.outcome is not Outcome.RUNNING
+    assert summary.travel > 0.005
+    again = run_episode(TaskSimulation(scenario, "twin", policy), seed=1)
+    assert dataclasses.asdict(again) == dataclasses.asdict(summary)
+
+
+TORCHLESS = """
+import sys
+from pathlib import Path
+sys.modules["torch"] = None  # any import of it fails
+from drake_disasm.policies import load_policy
+from drake_disasm.scenario import load_scenario
+from drake_disasm.task.simulation import TaskSimulation
+simulation = TaskSimulation(
+    load_scenario("sliding"), "twin", load_policy(Path(sys.argv[1]))
+)
+simulation.reset(0)
+simulation.step()
+assert simulation.action().any()
+assert not any(name.startswith("torch.") for name in sys.modules)
+"""
+
+
+def test_policy_runs_without_torch(policy: LearnedPolicy, tmp_path) -> None:
+    save_policy(tmp_path / "p.npz", policy)
+    command = [sys.executable, "-c", TORCHLESS, str(tmp_path / "p.npz")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+
+
+def _described(policy: LearnedPolicy, **changes: object) -> LearnedPolicy:
+    description = dataclasses.replace(policy.description, **changes)
+    return dataclasses.replace(policy, description=description)
+
+
+@pytest.mark.parametrize(
+    ("changes", "overrides", "words"),
+    [
+        ({"period": 0.05}, [], ["task.period", "0.05", "0.1"]),
+        ({}, ["task.period=0.2"], ["task.period", "0.2", "set task.period=0.1"]),
+        (
+            {},
+            ["observation.variant=small_angle"],
+            ["observation.variant", "exact", "small_angle"],
+        ),
+        ({"max_translation": 0.004}, [], ["task.max_translation", "0.004", "0.003"]),
+        ({}, ["task.max_rotation=0.01"], ["task.max_rotation", "0.01", "0.0174533"]),
+        ({"state_names": ("x", "y")}, [], ["state", "('x', 'y')", "train anew"]),
+        ({"action_names": ("dx",)}, [], ["action", "('dx',)", "train anew"]),
+    ],
+)
+def test_policy_of_another_task_is_refused(
+    policy: LearnedPolicy, changes: dict, overrides: list[str], words: list[str]
+) -> None:
+    scenario = load_scenario("removal", overrides)
+    with pytest.raises(DisasmError) as caught:
+        _described(policy, **changes).check_fits(scenario)
+    message = str(caught.value)
+    assert "\n" not in message and "removal" in message
+    assert all(word in message for word in words), message
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ["lock.clearance=0.0003"],
+        ["effects=[!SensorBias {fx: 0.5}]"],
+        ["task.max_translation=0.005", "task.max_rotation=0.05"],
+        ["task.steps=200", "imprecision=0.0003"],
+    ],
+)
+def test_policy_carries_over(policy: LearnedPolicy, overrides: list[str]) -> None:
+    policy.check_fits(load_scenario("removal_turned", overrides))
+
+
+def test_load_policy_is_the_policy(policy: LearnedPolicy, tmp_path) -> None:
+    save_policy(tmp_path / "p.npz", policy)
+    loaded = load_policy(tmp_path / "p.npz")
+    for s in np.random.default_rng(4).normal(size=(5, 12)):
+        np.testing.assert_array_equal(loaded(s), policy(s))
