@@ -1,0 +1,58 @@
+"""What a log teaches: the same transitions as having been there."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drake_disasm.learning.dataset import remember
+from drake_disasm.learning.hyperparameters import preset
+from drake_disasm.learning.replay import Replay
+from drake_disasm.learning.training import Training, TrainingSpec, action_map
+from drake_disasm.scenario import load_scenario
+from sysid.logs import LogHeader, LogWriter, flat_columns, read_log
+from sysid.logs.transitions import observations
+
+SCENARIO = load_scenario("sliding", ["imprecision=0.0002", "task.steps=12"])
+
+
+@pytest.mark.parametrize("base", ["", "admittance"])
+def test_a_log_teaches_what_was_lived_through(base: str, tmp_path: Path) -> None:
+    config = dataclasses.replace(
+        preset("chapter3"), hidden=[4], base=base, exploration=0.0002
+    )
+    training = Training(TrainingSpec(SCENARIO, "twin", config, 3, compiled=False))
+    writer = LogWriter(tmp_path / "log", _header())
+    for _ in range(2):
+        _, recorder = training.run_episode()
+        writer.write_episode(flat_columns("transitions", recorder.columns()))
+    memory = Replay(100)
+    for episode in read_log(tmp_path / "log").episodes:
+        remember(
+            memory,
+            observations(episode),
+            episode["action"][:-1],
+            bool(episode["terminated"][-1]),
+            SCENARIO.task,
+            action_map(SCENARIO, config),
+            config,
+        )
+    lived, read = training.replay.contents()[0], memory.contents()[0]
+    np.testing.assert_allclose(read, lived, atol=2e-5)
+
+
+def _header() -> LogHeader:
+    return LogHeader(
+        kind="transitions", task="sliding", provenance={}, period=0.1, joints=()
+    )
+
+
+def test_an_action_out_of_reach_is_cut_to_the_nearest() -> None:
+    config, memory = preset("chapter3"), Replay(5)
+    actions = np.array([[0.009, -0.009, 0.0015, 0, 0, 0]])
+    remember(
+        memory, np.zeros((2, 12)), actions, False, SCENARIO.task,
+        action_map(SCENARIO, config), config,
+    )  # fmt: skip
+    np.testing.assert_allclose(memory.contents()[0][0, 12:15], [1.0, -1.0, 0.5])
