@@ -134,7 +134,7 @@ def positive(text: str) -> int:
 
 def provenance(program: str, arguments: Sequence[str], seed: int) -> dict[str, Any]:
     """Returns where a result is from, as plain data for a log's header."""
-    packages = ("drake", "numpy", "drake_disasm")
+    packages = ("drake", "numpy", "torch", "drake_disasm")
     return {
         "program": program,
         "command": " ".join(["python", f"tools/{program}.py", *arguments]),

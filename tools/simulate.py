@@ -54,11 +54,11 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 def _add_run_arguments(add: Callable[..., object]) -> None:
     add(
         "--policy",
-        default="admittance",
+        default="removal_randomised",
         metavar="NAME",
         help="a scripted one (straight, admittance), a trained one (a name in "
         "models/policies, or an .npz file), or module:callable from (12,) to (6,) "
-        "(default: admittance)",
+        "(default: removal_randomised, the shipped one)",
     )
     add(
         "--model",

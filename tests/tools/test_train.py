@@ -92,6 +92,12 @@ def test_a_log_holds_what_was_chosen_not_what_was_executed(tmp_path: Path) -> No
     assert moved[:-1, :3].max() > 1e-5 and moved[:, 3:].max() == 0.0
 
 
+def test_the_cell_can_be_trained_on(tmp_path: Path) -> None:
+    _finished(tmp_path / "out", "--episodes=1", "--model=cell", "--validation=1")
+    log = read_log(tmp_path / "out/seed_000/log")
+    assert log.header.joints and log.episodes[0]["q"].shape[1] == 7
+
+
 def test_seeds_apart_and_together_are_the_same(
     undisturbed: Path, tmp_path: Path
 ) -> None:

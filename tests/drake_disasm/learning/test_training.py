@@ -10,6 +10,7 @@ import torch
 from torch.utils._pytree import tree_leaves
 
 from drake_disasm.errors import DisasmError
+from drake_disasm.learning import run
 from drake_disasm.learning.dataset import remember
 from drake_disasm.learning.evaluation import validate_policy
 from drake_disasm.learning.hyperparameters import preset
@@ -235,3 +236,14 @@ def test_a_checkpoint_of_other_networks_is_refused(tmp_path: Path) -> None:
     training.save(tmp_path / "c.npz")
     with pytest.raises(DisasmError, match="other networks"):
         _training(hidden=[9]).restore(tmp_path / "c.npz")
+
+
+def test_a_folder_is_trained_in_by_one_program_at_a_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "_PATIENCE", 0.3)
+    refused = pytest.raises(DisasmError, match="another program is training there")
+    with run._locked(tmp_path), refused, run._locked(tmp_path):
+        pass
+    with run._locked(tmp_path):
+        pass

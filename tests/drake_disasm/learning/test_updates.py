@@ -134,6 +134,25 @@ def _check(reference: Any, state: AgentState, algorithm: str) -> None:
         same(_linear(reference.critic_target.q_networks[i]), state.target_critics[i])
 
 
+def _share_noise(agent: Agent, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Makes agent and reference use the same noise, wherever each draws it."""
+    noise = torch.from_numpy(np.random.default_rng(5).standard_normal((20, 12))).float()
+    now, then = noise[:, :6], noise[:, 6:]
+    calls = iter(range(10**6))  # SAC asks for the states, then for the next states
+    monkeypatch.setattr(
+        torch.distributions.Normal,
+        "rsample",
+        lambda self, shape=None: self.loc + self.scale * (now, then)[next(calls) % 2],
+    )
+    monkeypatch.setattr(
+        torch.Tensor,
+        "normal_",
+        lambda self, mean=0.0, std=1.0: self.copy_(mean + std * now),
+    )
+    given = noise if agent.config.algorithm == "sac" else now
+    monkeypatch.setattr(agent, "_noise", lambda *_: given)
+
+
 def _train_reference(reference: Any, batches: list[np.ndarray]) -> None:
     reference.replay_buffer = _Fed(batches)
     reference._setup_learn(1)
@@ -144,7 +163,7 @@ def _train_reference(reference: Any, batches: list[np.ndarray]) -> None:
     ("algorithm", "changes"),
     [
         ("ddpg", {}),
-        ("td3", {"target_noise": 0.0}),
+        ("td3", {"target_noise": 0.3, "target_noise_limit": 0.2}),
         ("sac", {}),
         ("sac", {"adapt_entropy": True}),
     ],
@@ -161,21 +180,7 @@ def test_updates_are_those_of_stable_baselines3(
     agent = Agent(config, seed=1, compiled=False)
     reference = _reference(algorithm, config, env)
     _give(reference, agent.state, algorithm)
-    noise = np.zeros((20, 12), np.float32)
-    monkeypatch.setattr(agent, "_noise", lambda *_: torch.from_numpy(noise[:, :6]))
-    if algorithm == "sac":
-        # The same noise for both: the reference draws it inside `rsample`.
-        noise[:] = np.random.default_rng(5).standard_normal((20, 12))
-        draws = [torch.from_numpy(noise[:, :6]), torch.from_numpy(noise[:, 6:])]
-        calls = iter(range(10**6))
-        monkeypatch.setattr(
-            torch.distributions.Normal,
-            "rsample",
-            lambda self, shape=None: (
-                self.loc + self.scale * draws[next(calls) % len(draws)]
-            ),
-        )
-        monkeypatch.setattr(agent, "_noise", lambda *_: torch.from_numpy(noise))
+    _share_noise(agent, monkeypatch)
     batches = list(_batches(_UPDATES))
     for rows in batches:
         agent.learn(rows, np.random.default_rng(0))
