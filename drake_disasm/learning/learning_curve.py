@@ -54,6 +54,12 @@ def plot_learning_curves(trainings: Mapping[str, Seeds], path: Path) -> None:
         name = f"{label} ({len(seeds)} seed{'s' if len(seeds) > 1 else ''})"
         _draw(axes[0], rewards, name, colour, thin=len(trainings) == 1)
         _draw(axes[1], success, name, colour, thin=len(trainings) == 1)
+    _label(axes)
+    write_atomically(path, lambda stream: figure.savefig(stream, format="png", dpi=120))
+    pyplot.close(figure)
+
+
+def _label(axes: Any) -> None:
     axes[0].set_ylabel("episodic reward")
     axes[1].set_ylabel("successful episodes [%]")
     axes[1].set_xlabel("episode")
@@ -64,8 +70,6 @@ def plot_learning_curves(trainings: Mapping[str, Seeds], path: Path) -> None:
     axes[0].legend(loc="best")
     for axis in axes:
         axis.grid(alpha=0.3)
-    write_atomically(path, lambda stream: figure.savefig(stream, format="png", dpi=120))
-    pyplot.close(figure)
 
 
 def _curves(values: Sequence[Sequence[float]]) -> np.ndarray:
@@ -74,7 +78,7 @@ def _curves(values: Sequence[Sequence[float]]) -> np.ndarray:
     return np.stack([moving_mean(row[:length], _WINDOW) for row in values])
 
 
-def _draw(axis, curves: np.ndarray, label: str, colour: str, thin: bool) -> None:  # type: ignore[no-untyped-def]
+def _draw(axis: Any, curves: np.ndarray, label: str, colour: str, thin: bool) -> None:
     episodes = np.arange(1, curves.shape[1] + 1)
     if thin and len(curves) > 1:
         axis.plot(episodes, curves.T, color=colour, alpha=0.25, linewidth=0.7)
