@@ -1,7 +1,7 @@
 """One seed of tools/train.py, in whatever process it runs."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +65,7 @@ def train_seed(job: SeedJob, report: Callable[[News | None], None]) -> dict[str,
     provenance = experiment.provenance | {
         "seed": job.seed,
         "preset": experiment.preset,
+        "data": experiment.logs | experiment.demonstrations,
     }
     demonstrations = _memory(experiment, experiment.demonstrations)
     dataset = _memory(experiment, experiment.logs)
@@ -76,7 +77,7 @@ def train_seed(job: SeedJob, report: Callable[[News | None], None]) -> dict[str,
     return run_training(training, job.folder, _Log(job), *end)
 
 
-def _memory(experiment: Experiment, folders: Sequence[str]) -> Replay | None:
+def _memory(experiment: Experiment, folders: Collection[str]) -> Replay | None:
     """Returns a memory that holds all transitions of some logs, if there are any."""
     task, config = experiment.scenario.task, experiment.config
     if not folders:

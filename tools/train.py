@@ -33,6 +33,7 @@ from drake_disasm.mdp import Outcome
 from drake_disasm.parallel import run_jobs
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import MODELS
+from sysid.logs import read_logs
 
 _EXAMPLES = """examples:
   python tools/train.py --out out/first --episodes 30          a first look
@@ -189,11 +190,18 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
         compiled=not args.eager,
         threads=args.threads,
         validation=args.validation,
-        logs=tuple(str(path) for path in args.from_logs),
+        logs=_hashes(args.from_logs),
         updates=args.updates or 0,
-        demonstrations=tuple(str(path) for path in args.demonstrations),
+        demonstrations=_hashes(args.demonstrations),
         provenance=cli.provenance("train", arguments, args.first_seed),
     )
+
+
+def _hashes(folders: Sequence[Path]) -> dict[str, str]:
+    """Returns the hash of each log's data; a log that can't be read is refused here."""
+    if not folders:
+        return {}
+    return {str(log.folder): log.data_hash for log in read_logs(folders)}
 
 
 def _train(jobs: list[SeedJob], workers: int) -> None:

@@ -31,9 +31,10 @@ class Experiment:
         scenario, model, config, compiled, threads: as in TrainingSpec.
         preset: name of what the hyper-parameters began with.
         validation: greedy episodes after each training.
-        logs: folders to learn from without acting; empty to act.
+        logs: folders to learn from without acting, with the hash of what is in
+            them; empty to act.
         updates: gradient updates on those; 0 for one per transition.
-        demonstrations: folders of logs to mix into each batch.
+        demonstrations: folders of logs to mix into each batch, and hashes.
         provenance: command, date, versions, commit.
     """
 
@@ -44,9 +45,9 @@ class Experiment:
     compiled: bool = True
     threads: int = 1
     validation: int = 10
-    logs: tuple[str, ...] = ()
+    logs: dict[str, str] = dataclasses.field(default_factory=dict)
     updates: int = 0
-    demonstrations: tuple[str, ...] = ()
+    demonstrations: dict[str, str] = dataclasses.field(default_factory=dict)
     provenance: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     def spec(self, seed: int) -> TrainingSpec:

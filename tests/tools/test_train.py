@@ -198,6 +198,9 @@ def test_learning_from_logs_alone(undisturbed: Path, tmp_path: Path) -> None:
     assert result["updates"] == 50 and "training" not in result
     assert result["validation"]["episodes"] == 2
     assert not (out / "seed_000/log").exists()
+    policy = load_policy(out / "seed_000/policy.npz")
+    expected = {path: read_log(path).data_hash for path in logs}
+    assert policy.description.provenance["data"] == expected
 
 
 def test_demonstrations_are_mixed_in(undisturbed: Path, tmp_path: Path) -> None:
