@@ -206,7 +206,8 @@ def _hashes(folders: Sequence[Path]) -> dict[str, str]:
 
 def _train(jobs: list[SeedJob], workers: int) -> None:
     total = sum(job.experiment.config.episodes for job in jobs)
-    with tqdm(total=total, unit="episode") as bar:
+    unit = "round" if jobs[0].experiment.logs else "episode"
+    with tqdm(total=total, unit=unit) as bar:
         for _ in run_jobs(train_seed, jobs, workers, _Progress(bar)):
             pass
 

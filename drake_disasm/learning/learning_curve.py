@@ -65,7 +65,9 @@ def _label(axes: Any) -> None:
     axes[1].set_xlabel("episode")
     axes[1].set_ylim(-3, 103)
     axes[0].set_title(
-        f"interquartile mean over seeds, 95 % bootstrap interval, {_WINDOW} episodes"
+        f"mean of the last {_WINDOW} episodes: interquartile mean over seeds, "
+        "95 % bootstrap interval",
+        fontsize="medium",
     )
     axes[0].legend(loc="best")
     for axis in axes:
