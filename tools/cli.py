@@ -21,7 +21,7 @@ from drake_disasm.policies import (
     shipped_policies,
 )
 from drake_disasm.quantity import closest
-from drake_disasm.scenario import Scenario
+from drake_disasm.scenario import Scenario, shipped_scenarios
 from drake_disasm.systems.policy import Policy
 
 EXIT_BAD_INPUT = 2
@@ -71,7 +71,7 @@ def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
         "--scenario",
         default="removal",
         metavar="NAME|FILE",
-        help="a shipped scenario (removal, removal_turned, sliding) or a YAML file "
+        help=f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file "
         "(default: removal)",
     )
     parser.add_argument(

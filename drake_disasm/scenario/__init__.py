@@ -11,6 +11,7 @@ from drake_disasm.scenario.files import (
     scenario_from_mapping,
     scenario_path,
     scenario_to_mapping,
+    shipped_scenarios,
 )
 from drake_disasm.scenario.randomisation import draw, with_values
 from drake_disasm.scenario.schema import (
@@ -50,6 +51,7 @@ __all__ = [
     "scenario_from_mapping",
     "scenario_path",
     "scenario_to_mapping",
+    "shipped_scenarios",
     "validate",
     "with_values",
 ]

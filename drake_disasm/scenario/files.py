@@ -16,6 +16,11 @@ from drake_disasm.scenario.strict_yaml import parse
 from drake_disasm.scenario.validity import validate
 
 
+def shipped_scenarios() -> list[str]:
+    """Returns the names of the scenarios that come with the package."""
+    return sorted(path.stem for path in (models_dir() / "scenarios").glob("*.yaml"))
+
+
 def scenario_path(name: str) -> Path:
     """Returns the file of a shipped scenario's name, or the path as given.
 
@@ -26,8 +31,8 @@ def scenario_path(name: str) -> Path:
     for path in (Path(name), shipped / f"{name}.yaml"):
         if path.is_file():
             return path
-    names = sorted(p.stem for p in shipped.glob("*.yaml"))
-    raise DisasmError(f"scenario {name}: no such file; {closest(name, names)}")
+    known = closest(name, shipped_scenarios())
+    raise DisasmError(f"scenario {name}: no such file; {known}")
 
 
 def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
