@@ -87,7 +87,8 @@ def _check_number(name: str, number: float, metadata: Any) -> None:
     low, high = metadata.get("low", -math.inf), metadata.get("high", math.inf)
     if math.isfinite(number) and low <= number <= high:
         return
+    unit = metadata.get("unit", "")
+    value = f"{number:g}" if unit in ("", "1") else f"{number:g} {unit}"
     raise DisasmError(
-        f"{name}: {number:g} {metadata.get('unit', '')} is out of range; "
-        f"give a value from {low:g} to {high:g}"
+        f"{name}: {value} is out of range; give a value from {low:g} to {high:g}"
     )

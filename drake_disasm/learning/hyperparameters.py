@@ -250,6 +250,8 @@ def _value(key: str, text: str, present: Any) -> Any:
     if isinstance(present, float) and isinstance(value, (int, str)):
         with contextlib.suppress(ValueError):  # YAML takes 1e-3 for a text
             value = float(text)
+    if value is None and isinstance(present, str):  # `base=` takes the base away
+        value = ""
     if isinstance(value, bool) is not isinstance(present, bool) or not isinstance(
         value, type(present)
     ):

@@ -219,7 +219,7 @@ def test_demonstrations_are_mixed_in(undisturbed: Path, tmp_path: Path) -> None:
         (["--hyper", "gama=1"], "did you mean 'gamma'"),
         (["--from-logs", "nowhere"], "nowhere"),
         (["--hyper", "demonstrations=0.5"], "--demonstrations DIR"),
-        (["--episodes=0"], "episodes: 0 1 is out of range"),
+        (["--episodes=0"], "episodes: 0 is out of range"),
     ],
 )
 def test_bad_input_is_one_line(

@@ -63,6 +63,7 @@ def test_overrides_are_read_as_the_kind_that_they_change() -> None:
     )
     assert (config.hidden, config.tau, config.batch) == ([16, 8], 0.01, 7)
     assert config.layer_norm and config.base == "admittance"
+    assert override(config, ["base="]).base == ""
 
 
 @pytest.mark.parametrize(
@@ -71,7 +72,7 @@ def test_overrides_are_read_as_the_kind_that_they_change() -> None:
         ("gama=0.9", "did you mean 'gamma'"),
         ("gamma", "write it as key=value"),
         ("gamma=high", "is no float"),
-        ("gamma=1.5", "gamma: 1.5 1 is out of range"),
+        ("gamma=1.5", "gamma: 1.5 is out of range"),
         ("gamma=.nan", "gamma: nan"),
         ("batch=2.5", "is no int"),
         ("layer_norm=1", "is no bool"),
