@@ -16,9 +16,13 @@ from drake_disasm.scenario.strict_yaml import parse
 from drake_disasm.scenario.validity import validate
 
 
+def _shipped_dir() -> Path:
+    return models_dir() / "scenarios"
+
+
 def shipped_scenarios() -> list[str]:
     """Returns the names of the scenarios that come with the package."""
-    return sorted(path.stem for path in (models_dir() / "scenarios").glob("*.yaml"))
+    return sorted(path.stem for path in _shipped_dir().glob("*.yaml"))
 
 
 def scenario_path(name: str) -> Path:
@@ -27,8 +31,7 @@ def scenario_path(name: str) -> Path:
     Raises:
         DisasmError: neither a shipped scenario nor a file.
     """
-    shipped = models_dir() / "scenarios"
-    for path in (Path(name), shipped / f"{name}.yaml"):
+    for path in (Path(name), _shipped_dir() / f"{name}.yaml"):
         if path.is_file():
             return path
     known = closest(name, shipped_scenarios())
