@@ -28,8 +28,8 @@ def test_only_and_json(tmp_path: Path) -> None:
     figures = json.loads(file.read_text())
     assert set(figures) == set(keys)
     assert figures["twin_reset_ms"] > 0.0
-    # On a busy machine a share of times can come out below zero.
-    assert math.isfinite(figures["twin_python_share"])
+    # From below there is no bound: on a busy machine a share of times can be negative.
+    assert -math.inf < figures["twin_python_share"] < 1.0
     assert figures["policy_inference_us"] > 0.0
     assert "the network in torch" in done.stdout
     assert all(key in done.stdout for key in keys)
