@@ -40,6 +40,9 @@ from pydrake.systems.framework import Context
 from drake_disasm.effects import Environment
 from drake_disasm.scenario import ContactConfig, LockConfig
 
+#: Dimensions that shape the groove alone, not the bolt.
+GROOVE_FIELDS = ("clearance", "channel_clearance", "keyhole_clearance", "travel")
+
 _BORDER = 0.010  # m, solid rim around the channel
 _FLOOR = 0.003  # m, plate under the channel
 _PAD_FRICTION = 0.8  # steel on rubber, as on the gripper's pads
@@ -109,13 +112,7 @@ def add_lock(
 ) -> Lock:
     """Adds groove (welded to a movable frame in Gn) and bolt (free) to the plant."""
     frame = plant.AddFrame(FixedOffsetFrame("groove_pose", frame_Gn, RigidTransform()))
-    nominal = Environment(
-        X_GnG=RigidTransform(),
-        friction=contact.friction,
-        modulus=contact.modulus,
-        head_modulus=contact.head_modulus,
-        dissipation=contact.dissipation,
-    )
+    nominal = nominal_environment(contact)
     groove = plant.AddRigidBody(
         "groove", plant.AddModelInstance("lock"), _groove_inertia(lock)
     )
@@ -128,6 +125,40 @@ def add_lock(
     return Lock(
         lock, groove, bolt, frame, groove_ids, bolt_ids, contact.resolution, nominal
     )
+
+
+def nominal_environment(contact: ContactConfig) -> Environment:
+    """Returns the environment that a scenario denotes before effects."""
+    return Environment(
+        X_GnG=RigidTransform(),
+        friction=contact.friction,
+        modulus=contact.modulus,
+        head_modulus=contact.head_modulus,
+        dissipation=contact.dissipation,
+    )
+
+
+def reshape_groove(
+    lock: Lock, config: LockConfig, scene_graph: SceneGraph, context: Context
+) -> None:
+    """Gives the groove other dimensions in a scene graph's Context, in place.
+
+    The shapes lose nothing but their size; `set_environment` is to follow, since
+    the proximity representation is made anew with the material.
+
+    Args:
+        lock: whose groove.
+        config: may differ from the lock's in GROOVE_FIELDS alone.
+        scene_graph: that the groove is registered with.
+        context: of the scene graph.
+    """
+    source = lock.groove.GetParentPlant().get_source_id()
+    for geometry_id, (low, high) in zip(
+        lock.groove_ids, groove_boxes(config).values(), strict=True
+    ):
+        X_GP = RigidTransform((low + high) / 2)
+        shape = Box(*(high - low))
+        scene_graph.ChangeShape(context, source, geometry_id, shape, X_GP)
 
 
 def set_environment(

@@ -21,10 +21,10 @@ class PayloadError(SensorEffect):
     motion, where inertial forces are negligible. Zeroing sees it.
     """
 
-    mass: float = parameter("kg", -2.0, 2.0, "mass that the tool data lack")
-    cx: float = parameter("kg m", -0.2, 0.2, "first moment lacking, along x_S")
-    cy: float = parameter("kg m", -0.2, 0.2, "first moment lacking, along y_S")
-    cz: float = parameter("kg m", -0.2, 0.2, "first moment lacking, along z_S")
+    mass: float = parameter("kg", -10.0, 10.0, "mass that the tool data lack")
+    cx: float = parameter("kg m", -2.0, 2.0, "first moment lacking, along x_S")
+    cy: float = parameter("kg m", -2.0, 2.0, "first moment lacking, along y_S")
+    cz: float = parameter("kg m", -2.0, 2.0, "first moment lacking, along z_S")
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
         """Adds the weight of what was not accounted for."""

@@ -1,10 +1,14 @@
 """The digital twin: bolt, groove and contact alone."""
 
+import dataclasses
+from typing import Any
+
 import numpy as np
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
     Frame,
     Joint,
+    JointActuator,
     PdControllerGains,
     PrismaticJoint,
     RevoluteJoint,
@@ -19,13 +23,20 @@ from pydrake.systems.primitives import (
 )
 
 from drake_disasm.coordinates import BoltCoordinates
-from drake_disasm.lock import add_lock
+from drake_disasm.errors import DisasmError
+from drake_disasm.lock import (
+    GROOVE_FIELDS,
+    add_lock,
+    nominal_environment,
+    reshape_groove,
+)
 from drake_disasm.ports import TWIN_PORTS
-from drake_disasm.scenario import Scenario
+from drake_disasm.scenario import Scenario, TwinConfig, validate
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.tool import Tool
 
 _AXES = np.eye(3)
+_MATERIAL_FIELDS = ("friction", "modulus", "head_modulus", "dissipation")
 
 
 class TwinStation(SimulatedStation):
@@ -69,6 +80,46 @@ class TwinStation(SimulatedStation):
         builder = DiagramBuilder()
         self._build(builder)
 
+    def can_become(self, scenario: Scenario) -> bool:
+        """Returns whether `become` can turn this station into another scenario's."""
+        return _structure(scenario) == _structure(self.scenario)
+
+    def become(self, context: Context, scenario: Scenario) -> None:
+        """Turns this station into that of another scenario without a rebuild.
+
+        Identification asks for hundreds of parameter sets; in place, one costs a few
+        milliseconds and leaves nothing behind, and every bit is as after a rebuild.
+        Springs and dampers belong to the plant, not to the Context: a station that
+        is reconfigured serves one Context.
+
+        Args:
+            context: this station's; its time and state stay as they are.
+            scenario: may differ in effects, in what the contact is made of, in
+                the groove's dimensions, and in the section `twin`.
+
+        Raises:
+            DisasmError: the scenario is out of bounds, or differs elsewhere.
+        """
+        validate(scenario)
+        if not self.can_become(scenario):
+            raise DisasmError(
+                "the twin can't take this scenario in place; build a station of it"
+            )
+        self.scenario = scenario
+        reshape_groove(
+            self.lock,
+            scenario.lock,
+            self.scene_graph,
+            self.part_context(self.scene_graph, context),
+        )
+        self.lock = dataclasses.replace(
+            self.lock,
+            config=scenario.lock,
+            nominal=nominal_environment(scenario.contact),
+        )
+        self._set_springs(scenario.twin, self.part_context(self.plant, context))
+        self.set_effects(context, scenario.effects)
+
     def _build(self, builder: DiagramBuilder) -> None:
         time_step = self.scenario.simulation.twin_time_step
         frame_Gn, plant = self._add_plant(builder, time_step), self.plant
@@ -85,21 +136,25 @@ class TwinStation(SimulatedStation):
     def _add_carrier(self, frame_Gn: Frame) -> RigidBody:
         """Adds six joints with the spring and damper of each axis."""
         twin, plant = self.scenario.twin, self.plant
+        self._actuators: dict[int, JointActuator] = {}
         instance = plant.AddModelInstance("carrier")
         parent, body = frame_Gn, None
-        inertia = [twin.mass] * 3 + [twin.inertia] * 3
         for axis in (0, 1, 2, 5, 4, 3):
             body = plant.AddRigidBody(f"axis_{axis}", instance, SpatialInertia.Zero())
             joint = plant.AddJoint(_axis_joint(axis, parent, body.body_frame()))
             actuator = plant.AddJointActuator(f"axis_{axis}", joint)
-            actuator.set_default_rotor_inertia(inertia[axis])
+            actuator.set_default_rotor_inertia(_inertia(twin, axis))
             actuator.set_default_gear_ratio(1.0)
-            k = twin.stiffness[axis]
-            d = 2.0 * twin.damping_ratio * np.sqrt(k * inertia[axis])
-            actuator.set_controller_gains(PdControllerGains(p=k, d=d))
+            actuator.set_controller_gains(_gains(twin, axis))
+            self._actuators[axis] = actuator
             parent = body.body_frame()
         assert body is not None
         return body
+
+    def _set_springs(self, twin: TwinConfig, plant_context: Context) -> None:
+        for axis, actuator in self._actuators.items():
+            actuator.SetRotorInertia(plant_context, _inertia(twin, axis))
+            actuator.set_controller_gains(_gains(twin, axis))
 
     def _add_sensor_joint(self, carrier: RigidBody) -> tuple[Frame, Joint]:
         X_BS = self.X_SB.inverse()
@@ -138,3 +193,32 @@ class TwinStation(SimulatedStation):
 def _axis_joint(axis: int, parent: Frame, child: Frame) -> Joint:
     kind = PrismaticJoint if axis < 3 else RevoluteJoint
     return kind(f"axis_{axis}", parent, child, _AXES[axis % 3])
+
+
+def _inertia(twin: TwinConfig, axis: int) -> float:
+    """Returns what an axis moves beside the bolt [kg or kg m^2]."""
+    return twin.mass if axis < 3 else twin.inertia
+
+
+def _gains(twin: TwinConfig, axis: int) -> PdControllerGains:
+    k = twin.stiffness[axis]
+    d = 2.0 * twin.damping_ratio * np.sqrt(k * _inertia(twin, axis))
+    return PdControllerGains(p=k, d=d)
+
+
+def _structure(scenario: Scenario) -> Scenario:
+    """Returns a scenario without what the station can take in place."""
+    return dataclasses.replace(
+        scenario,
+        name="",
+        effects=[],
+        randomisation=[],
+        twin=TwinConfig(),
+        contact=_without(scenario.contact, _MATERIAL_FIELDS),
+        lock=_without(scenario.lock, GROOVE_FIELDS),
+    )
+
+
+def _without(section: Any, names: tuple[str, ...]) -> Any:
+    """Returns a section of a scenario with some of its numbers at zero."""
+    return dataclasses.replace(section, **dict.fromkeys(names, 0.0))

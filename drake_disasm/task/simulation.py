@@ -34,7 +34,7 @@ from drake_disasm.effects import Effect
 from drake_disasm.lock import lift_needed
 from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
 from drake_disasm.scenario import Scenario, draw, with_values
-from drake_disasm.stations import Station, make_station
+from drake_disasm.stations import SimulatedStation, Station, make_station
 from drake_disasm.systems.imprecision import ImprecisionNoise, clamped
 from drake_disasm.systems.observation import Mounting, ObservationProcessor
 from drake_disasm.systems.policy import Policy, PolicySystem
@@ -224,7 +224,8 @@ class TaskSimulation:
         station, task = self.station, scenario.task
         self._lift_needed = lift_needed(scenario.lock, task.lift_success)
         add = builder.AddNamedSystem
-        self.processor = add("observation_processor", self._make_processor())
+        processor = make_processor(station, scenario.observation.variant)
+        self.processor = add("observation_processor", processor)
         self.monitor = add("task_monitor", TaskMonitor(task, self._lift_needed))
         self.imprecision = add(
             "imprecision", ImprecisionNoise(scenario.imprecision, self.bounds)
@@ -256,19 +257,6 @@ class TaskSimulation:
             grip = add("grip", ConstantVectorSource([station.grip_command]))
             connect(grip.get_output_port(), station.GetInputPort("gripper.position"))
         self._add_policy(builder, self._policy)
-
-    def _make_processor(self) -> ObservationProcessor:
-        station = self.station
-        mounting = Mounting(
-            station.X_SB,
-            station.X_WG.rotation(),
-            station.payload_mass,
-            station.p_SoScm_S,
-            station.plant.gravity_field().gravity_vector(),
-        )
-        return ObservationProcessor(
-            station.coordinates, mounting, self.scenario.observation.variant
-        )
 
     def _add_policy(self, builder: DiagramBuilder, policy: Policy | None) -> None:
         self.policy_system: PolicySystem | None = None
@@ -303,6 +291,18 @@ class TaskSimulation:
             self.station.reading_at_zeroing(settled),
         )
         return root
+
+
+def make_processor(station: SimulatedStation, variant: str) -> ObservationProcessor:
+    """Returns the observation processing that fits a station, not yet zeroed."""
+    mounting = Mounting(
+        station.X_SB,
+        station.X_WG.rotation(),
+        station.payload_mass,
+        station.p_SoScm_S,
+        station.plant.gravity_field().gravity_vector(),
+    )
+    return ObservationProcessor(station.coordinates, mounting, variant)
 
 
 def add_motion(

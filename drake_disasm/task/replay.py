@@ -1,0 +1,210 @@
+"""The twin driven open loop: from a measured state, through a measured command.
+
+Arm, gripper and sensor together are a damped spring that forgets in some 11 ms how it
+was moved. So a step of 100 ms, of which only the end is compared, needs its last part
+alone in fine steps: `TwinReplay` can take the rest in coarse ones, at half the time
+(docs/identification.md has the figures).
+"""
+
+import dataclasses
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+
+from drake_disasm.scenario import Scenario
+from drake_disasm.spatial import pose_from_vector, rotation_vector
+from drake_disasm.stations import TwinStation
+from drake_disasm.task.simulation import add_motion, make_processor
+from drake_disasm.timing import boundary
+
+#: Coordinates, their rates and the commanded ones, each (6,).
+_State = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+_COARSE = 0.02  # s, what validity allows at most
+
+
+class TwinReplay:
+    """Simulates measured steps of the task, each from a state that is given.
+
+    It is `TaskSimulation` without policy, reward and imprecision, and without
+    sensor noise: what a noise-free sensor would read, effects included. Motion is
+    Drake's own; Python is called once a step, at its end. `become` changes the
+    parameters in place, so that one diagram serves a whole identification.
+
+    The coordinates are the twin's: x, y, z [m], yaw, pitch, roll [rad] of B in Gn
+    (`BoltCoordinates`).
+
+    Args:
+        scenario: what the twin is; its `simulation.twin_time_step` is the fine one.
+        coarse: whether all but the end of a step may be simulated in coarse steps.
+    """
+
+    def __init__(self, scenario: Scenario, coarse: bool = False) -> None:
+        self._fine = _ReplayDiagram(scenario)
+        self._fine.zero()
+        self._coarse: _ReplayDiagram | None = None
+        self._period = scenario.task.period
+        self._switch = 0.0
+        time_step = coarse_step(scenario) if coarse else 0.0
+        if time_step:
+            self._coarse = _ReplayDiagram(with_time_step(scenario, time_step))
+            self._switch = self._period - time_step
+
+    def become(self, scenario: Scenario) -> None:
+        """Takes a scenario's parameters, in place where the station can.
+
+        Raises:
+            DisasmError: the scenario is out of bounds.
+        """
+        if not self._fine.station.can_become(noise_free(scenario)):
+            self.__init__(scenario, self._coarse is not None)  # type: ignore[misc]
+            return
+        self._fine.become(scenario)
+        self._fine.zero()
+        if self._coarse:
+            self._coarse.become(with_time_step(scenario, self._coarse.time_step))
+
+    def start(self, step: int, q: np.ndarray, v: np.ndarray, qd: np.ndarray) -> None:
+        """Puts the twin into a state.
+
+        Args:
+            step: periods of the MDP since the episode began.
+            q, v: (6,) coordinates and their rates.
+            qd: (6,) commanded coordinates.
+        """
+        self._step = step
+        self._state: _State | None = (q, v, qd)
+
+    def advance(self, qd_rate: np.ndarray) -> np.ndarray:
+        """Moves the command at a rate for one period; returns the state (12,) then.
+
+        Args:
+            qd_rate: (6,) rate of the commanded coordinates.
+
+        Raises:
+            RuntimeError: Drake's solver gave up.
+        """
+        begin, end = (boundary(self._step + i, self._period) for i in (0, 1))
+        self._step += 1
+        if self._coarse:
+            switch = begin + self._switch
+            self._coarse.start(begin, *(self._state or self._fine.state()))
+            self._coarse.advance(qd_rate, switch)
+            self._fine.start(switch, *self._coarse.state())
+        elif self._state:
+            self._fine.start(begin, *self._state)
+        self._state = None
+        self._fine.advance(qd_rate, end)
+        return self._fine.observation()
+
+
+class _ReplayDiagram:
+    """The twin with a command that moves at a constant rate, and its observation."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._build(noise_free(scenario))
+
+    @property
+    def time_step(self) -> float:
+        """Of the plant [s]."""
+        return self.station.time_step
+
+    def become(self, scenario: Scenario) -> None:
+        """Takes a scenario's parameters in place, from a clean Context."""
+        self._simulator.reset_context(self._clean.Clone())
+        self._find_contexts()
+        self.station.become(self._station_context, noise_free(scenario))
+
+    def zero(self) -> None:
+        """Lets the bolt settle at A and zeroes the sensor, as an episode does."""
+        rest = np.zeros(6)
+        self.start(boundary(0, 1.0), rest, rest, self.station.start)
+        self.advance(rest, self.station.settling_time)
+        reading = self.station.reading_at_zeroing(self._station_context)
+        self._processor.zero(self._processor_context, reading)
+
+    def start(self, time: float, q: np.ndarray, v: np.ndarray, qd: np.ndarray) -> None:
+        """Puts the twin into a state (see `TwinReplay`) at a time [s]."""
+        self._context.SetTime(time)
+        plant = self.station.plant
+        plant.SetPositions(self._plant_context, q)
+        plant.SetVelocities(self._plant_context, v)
+        self._motion_context.SetDiscreteState(qd)
+        self._simulator.Initialize()
+
+    def advance(self, qd_rate: np.ndarray, time: float) -> None:
+        """Moves the command at a rate (6,) until a time [s]."""
+        self._rate.SetFromVector(qd_rate)
+        self._simulator.AdvanceTo(time)
+
+    def state(self) -> _State:
+        """Returns coordinates, their rates and the commanded ones, each (6,)."""
+        plant = self.station.plant
+        return (
+            plant.GetPositions(self._plant_context),
+            plant.GetVelocities(self._plant_context),
+            self._motion_context.get_discrete_state_vector().CopyToVector(),
+        )
+
+    def observation(self) -> np.ndarray:
+        """Returns the state (12,) of the task now, its rotation as a vector."""
+        wrench = self._observation.Eval(self._processor_context)[6:]
+        X_GB = pose_from_vector(self._pose.Eval(self._processor_context))
+        turn = rotation_vector(X_GB.rotation())
+        return np.concatenate([X_GB.translation(), turn, wrench])
+
+    def _build(self, scenario: Scenario) -> None:
+        builder = DiagramBuilder()
+        self.station = builder.AddNamedSystem("station", TwinStation(scenario))
+        self._source = builder.AddNamedSystem("rate", ConstantVectorSource(np.zeros(6)))
+        self._motion = add_motion(builder, self._source.get_output_port(), self.station)
+        self._processor = builder.AddNamedSystem(
+            "observation_processor",
+            make_processor(self.station, scenario.observation.variant),
+        )
+        builder.Connect(
+            self.station.GetOutputPort("bolt.position_measured"),
+            self._processor.GetInputPort("position_measured"),
+        )
+        builder.Connect(
+            self.station.GetOutputPort("ft_sensor.wrench"),
+            self._processor.GetInputPort("wrench"),
+        )
+        self._simulator = Simulator(builder.Build())
+        self._clean: Context = self._simulator.get_context().Clone()
+        self._observation = self._processor.GetOutputPort("observation")
+        self._pose = self._processor.GetOutputPort("X_GB")
+        self._find_contexts()
+        self.station.set_effects(self._station_context, scenario.effects)
+
+    def _find_contexts(self) -> None:
+        root = self._simulator.get_mutable_context()
+        self._context = root
+        self._station_context = self.station.GetMyMutableContextFromRoot(root)
+        self._plant_context = self.station.plant.GetMyMutableContextFromRoot(root)
+        self._motion_context = self._motion.GetMyMutableContextFromRoot(root)
+        self._processor_context = self._processor.GetMyMutableContextFromRoot(root)
+        source_context = self._source.GetMyMutableContextFromRoot(root)
+        self._rate = self._source.get_mutable_source_value(source_context)
+
+
+def coarse_step(scenario: Scenario) -> float:
+    """Returns a step [s] of about 20 ms that divides the period; 0 if there is none."""
+    period, fine = scenario.task.period, scenario.simulation.twin_time_step
+    step = period / np.ceil(period / _COARSE - 1e-9)
+    whole = step / fine
+    return step if whole > 1.5 and abs(whole - round(whole)) < 1e-6 else 0.0
+
+
+def with_time_step(scenario: Scenario, time_step: float) -> Scenario:
+    """Returns the scenario with another step of the twin [s]."""
+    simulation = dataclasses.replace(scenario.simulation, twin_time_step=time_step)
+    return dataclasses.replace(scenario, simulation=simulation)
+
+
+def noise_free(scenario: Scenario) -> Scenario:
+    """Returns the scenario with a sensor that neither errs nor rounds."""
+    silent = dataclasses.replace(scenario.ft_sensor, noise=[0.0] * 6, quantum=[0.0] * 6)
+    return dataclasses.replace(scenario, ft_sensor=silent, randomisation=[])

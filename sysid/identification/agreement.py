@@ -1,0 +1,102 @@
+"""A verdict on two searches: did they find the same, and what it means if not."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from sysid.identification.sensitivity import Sensitivity
+from sysid.identification.uncertainty import Uncertainty
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether two methods agree.
+
+    Attributes:
+        agree: in the objective and in the parameters.
+        objective_gap: difference of the objective over that which marks the edge
+            of the joint 95 % confidence region; below 1 they are as good.
+        parameter_gap: (p,) differences in standard deviations.
+        distance: Mahalanobis distance over that of the region's edge; below 1 they
+            are within it.
+        text: what it means.
+    """
+
+    agree: bool
+    objective_gap: float
+    parameter_gap: Array
+    distance: float
+    text: str
+
+
+def verdict(
+    names: tuple[str, str],
+    points: tuple[Array, Array],
+    values: tuple[float, float],
+    residuals: int,
+    spread: Uncertainty,
+    identifiable: Sensitivity,
+) -> Verdict:
+    """Compares two optima.
+
+    The region is that of the likelihood: n (f1^2 - f2^2) / f2^2 <= chi2(0.95, p),
+    stretched by how much wider the bootstrap is than Gauss-Newton, for residuals
+    that are not independent.
+
+    Args:
+        names: of the methods.
+        points: (p,) each, in the unit box.
+        values: of the objective.
+        residuals: how many numbers the objective is the rms of.
+        spread: at the better one.
+        identifiable: at the better one.
+    """
+    size = len(points[0])
+    edge = float(chi2.ppf(0.95, size))
+    C = spread.bootstrap_covariance
+    stretch = max(1.0, float(np.trace(C @ np.linalg.pinv(spread.covariance))) / size)
+    low, high = sorted(values)
+    gap = residuals * (high**2 - low**2) / max(low**2, 1e-300) / edge / stretch
+    difference = points[0] - points[1]
+    squared = float(difference @ np.linalg.pinv(C, hermitian=True) @ difference)
+    distance = float(np.sqrt(squared / edge))
+    sigma = np.sqrt(np.maximum(np.diagonal(C), 1e-300))
+    same_value, same_point = gap <= 1.0, distance <= 1.0
+    worse = names[int(values[1] > values[0])]
+    text = _text(names, worse, same_value, same_point, values, identifiable)
+    return Verdict(
+        same_value and same_point, float(gap), difference / sigma, distance, text
+    )
+
+
+def _text(
+    names: tuple[str, str],
+    worse: str,
+    same_value: bool,
+    same_point: bool,
+    values: tuple[float, float],
+    identifiable: Sensitivity,
+) -> str:
+    first, second = names
+    if same_value and same_point:
+        return (
+            f"{first} and {second} agree: the same objective ({values[0]:.4f} and "
+            f"{values[1]:.4f}) and the same parameters within their uncertainty."
+        )
+    if not same_value:
+        better = second if worse == first else first
+        return (
+            f"{worse} is stuck: it ended at {max(values):.4f}, {better} at "
+            f"{min(values):.4f}, which is more than noise explains. Take {better}'s "
+            "values; a larger --budget or narrower bounds help the other."
+        )
+    loose = identifiable.combinations[-1].text(identifiable.names)
+    return (
+        f"{first} and {second} reach the same objective with different parameters: "
+        f"the log does not fix them. What it fixes least is {loose}. Freeze one of "
+        "these, or record motions that tell them apart."
+    )

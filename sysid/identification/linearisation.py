@@ -1,0 +1,82 @@
+"""The objective's residuals and their derivatives at a point."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.objective import Objective, huber_weights
+
+Array = NDArray[np.float64]
+
+_FIRST_STEP = 2e-3  # of the parameter's range
+_LEAST_STEP = 1e-6
+_NOTICEABLE = 3.0  # standard deviations that a step should move the residuals by
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Residuals r(u) near a point u0 of the unit box: r(u) ~ r0 + J (u - u0).
+
+    Attributes:
+        u: (p,) the point.
+        residual: (rows, channels) in units of the noise.
+        jacobian: (rows, channels, p) per range of the parameter.
+        weights: (rows, channels) Huber's, 1 for all but outliers.
+    """
+
+    u: Array
+    residual: Array
+    jacobian: Array
+    weights: Array
+
+    @property
+    def information(self) -> Array:
+        """J^T W J (p, p), the inverse covariance of a noise of one."""
+        J, w = self.flat_jacobian, self.weights.reshape(-1)
+        return J.T @ (w[:, None] * J)
+
+    @property
+    def flat_jacobian(self) -> Array:
+        """The jacobian as (rows * channels, p)."""
+        return self.jacobian.reshape(-1, self.jacobian.shape[-1])
+
+    @property
+    def effect(self) -> Array:
+        """How much each parameter moves the residuals over its range, rms (p,)."""
+        return np.sqrt(np.mean(self.flat_jacobian**2, axis=0))
+
+
+def linearise(
+    objective: Objective, u: Array, steps: Array | None = None
+) -> Linearisation:
+    """Returns the linearisation at a point (p,) of the unit box, 2 p + 1 evaluations.
+
+    Central differences; at a bound one-sided.
+
+    Args:
+        objective: whose residuals.
+        u: where.
+        steps: (p,) of the differences, in the unit box.
+    """
+    size = len(u)
+    steps = np.full(size, _FIRST_STEP) if steps is None else steps
+    ahead = np.clip(u + np.diag(steps), 0.0, 1.0)
+    behind = np.clip(u - np.diag(steps), 0.0, 1.0)
+    points = np.vstack([u[None], ahead, behind])
+    found = np.array(objective.residuals(objective.scaling.from_unit(points)))
+    way = np.diagonal(ahead - behind)
+    difference = found[1 : size + 1] - found[size + 1 :]
+    jacobian = np.moveaxis(difference / way[:, None, None], 0, -1)
+    weights = huber_weights(found[0], objective.huber)
+    return Linearisation(u, found[0], jacobian, weights)
+
+
+def fitting_steps(linearisation: Linearisation) -> Array:
+    """Returns steps (p,) that the log can just notice, for the next linearisation.
+
+    A parameter that the log fixes to a millionth of its range needs a far smaller
+    step than one that it hardly fixes.
+    """
+    norm = np.sqrt(np.diagonal(linearisation.information))
+    return np.clip(_NOTICEABLE / np.maximum(norm, 1e-300), _LEAST_STEP, _FIRST_STEP)

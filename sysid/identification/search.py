@@ -1,0 +1,177 @@
+"""One method's way to the optimum: globally on few rows, then closely on all.
+
+The measured optimum of a five-parameter fit is a valley a ten-thousandth of the box
+wide. A global search finds the region of it, and needs no more than some sixty rows
+for that, at a tenth of the time. Gauss-Newton then goes down, and gives coordinates in
+which the valley is round, where the method searches again, on all rows.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.identification.gauss_newton import gauss_newton
+from sysid.identification.journal import Journal
+from sysid.identification.linearisation import Linearisation
+from sysid.identification.result import MethodResult, SearchPart
+from sysid.objective import Objective
+from sysid.optimise.bees import BeesAlgorithm, BeesSettings, Propose, Stop
+from sysid.optimise.coordinates import BatchFunction, Box, Whitened
+from sysid.optimise.nlopt_search import nlopt_search
+from sysid.optimise.trace import Trace
+
+Array = NDArray[np.float64]
+
+METHODS = ("bees", "nlopt")
+
+_POLISH = 0.25  # part of a search that SBPLX gets at its end
+_CLOSE = 0.25  # part of the budget for the close search
+_WHITENED_STEP = 0.05  # SBPLX's first step over the box of z
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How hard a method tries.
+
+    Attributes:
+        evaluations: of the global search, polish included.
+        cycles: of the bees, instead; NLopt then gets as many evaluations.
+        close: evaluations of the close search on all rows; 0 leaves it and
+            Gauss-Newton out, and searches globally on all rows (the thesis's way).
+        bees: the colony.
+        seed: of the searches.
+        propose: a surrogate's proposals in place of scouts, for the bees.
+    """
+
+    evaluations: int = 300
+    cycles: int | None = None
+    close: int = 60
+    bees: BeesSettings = field(default_factory=BeesSettings)
+    seed: int = 0
+    propose: Propose | None = None
+
+    @property
+    def budget(self) -> int:
+        """Evaluations of the global search, whatever limits it."""
+        if self.cycles is None:
+            return self.evaluations
+        bees = self.bees.initial + (self.cycles) * self.bees.per_cycle
+        return int(np.ceil(bees / (1.0 - _POLISH)))
+
+
+#: Called after each batch: part, evaluations done, evaluations in all, best value.
+News = Callable[[str, int, int, float], None]
+
+
+class Search:
+    """Runs one method; each part's evaluations go through the journal."""
+
+    def __init__(
+        self,
+        method: str,
+        full: Objective,
+        thin: Objective,
+        effort: Effort,
+        journal: Journal,
+        news: News,
+    ) -> None:
+        self._method, self._full, self._effort = method, full, effort
+        self._thin = thin if effort.close else full
+        self._journal, self._news = journal, news
+
+    def run(self) -> MethodResult:
+        """Returns where the method ends."""
+        part = self._part("global", self._thin)
+        u, value = part.trace.best, part.trace.best_value
+        if not self._effort.close:
+            return MethodResult(self._method, (part,), u, value)
+        here = self._descended(u)
+        close = self._close(here)
+        u, value = here.u, self._full.value(here.residual)
+        if close.trace.best_value < value:
+            u, value = close.trace.best, close.trace.best_value
+        return MethodResult(self._method, (part, close), u, value)
+
+    def _part(self, name: str, objective: Objective) -> SearchPart:
+        """Searches the unit box."""
+        box = Box.unit(len(self._full.model.parameters))
+        label = f"{self._method}, {name}"
+        function = self._function(label, objective)
+        trace = self._searched(label, function, box, self._effort.budget, 0.1)
+        return SearchPart(label, objective.model.measurements.rows, trace)
+
+    def _descended(self, u: Array) -> Linearisation:
+        """Goes down by Gauss-Newton, on few rows and then on all."""
+        name = f"{self._method}, descent"
+        kept = self._journal.stage(name)
+        if kept is not None:
+            return gauss_newton(self._full, np.array(kept), 0)
+
+        def tell(value: float) -> None:
+            self._news(name, 0, 0, value)
+
+        thin = gauss_newton(self._thin, u, 10, tell)
+        here = gauss_newton(self._full, thin.u, 6, tell)
+        self._journal.finish(name, here.u.tolist())
+        return here
+
+    def _close(self, here: Linearisation) -> SearchPart:
+        """Searches on all rows in coordinates whitened by the linearisation."""
+        label = f"{self._method}, close"
+        box = Box.unit(len(here.u))
+        scale = max(self._full.value(here.residual), 1e-9)
+        white = Whitened(here.u, scale * _factor(here), box)
+        function = white.wrap(self._function(label, self._full))
+        found = self._searched(
+            label, function, white.box, self._effort.close, _WHITENED_STEP
+        )
+        points = [white.to_x(z) for z in found.points]
+        trace = Trace(points, found.values, found.cycle_ends, found.stopped)
+        return SearchPart(label, self._full.model.measurements.rows, trace)
+
+    def _searched(
+        self, label: str, function: BatchFunction, box: Box, budget: int, step: float
+    ) -> Trace:
+        """Spends a budget: the method, then SBPLX from its best."""
+        polish = int(_POLISH * budget)
+
+        def tell(trace: Trace) -> None:
+            self._news(label, trace.evaluations, budget, trace.best_value)
+
+        trace = self._explored(function, box, budget - polish, tell)
+        left = budget - trace.evaluations
+        return nlopt_search(
+            function, box, "LN_SBPLX", left, trace.best, 0, step, trace, tell
+        )
+
+    def _explored(
+        self,
+        function: BatchFunction,
+        box: Box,
+        budget: int,
+        tell: Callable[[Trace], None],
+    ) -> Trace:
+        effort = self._effort
+        if self._method == "nlopt":
+            return nlopt_search(
+                function, box, "GN_CRS2_LM", budget, seed=effort.seed, callback=tell
+            )
+        bees = BeesAlgorithm(box, effort.bees, effort.seed, effort.propose)
+        stop = Stop(evaluations=budget)
+        return bees.run(function, stop=stop, callback=lambda b: tell(b.trace))
+
+    def _function(self, label: str, objective: Objective) -> BatchFunction:
+        scaling = objective.scaling
+        return self._journal.remembered(
+            label, lambda u: objective(scaling.from_unit(u))
+        )
+
+
+def _factor(here: Linearisation) -> Array:
+    """Returns L with L L^T the covariance, no direction wider than half the box."""
+    values, vectors = np.linalg.eigh(here.information)
+    width = 1.0 / np.sqrt(np.maximum(values, 1e-300))
+    factor: Array = vectors * np.minimum(width, 0.1)
+    return factor

@@ -1,0 +1,137 @@
+"""Before a fit: does every parameter reach the model, and can this log fix it?"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.identification.linearisation import Linearisation, linearise
+from sysid.objective import Objective
+from sysid.parameters import Parameter
+
+Array = NDArray[np.float64]
+
+#: A combination that the log fixes no better than to this part of its range, with 95 %
+#: confidence and a perfect model, is one that the log does not fix.
+LOOSE = 0.5
+
+_PROBES = (0.05, 0.5, 0.95)  # of the range, where a parameter without slope is tried
+_NAMED = 0.3  # least share of a parameter in a combination that is named
+_SILENT = 1e-9  # rms change, in units of the noise, that is none
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A direction in the parameters' unit box.
+
+    Attributes:
+        weights: (p,) of length 1.
+        interval: half width of its 95 % interval, in ranges, for a perfect model.
+    """
+
+    weights: Array
+    interval: float
+
+    @property
+    def loose(self) -> bool:
+        """Whether the log does not fix it."""
+        return self.interval > LOOSE
+
+    def text(self, names: Sequence[str]) -> str:
+        """Returns it in words: the parameters that have a share in it, signed."""
+        order = np.argsort(-np.abs(self.weights))
+        sign = np.sign(self.weights[order[0]])
+        parts = [
+            f"{sign * self.weights[i]:+.2f} {names[i]}"
+            for i in order
+            if abs(self.weights[i]) >= _NAMED
+        ]
+        return " ".join(parts)
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What a log can say about parameters, at one point.
+
+    Attributes:
+        names: of the parameters.
+        effect: (p,) rms change of the residuals over a parameter's range, in units
+            of the noise, by the slope at the point.
+        silent: names of those that change nothing anywhere in their range.
+        combinations: orthogonal directions, the best fixed first, without the silent.
+    """
+
+    names: tuple[str, ...]
+    effect: Array
+    silent: tuple[str, ...]
+    combinations: tuple[Combination, ...]
+
+    @property
+    def loose(self) -> tuple[Combination, ...]:
+        """The combinations that the log does not fix."""
+        return tuple(c for c in self.combinations if c.loose)
+
+    @property
+    def complaints(self) -> list[str]:
+        """Returns a line for each thing that the log can't tell."""
+        lines = [
+            f"{name}: has no effect on this log's channels anywhere within its bounds"
+            for name in self.silent
+        ]
+        names = self.names
+        return lines + [
+            f"{c.text(names)}: this log fixes the combination only to "
+            f"+-{100 * c.interval:.0f} % of its range"
+            for c in self.loose
+        ]
+
+    def to_freeze(self) -> list[str]:
+        """Returns the silent ones, and one parameter of each loose combination."""
+        chosen = list(self.silent)
+        for combination in self.loose:
+            order = np.argsort(-np.abs(combination.weights))
+            free = [self.names[i] for i in order if self.names[i] not in chosen]
+            chosen += free[:1]
+        return chosen
+
+
+def sensitivity(objective: Objective, u: Array) -> Sensitivity:
+    """Returns what the log can say at a point (p,) of the unit box."""
+    here = linearise(objective, u)
+    flat = np.flatnonzero(here.effect <= _SILENT)
+    names = [p.name for p in objective.model.parameters]
+    silent = [names[i] for i in flat if _is_silent(objective, here, int(i))]
+    return of_linearisation(here, objective.model.parameters, silent)
+
+
+def of_linearisation(
+    here: Linearisation, parameters: Sequence[Parameter], silent: Sequence[str] = ()
+) -> Sensitivity:
+    """Returns what derivatives that are there already say."""
+    names = tuple(p.name for p in parameters)
+    active = np.array([name not in silent for name in names])
+    return Sensitivity(names, here.effect, tuple(silent), _combinations(here, active))
+
+
+def _combinations(
+    here: Linearisation, active: NDArray[np.bool_]
+) -> tuple[Combination, ...]:
+    """Returns the right singular vectors of the scaled Jacobian."""
+    if not active.any():
+        return ()
+    _, s, Vt = np.linalg.svd(here.flat_jacobian[:, active], full_matrices=False)
+    combinations = []
+    for size, row in zip(s, Vt, strict=True):
+        weights = np.zeros(len(active))
+        weights[active] = row
+        combinations.append(Combination(weights, float(1.96 / max(size, 1e-300))))
+    return tuple(combinations)
+
+
+def _is_silent(objective: Objective, here: Linearisation, number: int) -> bool:
+    """Returns whether a parameter without slope changes nothing elsewhere either."""
+    points = np.tile(here.u, (len(_PROBES), 1))
+    points[:, number] = _PROBES
+    found = objective.residuals(objective.scaling.from_unit(points))
+    return all(np.abs(r - here.residual).max() <= _SILENT for r in found)

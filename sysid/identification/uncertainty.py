@@ -1,0 +1,136 @@
+"""How sure the values are: two intervals, one of which asks for no whiteness."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.identification.linearisation import Linearisation
+
+Array = NDArray[np.float64]
+
+_DRAWS = 2000
+_Z95 = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Spread of an estimate, in the unit box.
+
+    Attributes:
+        scale: rms weighted residual, by which a noise of one is stretched.
+        covariance: (p, p) by Gauss-Newton: right if residuals are white.
+        draws: (b, p) block bootstrap of the estimate: right if residuals further
+            apart than a block are independent.
+        block: length of a block in rows.
+    """
+
+    scale: float
+    covariance: Array
+    draws: Array
+    block: int
+
+    @property
+    def gauss_newton(self) -> Array:
+        """95 % intervals (p, 2) by the covariance, relative to the estimate."""
+        half = _Z95 * np.sqrt(np.diagonal(self.covariance))
+        return np.column_stack([-half, half])
+
+    @property
+    def bootstrap(self) -> Array:
+        """95 % intervals (p, 2) by the bootstrap, relative to the estimate."""
+        return np.quantile(self.draws, [0.025, 0.975], axis=0).T
+
+    @property
+    def bootstrap_covariance(self) -> Array:
+        """Covariance (p, p) of the bootstrap's draws."""
+        return np.atleast_2d(np.cov(self.draws.T))
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation (p, p) of the bootstrap's draws."""
+        C = self.bootstrap_covariance
+        root = np.sqrt(np.maximum(np.diagonal(C), 1e-300))
+        return C / np.outer(root, root)
+
+
+def uncertainty(
+    here: Linearisation, episode: NDArray[np.int64], seed: int = 0
+) -> Uncertainty:
+    """Returns the spread of the estimate at which residuals were linearised.
+
+    The bootstrap draws blocks of rows with replacement, and takes one weighted
+    Gauss-Newton step for each draw: no simulation is needed. A block is twice as
+    long as residuals stay correlated.
+
+    Args:
+        here: at the estimate.
+        episode: (rows,) of each row; a block never spans two.
+        seed: of the draws.
+    """
+    r, w = here.residual, here.weights
+    dof = max(1, r.size - len(here.u))
+    scale = float(np.sqrt(np.sum(w * r**2) / dof))
+    block = block_length(r, episode)
+    blocks = block_numbers(episode, block)
+    return Uncertainty(
+        scale,
+        np.array(scale**2 * np.linalg.pinv(here.information, hermitian=True)),
+        _block_bootstrap(here, blocks, seed),
+        block,
+    )
+
+
+def block_length(residual: Array, episode: NDArray[np.int64]) -> int:
+    """Returns twice the rows over which residuals (rows, channels) are correlated.
+
+    The longest over channels of the integrated autocorrelation time, summed until
+    it first falls below 0.05; at most a tenth of the rows.
+    """
+    limit = max(1, len(residual) // 10)
+    longest = 1.0
+    centred = residual - residual.mean(axis=0)
+    power = np.mean(centred**2, axis=0)
+    time = np.ones(residual.shape[1])
+    falling = power > 0.0
+    for lag in range(1, limit):
+        same = episode[lag:] == episode[:-lag]
+        product = np.mean((centred[lag:] * centred[:-lag])[same], axis=0)
+        rho = product / np.maximum(power, 1e-300) if same.any() else 0.0 * power
+        falling &= rho > 0.05
+        if not falling.any():
+            break
+        time += 2.0 * np.where(falling, rho, 0.0)
+        longest = float(time.max())
+    return int(np.clip(np.ceil(2.0 * longest), 1, limit)) if longest > 1.0 else 1
+
+
+def block_numbers(episode: NDArray[np.int64], length: int) -> NDArray[np.int64]:
+    """Returns the number of the block (rows,) that each row falls into."""
+    row = np.zeros(len(episode), dtype=np.int64)
+    for number in np.unique(episode):
+        mask = episode == number
+        row[mask] = np.arange(mask.sum()) // length
+    _, blocks = np.unique(np.column_stack([episode, row]), axis=0, return_inverse=True)
+    numbers: NDArray[np.int64] = np.asarray(blocks).reshape(-1)
+    return numbers
+
+
+def _block_bootstrap(
+    here: Linearisation, blocks: NDArray[np.int64], seed: int
+) -> Array:
+    """Returns draws (b, p) of the estimate's error."""
+    J, w, r = here.jacobian, here.weights, here.residual
+    count = int(blocks.max()) + 1
+    size = len(here.u)
+    H, g = np.zeros((count, size, size)), np.zeros((count, size))
+    np.add.at(H, blocks, np.einsum("rci,rc,rcj->rij", J, w, J))
+    np.add.at(g, blocks, np.einsum("rci,rc,rc->ri", J, w, r))
+    # A draw's own optimum: what is left of the gradient at the estimate is not noise.
+    g = g - g.mean(axis=0)
+    generator = np.random.default_rng(seed)
+    times = generator.multinomial(count, np.full(count, 1.0 / count), _DRAWS)
+    drawn_H = np.tensordot(times, H, 1)
+    drawn_g = times @ g
+    inverse = np.linalg.pinv(drawn_H, hermitian=True)
+    return -np.einsum("bij,bj->bi", inverse, drawn_g)

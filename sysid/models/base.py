@@ -1,0 +1,156 @@
+"""What every identification works on: a model that predicts a log's channels."""
+
+import abc
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drake_disasm.errors import DisasmError
+from sysid.parameters import Parameter
+
+Array = NDArray[np.float64]
+
+
+class PredictionError(Exception):
+    """A model can't be evaluated at these parameters: the simulation failed."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Channel:
+    """One measured quantity.
+
+    Attributes:
+        name: such as "fx".
+        unit: SI unit.
+        noise: standard deviation of the measurement; residuals are divided by it.
+        origin: where that number is from, for the report.
+    """
+
+    name: str
+    unit: str
+    noise: float
+    origin: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Measurements:
+    """What was measured, in the rows and channels that a model predicts.
+
+    Attributes:
+        values: (rows, channels).
+        channels: what the columns are.
+        episode: (rows,) number of the episode that each row is of, from 0.
+        names: of the episodes.
+    """
+
+    values: Array
+    channels: tuple[Channel, ...]
+    episode: NDArray[np.int64]
+    names: tuple[str, ...]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.values)
+
+    @property
+    def noise(self) -> Array:
+        """Standard deviation of each channel (channels,)."""
+        return np.array([channel.noise for channel in self.channels])
+
+    def select(self, mask: NDArray[np.bool_]) -> Self:
+        """Returns the rows where the mask (rows,) is true, episodes numbered anew."""
+        kept, episode = np.unique(self.episode[mask], return_inverse=True)
+        return dataclasses.replace(
+            self,
+            values=self.values[mask],
+            episode=episode,
+            names=tuple(self.names[i] for i in kept),
+        )
+
+    def with_noise(self, noise: Array, origin: str) -> Self:
+        """Returns the same with other standard deviations (channels,)."""
+        channels = tuple(
+            dataclasses.replace(channel, noise=float(value), origin=origin)
+            for channel, value in zip(self.channels, noise, strict=True)
+        )
+        return dataclasses.replace(self, channels=channels)
+
+
+class LogModel(abc.ABC):
+    """Predicts a log's measured channels under parameters.
+
+    A model goes through pickle to the workers that evaluate it; what it builds
+    there, such as a diagram, it builds once and keeps out of the pickle.
+
+    Attributes:
+        parameters: what can be varied, in the order of theta.
+        measurements: what it is compared with.
+        affine: whether predictions are affine in theta, so that least squares
+            have one exact solution.
+    """
+
+    parameters: tuple[Parameter, ...]
+    measurements: Measurements
+    affine: bool = False
+
+    @property
+    def noise_groups(self) -> tuple[str, ...]:
+        """For each channel a label; channels of one label have one unknown noise."""
+        return tuple(channel.name for channel in self.measurements.channels)
+
+    @abc.abstractmethod
+    def predict(self, theta: Array, rows: slice) -> Array:
+        """Returns the channels (len(rows), channels) that the model says.
+
+        Args:
+            theta: (p,) values of `parameters`.
+            rows: one of `chunks`.
+
+        Raises:
+            PredictionError: the simulation failed.
+        """
+
+    @abc.abstractmethod
+    def chunks(self) -> list[slice]:
+        """Returns the pieces of work that one evaluation falls into."""
+
+    @abc.abstractmethod
+    def of_episodes(self, episodes: Sequence[int]) -> Self:
+        """Returns the same model of some of the episodes."""
+
+    @abc.abstractmethod
+    def freeze(self, values: Mapping[str, float]) -> Self:
+        """Returns the same model with some parameters fixed at values."""
+
+    @abc.abstractmethod
+    def with_measurements(self, measurements: Measurements) -> Self:
+        """Returns the same model compared with other measurements of the same rows."""
+
+    def thin(self, every: int) -> "LogModel":
+        """Returns the same model of every n-th row, where rows stand alone."""
+        return self
+
+    def describe(self, theta: Array) -> dict[str, tuple[float, str]]:
+        """Returns quantities that people ask for, with units, by name; none here."""
+        return {}
+
+
+def row_mask(measurements: Measurements, episodes: Sequence[int]) -> NDArray[np.bool_]:
+    """Returns which rows (rows,) are of some episodes.
+
+    Raises:
+        DisasmError: no row is.
+    """
+    mask = np.isin(measurements.episode, episodes)
+    if not mask.any():
+        raise DisasmError("no episode is left to fit; hold out fewer")
+    return mask
+
+
+def even_chunks(rows: int, size: int) -> list[slice]:
+    """Returns slices of at most `size` rows that cover all of them."""
+    return [slice(i, min(i + size, rows)) for i in range(0, rows, size)]

@@ -1,0 +1,113 @@
+"""The model that a kind of log asks for."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.quantity import closest
+from drake_disasm.scenario import Scenario, scenario_from_mapping
+from sysid.logs import Log
+from sysid.models.base import LogModel
+from sysid.models.joint_motion import JointMotionModel
+from sysid.models.static_wrench import DEFAULT_PARAMETERS, StaticWrenchModel
+from sysid.models.twin import TwinModel
+from sysid.scenario_parameters import Request, scenario_parameters
+
+#: What is compared, by the kind of log; the first is the default.
+OBJECTIVES = {
+    "transitions": ("transitions", "rollout"),
+    "static_wrench": ("static_wrench",),
+    "joint_motion": ("joint_motion",),
+}
+
+
+@dataclass(frozen=True)
+class ModelChoice:
+    """What a user says of the model beside the logs.
+
+    Attributes:
+        objective: one of OBJECTIVES for the kind of log; None for the default.
+        scenario: in place of what the log states; None for that.
+        requests: parameters to vary; none asks for a kind's default ones.
+        urdf: of the arm, in place of what the log states.
+        coarse: whether transitions may begin in coarse time steps.
+        noise: standard deviations of channels, by name, in place of the model's.
+    """
+
+    objective: str | None = None
+    scenario: Scenario | None = None
+    requests: tuple[Request, ...] = ()
+    urdf: str | None = None
+    coarse: bool = True
+    noise: tuple[tuple[str, float], ...] = ()
+
+
+def model_of(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
+    """Returns the model that predicts the channels of some logs of one kind.
+
+    Raises:
+        DisasmError: the objective is not for this kind of log, a parameter does not
+            exist, or a log lacks what the model needs.
+    """
+    kind = logs[0].header.kind
+    objective = choice.objective or OBJECTIVES[kind][0]
+    if objective not in OBJECTIVES[kind]:
+        raise DisasmError(
+            f"--objective {objective}: {logs[0].folder} is a log of kind '{kind}'; "
+            f"for that use {' or '.join(OBJECTIVES[kind])}"
+        )
+    make = {"static_wrench": _static_wrench, "joint_motion": _joint_motion}
+    model = make.get(kind, _twin)(logs, choice)
+    return _with_noise(model, dict(choice.noise))
+
+
+def stated_scenario(logs: Sequence[Log]) -> Scenario | None:
+    """Returns the scenario that the first log states, if it states one."""
+    mapping = logs[0].header.scenario
+    return scenario_from_mapping(dict(mapping)) if mapping else None
+
+
+def _twin(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
+    scenario = choice.scenario or stated_scenario(logs)
+    if scenario is None:
+        raise DisasmError(
+            f"{logs[0].folder}: states no scenario; name the one that the twin "
+            "begins with by --scenario"
+        )
+    scenario, parameters = scenario_parameters(scenario, choice.requests)
+    rollout = choice.objective == "rollout"
+    return TwinModel(logs, scenario, parameters, rollout, choice.coarse)
+
+
+def _static_wrench(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
+    requests = choice.requests or tuple(Request(n) for n in DEFAULT_PARAMETERS)
+    known = choice.scenario or stated_scenario(logs)
+    scenario, parameters = scenario_parameters(known or Scenario(), requests)
+    return StaticWrenchModel(logs, scenario, parameters, known is not None)
+
+
+def _joint_motion(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
+    model = JointMotionModel(logs, choice.urdf)
+    names = [request.name for request in choice.requests]
+    return model.only(names) if names else model
+
+
+def _with_noise(model: LogModel, noise: dict[str, float]) -> LogModel:
+    """Returns the model with some channels' noise as the user says."""
+    known = [channel.name for channel in model.measurements.channels]
+    for name, value in noise.items():
+        if name not in known:
+            raise DisasmError(
+                f"--noise {name}: no such channel; {closest(name, known)}"
+            )
+        if not value > 0.0:
+            raise DisasmError(f"--noise {name}={value:g}: give a number above zero")
+    channels = tuple(
+        dataclasses.replace(channel, noise=noise[channel.name], origin="as given")
+        if channel.name in noise
+        else channel
+        for channel in model.measurements.channels
+    )
+    measurements = dataclasses.replace(model.measurements, channels=channels)
+    return model.with_measurements(measurements)

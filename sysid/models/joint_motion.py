@@ -1,0 +1,165 @@
+"""An arm's joint torques from its motion: rigid bodies, of any URDF."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.quantity import closest
+from sysid.logs import Episode, Log
+from sysid.logs.refusal import refusal
+from sysid.models.base import Array, Channel, LogModel, Measurements, row_mask
+from sysid.models.regressor import ArmDynamics, BaseSet, base_set
+from sysid.parameters import Parameter, by_name
+
+_NEEDED = ("q", "v", "vd", "tau")
+_REACH = 5.0  # times what a parameter would need to explain all torque alone
+
+
+class JointMotionModel(LogModel):
+    """tau = Y(q, v, vd) beta, with beta the identifiable base parameters.
+
+    Of ten inertial parameters per link, many never show in joint torques, and
+    others only in sums. `parameters` are the sums that do show; each is named by
+    the first of its terms, and `doc` has them all.
+    """
+
+    def __init__(self, logs: Sequence[Log], urdf: str | None = None) -> None:
+        """Takes the motion out of the logs.
+
+        Args:
+            logs: of joint motion, with q, v, vd and tau, of one arm.
+            urdf: the arm; by default what the first log names.
+
+        Raises:
+            DisasmError: a log is of another kind or arm, lacks a quantity, or there
+                is no URDF.
+        """
+        episodes = [(log, e) for log in logs for e in log.episodes]
+        _refuse_other_logs(logs, episodes)
+        header = logs[0].header
+        urdf = urdf or header.urdf
+        if urdf is None:
+            raise refusal(
+                logs[0].folder / "log.yaml", "no 'urdf'", "name the arm by --urdf FILE"
+            )
+        arm = ArmDynamics(urdf, header.joints)
+        base = base_set(arm.random_regressor())
+        parts = [arm.regressor(e["q"], e["v"], e["vd"]) for _, e in episodes]
+        self._Y = np.concatenate(parts)[:, :, base.independent]
+        self._beta = base.beta(arm.inertia)
+        self._fixed = np.zeros(len(self._beta))
+        self._free = np.arange(len(self._beta))
+        self.affine = True
+        self.measurements = Measurements(
+            np.concatenate([episode["tau"] for _, episode in episodes]),
+            tuple(Channel(j, "N m", np.nan, "estimated") for j in header.joints),
+            np.repeat(np.arange(len(episodes)), [e.rows for _, e in episodes]),
+            tuple(f"{log.folder.name}/{e.name}" for log, e in episodes),
+        )
+        self.parameters = self._base_parameters(arm, base)
+
+    def predict(self, theta: Array, rows: slice) -> Array:
+        """See LogModel."""
+        beta = self._fixed.copy()
+        beta[self._free] = theta
+        torque: Array = self._Y[rows] @ beta
+        return torque
+
+    def chunks(self) -> list[slice]:
+        """See LogModel."""
+        return [slice(0, self.measurements.rows)]
+
+    def of_episodes(self, episodes: Sequence[int]) -> Self:
+        """See LogModel."""
+        mask = row_mask(self.measurements, episodes)
+        return self._changed(
+            _Y=self._Y[mask], measurements=self.measurements.select(mask)
+        )
+
+    def freeze(self, values: Mapping[str, float]) -> Self:
+        """See LogModel."""
+        names = [p.name for p in self.parameters]
+        free = [i for i, name in enumerate(names) if name not in values]
+        fixed = self._fixed.copy()
+        for i, name in enumerate(names):
+            if name in values:
+                fixed[self._free[i]] = values[name]
+        return self._changed(
+            _fixed=fixed,
+            _free=self._free[free],
+            parameters=tuple(self.parameters[i] for i in free),
+        )
+
+    def with_measurements(self, measurements: Measurements) -> Self:
+        """See LogModel."""
+        return self._changed(measurements=measurements)
+
+    def only(self, names: Sequence[str]) -> Self:
+        """Returns the same model with all but the named parameters at the URDF's.
+
+        Raises:
+            DisasmError: there is no such base parameter.
+        """
+        known = [p.name for p in self.parameters]
+        for name in names:
+            if name not in known:
+                raise DisasmError(
+                    f"parameter {name}: is no base parameter of this arm; "
+                    f"{closest(name, known)}"
+                )
+        rest = {p.name: p.nominal for p in self.parameters if p.name not in names}
+        return self.freeze(rest)
+
+    def urdf_values(self) -> Mapping[str, float]:
+        """Returns the base parameters that the URDF's inertias amount to, by name."""
+        return by_name(self.parameters, self._beta[self._free])
+
+    def _base_parameters(
+        self, arm: ArmDynamics, base: BaseSet
+    ) -> tuple[Parameter, ...]:
+        """Returns base parameters with bounds wide enough for any real arm."""
+        size = np.sqrt(np.mean(self._Y**2, axis=(0, 1)))
+        torque = float(np.sqrt(np.mean(self.measurements.values**2)))
+        reach = np.abs(self._beta) + _REACH * torque / np.maximum(size, 1e-9)
+        return tuple(
+            Parameter(
+                arm.names[base.independent[i]],
+                float(value),
+                float(value - reach[i]),
+                float(value + reach[i]),
+                arm.units[base.independent[i]],
+                base.label(i, arm.names),
+            )
+            for i, value in enumerate(self._beta)
+        )
+
+    def _changed(self, **attributes: Any) -> Self:
+        changed = type(self).__new__(type(self))
+        changed.__dict__.update(self.__dict__ | attributes)
+        return changed
+
+
+def _refuse_other_logs(
+    logs: Sequence[Log], episodes: Sequence[tuple[Log, Episode]]
+) -> None:
+    for log in logs:
+        where, header = log.folder / "log.yaml", log.header
+        if header.kind != "joint_motion":
+            raise refusal(
+                where,
+                f"a log of kind '{header.kind}', inverse dynamics needs 'joint_motion'",
+                "name such a log",
+            )
+        if header.joints != logs[0].header.joints:
+            raise refusal(where, "other joints than in the first log", "fit it apart")
+    for _, episode in episodes:
+        for quantity in _NEEDED:
+            if quantity not in episode:
+                raise refusal(
+                    episode.path,
+                    f"no columns '{quantity}.*'",
+                    "inverse dynamics needs q, v, vd and tau; differentiate and "
+                    "filter q",
+                )

@@ -1,0 +1,220 @@
+"""Inverse dynamics of an arm, linear in its links' inertial parameters."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    JacobianWrtVariable,
+    RigidBody,
+    SpatialInertia,
+)
+from scipy.linalg import qr
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.models import add_model
+from drake_disasm.quantity import closest
+
+Array = NDArray[np.float64]
+
+#: A link's inertial parameters: mass, first moment, inertia about Bo, in B.
+INERTIAL = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+INERTIAL_UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
+
+_EXCITATION = 200  # random states that reveal which parameters matter
+_RANK = 1e-8  # of the largest diagonal element
+
+
+class ArmDynamics:
+    """tau = Y(q, v, vd) pi for an arm of a URDF, by Drake's kinematics.
+
+    tau are the joint torques that the motion takes, Drake's
+    `CalcInverseDynamics(vd)` minus gravity's, and pi stacks INERTIAL over the
+    links. Friction and rotors are not in it.
+
+    Attributes:
+        links: names of the links that move, in the order of pi.
+        inertia: pi by the URDF.
+
+    Args:
+        urdf: a path, or `package://`.
+        joints: names of the actuated joints, in the order of q, v, vd and tau.
+    """
+
+    def __init__(self, urdf: str, joints: Sequence[str]) -> None:
+        self._plant = plant = MultibodyPlant(0.0)
+        instance = add_model(plant, urdf)
+        bodies = [plant.get_body(i) for i in plant.GetBodyIndices(instance)]
+        self._bodies: list[RigidBody] = bodies
+        _weld_root(plant, bodies)
+        plant.Finalize()
+        self._context = plant.CreateDefaultContext()
+        self._columns = _velocity_columns(plant, joints, urdf)
+        self.links = tuple(body.name() for body in self._bodies)
+        self.inertia = np.concatenate(
+            [_inertial(body.default_spatial_inertia()) for body in self._bodies]
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of pi's elements."""
+        return tuple(f"{link}.{name}" for link in self.links for name in INERTIAL)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of pi's elements."""
+        return INERTIAL_UNITS * len(self.links)
+
+    def regressor(self, q: Array, v: Array, vd: Array) -> Array:
+        """Returns Y (n, joints, parameters) of states (n, joints)."""
+        return np.array([self._row(*state) for state in zip(q, v, vd, strict=True)])
+
+    def random_regressor(self) -> Array:
+        """Returns Y of random states: what any motion at all could reveal."""
+        generator = np.random.default_rng(0)
+        size = (_EXCITATION, len(self._columns))
+        low, high = -np.ones(size), np.ones(size)
+        states = [generator.uniform(k * low, k * high) for k in (3.0, 2.0, 5.0)]
+        return self.regressor(*states)
+
+    def _row(self, q: Array, v: Array, vd: Array) -> Array:
+        plant, context, columns = self._plant, self._context, self._columns
+        full = np.zeros(plant.num_velocities())
+        positions, velocities, accelerations = full.copy(), full.copy(), full.copy()
+        positions[columns], velocities[columns] = q, v
+        accelerations[columns] = vd
+        plant.SetPositions(context, positions)
+        plant.SetVelocities(context, velocities)
+        A_W = plant.CalcSpatialAccelerationsFromVdot(context, accelerations)
+        blocks = [self._block(body, A_W[int(body.index())]) for body in self._bodies]
+        return np.hstack(blocks)[columns]
+
+    def _block(self, body: RigidBody, A_WB: object) -> Array:
+        """Returns a link's part (joints, 10) of Y at the plant's state."""
+        plant, context = self._plant, self._context
+        R_BW = plant.EvalBodyPoseInWorld(context, body).rotation().matrix().T
+        w_B = R_BW @ plant.EvalBodySpatialVelocityInWorld(context, body).rotational()
+        alpha_B = R_BW @ A_WB.rotational()  # type: ignore[attr-defined]
+        g_W = plant.gravity_field().gravity_vector()
+        a_B = R_BW @ (A_WB.translational() - g_W)  # type: ignore[attr-defined]
+        frame = body.body_frame()
+        J = plant.CalcJacobianSpatialVelocity(
+            context, JacobianWrtVariable.kV, frame, np.zeros(3), plant.world_frame(),
+            frame,
+        )  # fmt: skip
+        block: Array = J.T @ body_regressor(w_B, alpha_B, a_B)
+        return block
+
+
+def body_regressor(w: Array, alpha: Array, a: Array) -> Array:
+    """Returns Y (6, 10) with [tau; f] = Y [m, mx, my, mz, Ixx, ..., Izz].
+
+    Newton's and Euler's equations of a rigid body about its frame's origin Bo:
+    f = m a + alpha x c + w x (w x c), tau = c x a + I alpha + w x I w, with c = m
+    p_BoBcm.
+
+    Args:
+        w, alpha: (3,) angular velocity and acceleration, in B.
+        a: (3,) acceleration of Bo minus gravity, in B.
+    """
+    W = _skew(w)
+    L = _inertia_times(alpha) + W @ _inertia_times(w)
+    Y = np.zeros((6, 10))
+    Y[3:, 0] = a
+    Y[3:, 1:4] = _skew(alpha) + W @ W
+    Y[:3, 1:4] = -_skew(a)
+    Y[:3, 4:] = L
+    return Y
+
+
+@dataclass(frozen=True)
+class BaseSet:
+    """The combinations of inertial parameters that motion can reveal at all.
+
+    beta = pi[independent] + K pi[dependent], and tau = Y[:, independent] beta.
+
+    Attributes:
+        independent, dependent: indices into pi; those without any effect are in
+            neither.
+        K: how the dependent ones add to the independent.
+    """
+
+    independent: NDArray[np.int64]
+    dependent: NDArray[np.int64]
+    K: Array
+
+    def beta(self, pi: Array) -> Array:
+        """Returns the base parameters of inertial parameters."""
+        return pi[self.independent] + self.K @ pi[self.dependent]
+
+    def label(self, number: int, names: Sequence[str]) -> str:
+        """Returns what a base parameter is a sum of."""
+        parts = [names[self.independent[number]]]
+        for k, j in zip(self.K[number], self.dependent, strict=True):
+            if abs(k) > 1e-6:
+                parts.append(f"{k:+.4g} {names[j]}")
+        return " ".join(parts)
+
+
+def base_set(Y: Array) -> BaseSet:
+    """Returns the base set by QR with pivoting of a regressor (n, joints, k).
+
+    Gautier's method: columns without effect are left out, and of those that depend
+    on each other the QR keeps a well-conditioned few.
+    """
+    flat = Y.reshape(-1, Y.shape[-1])
+    used = np.flatnonzero(np.linalg.norm(flat, axis=0) > _RANK * np.linalg.norm(flat))
+    R, order = qr(flat[:, used], mode="r", pivoting=True)
+    diagonal = np.abs(np.diagonal(R))
+    rank = int(np.sum(diagonal > _RANK * diagonal[0]))
+    K = np.linalg.solve(R[:rank, :rank], R[:rank, rank:])
+    K[np.abs(K) < 1e-9] = 0.0
+    return BaseSet(used[order[:rank]], used[order[rank:]], np.array(K, dtype=float))
+
+
+def _weld_root(plant: MultibodyPlant, bodies: Sequence[RigidBody]) -> None:
+    """Welds what no joint holds to the world: an arm's base."""
+    joints = [plant.get_joint(i) for i in plant.GetJointIndices()]
+    held = {int(joint.child_body().index()) for joint in joints}
+    for body in bodies:
+        if int(body.index()) not in held:
+            plant.WeldFrames(plant.world_frame(), body.body_frame())
+
+
+def _velocity_columns(
+    plant: MultibodyPlant, joints: Sequence[str], urdf: str
+) -> list[int]:
+    """Returns the index among the plant's velocities of each joint's."""
+    known = {
+        joint.name(): joint
+        for joint in (plant.get_joint(i) for i in plant.GetJointIndices())
+        if joint.num_velocities() == 1
+    }
+    for name in joints:
+        if name not in known:
+            raise DisasmError(
+                f"{urdf}: has no joint '{name}', which the log has; "
+                f"{closest(name, list(known))}"
+            )
+    return [known[name].velocity_start() for name in joints]
+
+
+def _inertial(M_B: SpatialInertia) -> Array:
+    """Returns INERTIAL (10,) of a spatial inertia about Bo in B."""
+    mass = M_B.get_mass()
+    inertia = M_B.CalcRotationalInertia().CopyToFullMatrix3()
+    upper = inertia[np.triu_indices(3)]
+    return np.concatenate([[mass], mass * M_B.get_com(), upper])
+
+
+def _skew(a: Array) -> Array:
+    """Returns [a]x with [a]x b = a x b."""
+    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+
+
+def _inertia_times(w: Array) -> Array:
+    """Returns L (3, 6) with I w = L [Ixx, Ixy, Ixz, Iyy, Iyz, Izz]."""
+    x, y, z = w
+    return np.array([[x, y, z, 0, 0, 0], [0, x, 0, y, z, 0], [0, 0, x, 0, y, z]])

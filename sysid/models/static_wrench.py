@@ -1,0 +1,188 @@
+"""Static readings of a force/torque sensor: payload, bias, and any sensor effect."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+from pydrake.math import RotationMatrix
+from pydrake.multibody.tree import UniformGravityFieldElement
+
+from drake_disasm.effects import PayloadError, Sensing, SensorEffect
+from drake_disasm.errors import DisasmError
+from drake_disasm.scenario import Scenario, with_values
+from drake_disasm.spatial import weight_wrench
+from drake_disasm.tool import Tool
+from sysid.logs import Episode, Log, rotation_matrices, sensor_wrench
+from sysid.logs.refusal import refusal
+from sysid.logs.schema import WRENCH
+from sysid.models.base import Array, Channel, LogModel, Measurements, row_mask
+from sysid.parameters import Parameter, by_name, by_path
+
+#: Weight, first moment and bias: all that a rigid load on an ideal sensor can do.
+DEFAULT_PARAMETERS = tuple(
+    f"{effect}.{field}"
+    for effect, fields in (
+        ("PayloadError", ("mass", "cx", "cy", "cz")),
+        ("SensorBias", WRENCH),
+    )
+    for field in fields
+)
+
+_GRAVITY_W = UniformGravityFieldElement().gravity_vector()
+
+
+class StaticWrenchModel(LogModel):
+    """The reading at rest: the known payload's weight, through the sensor's effects.
+
+    The effects are those of the simulated sensor, the same code. Channels are the
+    reading at So in S, in whatever frame the log states it.
+    """
+
+    def __init__(
+        self,
+        logs: Sequence[Log],
+        scenario: Scenario,
+        parameters: Sequence[Parameter],
+        known_payload: bool = False,
+    ) -> None:
+        """Takes the readings out of the logs.
+
+        Args:
+            logs: of static readings.
+            scenario: its sensor effects act; parameters are paths in it.
+            parameters: of sensor effects.
+            known_payload: whether the scenario's tool hangs on the sensor, so that
+                PayloadError is what its data lack. Else PayloadError is all.
+
+        Raises:
+            DisasmError: a log is of another kind, or a parameter is of something
+                else than a sensor effect.
+        """
+        for log in logs:
+            if log.header.kind != "static_wrench":
+                raise refusal(
+                    log.folder / "log.yaml",
+                    f"a log of kind '{log.header.kind}', readings at rest are "
+                    "'static_wrench'",
+                    "name such a log",
+                )
+        self.parameters, self.scenario = tuple(parameters), scenario
+        self.affine = True
+        payload = _payload(scenario) if known_payload else (0.0, np.zeros(3))
+        self._mass: float = payload[0]
+        self._p_SoScm_S: Array = payload[1]
+        episodes = [(log, episode) for log in logs for episode in log.episodes]
+        self._R_WS = np.concatenate(
+            [rotation_matrices(episode["R_WS"]) for _, episode in episodes]
+        )
+        self._time = np.concatenate([_clock(episode) for _, episode in episodes])
+        self.measurements = Measurements(
+            np.concatenate([sensor_wrench(log.header, e) for log, e in episodes]),
+            _channels(),
+            np.repeat(np.arange(len(episodes)), [e.rows for _, e in episodes]),
+            tuple(f"{log.folder.name}/{e.name}" for log, e in episodes),
+        )
+        self._refuse_other_parameters()
+
+    def predict(self, theta: Array, rows: slice) -> Array:
+        """See LogModel."""
+        effects = [
+            effect
+            for effect in self.scenario_at(theta).effects
+            if isinstance(effect, SensorEffect)
+        ]
+        readings = []
+        for R_WS, time in zip(self._R_WS[rows], self._time[rows], strict=True):
+            sensing = Sensing(float(time), RotationMatrix(R_WS), _GRAVITY_W)
+            reading = weight_wrench(
+                self._mass, self._p_SoScm_S, sensing.R_WS, _GRAVITY_W
+            )
+            for effect in effects:
+                reading = effect.apply(reading, sensing)
+            readings.append(reading)
+        return np.array(readings)
+
+    @property
+    def noise_groups(self) -> tuple[str, ...]:
+        """Force axes share one unknown noise, torque axes another.
+
+        Estimated one by one, an axis that happens to fit well would outvote the rest.
+        """
+        return tuple(channel.unit for channel in self.measurements.channels)
+
+    def chunks(self) -> list[slice]:
+        """See LogModel."""
+        return [slice(0, self.measurements.rows)]
+
+    def of_episodes(self, episodes: Sequence[int]) -> Self:
+        """See LogModel."""
+        mask = row_mask(self.measurements, episodes)
+        return self._changed(
+            _R_WS=self._R_WS[mask],
+            _time=self._time[mask],
+            measurements=self.measurements.select(mask),
+        )
+
+    def freeze(self, values: Mapping[str, float]) -> Self:
+        """See LogModel."""
+        return self._changed(
+            scenario=with_values(self.scenario, by_path(self.parameters, values)),
+            parameters=tuple(p for p in self.parameters if p.name not in values),
+        )
+
+    def with_measurements(self, measurements: Measurements) -> Self:
+        """See LogModel."""
+        return self._changed(measurements=measurements)
+
+    def scenario_at(self, theta: Array) -> Scenario:
+        """Returns the scenario with the parameters' values (p,) in it."""
+        values = by_name(self.parameters, theta)
+        return with_values(self.scenario, by_path(self.parameters, values))
+
+    def describe(self, theta: Array) -> dict[str, tuple[float, str]]:
+        """Returns weight and centre of mass of what PayloadError stands for."""
+        for effect in self.scenario_at(theta).effects:
+            if isinstance(effect, PayloadError) and effect.mass != 0.0:
+                moment = {"x": effect.cx, "y": effect.cy, "z": effect.cz}
+                weight = effect.mass * float(np.linalg.norm(_GRAVITY_W))
+                centre = {
+                    f"centre of mass {axis}": (value / effect.mass, "m")
+                    for axis, value in moment.items()
+                }
+                return {"weight": (weight, "N"), **centre}
+        return {}
+
+    def _refuse_other_parameters(self) -> None:
+        for parameter in self.parameters:
+            head, _, rest = parameter.path.partition(".")
+            number = rest.partition(".")[0]
+            effect = self.scenario.effects[int(number)] if head == "effects" else None
+            if not isinstance(effect, SensorEffect):
+                raise DisasmError(
+                    f"parameter {parameter.name}: readings at rest do not depend on "
+                    "it; name sensor effects, such as PayloadError.mass SensorBias.fx"
+                )
+
+    def _changed(self, **attributes: Any) -> Self:
+        changed = type(self).__new__(type(self))
+        changed.__dict__.update(self.__dict__ | attributes)
+        return changed
+
+
+def _payload(scenario: Scenario) -> tuple[float, np.ndarray]:
+    tool = Tool.from_models(scenario)
+    return tool.mass, tool.p_SoScm_S
+
+
+def _clock(episode: Episode) -> Array:
+    """Returns the time (rows,) since the log began [s], or the order of readings."""
+    clock: Array = episode["time"] if "time" in episode else episode["order"]
+    return clock - clock[0]
+
+
+def _channels() -> tuple[Channel, ...]:
+    units = ["N"] * 3 + ["N m"] * 3
+    return tuple(
+        Channel(name, unit, np.nan, "estimated")
+        for name, unit in zip(WRENCH, units, strict=True)
+    )

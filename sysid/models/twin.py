@@ -1,0 +1,274 @@
+"""The digital twin as a model of measured transitions (thesis, eq. 4.8)."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+from scipy.spatial.transform import Rotation
+
+from drake_disasm.coordinates import BoltCoordinates
+from drake_disasm.errors import DisasmError
+from drake_disasm.mdp import STATE_NAMES
+from drake_disasm.scenario import Scenario, with_values
+from drake_disasm.spatial import pose_from_vector
+from drake_disasm.task.replay import TwinReplay
+from drake_disasm.tool import Tool
+from sysid.logs import Episode, Log
+from sysid.logs.refusal import refusal
+from sysid.logs.transitions import observations
+from sysid.models.base import (
+    Array,
+    Channel,
+    LogModel,
+    Measurements,
+    PredictionError,
+    even_chunks,
+    row_mask,
+)
+from sysid.parameters import Parameter, by_name, by_path
+
+#: How well a robot's own encoders repeat within an episode, m and rad: below its
+#: repeatability (0.1 mm, against an outside frame), above their resolution.
+POSE_NOISE = (2e-5, 1e-4)
+
+_CHUNK = 32  # transitions: a tenth of a second of work
+
+
+@dataclasses.dataclass(frozen=True)
+class Steps:
+    """Measured steps as the twin's coordinates; a row is a step.
+
+    Attributes:
+        index: (n,) periods since the episode began.
+        q, v: (n, 6) measured coordinates at the step's start, and their rates, by
+            difference from the step before.
+        qd, qd_rate: (n, 6) commanded coordinates then, and their rate in the step.
+    """
+
+    index: NDArray[np.int64]
+    q: Array
+    v: Array
+    qd: Array
+    qd_rate: Array
+
+    def select(self, mask: NDArray[np.bool_]) -> Self:
+        """Returns the steps where the mask (n,) is true."""
+        return dataclasses.replace(
+            self,
+            **{f.name: getattr(self, f.name)[mask] for f in dataclasses.fields(self)},
+        )
+
+
+class TwinModel(LogModel):
+    """The twin replays measured commands; its next states are compared.
+
+    Channels are the bolt's pose in G (x, y, z, u, v, w) and the processed wrench,
+    taken back to the sensor's origin and axes (fx ... tz), where the noise of the
+    six channels is independent. Shifted to the bolt, force noise times the lever
+    would be in the torques, too.
+
+    With `rollout` false, each transition is simulated from its *measured* previous
+    state (eq. 4.8). With `rollout` true an episode is simulated whole from its first
+    state, and each of its states is compared: errors add up there, so effects too
+    small for one step show.
+    """
+
+    def __init__(
+        self,
+        logs: Sequence[Log],
+        scenario: Scenario,
+        parameters: Sequence[Parameter],
+        rollout: bool = False,
+        coarse: bool = True,
+    ) -> None:
+        """Takes the steps out of the logs.
+
+        Args:
+            logs: of transitions.
+            scenario: what the twin is at the parameters' nominal values.
+            parameters: paths in that scenario.
+            rollout: whether episodes are simulated whole.
+            coarse: whether a transition may begin in coarse steps (`TwinReplay`).
+
+        Raises:
+            DisasmError: a log is of another kind or period.
+        """
+        self.parameters = tuple(parameters)
+        self.scenario, self.rollout, self.coarse = scenario, rollout, coarse
+        self._X_SB = Tool.from_models(scenario).X_SB
+        episodes = [(log, episode) for log in logs for episode in log.episodes]
+        for log in logs:
+            _refuse_other_logs(log, scenario)
+        self.steps = _concatenated([_steps(e, scenario) for _, e in episodes])
+        states = [observations(episode)[1:] for _, episode in episodes]
+        self.measurements = Measurements(
+            at_sensor(np.concatenate(states), self._X_SB),
+            _channels(scenario),
+            np.repeat(np.arange(len(states)), [len(s) for s in states]),
+            tuple(f"{log.folder.name}/{episode.name}" for log, episode in episodes),
+        )
+        self._replay: TwinReplay | None = None
+        self._theta: bytes | None = None
+
+    def predict(self, theta: Array, rows: slice) -> Array:
+        """See LogModel."""
+        try:
+            replay = self._replay_at(theta)
+            return at_sensor(self._simulate(replay, rows), self._X_SB)
+        except (RuntimeError, DisasmError, ValueError) as error:
+            self._replay = self._theta = None
+            text = " ".join(str(error).split())
+            raise PredictionError(text) from None
+
+    def chunks(self) -> list[slice]:
+        """See LogModel; a rollout can't be cut within an episode."""
+        if not self.rollout:
+            return even_chunks(self.measurements.rows, _CHUNK)
+        starts = np.flatnonzero(np.diff(self.measurements.episode, prepend=-1))
+        ends = [*starts[1:], self.measurements.rows]
+        return [slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True)]
+
+    def of_episodes(self, episodes: Sequence[int]) -> Self:
+        """See LogModel."""
+        return self._selected(row_mask(self.measurements, episodes))
+
+    def thin(self, every: int) -> Self:
+        """See LogModel; a rollout keeps every n-th episode."""
+        rows = np.arange(self.measurements.rows)
+        of = self.measurements.episode if self.rollout else rows
+        return self._selected(of % every == 0)
+
+    def freeze(self, values: Mapping[str, float]) -> Self:
+        """See LogModel."""
+        return self._changed(
+            scenario=with_values(self.scenario, by_path(self.parameters, values)),
+            parameters=tuple(p for p in self.parameters if p.name not in values),
+        )
+
+    def with_measurements(self, measurements: Measurements) -> Self:
+        """See LogModel."""
+        return self._changed(measurements=measurements)
+
+    def scenario_at(self, theta: Array) -> Scenario:
+        """Returns the scenario with the parameters' values (p,) in it."""
+        values = by_name(self.parameters, theta)
+        return with_values(self.scenario, by_path(self.parameters, values))
+
+    def _selected(self, mask: NDArray[np.bool_]) -> Self:
+        return self._changed(
+            steps=self.steps.select(mask),
+            measurements=self.measurements.select(mask),
+        )
+
+    def _changed(self, **attributes: Any) -> Self:
+        changed = type(self).__new__(type(self))
+        changed.__dict__.update(self.__getstate__() | attributes)
+        return changed
+
+    def _replay_at(self, theta: Array) -> TwinReplay:
+        """Returns the twin at parameters (p,); a change takes some 10 ms."""
+        if self._replay is None:
+            scenario, coarse = self.scenario_at(theta), self.coarse and not self.rollout
+            self._replay = TwinReplay(scenario, coarse)
+        elif self._theta != theta.tobytes():
+            self._replay.become(self.scenario_at(theta))
+        self._theta = theta.tobytes()
+        return self._replay
+
+    def _simulate(self, replay: TwinReplay, rows: slice) -> Array:
+        """Returns the states (len(rows), 12) after each step."""
+        steps, states = self.steps, []
+        for i in range(rows.start, rows.stop):
+            if not self.rollout or i == rows.start:
+                replay.start(int(steps.index[i]), steps.q[i], steps.v[i], steps.qd[i])
+            states.append(replay.advance(steps.qd_rate[i]))
+        return np.array(states)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leaves the diagram out: each worker builds its own."""
+        return self.__dict__ | {"_replay": None, "_theta": None}
+
+
+def at_sensor(states: Array, X_SB: RigidTransform) -> Array:
+    """Returns states with the wrench at So in S in place of that at Bo in G.
+
+    The inverse of the last step of observation processing.
+
+    Args:
+        states: (n, 12), position, rotation vector and wrench [f; tau] at Bo, in G.
+        X_SB: the bolt in the sensor's frame.
+    """
+    X_BS = X_SB.inverse()
+    R_GB = Rotation.from_rotvec(states[:, 3:6]).as_matrix()
+    p_BoSo_G = R_GB @ X_BS.translation()
+    f_G, t_Bo_G = states[:, 6:9], states[:, 9:12]
+    t_So_G = t_Bo_G - np.cross(p_BoSo_G, f_G)
+    R_GS = R_GB @ X_BS.rotation().matrix()
+    in_S = [np.einsum("nij,ni->nj", R_GS, vector) for vector in (f_G, t_So_G)]
+    return np.hstack([states[:, :6], *in_S])
+
+
+def _channels(scenario: Scenario) -> tuple[Channel, ...]:
+    units = ["m"] * 3 + ["rad"] * 3 + ["N"] * 3 + ["N m"] * 3
+    sensor = scenario.ft_sensor
+    counts = np.array(sensor.quantum) / np.sqrt(12.0)
+    wrench = np.hypot(sensor.noise, counts)
+    noise = [POSE_NOISE[0]] * 3 + [POSE_NOISE[1]] * 3 + wrench.tolist()
+    if min(noise) <= 0.0:
+        raise DisasmError(
+            "ft_sensor.noise: is zero with a zero quantum; channels are weighted by "
+            "their noise, give the sensor's"
+        )
+    origins = ["repeatability of the arm"] * 6 + ["ft_sensor.noise"] * 6
+    return tuple(
+        Channel(*row) for row in zip(STATE_NAMES, units, noise, origins, strict=True)
+    )
+
+
+def _refuse_other_logs(log: Log, scenario: Scenario) -> None:
+    where = log.folder / "log.yaml"
+    if log.header.kind != "transitions":
+        raise refusal(
+            where,
+            f"a log of kind '{log.header.kind}', the twin predicts 'transitions'",
+            "name a log that tools/simulate.py --record or the cell wrote",
+        )
+    period = log.header.period
+    if period is None or abs(period - scenario.task.period) > 1e-9:
+        raise refusal(
+            where,
+            f"period {period} s, the scenario has task.period {scenario.task.period} s",
+            "give the scenario that was recorded, or --set task.period",
+        )
+
+
+def _steps(episode: Episode, scenario: Scenario) -> Steps:
+    measured = _coordinates(episode["X_GB_measured"])
+    commanded = _coordinates(episode["X_GB_commanded"])
+    period = scenario.task.period
+    rates = np.diff(measured, axis=0) / period
+    return Steps(
+        np.arange(episode.rows - 1),
+        measured[:-1],
+        np.vstack([np.zeros((1, 6)), rates[:-1]]),
+        commanded[:-1],
+        np.diff(commanded, axis=0) / period,
+    )
+
+
+def _coordinates(poses: Array) -> Array:
+    """Returns the twin's coordinates (n, 6) of poses (n, 7)."""
+    twin = BoltCoordinates()
+    return np.array([twin.solve(pose_from_vector(p), np.zeros(6)) for p in poses])
+
+
+def _concatenated(parts: Sequence[Steps]) -> Steps:
+    return Steps(
+        *(
+            np.concatenate([getattr(part, f.name) for part in parts])
+            for f in dataclasses.fields(Steps)
+        )
+    )

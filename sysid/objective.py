@@ -1,0 +1,105 @@
+"""How far a model is from a log: eq. 4.8, weighted by the channels' noise."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models.base import Array, LogModel
+from sysid.parameters import Scaling
+from sysid.workers import Workers
+
+#: What every weighted residual counts as where the simulation failed: a million
+#: times the noise, worse than any fit, and finite. Others are held below it.
+FAILED_RESIDUAL = 1e6
+
+
+class Objective:
+    """f(theta) = sqrt(mean (r / sigma)^2), the rms residual in units of the noise.
+
+    It is eq. 4.8's (1/n) ||s'_real - s'_sim||_2 with each channel divided by its
+    standard deviation, times a constant, sqrt(n / channels): it orders parameters
+    alike, does not depend on the size of the log, and 1 means "as good as the
+    sensors". A theta at which the simulation fails counts as FAILED_RESIDUAL in
+    every channel of every row.
+
+    With a finite `huber`, a residual beyond that many standard deviations counts
+    linearly instead of squared (Huber 1964): a transition in which the bolt runs into
+    the stop misses by fifty times the noise over a millisecond's difference, and a
+    handful of those would otherwise outvote all others.
+
+    Attributes:
+        model: predicts.
+        huber: where squares end; infinity has them everywhere, as eq. 4.8 does.
+        scaling: between parameters and the unit box.
+        evaluations: parameter sets simulated so far.
+        failures: those at which the simulation failed, each with the reason.
+    """
+
+    def __init__(
+        self, model: LogModel, workers: Workers, huber: float = np.inf
+    ) -> None:
+        self.model, self.huber = model, huber
+        self.scaling = Scaling(model.parameters)
+        self.evaluations = 0
+        self.failures: list[tuple[Array, str]] = []
+        self._workers = workers
+
+    def __call__(self, thetas: Array) -> Array:
+        """Returns the values (b,) of parameter sets (b, p)."""
+        return np.array([self.value(r) for r in self.residuals(thetas)])
+
+    def value(self, residual: Array) -> float:
+        """Returns f of weighted residuals (rows, channels)."""
+        return rms(tempered(residual, self.huber))
+
+    def residuals(self, thetas: Array) -> list[Array]:
+        """Returns the weighted residuals (rows, channels) of each of (b, p) sets.
+
+        The sum over rows is the caller's, in their order, so that no value depends
+        on how many workers shared the work.
+        """
+        thetas = np.atleast_2d(thetas)
+        chunks = self.model.chunks()
+        work = [(theta, rows) for theta in thetas for rows in chunks]
+        parts = self._workers.predict(self.model, work)
+        self.evaluations += len(thetas)
+        return [
+            self._weighted(theta, parts[i * len(chunks) : (i + 1) * len(chunks)])
+            for i, theta in enumerate(thetas)
+        ]
+
+    def predictions(self, theta: Array) -> Array:
+        """Returns what the model says at (p,), in SI units, (rows, channels)."""
+        measured = self.model.measurements
+        return measured.values + self.residuals(theta)[0] * measured.noise
+
+    def _weighted(self, theta: Array, parts: Sequence[Array | str]) -> Array:
+        measured = self.model.measurements
+        predicted: list[Array] = []
+        for part in parts:
+            if isinstance(part, str):
+                self.failures.append((theta, part))
+                return np.full(measured.values.shape, FAILED_RESIDUAL)
+            predicted.append(part)
+        residual = (np.concatenate(predicted) - measured.values) / measured.noise
+        return np.clip(residual, -FAILED_RESIDUAL, FAILED_RESIDUAL)
+
+
+def tempered(residual: Array, huber: float) -> Array:
+    """Returns residuals whose squares are Huber's loss, signs kept."""
+    size = np.abs(residual)
+    if huber == np.inf:
+        return residual
+    bent = np.sqrt(np.maximum(2.0 * huber * size - huber**2, 0.0))
+    return np.where(size <= huber, residual, np.sign(residual) * bent)
+
+
+def huber_weights(residual: Array, huber: float) -> Array:
+    """Returns the weight of each residual in a least-squares step, 1 within `huber`."""
+    return np.minimum(1.0, huber / np.maximum(np.abs(residual), 1e-300))
+
+
+def rms(residual: NDArray[np.float64]) -> float:
+    """Returns the root mean square of all elements."""
+    return float(np.sqrt(np.mean(np.square(residual))))

@@ -1,0 +1,12 @@
+"""Derivative-free minimisation within a box: the Bees Algorithm, and NLopt beside it.
+
+Each search takes a function of a *batch* of points, so that whoever evaluates them
+can do so in parallel, and returns a `Trace` of all that it evaluated.
+"""
+
+from sysid.optimise.bees import BeesAlgorithm, BeesSettings
+from sysid.optimise.coordinates import Box, Whitened
+from sysid.optimise.nlopt_search import nlopt_search
+from sysid.optimise.trace import Trace
+
+__all__ = ["BeesAlgorithm", "BeesSettings", "Box", "Trace", "Whitened", "nlopt_search"]

@@ -1,0 +1,162 @@
+"""The pictures of a report, as pure functions of a result."""
+
+import base64
+import io
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from sysid.identification.profile import Profile
+from sysid.identification.result import Comparison, Identified, MethodResult
+from sysid.models.base import Channel
+
+Array = NDArray[np.float64]
+
+_COLOURS = {"bees": "#d98c00", "nlopt": "#2060a0"}
+_BEFORE, _AFTER, _MEASURED = "#b0b0b0", "#c03030", "#202020"
+_SHOWN_ROWS = 400
+_DPI = 100
+
+
+def as_data_url(figure: Figure) -> str:
+    """Returns a figure as a PNG inside a `data:` address."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=_DPI)
+    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+
+
+def fit_figure(comparison: Comparison, channels: Sequence[Channel]) -> Figure:
+    """Returns measured and predicted channels over the first rows."""
+    columns = 3 if len(channels) > 3 else len(channels)
+    lines = -(-len(channels) // columns)
+    figure = Figure(figsize=(4.2 * columns, 2.1 * lines), layout="constrained")
+    axes = figure.subplots(lines, columns, squeeze=False, sharex=True).reshape(-1)
+    rows = slice(0, _SHOWN_ROWS)
+    for i, (ax, channel) in enumerate(zip(axes, channels, strict=False)):
+        ax.plot(comparison.before[rows, i], color=_BEFORE, lw=1.0, label="before")
+        ax.plot(comparison.after[rows, i], color=_AFTER, lw=1.2, label="after")
+        ax.plot(comparison.measured[rows, i], ".", color=_MEASURED, ms=2.5, zorder=3)
+        _mark_episodes(ax, comparison.episode[rows])
+        _zoom(ax, comparison.measured[rows, i], comparison.after[rows, i])
+        ax.set_title(f"{channel.name} [{channel.unit}]", fontsize=9)
+        ax.tick_params(labelsize=7)
+    for ax in axes[len(channels) :]:
+        ax.set_visible(False)
+    axes[0].plot([], [], ".", color=_MEASURED, label="measured")
+    axes[0].legend(fontsize=7)
+    figure.supxlabel("row", fontsize=9)
+    return figure
+
+
+def residual_figure(comparison: Comparison, channels: Sequence[Channel]) -> Figure:
+    """Returns each channel's rms error before and after, in units of its noise."""
+    noise = np.array([channel.noise for channel in channels])
+    figure = Figure(figsize=(8.5, 2.8), layout="constrained")
+    ax = figure.subplots()
+    place = np.arange(len(channels))
+    for shift, predicted, colour, label in (
+        (-0.2, comparison.before, _BEFORE, "before"),
+        (0.2, comparison.after, _AFTER, "after"),
+    ):
+        size = comparison.rms(predicted) / noise
+        ax.bar(place + shift, np.maximum(size, 1e-3), 0.4, color=colour, label=label)
+    ax.axhline(1.0, color=_MEASURED, lw=0.8, ls="--", label="noise")
+    ax.set_yscale("log")
+    ax.set_xticks(place, [c.name for c in channels], fontsize=8, rotation=30)
+    ax.set_ylabel("rms residual / noise", fontsize=9)
+    ax.legend(fontsize=8, ncols=3)
+    return figure
+
+
+def trace_figure(methods: Sequence[MethodResult], floor: float) -> Figure:
+    """Returns best value against evaluations, as the thesis's figure 4.6."""
+    names = [part.name.split(", ")[1] for part in methods[0].parts]
+    figure = Figure(figsize=(4.4 * len(names), 3.2), layout="constrained")
+    for number, ax in enumerate(np.atleast_1d(figure.subplots(1, len(names)))):
+        for method in methods:
+            _draw_trace(ax, method, number)
+        ax.axhline(floor, color=_MEASURED, lw=0.8, ls="--", label="perfect model")
+        rows = methods[0].parts[number].rows
+        ax.set_title(f"{names[number]} search, {rows} rows", fontsize=9)
+        ax.set_yscale("log")
+        ax.set_xlabel("evaluations", fontsize=9)
+        ax.set_ylabel("objective, best so far", fontsize=9)
+        ax.legend(fontsize=8)
+    return figure
+
+
+def correlation_figure(found: Identified) -> Figure:
+    """Returns the correlation of the estimates as a coloured matrix."""
+    names = [p.name for p in found.parameters]
+    size = min(3.0 + 0.45 * len(names), 12.0)
+    figure = Figure(figsize=(size + 1.0, size), layout="constrained")
+    ax = figure.subplots()
+    C = found.spread.correlation
+    image = ax.imshow(C, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+    figure.colorbar(image, ax=ax, shrink=0.7)
+    ax.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
+    ax.set_yticks(range(len(names)), names, fontsize=7)
+    if len(names) <= 12:
+        for i, j in np.ndindex(C.shape):
+            dark = abs(C[i, j]) > 0.6
+            ax.text(j, i, f"{C[i, j]:.2f}", ha="center", va="center", fontsize=7,
+                    color="white" if dark else "black")  # fmt: skip
+    return figure
+
+
+def identifiability_figure(found: Identified) -> Figure:
+    """Returns how closely the log fixes each orthogonal combination."""
+    figure = Figure(figsize=(6.5, 2.6), layout="constrained")
+    ax = figure.subplots()
+    for label, sensed, colour in (
+        ("at the start", found.before, _BEFORE),
+        ("at the result", found.after, _AFTER),
+    ):
+        widths = [c.interval for c in sensed.combinations]
+        ax.plot(
+            range(1, len(widths) + 1), widths, "o-", ms=4, color=colour, label=label
+        )
+    ax.axhline(0.5, color=_MEASURED, ls="--", lw=0.8, label="not fixed above")
+    ax.set_yscale("log")
+    ax.set_xlabel("combination, the best fixed first", fontsize=9)
+    ax.set_ylabel("95 % half width / range", fontsize=9)
+    ax.legend(fontsize=8)
+    return figure
+
+
+def profile_figure(profiles: Sequence[Profile]) -> Figure:
+    """Returns profile likelihoods with the edge of the 95 % interval."""
+    figure = Figure(figsize=(3.6 * len(profiles), 2.8), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(1, len(profiles)))
+    for ax, p in zip(axes, profiles, strict=True):
+        ax.plot(p.theta, p.values, "o-", ms=4, color=_AFTER)
+        ax.axhline(p.edge, color=_MEASURED, ls="--", lw=0.8)
+        ax.set_title(p.name, fontsize=9)
+        ax.tick_params(labelsize=7)
+    return figure
+
+
+def _draw_trace(ax: Axes, method: MethodResult, number: int) -> None:
+    trace = method.parts[number].trace
+    evaluations = np.arange(1, trace.evaluations + 1)
+    colour = _COLOURS.get(method.name)
+    ax.step(
+        evaluations, trace.best_so_far(), where="post", color=colour, label=method.name
+    )
+    ax.plot(evaluations, trace.values, ".", ms=1.5, color=colour, alpha=0.4)
+
+
+def _mark_episodes(ax: Axes, episode: NDArray[np.int64]) -> None:
+    for row in np.flatnonzero(np.diff(episode)) + 1:
+        ax.axvline(float(row), color="#d0d0d0", lw=0.6, zorder=0)
+
+
+def _zoom(ax: Axes, measured: Array, after: Array) -> None:
+    """Shows measured and fitted values whole; before the fit anything may be."""
+    values = np.concatenate([measured, after])
+    low, high = float(values.min()), float(values.max())
+    margin = 0.08 * (high - low) or 1e-9
+    ax.set_ylim(low - margin, high + margin)

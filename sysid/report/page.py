@@ -1,0 +1,78 @@
+"""The page: a result and its pictures in a template."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import jinja2
+
+from sysid.identification.plain import to_mapping
+from sysid.identification.result import Identified
+from sysid.report import figures
+
+_ENVIRONMENT = jinja2.Environment(
+    loader=jinja2.PackageLoader("sysid.report", "."),
+    autoescape=True,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    undefined=jinja2.StrictUndefined,
+)
+
+
+def _number(value: float) -> str:
+    return f"{value:.5g}"
+
+
+_ENVIRONMENT.filters["number"] = _number
+
+
+def report_page(found: Identified, origin: Mapping[str, Any]) -> str:
+    """Returns the report of a result as one HTML page that needs nothing else.
+
+    Args:
+        found: the result.
+        origin: where it is from, as `result.json` has it.
+    """
+    shown = found.held_out or found.fitted
+    template = _ENVIRONMENT.get_template("identification.html.j2")
+    return template.render(
+        result=to_mapping(found),
+        shown="held-out" if found.held_out else "fitted",
+        pictures=_pictures(found, shown),
+        origin=origin,
+        conclusion=_conclusion(found),
+    )
+
+
+def _pictures(found: Identified, shown: Any) -> dict[str, str]:
+    methods = list(found.methods.values())
+    drawn = {
+        "fit": figures.fit_figure(shown, found.channels),
+        "residual": figures.residual_figure(shown, found.channels),
+        "traces": figures.trace_figure(methods, found.floor),
+        "correlation": figures.correlation_figure(found),
+        "identifiability": figures.identifiability_figure(found),
+    }
+    if found.profiles:
+        drawn["profiles"] = figures.profile_figure(found.profiles)
+    return {name: figures.as_data_url(figure) for name, figure in drawn.items()}
+
+
+def _conclusion(found: Identified) -> str:
+    """Returns one sentence on whether the model explains the log."""
+    judged, where = found.fitted, "fitted"
+    if found.held_out:
+        judged, where = found.held_out, "held-out"
+    ratio = judged.value_after / found.floor
+    if any(channel.origin == "first fit" for channel in found.channels):
+        coloured = int((found.whiteness < 0.05).sum())
+        return (
+            "The sensors' noise is not stated, so it was estimated from this fit. "
+            f"{coloured} of {len(found.channels)} channels leave a residual that does "
+            "not look like noise (Ljung-Box, p < 0.05)."
+        )
+    if ratio < 1.1:
+        return f"The model explains the {where} rows down to the sensors' noise."
+    return (
+        f"The {where} rows are off by {ratio:.1f} times what noise explains: the model "
+        "lacks something, or a channel's noise is stated too small."
+    )

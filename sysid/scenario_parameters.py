@@ -1,0 +1,220 @@
+"""Which numbers of a scenario can be identified, and how users name them."""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from drake_disasm.effects import EFFECTS
+from drake_disasm.errors import DisasmError
+from drake_disasm.quantity import closest
+from drake_disasm.scenario import Scenario
+from sysid.parameters import Parameter
+
+_EFFECTS = {effect.__name__: effect for effect in EFFECTS}
+_KEYS = ("low", "high", "nominal", "scale")
+_SCALES = ("linear", "log")
+_DECADES = 1e3  # bounds that span more are searched by logarithm
+
+
+@dataclasses.dataclass(frozen=True)
+class Request:
+    """What a user asks of one parameter; None leaves the scenario's own.
+
+    Attributes:
+        name: `section.field`, `section.list.0`, `effects.0.field`, or `Effect.field`,
+            which adds the effect at its null value if the scenario has none.
+        low, high: bounds.
+        nominal: where the search begins.
+        scale: "linear" or "log".
+    """
+
+    name: str
+    low: float | None = None
+    high: float | None = None
+    nominal: float | None = None
+    scale: str | None = None
+
+
+def read_requests(words: Sequence[str]) -> list[Request]:
+    """Returns what a command line's names and files ask for.
+
+    Args:
+        words: names, or YAML files with a mapping of names to `{low, high, nominal,
+            scale}`, each of which may be left out.
+
+    Raises:
+        DisasmError: an unreadable file, an unknown key, a value that is no number,
+            a name given twice.
+    """
+    requests = [
+        request
+        for word in words
+        for request in (
+            _read_file(Path(word))
+            if word.endswith((".yaml", ".yml"))
+            else [Request(word)]
+        )
+    ]
+    names = [request.name for request in requests]
+    for name in names:
+        if names.count(name) > 1:
+            raise DisasmError(f"parameter {name}: is given twice; keep one")
+    if not requests:
+        raise DisasmError(
+            "no parameter is named; give --parameters, for example "
+            "contact.friction GroovePose.ry"
+        )
+    return requests
+
+
+def scenario_parameters(
+    scenario: Scenario, requests: Sequence[Request]
+) -> tuple[Scenario, tuple[Parameter, ...]]:
+    """Returns the parameters asked for, and the scenario that has them all.
+
+    The scenario has one more effect for each that was named and not there, at its
+    null value.
+
+    Raises:
+        DisasmError: there is no such number, or its bounds can't be.
+    """
+    scenario = dataclasses.replace(scenario, effects=list(scenario.effects))
+    found = []
+    for request in requests:
+        path = _path(scenario, request.name)
+        value, metadata = _leaf(scenario, path)
+        found.append(_parameter(path, value, metadata, request))
+    return scenario, tuple(found)
+
+
+def _path(scenario: Scenario, name: str) -> str:
+    """Returns the path of a name, adding the effect that it speaks of."""
+    effect, _, field = name.partition(".")
+    if effect not in _EFFECTS:
+        return name
+    numbers = [i for i, e in enumerate(scenario.effects) if type(e).__name__ == effect]
+    if len(numbers) > 1:
+        raise DisasmError(
+            f"parameter {name}: the scenario lists {effect} {len(numbers)} times; "
+            f"write effects.{numbers[0]}.{field}"
+        )
+    if not numbers:
+        scenario.effects.append(_EFFECTS[effect]())
+        numbers = [len(scenario.effects) - 1]
+    return f"effects.{numbers[0]}.{field}"
+
+
+def _leaf(scenario: Scenario, path: str) -> tuple[float, Mapping[str, Any]]:
+    """Returns the value at a path and what its field says of it."""
+    value: Any = scenario
+    metadata: Mapping[str, Any] = {}
+    for part in path.split("."):
+        if isinstance(value, list):
+            value = _item(value, part, path)
+            continue
+        fields = (
+            {f.name: f for f in dataclasses.fields(value)}
+            if dataclasses.is_dataclass(value)
+            else {}
+        )
+        if part not in fields:
+            known = [*fields, *(_EFFECTS if value is scenario else [])]
+            raise DisasmError(
+                f"parameter {path}: '{part}' does not exist; {closest(part, known)}"
+            )
+        metadata, value = fields[part].metadata, getattr(value, part)
+    if not isinstance(value, float) or not math.isfinite(metadata.get("low", math.inf)):
+        raise DisasmError(
+            f"parameter {path}: is no number that can vary; name one such as "
+            "contact.friction, twin.stiffness.0 or GroovePose.ry"
+        )
+    return value, metadata
+
+
+def _item(values: list[Any], part: str, path: str) -> Any:
+    if part.isdecimal() and int(part) < len(values):
+        return values[int(part)]
+    raise DisasmError(
+        f"parameter {path}: there is no number {part} of {len(values)}; count from 0"
+    )
+
+
+def _parameter(
+    path: str, value: float, metadata: Mapping[str, Any], request: Request
+) -> Parameter:
+    low = metadata["low"] if request.low is None else request.low
+    high = metadata["high"] if request.high is None else request.high
+    _refuse_beyond(path, low, high, metadata)
+    scale = request.scale or ("log" if low > 0 and high > _DECADES * low else "linear")
+    return Parameter(
+        request.name,
+        value if request.nominal is None else request.nominal,
+        low,
+        high,
+        metadata["unit"],
+        metadata["doc"],
+        scale == "log",
+        path,
+    )
+
+
+def _refuse_beyond(
+    path: str, low: float, high: float, metadata: Mapping[str, Any]
+) -> None:
+    """Refuses a search where the scenario's own check would refuse the result."""
+    own_low, own_high = metadata["low"], metadata["high"]
+    if low < own_low or high > own_high:
+        if not (math.isfinite(low) and math.isfinite(high)):
+            return  # Parameter says it better
+        raise DisasmError(
+            f"parameter {path}: bounds {low:g} to {high:g} go beyond {own_low:g} to "
+            f"{own_high:g} {metadata['unit']}, which a scenario may have; narrow them"
+        )
+
+
+def _read_file(path: Path) -> list[Request]:
+    try:
+        raw = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise DisasmError(
+            f"{path}: can't be read ({error}); name a YAML file"
+        ) from None
+    except yaml.YAMLError as error:
+        text = " ".join(str(error).split())
+        raise DisasmError(f"{path}: not YAML ({text}); mend it") from None
+    if not isinstance(raw, dict) or not raw:
+        raise DisasmError(
+            f"{path}: is no mapping; write lines of `contact.friction: "
+            "{low: 0.0, high: 1.0}`"
+        )
+    return [_request(str(name), entry, path) for name, entry in raw.items()]
+
+
+def _request(name: str, entry: Any, path: Path) -> Request:
+    entry = entry or {}
+    if not isinstance(entry, dict):
+        raise DisasmError(
+            f"{path}: {name}: is no mapping; write {{low: ..., high: ...}}"
+        )
+    for key, value in entry.items():
+        if key not in _KEYS:
+            raise DisasmError(
+                f"{path}: {name}: unknown key '{key}'; {closest(str(key), list(_KEYS))}"
+            )
+        if key == "scale" and value not in _SCALES:
+            raise DisasmError(f"{path}: {name}: scale '{value}'; use linear or log")
+        if key != "scale" and (isinstance(value, bool) or not _is_number(value)):
+            raise DisasmError(
+                f"{path}: {name}: {key} is {value!r}; give a number (YAML reads 1e-3 "
+                "as a text, 1.0e-3 as a number)"
+            )
+    numbers = {k: float(v) for k, v in entry.items() if k != "scale"}
+    return Request(name, **numbers, scale=entry.get("scale"))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float)

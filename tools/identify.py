@@ -1,0 +1,321 @@
+"""Finds the parameters of a model from a measured log, and how sure they are.
+
+The log says what is fitted: transitions of the task by the digital twin, readings of
+a force/torque sensor at rest by payload and bias, joint torques of an arm by its
+rigid-body dynamics. Two searches, the Bees Algorithm and NLopt, check each other.
+Writes the identified scenario, `result.json`, and a report that opens offline.
+"""
+
+import argparse
+import json
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import cli
+import numpy as np
+from tqdm import tqdm
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
+from drake_disasm.writing import write_atomically
+from sysid.identification.journal import Journal
+from sysid.identification.pipeline import Settings, identify
+from sysid.identification.plain import summary, to_mapping
+from sysid.identification.result import Identified
+from sysid.identification.search import METHODS, Effort
+from sysid.identification.split import split_episodes
+from sysid.logs import Log, read_logs
+from sysid.models import LogModel
+from sysid.models.from_logs import OBJECTIVES, ModelChoice, model_of
+from sysid.optimise import BeesSettings
+from sysid.report import report_page
+from sysid.scenario_parameters import read_requests
+from sysid.workers import Workers
+
+_THESIS_CYCLES = 10
+_EXAMPLES = """examples:
+  python tools/simulate.py --model cell --policy admittance --explore 0.15 \\
+      --episodes 11 --no-meshcat --scenario removal --hidden removal_turned \\
+      --record out/log
+  python tools/identify.py --log out/log --out out/fit \\
+      --parameters contact.friction lock.clearance GroovePose.ry
+  python tools/simulate.py --scenario out/fit/scenario.yaml
+  python tools/identify.py --log out/log --parameters bounds.yaml --out out/fit2
+  python tools/identify.py --log readings --out out/sensor       a static_wrench log
+  python tools/identify.py --log run_1 run_2 --held-out run_2 --out out/arm
+
+A file of parameters has lines like
+  contact.friction: {low: 0.0, high: 0.6}
+  contact.modulus: {low: 1.0e+8, high: 1.0e+10, scale: log}
+"""
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    parser = argparse.ArgumentParser(
+        prog="identify.py",
+        description=__doc__,
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    _add_input_arguments(parser.add_argument)
+    _add_search_arguments(parser.add_argument)
+    _add_judgement_arguments(parser.add_argument)
+    args = parser.parse_args(arguments)
+    if args.preset == "thesis" and args.cycles is None and args.budget is None:
+        args.cycles = _THESIS_CYCLES
+    return args
+
+
+def _add_input_arguments(add: Callable[..., object]) -> None:
+    add("--log", nargs="+", required=True, metavar="DIR", help="logs of one kind")
+    add(
+        "--scenario",
+        metavar="NAME|FILE",
+        help="what the model begins with (default: what the log states)",
+    )
+    add(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        dest="overrides",
+        help="override one field of --scenario; repeatable",
+    )
+    add(
+        "--parameters",
+        nargs="+",
+        default=[],
+        metavar="NAME|FILE",
+        help="what to identify: section.field, Effect.field, or a YAML file with "
+        "bounds (default for static_wrench and joint_motion: all there are)",
+    )
+    add(
+        "--objective",
+        choices=[name for names in OBJECTIVES.values() for name in names],
+        help="what is compared: for transitions each step from its measured state "
+        "(default), or whole episodes by rollout",
+    )
+    add("--urdf", metavar="FILE", help="the arm of a joint_motion log")
+    add(
+        "--noise",
+        action="append",
+        default=[],
+        metavar="CHANNEL=SIGMA",
+        type=_assignment,
+        help="standard deviation of a channel, SI (default: the sensor's); repeatable",
+    )
+    add("--out", required=True, type=Path, metavar="DIR", help="an empty folder")
+    add("--resume", action="store_true", help="go on with what is in --out")
+
+
+def _add_search_arguments(add: Callable[..., object]) -> None:
+    add(
+        "--method",
+        choices=[*METHODS, "both"],
+        default="both",
+        help="Bees Algorithm, NLopt (CRS2), or both, compared (default)",
+    )
+    add(
+        "--preset",
+        choices=["default", "thesis"],
+        default="default",
+        help="thesis: table 4.2's colony on the raw box and the whole log, without "
+        "Gauss-Newton and with plain squares",
+    )
+    add("--cycles", type=cli.positive, metavar="N", help="of the bees")
+    add(
+        "--budget",
+        type=cli.positive,
+        metavar="N",
+        help="evaluations of each method's global search (default: 300)",
+    )
+    add(
+        "--surrogate",
+        action="store_true",
+        help="a Gaussian process proposes points in place of scouts",
+    )
+    add("--seed", type=int, default=0, help="of the searches (default: 0)")
+    add(
+        "--workers",
+        type=cli.positive,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="processes (default: one per core); any number gives the same bits",
+    )
+    add(
+        "--fine",
+        action="store_true",
+        help="take every transition in the twin's own time step: twice the time, for "
+        "logs of a twin with that step",
+    )
+
+
+def _add_judgement_arguments(add: Callable[..., object]) -> None:
+    add(
+        "--held-out",
+        nargs="+",
+        default=["0.25"],
+        metavar="SHARE|NAME",
+        help="episodes that are not fitted but predicted: a share, or names of logs or "
+        "log/episode_0001 (default: 0.25)",
+    )
+    add(
+        "--huber",
+        type=float,
+        metavar="K",
+        help="residuals beyond K standard deviations count linearly; inf for plain "
+        "squares as in eq. 4.8 (default: 3 for the twin, inf for readings at rest and "
+        "joint torques)",
+    )
+    add(
+        "--unidentifiable",
+        choices=["stop", "freeze"],
+        default="stop",
+        help="what to do with parameters that this log can't tell (default: stop)",
+    )
+    add(
+        "--profile",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="profile likelihood of some parameters, too (seven fits each)",
+    )
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the program; returns its exit status."""
+    args = parse(arguments)
+    logs = read_logs(args.log)
+    model = model_of(logs, _choice(args))
+    train, test = split_episodes(model.measurements.names, _held_out(args))
+    origin = cli.provenance("identify", arguments, args.seed) | _data(logs)
+    journal = Journal(args.out, _identity(args, logs), args.resume)
+    with Workers(args.workers) as workers, _Bars() as bars:
+        settings = _settings(args, model)
+        found = identify(model, train, test, settings, workers, journal, bars)
+    _write(args.out, found, model, origin)
+    print(summary(found))
+    print(f"report: {args.out / 'report.html'}")
+    return 0
+
+
+def _choice(args: argparse.Namespace) -> ModelChoice:
+    scenario: Scenario | None = None
+    if args.scenario:
+        scenario = load_scenario(args.scenario, args.overrides)
+    elif args.overrides:
+        raise DisasmError("--set: say of which --scenario")
+    requests = tuple(read_requests(args.parameters)) if args.parameters else ()
+    return ModelChoice(
+        args.objective, scenario, requests, args.urdf, not args.fine, tuple(args.noise)
+    )
+
+
+def _settings(args: argparse.Namespace, model: LogModel) -> Settings:
+    thesis = args.preset == "thesis"
+    effort = Effort(
+        evaluations=args.budget or 300,
+        cycles=args.cycles,
+        close=0 if thesis else 60,
+        bees=BeesSettings.thesis() if thesis else BeesSettings(),
+        seed=args.seed,
+        propose=_surrogate() if args.surrogate else None,
+    )
+    # Where the model is affine, plain squares have one exact optimum.
+    huber = args.huber or (np.inf if thesis or model.affine else 3.0)
+    if not huber > 0.0:
+        raise DisasmError("--huber: give a number above zero, or inf")
+    methods = METHODS if args.method == "both" else (args.method,)
+    return Settings(methods, effort, huber, args.unidentifiable, tuple(args.profile))
+
+
+def _surrogate() -> Callable[..., np.ndarray]:
+    from sysid.optimise.surrogate import propose  # scikit-learn takes a second
+
+    return propose
+
+
+def _held_out(args: argparse.Namespace) -> Sequence[str] | float:
+    if len(args.held_out) == 1:
+        try:
+            share = float(args.held_out[0])
+        except ValueError:
+            return list(args.held_out)
+        if not 0.0 <= share < 1.0:
+            raise DisasmError(f"--held-out {share:g}: give a share from 0 to below 1")
+        return share
+    return list(args.held_out)
+
+
+def _assignment(text: str) -> tuple[str, float]:
+    name, separator, value = text.partition("=")
+    try:
+        if separator:
+            return name, float(value)
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(f"'{text}': write CHANNEL=NUMBER")
+
+
+def _data(logs: Sequence[Log]) -> dict[str, object]:
+    return {"data": {str(log.folder): log.data_hash for log in logs}}
+
+
+def _identity(args: argparse.Namespace, logs: Sequence[Log]) -> dict[str, object]:
+    """Returns what must be the same for a resumed run to be the same run."""
+    ignored = ("workers", "resume", "out", "log", "profile")
+    kept = {k: v for k, v in vars(args).items() if k not in ignored}
+    return {**kept, "data": [log.data_hash for log in logs]}
+
+
+class _Bars:
+    """A progress bar for the part of the search that runs, with its best value."""
+
+    def __init__(self) -> None:
+        self._name = ""
+        self._bar: tqdm | None = None
+
+    def __call__(self, name: str, done: int, total: int, best: float) -> None:
+        """Shows where a part stands."""
+        cli.stop_if_interrupted()
+        if name != self._name:
+            self._close()
+            self._name = name
+            self._bar = tqdm(total=total or None, desc=name, unit="eval", leave=False)
+        assert self._bar is not None
+        if np.isfinite(best):
+            self._bar.set_postfix(best=f"{best:.4g}", refresh=not total)
+        self._bar.update(done - self._bar.n)
+
+    def __enter__(self) -> "_Bars":
+        """Returns the bars."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Takes the last one away."""
+        self._close()
+
+    def _close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+def _write(
+    folder: Path, found: Identified, model: LogModel, origin: dict[str, object]
+) -> None:
+    mapping = to_mapping(found) | {"provenance": origin}
+    scenario = getattr(model.freeze(found.frozen), "scenario_at", None)
+    if scenario is not None:
+        _write_text(folder / "scenario.yaml", dump_scenario(scenario(found.theta)))
+    _write_text(folder / "result.json", json.dumps(mapping, indent=2) + "\n")
+    _write_text(folder / "report.html", report_page(found, origin))
+
+
+def _write_text(path: Path, text: str) -> None:
+    write_atomically(path, lambda stream: stream.write(text.encode()))
+
+
+if __name__ == "__main__":
+    cli.run(main)
