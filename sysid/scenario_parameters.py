@@ -86,7 +86,7 @@ def scenario_parameters(
     found = []
     for request in requests:
         path = _path(scenario, request.name)
-        value, metadata = _leaf(scenario, path)
+        value, metadata = _leaf(scenario, path, request.name)
         found.append(_parameter(path, value, metadata, request))
     return scenario, tuple(found)
 
@@ -108,13 +108,15 @@ def _path(scenario: Scenario, name: str) -> str:
     return f"effects.{numbers[0]}.{field}"
 
 
-def _leaf(scenario: Scenario, path: str) -> tuple[float, Mapping[str, Any]]:
+def _leaf(
+    scenario: Scenario, path: str, name: str
+) -> tuple[float, Mapping[str, Any]]:
     """Returns the value at a path and what its field says of it."""
     value: Any = scenario
     metadata: Mapping[str, Any] = {}
     for part in path.split("."):
         if isinstance(value, list):
-            value = _item(value, part, path)
+            value = _item(value, part, name)
             continue
         fields = (
             {f.name: f for f in dataclasses.fields(value)}
@@ -124,22 +126,22 @@ def _leaf(scenario: Scenario, path: str) -> tuple[float, Mapping[str, Any]]:
         if part not in fields:
             known = [*fields, *(_EFFECTS if value is scenario else [])]
             raise DisasmError(
-                f"parameter {path}: '{part}' does not exist; {closest(part, known)}"
+                f"parameter {name}: '{part}' does not exist; {closest(part, known)}"
             )
         metadata, value = fields[part].metadata, getattr(value, part)
     if not isinstance(value, float) or not math.isfinite(metadata.get("low", math.inf)):
         raise DisasmError(
-            f"parameter {path}: is no number that can vary; name one such as "
+            f"parameter {name}: is no number that can vary; name one such as "
             "contact.friction, twin.stiffness.0 or GroovePose.ry"
         )
     return value, metadata
 
 
-def _item(values: list[Any], part: str, path: str) -> Any:
+def _item(values: list[Any], part: str, name: str) -> Any:
     if part.isdecimal() and int(part) < len(values):
         return values[int(part)]
     raise DisasmError(
-        f"parameter {path}: there is no number {part} of {len(values)}; count from 0"
+        f"parameter {name}: there is no number {part} of {len(values)}; count from 0"
     )
 
 

@@ -129,7 +129,7 @@ def _add_search_arguments(add: Callable[..., object]) -> None:
         "--budget",
         type=cli.positive,
         metavar="N",
-        help="evaluations of each method's global search (default: 300)",
+        help="evaluations of each method's global search (default: 400)",
     )
     add(
         "--surrogate",
@@ -216,9 +216,9 @@ def _choice(args: argparse.Namespace) -> ModelChoice:
 def _settings(args: argparse.Namespace, model: LogModel) -> Settings:
     thesis = args.preset == "thesis"
     effort = Effort(
-        evaluations=args.budget or 300,
+        evaluations=args.budget or 400,
         cycles=args.cycles,
-        close=0 if thesis else 60,
+        close=0 if thesis else 40,
         bees=BeesSettings.thesis() if thesis else BeesSettings(),
         seed=args.seed,
         propose=_surrogate() if args.surrogate else None,

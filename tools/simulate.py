@@ -14,6 +14,7 @@ import cli
 from tqdm import tqdm
 
 from drake_disasm.errors import DisasmError
+from drake_disasm.policies import Exploring
 from drake_disasm.scenario import Scenario, load_scenario, scenario_to_mapping
 from drake_disasm.stations import MODELS
 from drake_disasm.task.episode import (
@@ -27,6 +28,7 @@ from drake_disasm.visualization import MeshcatView, start_meshcat
 from drake_disasm.writing import make_folder
 from sysid.logs import LogHeader, LogWriter, flat_columns
 
+_MM = 1e-3
 _EXAMPLES = """examples:
   python tools/simulate.py                              the default, in Meshcat
   python tools/simulate.py --policy straight --scenario removal_turned
@@ -34,6 +36,9 @@ _EXAMPLES = """examples:
   python tools/simulate.py --set lock.clearance=0.0002 --set contact.friction=0.3
   python tools/simulate.py --html out/removal.html      a page that plays offline
   python tools/simulate.py --no-meshcat --episodes 100 --record out/log --resume
+  python tools/simulate.py --no-meshcat --episodes 11 --record out/log \
+      --policy admittance --explore 0.15 --hidden removal_turned
+                                  a log that states removal and measured another
 """
 
 
@@ -47,6 +52,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     cli.add_scenario_arguments(parser)
     _add_run_arguments(parser.add_argument)
+    _add_log_arguments(parser.add_argument)
     _add_view_arguments(parser.add_argument)
     return parser.parse_args(arguments)
 
@@ -79,11 +85,28 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
         default=0,
         help="of the first episode; the next ones count on (default: 0)",
     )
+
+
+def _add_log_arguments(add: Callable[..., object]) -> None:
     add("--record", type=Path, metavar="DIR", help="write a log into an empty folder")
     add(
         "--resume",
         action="store_true",
         help="with --record: go on with the log in the folder, which was interrupted",
+    )
+    add(
+        "--explore",
+        type=float,
+        default=0.0,
+        metavar="MM",
+        help="add Gaussian noise to the policy's actions, so that the log shows more: "
+        "standard deviation in mm, and in tenths of a degree (default: 0)",
+    )
+    add(
+        "--hidden",
+        metavar="NAME|FILE",
+        help="simulate this scenario instead, while the log states --scenario: a "
+        "reality with effects that nobody declared (--set applies to both)",
     )
 
 
@@ -113,19 +136,24 @@ def _add_view_arguments(add: Callable[..., object]) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
+    if args.explore < 0.0:
+        raise DisasmError(f"--explore {args.explore:g}: give millimetres, 0 or more")
     if args.resume and not args.record:
         raise DisasmError("--resume: say which log by --record DIR")
     scenario = load_scenario(args.scenario, args.overrides)
+    real = load_scenario(args.hidden, args.overrides) if args.hidden else scenario
     policy = cli.named_policy(args.policy, scenario)
     writer = _open_log(args, arguments, scenario) if args.record else None
+    done = writer.next_number if writer else 0
+    if args.explore:
+        policy = Exploring(policy, args.explore * _MM, args.seed + done)
     if args.html:
         make_folder(args.html.parent)
     view = _open_view(args)
-    simulation = TaskSimulation(scenario, args.model, policy, [view] if view else [])
+    simulation = TaskSimulation(real, args.model, policy, [view] if view else [])
     simulation.set_target_realtime_rate(_rate(args))
     summaries: list[EpisodeSummary] = []
     try:
-        done = writer.next_number if writer else 0
         for seed in range(args.seed + done, args.seed + args.episodes):
             summaries.append(_run_one(simulation, seed, writer, view))
     finally:
@@ -168,7 +196,10 @@ def _show(bar: tqdm, summary: EpisodeSummary) -> None:
 
 def _keep(writer: LogWriter | None, recorder: EpisodeRecorder | None) -> None:
     if writer and recorder and recorder.steps:
-        writer.write_episode(flat_columns("transitions", recorder.columns()))
+        columns = recorder.columns()
+        if writer.header.provenance["hidden"]:  # what was drawn would give it away
+            columns = {k: v for k, v in columns.items() if not k.startswith("extra.")}
+        writer.write_episode(flat_columns("transitions", columns))
 
 
 def _open_log(
@@ -176,6 +207,7 @@ def _open_log(
 ) -> LogWriter:
     joints = tuple(f"iiwa_joint_{i}" for i in range(1, 8))
     origin = {"simulated": True, "model": args.model, "policy": args.policy}
+    origin |= {"explore_mm": args.explore, "hidden": bool(args.hidden)}
     header = LogHeader(
         kind="transitions",
         task=scenario.name,

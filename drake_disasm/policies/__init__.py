@@ -1,5 +1,6 @@
 """Policies: scripted ones, and trained ones from files."""
 
+from drake_disasm.policies.exploring import Exploring
 from drake_disasm.policies.files import (
     find_policy,
     load_policy,
@@ -24,6 +25,7 @@ __all__ = [
     "SCRIPTED",
     "ActionMap",
     "Admittance",
+    "Exploring",
     "LearnedPolicy",
     "Network",
     "PolicyDescription",

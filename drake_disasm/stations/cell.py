@@ -20,6 +20,7 @@ from pydrake.systems.primitives import (
 )
 
 from drake_disasm.coordinates import ArmCoordinates
+from drake_disasm.errors import DisasmError
 from drake_disasm.lock import add_lock, bolt_inertia, plate_bottom
 from drake_disasm.models import add_arm, add_model
 from drake_disasm.ports import CELL_PORTS
@@ -77,6 +78,11 @@ class CellStation(SimulatedStation):
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__(scenario)
+        if scenario.contact.model != "hydroelastic":
+            raise DisasmError(
+                f"contact.model: '{scenario.contact.model}' is of the twin alone; "
+                "use hydroelastic for the cell, or --model twin"
+            )
         self.control_period = scenario.arm.control_period
         self.grip_command = _grip_command(scenario)
         self.tool = Tool.from_models(scenario)

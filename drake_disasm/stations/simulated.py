@@ -26,7 +26,12 @@ from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
 from drake_disasm.coordinates import Coordinates
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor
-from drake_disasm.effects import Effect, EnvironmentEffect, SensorEffect
+from drake_disasm.effects import (
+    Effect,
+    Environment,
+    EnvironmentEffect,
+    SensorEffect,
+)
 from drake_disasm.lock import Lock, set_environment
 from drake_disasm.ports import Health, Port, check_ports
 from drake_disasm.scenario import PlacementConfig, Scenario, validate
@@ -154,12 +159,15 @@ class SimulatedStation(Station):
         builder.Connect(plant.get_body_poses_output_port(), truth.get_input_port())
         builder.ExportOutput(truth.get_output_port(), "bolt_pose")
         builder.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
-        builder.ExportInput(
-            plant.get_applied_spatial_force_input_port(), "applied_spatial_force"
-        )
+        self._wire_applied_forces(builder)
         builder.ExportOutput(self.scene_graph.get_query_output_port(), "query_object")
         builder.BuildInto(self)
         check_ports(self, self.table)
+
+    def _wire_applied_forces(self, builder: DiagramBuilder) -> None:
+        """Exports the input for forces from outside."""
+        applied = self.plant.get_applied_spatial_force_input_port()
+        builder.ExportInput(applied, "applied_spatial_force")
 
     def set_effects(self, context: Context, effects: Sequence[Effect]) -> None:
         """Puts effects into this station's Context; nothing is rebuilt.
@@ -170,16 +178,20 @@ class SimulatedStation(Station):
         for effect in effects:
             if isinstance(effect, EnvironmentEffect):
                 environment = effect.apply(environment)
+        self._set_environment(context, environment)
+        self.sensor.set_effects(
+            self.part_context(self.sensor, context),
+            [e for e in effects if isinstance(e, SensorEffect)],
+        )
+
+    def _set_environment(self, context: Context, environment: Environment) -> None:
+        """Puts the world around the bolt into this station's Context."""
         set_environment(
             self.lock,
             environment,
             self.part_context(self.plant, context),
             self.scene_graph,
             self.part_context(self.scene_graph, context),
-        )
-        self.sensor.set_effects(
-            self.part_context(self.sensor, context),
-            [e for e in effects if isinstance(e, SensorEffect)],
         )
 
     def at_start(self, effects: Sequence[Effect]) -> Simulator:

@@ -4,6 +4,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
     Frame,
@@ -23,7 +24,9 @@ from pydrake.systems.primitives import (
 )
 
 from drake_disasm.coordinates import BoltCoordinates
+from drake_disasm.effects import Environment
 from drake_disasm.errors import DisasmError
+from drake_disasm.impact import ImpactLaw, LockShape
 from drake_disasm.lock import (
     GROOVE_FIELDS,
     add_lock,
@@ -31,11 +34,13 @@ from drake_disasm.lock import (
     reshape_groove,
 )
 from drake_disasm.ports import TWIN_PORTS
-from drake_disasm.scenario import Scenario, TwinConfig, validate
+from drake_disasm.scenario import ImpactConfig, Scenario, TwinConfig, validate
 from drake_disasm.stations.simulated import SimulatedStation
+from drake_disasm.systems.impact_contact import ImpactConditions, ImpactContact
 from drake_disasm.tool import Tool
 
 _AXES = np.eye(3)
+_JOINT_ORDER = (0, 1, 2, 5, 4, 3)  # x, y, z, then yaw, pitch, roll
 _MATERIAL_FIELDS = ("friction", "modulus", "head_modulus", "dissipation")
 
 
@@ -137,9 +142,9 @@ class TwinStation(SimulatedStation):
         """Adds six joints with the spring and damper of each axis."""
         twin, plant = self.scenario.twin, self.plant
         self._actuators: dict[int, JointActuator] = {}
-        instance = plant.AddModelInstance("carrier")
+        self._carrier = instance = plant.AddModelInstance("carrier")
         parent, body = frame_Gn, None
-        for axis in (0, 1, 2, 5, 4, 3):
+        for axis in _JOINT_ORDER:
             body = plant.AddRigidBody(f"axis_{axis}", instance, SpatialInertia.Zero())
             joint = plant.AddJoint(_axis_joint(axis, parent, body.body_frame()))
             actuator = plant.AddJointActuator(f"axis_{axis}", joint)
@@ -155,6 +160,60 @@ class TwinStation(SimulatedStation):
         for axis, actuator in self._actuators.items():
             actuator.SetRotorInertia(plant_context, _inertia(twin, axis))
             actuator.set_controller_gains(_gains(twin, axis))
+
+    def _wire_applied_forces(self, builder: DiagramBuilder) -> None:
+        """Sums forces from outside and IMPACT's, if that is the contact's model."""
+        self.impact: ImpactContact | None = None
+        if self.scenario.contact.model == "hydroelastic":
+            super()._wire_applied_forces(builder)
+            return
+        self._part_bolt_and_groove()
+        self.impact = builder.AddNamedSystem(
+            "impact_contact",
+            ImpactContact(self.lock.bolt.index(), self.X_WG.rotation(), self.time_step),
+        )
+        state = self.plant.get_state_output_port(self._carrier)
+        builder.Connect(state, self.impact.GetInputPort("state"))
+        desired = builder.GetSubsystemByName("desired_state").get_output_port()
+        builder.Connect(desired, self.impact.GetInputPort("desired_state"))
+        outside = self.impact.GetInputPort("applied_spatial_force")
+        builder.ExportInput(outside, "applied_spatial_force")
+        applied = self.plant.get_applied_spatial_force_input_port()
+        builder.Connect(self.impact.get_output_port(), applied)
+
+    def _part_bolt_and_groove(self) -> None:
+        """Leaves their contact to IMPACT."""
+        bolt, groove = (
+            GeometrySet(list(ids))
+            for ids in (self.lock.bolt_ids.values(), self.lock.groove_ids)
+        )
+        declaration = CollisionFilterDeclaration().ExcludeBetween(bolt, groove)
+        self.scene_graph.collision_filter_manager().Apply(declaration)
+
+    def _set_environment(self, context: Context, environment: Environment) -> None:
+        super()._set_environment(context, environment)
+        if self.impact is None:
+            return
+        plant_context = self.part_context(self.plant, context)
+        gains = [self._actuators[axis].get_controller_gains() for axis in _JOINT_ORDER]
+        conditions = ImpactConditions(
+            law=ImpactLaw.of(self.scenario.contact.impact),
+            shape=LockShape(self.scenario.lock),
+            friction=environment.friction,
+            X_GnG=environment.X_GnG,
+            M=self._mass_matrix(plant_context),
+            K=np.array([gain.p for gain in gains]),
+            D=np.array([gain.d for gain in gains]),
+        )
+        self.impact.set_conditions(self.part_context(self.impact, context), conditions)
+
+    def _mass_matrix(self, plant_context: Context) -> np.ndarray:
+        """Returns the joints' mass matrix at their zero."""
+        at_zero = self.plant.CreateDefaultContext()
+        for actuator in self._actuators.values():
+            inertia = actuator.rotor_inertia(plant_context)
+            actuator.SetRotorInertia(at_zero, inertia)
+        return self.plant.CalcMassMatrix(at_zero)
 
     def _add_sensor_joint(self, carrier: RigidBody) -> tuple[Frame, Joint]:
         X_BS = self.X_SB.inverse()
@@ -214,7 +273,9 @@ def _structure(scenario: Scenario) -> Scenario:
         effects=[],
         randomisation=[],
         twin=TwinConfig(),
-        contact=_without(scenario.contact, _MATERIAL_FIELDS),
+        contact=dataclasses.replace(
+            _without(scenario.contact, _MATERIAL_FIELDS), impact=ImpactConfig()
+        ),
         lock=_without(scenario.lock, GROOVE_FIELDS),
     )
 

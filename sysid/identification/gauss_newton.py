@@ -1,4 +1,4 @@
-"""A start for the searches: damped Gauss-Newton within the box."""
+"""Downhill from a point: Levenberg and Marquardt within the box."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ from sysid.objective import Objective
 
 Array = NDArray[np.float64]
 
-_TRIALS = np.array([1.0, 0.3, 0.1, 0.03, 0.01])  # parts of a step, in one batch
+_DAMPING = (0.0, 1e-3, 1e-2, 1e-1, 1.0, 10.0)  # all tried at once, as one batch
 _GAIN = 1e-3  # of the objective, below which another iteration does not pay
 
 
@@ -27,9 +27,10 @@ def gauss_newton(
 ) -> Linearisation:
     """Returns the linearisation where Gauss-Newton steps from u lead to.
 
-    Each step is SciPy's bounded linear least squares (weighted by Huber's weights),
-    then the best of five parts of it. Not a search: it finds the bottom of the
-    valley that it starts in, and how wide that is.
+    Each step is SciPy's bounded linear least squares, weighted by Huber's weights
+    and damped as by Levenberg and Marquardt; of six dampings, evaluated at once, the
+    best is taken. Not a search: it finds the bottom of the valley that it starts
+    in, and how wide that is.
 
     Args:
         objective: to minimise.
@@ -42,8 +43,8 @@ def gauss_newton(
         value = objective.value(here.residual)
         if callback:
             callback(value)
-        parts = here.u + _TRIALS[:, None] * _step(here)
-        points = np.clip(parts, 0.0, 1.0)
+        steps = np.array([_step(here, damping) for damping in _DAMPING])
+        points = np.clip(here.u + steps, 0.0, 1.0)
         values = objective(objective.scaling.from_unit(points))
         best = int(np.argmin(values))
         if values[best] >= value:
@@ -54,13 +55,14 @@ def gauss_newton(
     return here
 
 
-def _step(here: Linearisation) -> Array:
-    """Returns the weighted least-squares step (p,) that stays in the box."""
+def _step(here: Linearisation, damping: float) -> Array:
+    """Returns the weighted, damped least-squares step (p,) that stays in the box."""
     root = np.sqrt(here.weights).reshape(-1)
     J, r = root[:, None] * here.flat_jacobian, root * here.residual.reshape(-1)
     Q, R = np.linalg.qr(J)
-    ridge = 1e-9 * np.eye(len(here.u)) * max(1.0, float(np.abs(R).max()))
-    A = np.vstack([R, ridge])
+    size = np.linalg.norm(R, axis=0)
+    ridge = np.sqrt(damping) * size + 1e-9 * max(1.0, float(size.max()))
+    A = np.vstack([R, np.diag(ridge)])
     b = np.concatenate([-Q.T @ r, np.zeros(len(here.u))])
     step: Array = lsq_linear(A, b, (-here.u - 1e-12, 1.0 - here.u + 1e-12)).x
     return step

@@ -76,7 +76,10 @@ def fitting_steps(linearisation: Linearisation) -> Array:
     """Returns steps (p,) that the log can just notice, for the next linearisation.
 
     A parameter that the log fixes to a millionth of its range needs a far smaller
-    step than one that it hardly fixes.
+    step than one that it hardly fixes. Far from the optimum, where residuals are
+    large, contact comes and goes along a step, and a longer one sees past that.
     """
+    level = np.sqrt(np.mean(linearisation.weights * linearisation.residual**2))
     norm = np.sqrt(np.diagonal(linearisation.information))
-    return np.clip(_NOTICEABLE / np.maximum(norm, 1e-300), _LEAST_STEP, _FIRST_STEP)
+    steps = _NOTICEABLE * max(1.0, float(level)) / np.maximum(norm, 1e-300)
+    return np.clip(steps, _LEAST_STEP, _FIRST_STEP)

@@ -28,6 +28,9 @@ METHODS = ("bees", "nlopt")
 
 _POLISH = 0.25  # part of a search that SBPLX gets at its end
 _CLOSE = 0.25  # part of the budget for the close search
+_STARTS = 6  # of descents: the lowest point found need not lie in the right valley
+_HALVING = ((2, 3), (1, 15))  # so many of them go on after so many iterations
+_APART = 0.25  # of the box, between them
 _WHITENED_STEP = 0.05  # SBPLX's first step over the box of z
 
 
@@ -45,9 +48,9 @@ class Effort:
         propose: a surrogate's proposals in place of scouts, for the bees.
     """
 
-    evaluations: int = 300
+    evaluations: int = 400
     cycles: int | None = None
-    close: int = 60
+    close: int = 40
     bees: BeesSettings = field(default_factory=BeesSettings)
     seed: int = 0
     propose: Propose | None = None
@@ -84,10 +87,10 @@ class Search:
     def run(self) -> MethodResult:
         """Returns where the method ends."""
         part = self._part("global", self._thin)
-        u, value = part.trace.best, part.trace.best_value
         if not self._effort.close:
-            return MethodResult(self._method, (part,), u, value)
-        here = self._descended(u)
+            best = part.trace.best, part.trace.best_value
+            return MethodResult(self._method, (part,), *best)
+        here = self._descended(_starts(part.trace))
         close = self._close(here)
         u, value = here.u, self._full.value(here.residual)
         if close.trace.best_value < value:
@@ -102,8 +105,8 @@ class Search:
         trace = self._searched(label, function, box, self._effort.budget, 0.1)
         return SearchPart(label, objective.model.measurements.rows, trace)
 
-    def _descended(self, u: Array) -> Linearisation:
-        """Goes down by Gauss-Newton, on few rows and then on all."""
+    def _descended(self, starts: list[Array]) -> Linearisation:
+        """Goes down from several points on few rows, from the lowest end on all."""
         name = f"{self._method}, descent"
         kept = self._journal.stage(name)
         if kept is not None:
@@ -112,8 +115,11 @@ class Search:
         def tell(value: float) -> None:
             self._news(name, 0, 0, value)
 
-        thin = gauss_newton(self._thin, u, 10, tell)
-        here = gauss_newton(self._full, thin.u, 6, tell)
+        for count, iterations in _HALVING:
+            valleys = [gauss_newton(self._thin, u, iterations, tell) for u in starts]
+            valleys.sort(key=lambda here: self._thin.value(here.residual))
+            starts = [here.u for here in valleys[:count]]
+        here = gauss_newton(self._full, starts[0], 6, tell)
         self._journal.finish(name, here.u.tolist())
         return here
 
@@ -142,8 +148,9 @@ class Search:
 
         trace = self._explored(function, box, budget - polish, tell)
         left = budget - trace.evaluations
+        start = trace.best if trace.evaluations else None
         return nlopt_search(
-            function, box, "LN_SBPLX", left, trace.best, 0, step, trace, tell
+            function, box, "LN_SBPLX", left, start, 0, step, trace, tell
         )
 
     def _explored(
@@ -167,6 +174,18 @@ class Search:
         return self._journal.remembered(
             label, lambda u: objective(scaling.from_unit(u))
         )
+
+
+def _starts(trace: Trace) -> list[Array]:
+    """Returns the best points of a search that are apart from each other."""
+    chosen: list[Array] = []
+    for i in np.argsort(trace.values, kind="stable"):
+        point = trace.points[i]
+        if all(np.abs(point - other).max() > _APART for other in chosen):
+            chosen.append(point)
+        if len(chosen) == _STARTS:
+            break
+    return chosen
 
 
 def _factor(here: Linearisation) -> Array:

@@ -47,8 +47,9 @@ def nlopt_search(
     errors: list[BaseException] = []
 
     def value(x: Array, gradient: Array) -> float:
-        if trace.evaluations >= last:
-            raise nlopt.ForcedStop  # some algorithms overrun their own limit
+        if errors or trace.evaluations >= last:  # some overrun their own limit
+            solver.force_stop()
+            return np.inf
         try:
             point = box.clip(x)[None]
             trace.add(point, function(point))
@@ -56,7 +57,8 @@ def nlopt_search(
                 callback(trace)
         except BaseException as error:  # Ctrl-C too: it must not get lost in C++
             errors.append(error)
-            raise nlopt.ForcedStop from error
+            solver.force_stop()
+            return np.inf
         return trace.values[-1]
 
     solver = nlopt.opt(getattr(nlopt, algorithm), box.size)

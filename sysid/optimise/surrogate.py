@@ -54,7 +54,9 @@ def propose(
     process.optimizer = None
     chosen = []
     for _ in range(count):
-        best = candidates[int(np.argmax(_improvement(process, candidates, y.min())))]
+        number = int(np.argmax(_improvement(process, candidates, y.min())))
+        best = candidates[number]
+        candidates = np.delete(candidates, number, axis=0)
         chosen.append(best)
         x, y = np.vstack([x, best]), np.append(y, process.predict(best[None]))
         process.kernel = process.kernel_

@@ -1,0 +1,41 @@
+"""A policy with noise on its actions, for logs that show more of the contact."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+_STREAM = 0x4558504C  # apart from those of sensor noise and imprecision
+_TURN = np.deg2rad(0.1) / 1e-3  # rad of rotation noise per m of translation noise
+
+
+class Exploring:
+    """Adds Gaussian noise to every action, drawn anew in each episode.
+
+    Args:
+        policy: from observation (12,) to action (6,).
+        deviation: of the translations [m]; rotations get a tenth of a degree per mm.
+        seed: of the first episode; the next ones count on, so that an interrupted
+            recording goes on with the same noise.
+    """
+
+    def __init__(
+        self,
+        policy: Callable[[np.ndarray], np.ndarray],
+        deviation: float,
+        seed: int,
+    ) -> None:
+        self._policy, self._seed = policy, seed
+        self._deviation = deviation * np.array([1.0, 1.0, 1.0, _TURN, _TURN, _TURN])
+        self._generator = np.random.default_rng([seed, _STREAM])
+
+    def reset(self) -> None:
+        """Begins an episode."""
+        if hasattr(self._policy, "reset"):
+            self._policy.reset()
+        self._generator = np.random.default_rng([self._seed, _STREAM])
+        self._seed += 1
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Returns the policy's action (6,) with noise on it."""
+        noise = self._deviation * self._generator.normal(size=6)
+        return self._policy(observation) + noise

@@ -1,0 +1,188 @@
+"""The whole way from a model to its parameters, on a model with known ones."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.errors import DisasmError
+from sysid.identification.journal import Journal
+from sysid.identification.pipeline import Settings, identify, noise_floor
+from sysid.identification.plain import summary, to_mapping
+from sysid.identification.search import Effort
+from sysid.identification.sensitivity import sensitivity
+from sysid.objective import Objective
+from sysid.report import report_page
+from sysid.workers import Workers
+from tests.sysid.toys import Decay
+
+EFFORT = Effort(evaluations=120, close=40)
+TRUTH = {"a": 2.0, "b": 1.5, "c": 0.3}
+
+
+def run(model, folder, settings=None, test=(3,), resume=False, news=lambda *_: None):
+    journal = Journal(folder, {"seed": 0}, resume)
+    settings = settings or Settings(effort=EFFORT)
+    train = [i for i in range(4) if i not in test]
+    return identify(model, train, test, settings, Workers(), journal, news)
+
+
+def test_finds_the_truth_and_both_methods_agree(tmp_path):
+    found = run(Decay(), tmp_path / "fit")
+    for i, p in enumerate(found.parameters):
+        low, high = found.interval_bootstrap[i]
+        assert low < found.theta[i] < high
+        assert abs(found.theta[i] - TRUTH[p.name]) < 2 * (high - low)
+    assert found.verdict.agree, found.verdict.text
+    assert found.fitted.value_after == pytest.approx(1.0, abs=0.1)
+    assert found.held_out.value_after == pytest.approx(1.0, abs=0.15)
+    assert found.held_out.value_before > 3.0
+    assert (found.whiteness > 1e-3).all()
+    assert not found.notes
+
+
+def test_intervals_cover_the_truth_as_often_as_they_say(tmp_path):
+    """95 % of 3 x 60 intervals, give or take; single method to be quick."""
+    settings = Settings(("nlopt",), Effort(evaluations=60, close=10))
+    inside = {"gn": [], "bootstrap": []}
+    for seed in range(60):
+        found = run(Decay(seed=seed, rows=40), tmp_path / str(seed), settings)
+        truth = np.array([TRUTH[p.name] for p in found.parameters])
+        for name, interval in (
+            ("gn", found.interval_gn), ("bootstrap", found.interval_bootstrap)
+        ):  # fmt: skip
+            inside[name] += list((interval[:, 0] < truth) & (truth < interval[:, 1]))
+    for name, hits in inside.items():
+        assert 0.88 < np.mean(hits) < 0.99, (name, np.mean(hits))
+
+
+def test_a_parameter_without_effect_stops_the_fit_by_name(tmp_path):
+    model = Decay(("a", "idle"))
+    with pytest.raises(DisasmError, match="idle: has no effect.*--unidentifiable"):
+        run(model, tmp_path / "fit")
+
+
+def test_or_is_frozen_by_choice(tmp_path):
+    settings = Settings(effort=EFFORT, unidentifiable="freeze")
+    found = run(Decay(("a", "idle", "c")), tmp_path / "fit", settings)
+    assert [p.name for p in found.parameters] == ["a", "c"]
+    assert found.frozen == {"idle": 0.5}
+    assert any("idle was frozen" in note for note in found.notes)
+
+
+def test_a_combination_that_the_log_cannot_fix_is_named(tmp_path):
+    model = Decay(("a", "twin_of_a", "b"))
+    with pytest.raises(DisasmError, match=r"0\.71 .*0\.71 .*only to"):
+        run(model, tmp_path / "fit")
+    objective = Objective(model, Workers())
+    found = sensitivity(objective, np.full(3, 0.3))
+    assert len(found.loose) == 1 and len(found.to_freeze()) == 1
+    np.testing.assert_allclose(
+        np.abs(found.loose[0].weights), [0.707, 0.707, 0], atol=0.01
+    )
+
+
+def test_nothing_left_to_fit_is_said(tmp_path):
+    settings = Settings(effort=EFFORT, unidentifiable="freeze")
+    with pytest.raises(DisasmError, match="nothing is left"):
+        run(Decay(("idle",)), tmp_path / "fit", settings)
+
+
+def test_fewer_transitions_than_parameters(tmp_path):
+    with pytest.raises(DisasmError, match="2 transitions .* 3 parameters"):
+        run(Decay(rows=2), tmp_path / "fit", test=(1, 2, 3))
+
+
+def test_a_parameter_on_its_bound_is_noted(tmp_path):
+    found = run(Decay(noise=0.1)._changed(fixed={"b": 0.2}), tmp_path / "x", test=())
+    model = Decay(("a",))._changed(fixed={"b": 0.05, "c": 1.0})
+    bound = run(model, tmp_path / "fit")
+    assert any("ended on a bound" in note for note in bound.notes)
+    assert any("no episode was held out" in note for note in found.notes)
+
+
+def test_an_interrupted_identification_goes_on_to_the_same_bits(tmp_path):
+    whole = run(Decay(), tmp_path / "whole")
+
+    def interrupt(name, done, total, best):
+        if name == "nlopt, global" and done >= 30:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(Decay(), tmp_path / "fit", news=interrupt)
+    with pytest.raises(DisasmError, match="--resume"):
+        run(Decay(), tmp_path / "fit")
+    again = run(Decay(), tmp_path / "fit", resume=True)
+    assert again.theta.tobytes() == whole.theta.tobytes()
+    assert again.interval_bootstrap.tobytes() == whole.interval_bootstrap.tobytes()
+    for name, method in whole.methods.items():
+        for part, other in zip(method.parts, again.methods[name].parts, strict=True):
+            assert part.trace.values == other.trace.values
+    assert again.evaluations < whole.evaluations
+
+
+def test_half_a_line_in_the_journal_is_dropped(tmp_path):
+    whole = run(Decay(), tmp_path / "fit")
+    path = tmp_path / "fit" / "evaluations.jsonl"
+    text = path.read_text()
+    path.write_text(text[: len(text) // 2])
+    again = run(Decay(), tmp_path / "fit", resume=True)
+    assert again.theta.tobytes() == whole.theta.tobytes()
+    assert path.read_text() == text
+
+
+def test_refuses_to_go_on_with_another_identification(tmp_path):
+    run(Decay(), tmp_path / "fit")
+    with pytest.raises(DisasmError, match="another seed"):
+        Journal(tmp_path / "fit", {"seed": 1}, resume=True)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "notes.txt").write_text("mine")
+    with pytest.raises(DisasmError, match="not empty"):
+        Journal(tmp_path / "other", {}, resume=False)
+
+
+def test_the_thesis_search_counts_as_the_thesis_does(tmp_path):
+    from sysid.optimise import BeesSettings
+
+    effort = Effort(cycles=10, close=0, bees=BeesSettings.thesis())
+    settings = Settings(effort=effort, huber=np.inf)
+    found = run(Decay(), tmp_path / "fit", settings)
+    (part,) = found.methods["bees"].parts
+    assert part.trace.cycle_ends[:11] == list(range(6, 67, 6))  # then SBPLX
+    budgets = {m.parts[0].trace.evaluations for m in found.methods.values()}
+    assert max(budgets) - min(budgets) <= 6
+
+
+def test_a_profile_has_its_minimum_at_the_estimate(tmp_path):
+    settings = Settings(effort=EFFORT, profiles=("b",))
+    (curve,) = run(Decay(), tmp_path / "fit", settings).profiles
+    assert curve.name == "b"
+    lowest = int(np.argmin(curve.values))
+    assert 0 < lowest < len(curve.values) - 1
+    assert curve.values[0] > curve.edge < curve.values[-1]
+    with pytest.raises(DisasmError, match="--profile"):
+        run(Decay(), tmp_path / "2", Settings(profiles=("z",)))
+
+
+def test_the_floor_is_that_of_gaussian_noise():
+    assert noise_floor(np.inf) == pytest.approx(1.0, abs=1e-6)
+    z = np.random.default_rng(0).normal(size=200_000)
+    from sysid.objective import rms, tempered
+
+    assert noise_floor(1.0) == pytest.approx(rms(tempered(z, 1.0)), rel=0.01)
+
+
+def test_the_report_needs_nothing_else_and_says_it_all(tmp_path):
+    settings = Settings(effort=EFFORT, profiles=("c",))
+    found = run(Decay(), tmp_path / "fit", settings)
+    page = report_page(found, {"command": "test", "data": "abc"})
+    assert "http" not in page.replace("http-equiv", "")
+    assert page.count("data:image/png;base64,") == 6
+    for word in (
+        "Agreement",
+        "Warnings" if found.notes else "Parameters",
+        "abc",
+        "Fit",
+    ):
+        assert word in page
+    mapping = to_mapping(found)
+    assert set(mapping["parameters"]) == {"a", "b", "c"}
+    assert "bees and nlopt agree" in summary(found)

@@ -1,0 +1,52 @@
+"""Logs of a twin, made once for the tests of models."""
+
+from pathlib import Path
+
+import pytest
+
+from drake_disasm.policies import Exploring, make_policy
+from drake_disasm.scenario import Scenario, load_scenario, scenario_to_mapping
+from drake_disasm.task.episode import EpisodeRecorder, run_episode
+from drake_disasm.task.simulation import TaskSimulation
+from sysid.logs import Log, LogHeader, LogWriter, flat_columns, read_log
+
+
+def record(folder: Path, scenario: Scenario, episodes: int) -> Log:
+    """Records episodes of the twin with exploration noise."""
+    policy = Exploring(make_policy("admittance"), 1.5e-4, 0)
+    simulation = TaskSimulation(scenario, "twin", policy)
+    header = LogHeader(
+        "transitions",
+        "removal",
+        {"simulated": True},
+        period=scenario.task.period,
+        scenario=scenario_to_mapping(scenario),
+    )
+    with LogWriter(folder, header) as writer:
+        for seed in range(episodes):
+            recorder = EpisodeRecorder(simulation)
+            run_episode(simulation, seed, recorder)
+            writer.write_episode(flat_columns("transitions", recorder.columns()))
+    return read_log(folder)
+
+
+@pytest.fixture(scope="session")
+def turned() -> Scenario:
+    """A groove turned by 2 degrees, and short episodes."""
+    return load_scenario("removal_turned", ["task.steps=24"])
+
+
+@pytest.fixture(scope="session")
+def log(turned, tmp_path_factory) -> Log:
+    """Three episodes with sensor noise."""
+    return record(tmp_path_factory.mktemp("twin") / "log", turned, 3)
+
+
+@pytest.fixture(scope="session")
+def silent_log(turned, tmp_path_factory) -> Log:
+    """Two episodes whose sensor neither errs nor rounds."""
+    turned.ft_sensor.noise, noise = [0.0] * 6, turned.ft_sensor.noise
+    turned.ft_sensor.quantum, quantum = [0.0] * 6, turned.ft_sensor.quantum
+    found = record(tmp_path_factory.mktemp("silent") / "log", turned, 2)
+    turned.ft_sensor.noise, turned.ft_sensor.quantum = noise, quantum
+    return found

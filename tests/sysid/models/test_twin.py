@@ -1,0 +1,136 @@
+import dataclasses
+import pickle
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.scenario import load_scenario
+from drake_disasm.spatial import rotation_from_vector, shift_and_express
+from sysid.identification.gauss_newton import gauss_newton
+from sysid.models import PredictionError
+from sysid.models.twin import TwinModel, at_sensor
+from sysid.objective import Objective
+from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.workers import Workers
+
+NAMES = ("contact.friction", "lock.clearance", "GroovePose.ry")
+
+
+def make(log, scenario, names=NAMES, **options) -> TwinModel:
+    scenario, parameters = scenario_parameters(scenario, [Request(n) for n in names])
+    return TwinModel([log], scenario, parameters, **options)
+
+
+def truth(model: TwinModel) -> np.ndarray:
+    return np.array([p.nominal for p in model.parameters])
+
+
+def test_reproduces_the_twins_own_log(silent_log, turned):
+    """Each step from its measured state: the pose to a micron, forces to noise / 4.
+
+    What is left is the velocity at the step's start, which no log has.
+    """
+    model = make(silent_log, turned, coarse=False)
+    residual = Objective(model, Workers()).residuals(truth(model))[0]
+    assert np.abs(residual[:, :6]).max() < 0.05
+    assert np.quantile(np.abs(residual[:, 6:]), 0.95) < 0.25
+
+
+def test_a_rollout_reproduces_a_whole_episode(silent_log, turned):
+    model = make(silent_log, turned, rollout=True)
+    assert [s.stop - s.start for s in model.chunks()] == [24, 24]
+    residual = Objective(model, Workers()).residuals(truth(model))[0]
+    assert np.abs(residual[:, :6]).max() < 0.5
+    assert np.quantile(np.abs(residual[:, 6:]), 0.95) < 0.25
+
+
+def test_coarse_steps_cost_little_accuracy(silent_log, turned):
+    model = make(silent_log, turned)
+    residual = Objective(model, Workers()).residuals(truth(model))[0]
+    assert np.quantile(np.abs(residual), 0.9) < 1.0
+
+
+def test_at_the_truth_the_objective_is_the_sensors_noise(log, turned):
+    """Wrench channels at 1, pose channels (which a twin's log has exactly) at 0."""
+    objective = Objective(make(log, turned, coarse=False), Workers())
+    residual = objective.residuals(truth(objective.model))[0]
+    assert np.sqrt(np.mean(residual[:, 6:] ** 2)) == pytest.approx(1.0, abs=0.1)
+    assert objective(truth(objective.model))[0] == pytest.approx(0.707, abs=0.07)
+
+
+def test_workers_and_chunks_do_not_change_a_bit(log, turned, monkeypatch):
+    model = make(log, turned)
+    thetas = np.array([truth(model), [0.3, 5e-4, 0.02]])
+    alone = Objective(model, Workers()).residuals(thetas)
+    with Workers(2) as pool:
+        shared = Objective(model, pool).residuals(thetas)
+    monkeypatch.setattr("sysid.models.twin._CHUNK", 7)
+    cut = Objective(model, Workers()).residuals(thetas)
+    for a, b, c in zip(alone, shared, cut, strict=True):
+        assert a.tobytes() == b.tobytes() == c.tobytes()
+
+
+def test_recovers_parameters_from_nearby(log, turned):
+    start = dataclasses.replace(turned, effects=[])
+    model = make(log, start, ["contact.friction", "GroovePose.ry"], coarse=False)
+    objective = Objective(model.thin(2), Workers())
+    begin = objective.scaling.to_unit(np.array([0.25, 0.033]))
+    found = objective.scaling.from_unit(gauss_newton(objective, begin, 5).u)
+    np.testing.assert_allclose(found, [0.2, 0.0349], rtol=0.03)
+
+
+def test_channels_are_weighted_by_the_sensors_noise(log, turned):
+    channels = make(log, turned).measurements.channels
+    assert [c.name for c in channels[6:9]] == ["fx", "fy", "fz"]
+    np.testing.assert_allclose(
+        [c.noise for c in channels[6:]], turned.ft_sensor.noise, rtol=1e-3
+    )
+    assert channels[0].unit == "m" and channels[0].noise == 2e-5
+
+
+def test_a_scenario_that_cannot_be_is_a_failed_prediction(log, turned):
+    model = make(log, turned, ["lock.neck_diameter"])
+    with pytest.raises(PredictionError, match="slips through"):
+        model.predict(np.array([0.011]), slice(0, 2))
+    assert model.predict(np.array([0.005]), slice(0, 2)).shape == (2, 12)
+
+
+def test_goes_through_pickle_without_its_diagram(log, turned):
+    model = make(log, turned)
+    theta, rows = truth(model), slice(0, 3)
+    before = model.predict(theta, rows)
+    copy = pickle.loads(pickle.dumps(model))
+    assert copy._replay is None
+    assert copy.predict(theta, rows).tobytes() == before.tobytes()
+
+
+def test_episodes_rows_and_frozen_parameters(log, turned):
+    model = make(log, turned)
+    part = model.of_episodes([0, 2])
+    assert part.measurements.names == ("log/episode_0000", "log/episode_0002")
+    assert set(part.measurements.episode) == {0, 1} and part.measurements.rows == 48
+    assert model.thin(8).measurements.rows == 9
+    frozen = model.freeze({"GroovePose.ry": 0.01})
+    assert [p.name for p in frozen.parameters] == list(NAMES[:2])
+    assert frozen.scenario.effects[0].ry == 0.01 and model.scenario.effects[0].ry > 0.03
+
+
+def test_refuses_other_logs(log, turned):
+    with pytest.raises(DisasmError, match=r"task\.period"):
+        make(log, load_scenario("removal", ["task.period=0.2"]))
+    header = dataclasses.replace(log.header, kind="static_wrench")
+    with pytest.raises(DisasmError, match="the twin predicts 'transitions'"):
+        make(dataclasses.replace(log, header=header), turned)
+
+
+def test_the_wrench_at_the_sensor_is_the_inverse_of_the_shift_to_the_bolt():
+    X_SB = RigidTransform(RollPitchYaw(0.3, -0.2, 0.9), [0.01, 0.02, 0.21])
+    load, turn = np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3]), np.array([0.1, -0.05, 0.2])
+    X_GS = RigidTransform(rotation_from_vector(turn), np.zeros(3)) @ X_SB.inverse()
+    at_bolt = shift_and_express(load, X_GS)
+    state = np.concatenate([[1e-3, 2e-3, 3e-3], turn, at_bolt])
+    found = at_sensor(state[None], X_SB)[0]
+    np.testing.assert_allclose(found[6:], load, atol=1e-12)
+    np.testing.assert_array_equal(found[:6], state[:6])

@@ -1,0 +1,95 @@
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from drake_disasm.errors import DisasmError
+from sysid.objective import FAILED_RESIDUAL, Objective, huber_weights, rms, tempered
+from sysid.workers import Workers
+from tests.sysid.toys import NOISE, Decay
+
+TRUTH = np.array([2.0, 1.5, 0.3])
+THETAS = np.array([TRUTH, [1.0, 1.0, 1.0], [2.0, 2.95, 0.3], [0.5, 0.1, 0.0]])
+
+
+def test_is_one_at_the_truth():
+    value = Objective(Decay(), Workers())(TRUTH[None])[0]
+    assert value == pytest.approx(1.0, abs=0.1)
+
+
+def test_is_equation_4_8_up_to_a_constant():
+    """(1/n) ||s'_real - s'_sim||_2 of the weighted channels, times sqrt(n)."""
+    model = Decay()
+    objective = Objective(model, Workers())
+    n = model.measurements.rows
+    for theta in THETAS[[0, 1, 3]]:
+        predicted = model.predict(theta, slice(0, n))
+        weighted = (model.measurements.values - predicted) / NOISE
+        assert objective(theta)[0] == pytest.approx(
+            np.linalg.norm(weighted) / n * np.sqrt(n)
+        )
+
+
+def test_a_failed_simulation_is_a_finite_penalty_and_counted():
+    objective = Objective(Decay(), Workers())
+    values = objective(THETAS)
+    assert values[2] == FAILED_RESIDUAL and values[2] > values[[0, 1, 3]].max()
+    assert objective.evaluations == 4
+    ((theta, reason),) = objective.failures
+    assert np.array_equal(theta, THETAS[2]) and "too large to simulate" in reason
+
+
+def test_a_prediction_that_is_not_finite_is_a_failure_too():
+    class Broken(Decay):
+        def predict(self, theta, rows):
+            return super().predict(theta, rows) * np.nan
+
+    objective = Objective(Broken(), Workers())
+    assert objective(TRUTH)[0] == FAILED_RESIDUAL
+    assert "not finite" in objective.failures[0][1]
+
+
+def test_the_same_bits_with_one_worker_two_and_threads():
+    model = Decay()
+    expected = Objective(model, Workers())(THETAS)
+    with Workers(2) as pool:
+        assert np.array_equal(Objective(model, pool)(THETAS), expected)
+    with Workers(2, lambda: ThreadPoolExecutor(2)) as threads:
+        assert np.array_equal(Objective(model, threads)(THETAS), expected)
+
+
+def test_a_worker_that_dies_is_replaced_and_nothing_is_lost(tmp_path):
+    model = Decay()
+    expected = Objective(model, Workers())(THETAS)
+    model.die_once = tmp_path / "died"
+    with Workers(2) as pool:
+        assert np.array_equal(Objective(model, pool)(THETAS), expected)
+        assert pool.notes == ["a worker process died; its work was done again"]
+    assert model.die_once.exists()
+
+
+def test_workers_that_die_again_and_again_are_an_error():
+    model = Decay()
+    model.dies = True
+    with Workers(2) as pool, pytest.raises(DisasmError, match="fewer --workers"):
+        Objective(model, pool)(THETAS)
+
+
+def test_tempered_squares_are_hubers_loss():
+    r = np.array([-50.0, -3.0, -1.0, 0.0, 2.0, 3.0, 7.0])
+    expected = np.where(np.abs(r) <= 3, r**2, 2 * 3 * np.abs(r) - 9)
+    np.testing.assert_allclose(tempered(r, 3.0) ** 2, expected)
+    np.testing.assert_array_equal(np.sign(tempered(r, 3.0)), np.sign(r))
+    np.testing.assert_array_equal(tempered(r, np.inf), r)
+    np.testing.assert_allclose(huber_weights(r, 3.0), [0.06, 1, 1, 1, 1, 1, 3 / 7])
+
+
+def test_predictions_come_back_in_si():
+    model = Decay()
+    predicted = Objective(model, Workers()).predictions(TRUTH)
+    rows = slice(0, model.measurements.rows)
+    np.testing.assert_allclose(predicted, model.predict(TRUTH, rows))
+
+
+def test_rms():
+    assert rms(np.array([[3.0, -4.0]])) == pytest.approx(np.sqrt(12.5))
