@@ -108,9 +108,7 @@ def _path(scenario: Scenario, name: str) -> str:
     return f"effects.{numbers[0]}.{field}"
 
 
-def _leaf(
-    scenario: Scenario, path: str, name: str
-) -> tuple[float, Mapping[str, Any]]:
+def _leaf(scenario: Scenario, path: str, name: str) -> tuple[float, Mapping[str, Any]]:
     """Returns the value at a path and what its field says of it."""
     value: Any = scenario
     metadata: Mapping[str, Any] = {}

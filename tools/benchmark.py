@@ -24,6 +24,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import cli
 import numpy as np
 import psutil
+from objective_speed import (
+    SIZES,
+    THESIS_S,
+    cores,
+    evaluation_time,
+    recorded_log,
+)
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
@@ -173,6 +180,30 @@ def measure_memory() -> Iterator[Figure]:
     yield Figure(
         "peak_mib_train", peak, "MiB", "import torch, pydrake.all", peak / bare
     )
+    with recorded_log(100) as log, tempfile.TemporaryDirectory() as folder:
+        options = ["--preset", "thesis", "--cycles", "2", "--workers", "1"]
+        fitting = ["--log", str(log), "--parameters", "contact.friction", *options]
+        program = [sys.executable, str(tools / "identify.py"), *fitting]
+        peak = _peak_mib([*program, "--out", f"{folder}/out"])
+    bare = _peak_mib([sys.executable, "-c", "import scipy.stats, pydrake.all"])
+    yield Figure(
+        "peak_mib_identify", peak, "MiB", "import scipy, pydrake.all", peak / bare
+    )
+
+
+def measure_objective() -> Iterator[Figure]:
+    """Yields the time of one evaluation of the objective, beside the thesis's."""
+    with recorded_log(max(SIZES)) as log:
+        both = {}
+        for size in SIZES:
+            both[size] = evaluation_time(log, size, cores(), 3)
+            reference = "the thesis's 10 minutes"
+            ratio = both[size] / THESIS_S
+            yield Figure(f"objective_{size}_s", both[size], "s", reference, ratio)
+        alone = evaluation_time(log, SIZES[0], 1, 2)
+    reference = f"{cores()} cores"
+    ratio = alone / both[SIZES[0]]
+    yield Figure("objective_883_one_core_s", alone, "s", reference, ratio)
 
 
 def measure_update_speed(name: str) -> Iterator[Figure]:
@@ -268,7 +299,10 @@ MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
         )
         for name in ("chapter3", "chapter4", "chapter5")
     },
-    ("peak_mib_simulate", "peak_mib_train"): measure_memory,
+    ("objective_883_s", "objective_1776_s", "objective_883_one_core_s"): (
+        measure_objective
+    ),
+    ("peak_mib_simulate", "peak_mib_train", "peak_mib_identify"): measure_memory,
 }
 
 

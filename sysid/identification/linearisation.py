@@ -9,8 +9,10 @@ from sysid.objective import Objective, huber_weights
 
 Array = NDArray[np.float64]
 
-_FIRST_STEP = 2e-3  # of the parameter's range
+FIRST_STEP = 2e-3  # of the parameter's range
 _LEAST_STEP = 1e-6
+#: For a parameter that hardly matters: over less, the solver's own noise shows.
+WIDE_STEP = 0.03
 _NOTICEABLE = 3.0  # standard deviations that a step should move the residuals by
 
 
@@ -60,7 +62,7 @@ def linearise(
         steps: (p,) of the differences, in the unit box.
     """
     size = len(u)
-    steps = np.full(size, _FIRST_STEP) if steps is None else steps
+    steps = np.full(size, FIRST_STEP) if steps is None else steps
     ahead = np.clip(u + np.diag(steps), 0.0, 1.0)
     behind = np.clip(u - np.diag(steps), 0.0, 1.0)
     points = np.vstack([u[None], ahead, behind])
@@ -82,4 +84,4 @@ def fitting_steps(linearisation: Linearisation) -> Array:
     level = np.sqrt(np.mean(linearisation.weights * linearisation.residual**2))
     norm = np.sqrt(np.diagonal(linearisation.information))
     steps = _NOTICEABLE * max(1.0, float(level)) / np.maximum(norm, 1e-300)
-    return np.clip(steps, _LEAST_STEP, _FIRST_STEP)
+    return np.clip(steps, _LEAST_STEP, WIDE_STEP)

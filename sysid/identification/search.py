@@ -68,6 +68,21 @@ class Effort:
 News = Callable[[str, int, int, float], None]
 
 
+@dataclass(frozen=True)
+class _Valley:
+    """Where a descent ended.
+
+    Attributes:
+        u: (p,) in the unit box.
+        value: of the objective on all rows.
+        factor: (p, p) L with L L^T the covariance for a noise of one.
+    """
+
+    u: Array
+    value: float
+    factor: Array
+
+
 class Search:
     """Runs one method; each part's evaluations go through the journal."""
 
@@ -90,9 +105,9 @@ class Search:
         if not self._effort.close:
             best = part.trace.best, part.trace.best_value
             return MethodResult(self._method, (part,), *best)
-        here = self._descended(_starts(part.trace))
-        close = self._close(here)
-        u, value = here.u, self._full.value(here.residual)
+        valley = self._descended(_starts(part.trace))
+        close = self._close(valley)
+        u, value = valley.u, valley.value
         if close.trace.best_value < value:
             u, value = close.trace.best, close.trace.best_value
         return MethodResult(self._method, (part, close), u, value)
@@ -105,12 +120,13 @@ class Search:
         trace = self._searched(label, function, box, self._effort.budget, 0.1)
         return SearchPart(label, objective.model.measurements.rows, trace)
 
-    def _descended(self, starts: list[Array]) -> Linearisation:
+    def _descended(self, starts: list[Array]) -> _Valley:
         """Goes down from several points on few rows, from the lowest end on all."""
         name = f"{self._method}, descent"
         kept = self._journal.stage(name)
         if kept is not None:
-            return gauss_newton(self._full, np.array(kept), 0)
+            u, value, factor = kept
+            return _Valley(np.array(u), value, np.array(factor))
 
         def tell(value: float) -> None:
             self._news(name, 0, 0, value)
@@ -120,15 +136,18 @@ class Search:
             valleys.sort(key=lambda here: self._thin.value(here.residual))
             starts = [here.u for here in valleys[:count]]
         here = gauss_newton(self._full, starts[0], 6, tell)
-        self._journal.finish(name, here.u.tolist())
-        return here
+        valley = _Valley(here.u, self._full.value(here.residual), _factor(here))
+        self._journal.finish(
+            name, [valley.u.tolist(), valley.value, valley.factor.tolist()]
+        )
+        return valley
 
-    def _close(self, here: Linearisation) -> SearchPart:
+    def _close(self, valley: _Valley) -> SearchPart:
         """Searches on all rows in coordinates whitened by the linearisation."""
         label = f"{self._method}, close"
-        box = Box.unit(len(here.u))
-        scale = max(self._full.value(here.residual), 1e-9)
-        white = Whitened(here.u, scale * _factor(here), box)
+        box = Box.unit(len(valley.u))
+        scale = max(valley.value, 1e-9)
+        white = Whitened(valley.u, scale * valley.factor, box)
         function = white.wrap(self._function(label, self._full))
         found = self._searched(
             label, function, white.box, self._effort.close, _WHITENED_STEP

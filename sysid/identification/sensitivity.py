@@ -6,7 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.identification.linearisation import Linearisation, linearise
+from sysid.identification.linearisation import (
+    FIRST_STEP,
+    WIDE_STEP,
+    Linearisation,
+    linearise,
+)
 from sysid.objective import Objective
 from sysid.parameters import Parameter
 
@@ -18,6 +23,7 @@ LOOSE = 0.5
 
 _PROBES = (0.05, 0.5, 0.95)  # of the range, where a parameter without slope is tried
 _NAMED = 0.3  # least share of a parameter in a combination that is named
+_WEAK = 0.02  # rms change over a step, in units of the noise, to look at a wider one
 _SILENT = 1e-9  # rms change, in units of the noise, that is none
 
 
@@ -99,6 +105,9 @@ class Sensitivity:
 def sensitivity(objective: Objective, u: Array) -> Sensitivity:
     """Returns what the log can say at a point (p,) of the unit box."""
     here = linearise(objective, u)
+    weak = here.effect * 2.0 * FIRST_STEP < _WEAK
+    if weak.any():
+        here = linearise(objective, u, np.where(weak, WIDE_STEP, FIRST_STEP))
     flat = np.flatnonzero(here.effect <= _SILENT)
     names = [p.name for p in objective.model.parameters]
     silent = [names[i] for i in flat if _is_silent(objective, here, int(i))]

@@ -75,6 +75,11 @@ def _twin(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
             f"{logs[0].folder}: states no scenario; name the one that the twin "
             "begins with by --scenario"
         )
+    if not choice.requests:
+        raise DisasmError(
+            "name what the twin is to learn by --parameters, for example "
+            "contact.friction lock.clearance GroovePose.ry"
+        )
     scenario, parameters = scenario_parameters(scenario, choice.requests)
     rollout = choice.objective == "rollout"
     return TwinModel(logs, scenario, parameters, rollout, choice.coarse)

@@ -135,6 +135,10 @@ class TwinModel(LogModel):
         """See LogModel."""
         return self._selected(row_mask(self.measurements, episodes))
 
+    def first(self, rows: int) -> Self:
+        """Returns the same model of the first transitions alone."""
+        return self._selected(np.arange(self.measurements.rows) < rows)
+
     def thin(self, every: int) -> Self:
         """See LogModel; a rollout keeps every n-th episode."""
         rows = np.arange(self.measurements.rows)

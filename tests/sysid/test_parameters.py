@@ -97,7 +97,8 @@ def test_reads_names_and_files(tmp_path):
     path = tmp_path / "bounds.yaml"
     path.write_text(
         "contact.friction: {low: 0.1, high: 0.5, nominal: 0.3}\n"
-        "contact.modulus: {low: 1.0e+8, high: 1.0e+10, scale: linear}\nlock.clearance:\n"
+        "contact.modulus: {low: 1.0e+8, high: 1.0e+10, scale: linear}\n"
+        "lock.clearance:\n"
     )
     requests = read_requests([str(path), "GroovePose.ry"])
     assert [r.name for r in requests][-2:] == ["lock.clearance", "GroovePose.ry"]

@@ -56,7 +56,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(tmp_path):
 
 def test_a_parameter_without_effect_stops_the_fit_by_name(tmp_path):
     model = Decay(("a", "idle"))
-    with pytest.raises(DisasmError, match="idle: has no effect.*--unidentifiable"):
+    with pytest.raises(DisasmError, match=r"idle: has no effect.*--unidentifiable"):
         run(model, tmp_path / "fit")
 
 
@@ -87,7 +87,7 @@ def test_nothing_left_to_fit_is_said(tmp_path):
 
 
 def test_fewer_transitions_than_parameters(tmp_path):
-    with pytest.raises(DisasmError, match="2 transitions .* 3 parameters"):
+    with pytest.raises(DisasmError, match=r"2 transitions .* 3 parameters"):
         run(Decay(rows=2), tmp_path / "fit", test=(1, 2, 3))
 
 

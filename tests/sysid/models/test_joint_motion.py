@@ -15,7 +15,8 @@ from sysid.workers import Workers
 from tests.sysid.real_data import write_arm, write_motion
 
 LINK = """<link name="{0}"><inertial><origin xyz="{1}"/><mass value="{2}"/>
-<inertia ixx="0.02" ixy="0.001" ixz="0" iyy="0.03" iyz="0" izz="0.01"/></inertial></link>"""
+<inertia ixx="0.02" ixy="0.001" ixz="0" iyy="0.03" iyz="0" izz="0.01"/>
+</inertial></link>"""
 JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>
 <origin xyz="{3}" rpy="{4}"/><axis xyz="0 0 1"/>
 <limit lower="-3" upper="3" velocity="3" effort="99"/></joint>"""

@@ -21,10 +21,10 @@ SETTINGS = Settings(effort=Effort(evaluations=60, close=10), huber=np.inf)
 EQUAL = ("PayloadError.mass", "PayloadError.cz", *DEFAULT_PARAMETERS[4:])
 
 
-def synthetic(folder, noise=0.0, poses=20, payload=(0.0, np.zeros(3))):
+def synthetic(folder, noise=0.0, poses=20, payload=(0.0, (0.0, 0.0, 0.0))):
     R = Rotation.random(poses, random_state=1)
     g_S = R.inv().apply([0.0, 0.0, -9.81])
-    m, c = TRUTH[0] + payload[0], TRUTH[1:4] + payload[0] * payload[1]
+    m, c = TRUTH[0] + payload[0], TRUTH[1:4] + payload[0] * np.array(payload[1])
     reading = np.hstack([m * g_S, np.cross(c, g_S)]) + TRUTH[4:]
     reading += noise * np.random.default_rng(0).normal(size=reading.shape)
     quaternions = R.as_quat()[:, [3, 0, 1, 2]]

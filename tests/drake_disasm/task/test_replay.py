@@ -1,0 +1,102 @@
+"""The twin driven open loop, and turned into other scenarios in place."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.scenario import load_scenario, with_values
+from drake_disasm.stations import TwinStation
+from drake_disasm.task.replay import TwinReplay, coarse_step
+from drake_disasm.task.simulation import TaskSimulation
+
+TURNED = load_scenario("removal_turned", ["ft_sensor.noise=[0, 0, 0, 0, 0, 0]"])
+OTHER = with_values(
+    TURNED,
+    {
+        "lock.clearance": 0.0006,
+        "lock.travel": 0.05,
+        "contact.friction": 0.35,
+        "contact.modulus": 1e9,
+        "contact.dissipation": 5.0,
+        "twin.stiffness.1": 8e3,
+        "twin.mass": 5.0,
+        "twin.damping_ratio": 0.8,
+        "effects.0.ry": 0.02,
+    },
+)
+ACTIONS = np.random.default_rng(0).uniform(-1, 1, (6, 6)) * [
+    2e-3, 3e-4, 3e-4, 0, 2e-3, 0
+]  # fmt: skip
+
+
+def replayed(replay: TwinReplay) -> np.ndarray:
+    """Returns the states of a walk along the groove in contact."""
+    start = np.array([0.02, 0, 2e-4, 0, 0, 0])
+    replay.start(0, start, np.zeros(6), start)
+    return np.array([replay.advance(rate / 0.1) for rate in ACTIONS])
+
+
+def test_it_is_the_task_simulation_open_loop():
+    simulation = TaskSimulation(TURNED, "twin")
+    first = simulation.reset(0)
+    replay = TwinReplay(TURNED)
+    expected = np.array(
+        [simulation.step(a * [1, 1, 1, 0, 0, 0]).observation for a in ACTIONS]
+    )
+    replay.start(0, np.zeros(6), np.zeros(6), np.zeros(6))
+    found = np.array([replay.advance(a * [1, 1, 1, 0, 0, 0] / 0.1) for a in ACTIONS])
+    np.testing.assert_allclose(found, expected, atol=2e-3)  # the sensor rounds
+    assert first.shape == found[0].shape
+
+
+@pytest.mark.parametrize("coarse", [False, True])
+def test_becoming_another_scenario_is_building_it_anew_bit_for_bit(coarse):
+    replay = TwinReplay(TURNED, coarse)
+    before = replayed(replay)
+    replay.become(OTHER)
+    assert replayed(replay).tobytes() == replayed(TwinReplay(OTHER, coarse)).tobytes()
+    replay.become(TURNED)
+    assert replayed(replay).tobytes() == before.tobytes()
+
+
+def test_what_cannot_be_changed_in_place_is_built_anew():
+    replay = TwinReplay(TURNED)
+    thick = with_values(TURNED, {"lock.neck_diameter": 0.0051})
+    replay.become(thick)
+    assert replayed(replay).tobytes() == replayed(TwinReplay(thick)).tobytes()
+
+
+def test_a_state_leaves_no_trace_in_the_next():
+    replay = TwinReplay(TURNED)
+    first = replayed(replay)
+    replay.start(3, np.array([0.05, 1e-3, 0, 0, 0, 0]), np.ones(6) * 0.01, np.zeros(6))
+    replay.advance(np.zeros(6))
+    assert replayed(replay).tobytes() == first.tobytes()
+
+
+def test_coarse_steps_end_where_fine_ones_do():
+    difference = replayed(TwinReplay(TURNED, coarse=True)) - replayed(
+        TwinReplay(TURNED)
+    )
+    settled = difference[1:]  # the first begins with a jump into contact
+    assert np.abs(settled[:, :3]).max() < 1e-5
+    assert np.abs(settled[:, 6:9]).max() < 0.2
+
+
+def test_coarse_steps_divide_the_period():
+    assert coarse_step(TURNED) == pytest.approx(0.02)
+    fine = dataclasses.replace(TURNED.simulation, twin_time_step=0.02)
+    assert coarse_step(dataclasses.replace(TURNED, simulation=fine)) == 0.0
+
+
+def test_a_station_refuses_in_place_what_needs_another_plant():
+    station = TwinStation(TURNED)
+    thick = with_values(TURNED, {"lock.neck_diameter": 0.0051})
+    assert station.can_become(OTHER) and not station.can_become(thick)
+    context = station.CreateDefaultContext()
+    with pytest.raises(DisasmError, match="in place"):
+        station.become(context, thick)
+    with pytest.raises(DisasmError, match=r"contact\.friction"):
+        station.become(context, with_values(TURNED, {"contact.friction": 7.0}))

@@ -1,0 +1,91 @@
+"""IMPACT against its closed form, and the lock as circles and planes."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.impact import ImpactLaw, LockShape
+from drake_disasm.scenario import ImpactConfig, LockConfig
+
+LAW = ImpactLaw(stiffness=2000.0, exponent=1.5, damping=4.0, depth=0.2)
+MM = 1e-3
+
+
+def force(law: ImpactLaw, penetration_mm: float, rate_mm_s: float = 0.0) -> float:
+    return float(
+        law.force(np.array([penetration_mm * MM]), np.array([rate_mm_s * MM]))[0]
+    )
+
+
+@pytest.mark.parametrize("p", [0.01, 0.05, 0.2, 1.0])
+def test_without_motion_it_is_a_power_of_the_penetration(p):
+    assert force(LAW, p) == pytest.approx(2000.0 * p**1.5)
+
+
+def test_nothing_without_penetration():
+    assert force(LAW, 0.0, 5.0) == force(LAW, -0.1, 5.0) == 0.0
+
+
+def test_it_never_pulls():
+    assert force(LAW, 0.1, -1000.0) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("p", "share"), [(0.05, 0.15625), (0.1, 0.5), (0.2, 1), (0.5, 1)]
+)
+def test_damping_rises_by_adams_cubic_step(p, share):
+    """step(p, 0, 0, d, c) = c x^2 (3 - 2 x), x = p / d."""
+    assert force(LAW, p, 3.0) - force(LAW, p) == pytest.approx(4.0 * share * 3.0)
+
+
+def test_depth_zero_is_full_damping_at_once():
+    law = ImpactLaw(100.0, 1.0, 2.0, 0.0)
+    assert force(law, 1e-6, 5.0) == pytest.approx(10.0, rel=1e-4)
+
+
+def test_slopes_are_the_derivatives():
+    p, v, step = np.array([0.08, 0.3]) * MM, np.array([2.0, -1.0]) * MM, 1e-9
+    _, by_p, by_rate = LAW.force_and_slopes(p, v)
+    np.testing.assert_allclose(
+        by_p, (LAW.force(p + step, v) - LAW.force(p - step, v)) / (2 * step), rtol=1e-5
+    )
+    np.testing.assert_allclose(
+        by_rate,
+        (LAW.force(p, v + step) - LAW.force(p, v - step)) / (2 * step),
+        rtol=1e-5,
+    )
+
+
+def test_takes_the_scenarios_section():
+    config = ImpactConfig(stiffness=7.0, exponent=2.0, damping=3.0, depth=0.5)
+    assert ImpactLaw.of(config) == ImpactLaw(7.0, 2.0, 3.0, 0.5)
+
+
+def deepest(position):
+    found = LockShape(LockConfig()).contacts(np.eye(3), np.array(position) * MM)
+    i = int(np.argmax(found.penetration))
+    return found.penetration[i] / MM, found.normal[i]
+
+
+def test_in_the_middle_nothing_touches():
+    assert deepest([20.0, 0.0, 0.0])[0] == pytest.approx(-0.2)  # half the clearance
+
+
+@pytest.mark.parametrize(
+    ("position", "depth", "normal"),
+    [
+        ([20.0, 0.0, 0.25], 0.05, [0, 0, -1]),  # neck on the lip at +z
+        ([20.0, 0.0, -0.3], 0.1, [0, 0, 1]),
+        ([20.0, 0.25, 0.0], 0.05, [0, -1, 0]),  # head under the lips
+        ([20.0, -0.3, 0.0], 0.1, [0, 1, 0]),  # head on the floor
+        ([60.6, 0.0, 0.0], 0.1, [-1, 0, 0]),  # head at stop B
+        ([-0.7, 0.0, 0.0], 0.2, [1, 0, 0]),  # head at stop A
+    ],
+)
+def test_touches_where_the_lock_is(position, depth, normal):
+    found, direction = deepest(position)
+    assert found == pytest.approx(depth, abs=1e-9)
+    np.testing.assert_array_equal(direction, normal)
+
+
+def test_at_the_keyhole_the_lips_hold_nothing():
+    assert deepest([60.0, 10.0, 0.4])[0] < 0.0

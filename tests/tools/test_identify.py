@@ -1,0 +1,211 @@
+"""tools/identify.py: what it writes, and how it refuses bad input."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from drake_disasm.scenario import load_scenario
+from sysid.logs import read_log, write_static_wrench
+from tests.tools.programs import ROOT
+
+QUICK = ("--budget", "60", "--workers", "1")
+
+
+def program(*arguments: object, name: str = "identify") -> list[str]:
+    return [sys.executable, str(ROOT / f"tools/{name}.py"), *map(str, arguments)]
+
+
+def run(*arguments: object, name: str = "identify") -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        program(*arguments, name=name), capture_output=True, text=True, timeout=280
+    )
+
+
+@pytest.fixture(scope="module")
+def readings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two static logs of a 1.2 kg load on a sensor with a bias, with noise."""
+    folder = tmp_path_factory.mktemp("readings")
+    generator = np.random.default_rng(0)
+    for number in range(2):
+        R = Rotation.random(15, random_state=number)
+        g_S = R.inv().apply([0.0, 0.0, -9.81])
+        wrench = np.hstack([1.2 * g_S, np.cross([0, 0, 0.06], g_S)])
+        wrench += [1, 2, 3, 0, 0.1, 0] + 0.005 * generator.normal(size=wrench.shape)
+        quaternions = R.as_quat()[:, [3, 0, 1, 2]]
+        write_static_wrench(folder / f"log_{number}", quaternions, wrench, "S", "w", {})
+    return folder
+
+
+@pytest.fixture(scope="module")
+def transitions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log that states `removal` and was made on a groove with more friction."""
+    folder = tmp_path_factory.mktemp("transitions")
+    hidden = folder / "hidden.yaml"
+    hidden.write_text(
+        "name: hidden\neffects:\n"
+        "- !GrooveFriction {coefficient: 0.1}\n- !GroovePose {ry: 0.02}\n"
+    )
+    done = run(
+        "--model", "twin", "--no-meshcat", "--policy", "admittance", "--explore", 0.15,
+        "--episodes", 3, "--hidden", hidden, "--set", "task.steps=14",
+        "--record", folder / "log", name="simulate",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return folder / "log"
+
+
+def test_a_hidden_scenario_is_not_in_the_log(transitions: Path) -> None:
+    log = read_log(transitions)
+    assert log.header.scenario is not None
+    assert log.header.scenario["effects"] == []
+    assert log.header.provenance["hidden"] is True
+    assert log.header.provenance["explore_mm"] == 0.15
+    assert "GrooveFriction" not in (transitions / "log.yaml").read_text()
+
+
+def test_readings_at_rest_from_the_command_line(readings: Path, tmp_path: Path) -> None:
+    out = tmp_path / "fit"
+    logs = (readings / "log_0", readings / "log_1")
+    done = run("--log", *logs, "--held-out", "log_1", "--out", out, *QUICK)
+    assert done.returncode == 0, done.stderr
+    assert "bees and nlopt agree" in done.stdout
+    result = json.loads((out / "result.json").read_text())
+    low, high = result["derived"]["weight"]["interval_95"]
+    assert low - 0.01 < 1.2 * 9.81 < high + 0.01
+    assert result["objective"]["held_out"]["episodes"] == ["log_1/episode_0000"]
+    assert result["objective"]["held_out"]["after"] < 1.5
+    assert result["provenance"]["data"][str(logs[0])] == read_log(logs[0]).data_hash
+    assert "<img" in (out / "report.html").read_text()
+    assert load_scenario(str(out / "scenario.yaml")).effects
+
+
+def test_a_twin_from_the_command_line_and_back_into_simulate(
+    transitions: Path, tmp_path: Path
+) -> None:
+    """The hidden friction and turn are found, and the scenario runs as it is."""
+    bounds = tmp_path / "bounds.yaml"
+    bounds.write_text(
+        "contact.friction: {low: 0.1, high: 0.5}\n"
+        "GroovePose.ry: {low: 0.0, high: 0.04}\n"
+    )
+    out = tmp_path / "fit"
+    done = run(
+        "--log", transitions, "--parameters", bounds, "--out", out,
+        "--method", "nlopt", "--budget", 30, "--workers", 2,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads((out / "result.json").read_text())["parameters"]
+    assert found["contact.friction"]["value"] == pytest.approx(0.3, rel=0.05)
+    assert found["GroovePose.ry"]["value"] == pytest.approx(0.02, rel=0.05)
+    scenario = out / "scenario.yaml"
+    again = run(
+        "--no-meshcat", "--model", "twin", "--scenario", scenario, name="simulate"
+    )
+    assert again.returncode == 0, again.stderr
+
+
+def test_ctrl_c_leaves_a_state_that_resumes_to_the_same_result(
+    transitions: Path, tmp_path: Path
+) -> None:
+    arguments = (
+        "--log", transitions, "--parameters", "contact.friction", "--method", "bees",
+        "--preset", "thesis", "--cycles", "2", "--workers", "2",
+    )  # fmt: skip
+    whole = run(*arguments, "--out", tmp_path / "whole")
+    assert whole.returncode == 0, whole.stderr
+    out = tmp_path / "fit"
+    journal = out / "evaluations.jsonl"
+    process = subprocess.Popen(
+        program(*arguments, "--out", out), stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 200
+    while not (journal.exists() and len(journal.read_text().splitlines()) > 5):
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.05)
+    os.kill(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=100)
+    assert process.returncode == 130 and "what was finished is kept" in errors
+    assert not (out / "result.json").exists()
+    refused = run(*arguments, "--out", out)
+    assert refused.returncode == 2 and "--resume" in refused.stderr
+    other = run(*arguments, "--out", out, "--resume", "--seed", 3)
+    assert other.returncode == 2 and "another seed" in other.stderr
+    again = run(*arguments, "--out", out, "--resume")
+    assert again.returncode == 0, again.stderr
+    first, second = (
+        json.loads((folder / "result.json").read_text())["parameters"]
+        for folder in (tmp_path / "whole", out)
+    )
+    assert first == second
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--parameters", "contact.fricton"), "did you mean 'friction'"),
+        (("--parameters", "GroovePose.ry", "GroovePose.ry"), "twice"),
+        (("--objective", "static_wrench"), "transitions or rollout"),
+        (("--parameters", "contact.friction", "--held-out", "1.5"), "share"),
+        (("--parameters", "contact.friction", "--held-out", "x"), "no such episode"),
+        (("--parameters", "contact.friction", "--huber", "-1"), "above zero"),
+        (("--parameters", "contact.friction", "--noise", "fq=1"), "no such channel"),
+        (("--parameters", "contact.friction", "--set", "lock.travel=1"), "--scenario"),
+        ((), "--parameters"),
+    ],
+)
+def test_bad_input_is_one_line(
+    arguments: tuple[str, ...], message: str, transitions: Path, tmp_path: Path
+) -> None:
+    done = run("--log", transitions, "--out", tmp_path / "fit", *arguments)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ") and len(done.stderr.splitlines()) == 1
+    assert message in done.stderr
+    assert not (tmp_path / "fit" / "result.json").exists()
+
+
+def test_a_parameter_that_this_log_does_not_show_is_named(
+    transitions: Path, tmp_path: Path
+) -> None:
+    """Nobody got as far as the end of the groove."""
+    names = ("contact.friction", "lock.travel")
+    arguments = ("--log", transitions, "--parameters", *names, "--workers", 1)
+    done = run(*arguments, "--out", tmp_path / "fit")
+    assert done.returncode == 2
+    assert "lock.travel" in done.stderr and "range" in done.stderr
+
+
+def test_nan_in_the_middle_names_file_and_column(
+    readings: Path, tmp_path: Path
+) -> None:
+    source = readings / "log_0"
+    (tmp_path / "log").mkdir()
+    (tmp_path / "log" / "log.yaml").write_bytes((source / "log.yaml").read_bytes())
+    columns = read_log(source).episodes[0].columns
+    rows = np.column_stack(list(columns.values()))
+    rows[7, -1] = np.nan
+    np.savetxt(
+        tmp_path / "log" / "episode_0000.csv",
+        rows,
+        delimiter=",",
+        header=",".join(columns),
+        comments="",
+    )
+    done = run("--log", tmp_path / "log", "--out", tmp_path / "fit")
+    assert done.returncode == 2
+    assert "episode_0000.csv" in done.stderr and "wrench.tz" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_help_teaches() -> None:
+    done = run("--help")
+    assert done.returncode == 0
+    for word in ("examples:", "--unidentifiable", "--resume", "scale: log"):
+        assert word in done.stdout

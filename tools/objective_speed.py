@@ -1,0 +1,73 @@
+"""How long one evaluation of the identification objective takes."""
+
+import os
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from drake_disasm.policies import Exploring, make_policy
+from drake_disasm.scenario import load_scenario, scenario_to_mapping
+from drake_disasm.task.episode import EpisodeRecorder, run_episode
+from drake_disasm.task.simulation import TaskSimulation
+from sysid.logs import LogHeader, LogWriter, flat_columns, read_log
+from sysid.models.twin import TwinModel
+from sysid.objective import Objective
+from sysid.parameters import nominal_values
+from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.workers import Workers
+
+SIZES = (883, 1776)  # the thesis's, for which it gives about ten minutes
+THESIS_S = 600.0
+_SCENARIO = "removal_turned"
+_PARAMETERS = ("contact.friction", "lock.clearance", "GroovePose.ry")
+_NOISE = 1.5e-4  # m, of exploration
+
+
+@contextmanager
+def recorded_log(transitions: int) -> Iterator[Path]:
+    """Yields a log of the twin with at least so many transitions; it goes after."""
+    scenario = load_scenario(_SCENARIO)
+    policy = Exploring(make_policy("admittance"), _NOISE, 0)
+    simulation = TaskSimulation(scenario, "twin", policy)
+    with tempfile.TemporaryDirectory() as folder:
+        header = LogHeader(
+            kind="transitions",
+            task=scenario.name,
+            provenance={"simulated": True},
+            period=scenario.task.period,
+            scenario=scenario_to_mapping(scenario),
+        )
+        writer, count, seed = LogWriter(Path(folder) / "log", header), 0, 0
+        while count < transitions:
+            recorder = EpisodeRecorder(simulation)
+            count += run_episode(simulation, seed, recorder).steps
+            writer.write_episode(flat_columns("transitions", recorder.columns()))
+            seed += 1
+        yield writer.folder
+
+
+def evaluation_time(log: Path, transitions: int, workers: int, repeats: int) -> float:
+    """Returns the time [s] of one evaluation, the median of some; workers are warm."""
+    scenario, parameters = scenario_parameters(
+        load_scenario(_SCENARIO), [Request(name) for name in _PARAMETERS]
+    )
+    model = TwinModel([read_log(log)], scenario, parameters).first(transitions)
+    theta = nominal_values(parameters)
+    with Workers(workers) as pool:
+        objective = Objective(model, pool)
+        objective(theta)
+        times = []
+        for i in range(repeats):
+            start = time.perf_counter()
+            objective(theta * (1.0 + 1e-3 * i))  # as in a search: no two are the same
+            times.append(time.perf_counter() - start)
+    return float(np.median(times))
+
+
+def cores() -> int:
+    """Returns how many cores there are."""
+    return os.cpu_count() or 1
