@@ -26,11 +26,11 @@ from sysid.identification.sensitivity import (
     of_linearisation,
     sensitivity,
 )
-from sysid.identification.uncertainty import Uncertainty, uncertainty
+from sysid.identification.uncertainty import uncertainty
 from sysid.identification.whiteness import ljung_box
 from sysid.models.base import LogModel
 from sysid.objective import Objective, tempered
-from sysid.parameters import Scaling, nominal_values
+from sysid.parameters import nominal_values
 from sysid.workers import Workers
 
 Array = NDArray[np.float64]
@@ -86,7 +86,8 @@ def identify(
     fitted = model.of_episodes(train)
     _refuse_small_logs(fitted)
     _refuse_unknown_profiles(fitted, settings.profiles)
-    first = _sensitivity(fitted, settings, workers, news)
+    news("sensitivities", 0, 0, np.nan)
+    first = sensitivity(*_at_start(Objective(fitted, workers, settings.huber)))
     frozen = _frozen(first, fitted, settings)
     model, fitted = model.freeze(frozen), fitted.freeze(frozen)
     full = Objective(fitted, workers, settings.huber)
@@ -95,8 +96,19 @@ def identify(
         name: Search(name, full, thin, settings.effort, journal, news).run()
         for name in settings.methods
     }
-    return _concluded(
-        model, train, test, settings, workers, news, full, thin, methods, first, frozen
+    held_out = (
+        Objective(model.of_episodes(test), workers, settings.huber) if test else None
+    )
+    news("uncertainty", 0, 0, np.nan)
+    judged = _Judgement(full, held_out, methods, settings)
+    return Identified(
+        frozen=dict(frozen),
+        before=first,
+        profiles=judged.profiles(workers, news),
+        evaluations=full.evaluations + thin.evaluations,
+        failures=len(full.failures) + len(thin.failures),
+        notes=judged.notes(frozen) + list(dict.fromkeys(workers.notes)),
+        **judged.findings(),
     )
 
 
@@ -134,13 +146,10 @@ def _refuse_unknown_profiles(model: LogModel, names: Sequence[str]) -> None:
             )
 
 
-def _sensitivity(
-    model: LogModel, settings: Settings, workers: Workers, news: News
-) -> Sensitivity:
-    news("sensitivities", 0, 0, np.nan)
-    objective = Objective(model, workers, settings.huber)
-    start = objective.scaling.to_unit(nominal_values(model.parameters))
-    return sensitivity(objective, start)
+def _at_start(objective: Objective) -> tuple[Objective, Array]:
+    """Returns an objective and where its search begins, in the unit box."""
+    nominal = nominal_values(objective.model.parameters)
+    return objective, objective.scaling.to_unit(nominal)
 
 
 def _frozen(
@@ -166,56 +175,118 @@ def _frozen(
     return frozen
 
 
-def _concluded(
-    model: LogModel,
-    train: Sequence[int],
-    test: Sequence[int],
-    settings: Settings,
-    workers: Workers,
-    news: News,
-    full: Objective,
-    thin: Objective,
-    methods: dict[str, MethodResult],
-    first: Sensitivity,
-    frozen: Mapping[str, float],
-) -> Identified:
-    """Judges what the methods found."""
-    news("uncertainty", 0, 0, np.nan)
-    best = min(methods.values(), key=lambda result: result.value)
-    here = _linearised(full, best.u)
-    spread = uncertainty(here, full.model.measurements.episode)
-    after = of_linearisation(here, full.model.parameters)
-    scaling, theta = full.scaling, full.scaling.from_unit(here.u)
-    start = nominal_values(full.model.parameters)
-    fitted = _comparison(full, start, theta)
-    held = _held_out(model, test, settings, workers, start, theta)
-    residual = (fitted.after - fitted.measured) / full.model.measurements.noise
-    profiles = _profiles(full, workers, here.u, spread, settings, news)
-    return Identified(
-        parameters=full.model.parameters,
-        frozen=dict(frozen),
-        channels=full.model.measurements.channels,
-        start=start,
-        theta=theta,
-        u=here.u,
-        interval_gn=_to_parameters(scaling, here.u, spread.gauss_newton),
-        interval_bootstrap=_to_parameters(scaling, here.u, spread.bootstrap),
-        spread=spread,
-        before=first,
-        after=after,
-        methods=methods,
-        best=best.name,
-        verdict=_verdict(methods, full, spread, after),
-        profiles=profiles,
-        fitted=fitted,
-        held_out=held,
-        whiteness=np.array([ljung_box(column) for column in residual.T]),
-        floor=noise_floor(settings.huber),
-        derived=_derived(full.model, scaling, here.u, spread),
-        evaluations=full.evaluations + thin.evaluations,
-        failures=len(full.failures) + len(thin.failures),
-        notes=_notes(full, here.u, after, test, workers, frozen),
-    )
+class _Judgement:
+    """What is to be said of the optima that the methods found."""
+
+    def __init__(
+        self,
+        full: Objective,
+        held_out: Objective | None,
+        methods: Mapping[str, MethodResult],
+        settings: Settings,
+    ) -> None:
+        self._full, self._held_out = full, held_out
+        self._methods, self._settings = dict(methods), settings
+        self._best = min(methods.values(), key=lambda result: result.value)
+        here = _linearised(full, self._best.u)
+        self._u = here.u
+        self._spread = uncertainty(here, full.model.measurements.episode)
+        self._after = of_linearisation(here, full.model.parameters)
+
+    def findings(self) -> dict[str, Any]:
+        """Returns the fields of `Identified` that judge the result."""
+        full, model, u = self._full, self._full.model, self._u
+        start, theta = nominal_values(model.parameters), full.scaling.from_unit(u)
+        fitted = _comparison(full, start, theta)
+        residual = (fitted.after - fitted.measured) / model.measurements.noise
+        return {
+            "parameters": model.parameters,
+            "channels": model.measurements.channels,
+            "start": start,
+            "theta": theta,
+            "u": u,
+            "interval_gn": self._interval(self._spread.gauss_newton),
+            "interval_bootstrap": self._interval(self._spread.bootstrap),
+            "spread": self._spread,
+            "after": self._after,
+            "methods": self._methods,
+            "best": self._best.name,
+            "verdict": self._verdict(),
+            "fitted": fitted,
+            "held_out": (
+                _comparison(self._held_out, start, theta) if self._held_out else None
+            ),
+            "whiteness": np.array([ljung_box(column) for column in residual.T]),
+            "floor": noise_floor(self._settings.huber),
+            "derived": self._derived(),
+        }
+
+    def profiles(self, workers: Workers, news: News) -> tuple[Profile, ...]:
+        """Returns the profile likelihoods that were asked for."""
+        names = [p.name for p in self._full.model.parameters]
+        found = []
+        for name in self._settings.profiles:
+            if name in names:
+                news(f"profile of {name}", 0, 0, np.nan)
+                i = names.index(name)
+                deviation = np.sqrt(self._spread.bootstrap_covariance[i, i])
+                reach = _PROFILE_REACH * float(deviation)
+                found.append(profile(self._full, workers, self._u, name, reach))
+        return tuple(found)
+
+    def notes(self, frozen: Mapping[str, float]) -> list[str]:
+        """Returns what a reader should be warned of."""
+        notes = [f"{name} was frozen at {value:g}" for name, value in frozen.items()]
+        parameters = self._full.model.parameters
+        for parameter, place in zip(parameters, self._u, strict=True):
+            if min(place, 1.0 - place) < _EDGE:
+                notes.append(
+                    f"{parameter.name} ended on a bound: widen it, or the model lacks "
+                    "something that this parameter stands in for"
+                )
+        notes += [f"at the result: {line}" for line in self._after.complaints]
+        if self._held_out is None:
+            notes.append(
+                "no episode was held out: nothing tells whether the fit carries over; "
+                "record several episodes"
+            )
+        for reason in dict.fromkeys(text for _, text in self._full.failures):
+            notes.append(f"a simulation failed: {reason}")
+        return notes
+
+    def _interval(self, relative: Array) -> Array:
+        """Returns intervals (p, 2) about the optimum as intervals of parameters."""
+        ends = np.clip(self._u[:, None] + relative, 0.0, 1.0)
+        sides = [self._full.scaling.from_unit(side) for side in ends.T]
+        return np.column_stack(sides)
+
+    def _verdict(self) -> Verdict | None:
+        if len(self._methods) != 2:
+            return None
+        first, second = self._methods.values()
+        return verdict(
+            (first.name, second.name),
+            (first.u, second.u),
+            (first.value, second.value),
+            self._full.model.measurements.values.size,
+            self._spread,
+            self._after,
+        )
+
+    def _derived(self) -> dict[str, tuple[float, str, tuple[float, float]]]:
+        """Returns what people ask for beside theta, with bootstrap intervals."""
+        model, scaling = self._full.model, self._full.scaling
+        described = model.describe(scaling.from_unit(self._u))
+        if not described:
+            return {}
+        draws = scaling.from_unit(np.clip(self._u + self._spread.draws, 0.0, 1.0))
+        drawn = [model.describe(draw) for draw in draws]
+        found = {}
+        for name, (value, unit) in described.items():
+            spread = [d[name][0] for d in drawn if name in d]
+            low, high = np.quantile(spread, [0.025, 0.975])
+            found[name] = (value, unit, (float(low), float(high)))
+        return found
 
 
 def _linearised(objective: Objective, u: Array) -> Linearisation:
@@ -236,104 +307,3 @@ def _comparison(objective: Objective, start: Array, theta: Array) -> Comparison:
         objective.value(residuals[0]),
         objective.value(residuals[1]),
     )
-
-
-def _held_out(
-    model: LogModel,
-    test: Sequence[int],
-    settings: Settings,
-    workers: Workers,
-    start: Array,
-    theta: Array,
-) -> Comparison | None:
-    if not test:
-        return None
-    objective = Objective(model.of_episodes(test), workers, settings.huber)
-    return _comparison(objective, start, theta)
-
-
-def _profiles(
-    full: Objective,
-    workers: Workers,
-    u: Array,
-    spread: Uncertainty,
-    settings: Settings,
-    news: News,
-) -> tuple[Profile, ...]:
-    names = [p.name for p in full.model.parameters]
-    found = []
-    for name in settings.profiles:
-        if name in names:
-            news(f"profile of {name}", 0, 0, np.nan)
-            i = names.index(name)
-            reach = _PROFILE_REACH * float(np.sqrt(spread.bootstrap_covariance[i, i]))
-            found.append(profile(full, workers, u, name, reach))
-    return tuple(found)
-
-
-def _to_parameters(scaling: Scaling, u: Array, intervals: Array) -> Array:
-    """Returns intervals (p, 2) about u as intervals of the parameters."""
-    ends = np.clip(u[:, None] + intervals, 0.0, 1.0)
-    return np.column_stack(
-        [scaling.from_unit(ends[:, 0]), scaling.from_unit(ends[:, 1])]
-    )
-
-
-def _verdict(
-    methods: Mapping[str, MethodResult],
-    full: Objective,
-    spread: Uncertainty,
-    after: Sensitivity,
-) -> Verdict | None:
-    if len(methods) != 2:
-        return None
-    first, second = methods.values()
-    return verdict(
-        (first.name, second.name),
-        (first.u, second.u),
-        (first.value, second.value),
-        full.model.measurements.values.size,
-        spread,
-        after,
-    )
-
-
-def _derived(
-    model: LogModel, scaling: Scaling, u: Array, spread: Uncertainty
-) -> dict[str, tuple[float, str, tuple[float, float]]]:
-    """Returns what people ask for beside theta, with bootstrap intervals."""
-    theta = scaling.from_unit(u)
-    draws = scaling.from_unit(np.clip(u + spread.draws, 0.0, 1.0))
-    found: dict[str, Any] = {}
-    described = [model.describe(draw) for draw in draws]
-    for name, (value, unit) in model.describe(theta).items():
-        spread_of_it = [d[name][0] for d in described if name in d]
-        low, high = np.quantile(spread_of_it, [0.025, 0.975])
-        found[name] = (value, unit, (float(low), float(high)))
-    return found
-
-
-def _notes(
-    full: Objective,
-    u: Array,
-    after: Sensitivity,
-    test: Sequence[int],
-    workers: Workers,
-    frozen: Mapping[str, float],
-) -> list[str]:
-    notes = [f"{name} was frozen at {value:g}" for name, value in frozen.items()]
-    for parameter, place in zip(full.model.parameters, u, strict=True):
-        if min(place, 1.0 - place) < _EDGE:
-            notes.append(
-                f"{parameter.name} ended on a bound: widen it, or the model lacks "
-                "something that this parameter stands in for"
-            )
-    notes += [f"at the result: {line}" for line in after.complaints]
-    if not test:
-        notes.append(
-            "no episode was held out: nothing tells whether the fit carries "
-            "over; record several episodes"
-        )
-    for reason in dict.fromkeys(text for _, text in full.failures):
-        notes.append(f"a simulation failed: {reason}")
-    return notes + list(dict.fromkeys(workers.notes))
