@@ -12,7 +12,7 @@ FLOORS = (
     {"errors", "quantity", "resources", "spatial", "timing", "writing", "parallel"},
     {"effects"},
     {"scenario", "ports"},
-    {"mdp", "lock", "devices", "models"},
+    {"mdp", "lock", "impact", "devices", "models"},
     {"tool"},
     {"coordinates"},
     {"systems"},

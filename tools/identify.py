@@ -26,7 +26,7 @@ from sysid.identification.result import Identified
 from sysid.identification.search import METHODS, Effort
 from sysid.identification.split import split_episodes
 from sysid.logs import Log, read_logs
-from sysid.models import LogModel
+from sysid.models import LogModel, ScenarioModel
 from sysid.models.from_logs import OBJECTIVES, ModelChoice, model_of
 from sysid.optimise import BeesSettings
 from sysid.report import report_page
@@ -306,9 +306,10 @@ def _write(
     folder: Path, found: Identified, model: LogModel, origin: dict[str, object]
 ) -> None:
     mapping = to_mapping(found) | {"provenance": origin}
-    scenario = getattr(model.freeze(found.frozen), "scenario_at", None)
-    if scenario is not None:
-        _write_text(folder / "scenario.yaml", dump_scenario(scenario(found.theta)))
+    fitted = model.freeze(found.frozen)
+    if isinstance(fitted, ScenarioModel):
+        scenario = fitted.scenario_at(found.theta)
+        _write_text(folder / "scenario.yaml", dump_scenario(scenario))
     _write_text(folder / "result.json", json.dumps(mapping, indent=2) + "\n")
     _write_text(folder / "report.html", report_page(found, origin))
 

@@ -57,6 +57,7 @@ class Journal:
         """Returns a function whose values are looked up, or evaluated and kept."""
 
         def value(points: Array) -> Array:
+            """Evaluates what is not known yet."""
             keys = [(name, point.tobytes()) for point in points]
             new = [i for i, key in enumerate(keys) if key not in self._values]
             if new:

@@ -129,6 +129,7 @@ class Search:
             return _Valley(np.array(u), value, np.array(factor))
 
         def tell(value: float) -> None:
+            """Passes the news on."""
             self._news(name, 0, 0, value)
 
         for count, iterations in _HALVING:
@@ -163,6 +164,7 @@ class Search:
         polish = int(_POLISH * budget)
 
         def tell(trace: Trace) -> None:
+            """Passes the news on."""
             self._news(label, trace.evaluations, budget, trace.best_value)
 
         trace = self._explored(function, box, budget - polish, tell)

@@ -4,6 +4,12 @@ One interface, `LogModel`, for every kind of log: transitions and rollouts of th
 twin, static readings of a force/torque sensor, joint torques of an arm.
 """
 
-from sysid.models.base import Channel, LogModel, Measurements, PredictionError
+from sysid.models.base import (
+    Channel,
+    LogModel,
+    Measurements,
+    PredictionError,
+    ScenarioModel,
+)
 
-__all__ = ["Channel", "LogModel", "Measurements", "PredictionError"]
+__all__ = ["Channel", "LogModel", "Measurements", "PredictionError", "ScenarioModel"]

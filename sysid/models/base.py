@@ -3,13 +3,14 @@
 import abc
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.errors import DisasmError
-from sysid.parameters import Parameter
+from drake_disasm.scenario import Scenario, with_values
+from sysid.parameters import Parameter, by_name, by_path
 
 Array = NDArray[np.float64]
 
@@ -115,20 +116,31 @@ class LogModel(abc.ABC):
         """
 
     @abc.abstractmethod
+    def freeze(self, values: Mapping[str, float]) -> Self:
+        """Returns the same model with some parameters fixed at values, by name."""
+
+    @abc.abstractmethod
+    def _selected(self, mask: NDArray[np.bool_]) -> Self:
+        """Returns the same model of the rows where the mask (rows,) is true."""
+
     def chunks(self) -> list[slice]:
         """Returns the pieces of work that one evaluation falls into."""
+        return [slice(0, self.measurements.rows)]
 
-    @abc.abstractmethod
     def of_episodes(self, episodes: Sequence[int]) -> Self:
-        """Returns the same model of some of the episodes."""
+        """Returns the same model of some of the episodes.
 
-    @abc.abstractmethod
-    def freeze(self, values: Mapping[str, float]) -> Self:
-        """Returns the same model with some parameters fixed at values."""
+        Raises:
+            DisasmError: they have no row.
+        """
+        mask = np.isin(self.measurements.episode, episodes)
+        if not mask.any():
+            raise DisasmError("no episode is left to fit; hold out fewer")
+        return self._selected(mask)
 
-    @abc.abstractmethod
     def with_measurements(self, measurements: Measurements) -> Self:
         """Returns the same model compared with other measurements of the same rows."""
+        return self._changed(measurements=measurements)
 
     def thin(self, every: int) -> "LogModel":
         """Returns the same model of every n-th row, where rows stand alone."""
@@ -138,17 +150,37 @@ class LogModel(abc.ABC):
         """Returns quantities that people ask for, with units, by name; none here."""
         return {}
 
+    def _changed(self, **attributes: Any) -> Self:
+        """Returns a copy with other attributes, without what it has built."""
+        changed = type(self).__new__(type(self))
+        changed.__dict__.update(dict(self.__getstate__()) | attributes)
+        return changed
 
-def row_mask(measurements: Measurements, episodes: Sequence[int]) -> NDArray[np.bool_]:
-    """Returns which rows (rows,) are of some episodes.
+    def __getstate__(self) -> dict[str, Any]:
+        """Returns what goes through pickle; a model that builds leaves that out."""
+        return self.__dict__
 
-    Raises:
-        DisasmError: no row is.
+
+class ScenarioModel(LogModel):
+    """A model whose parameters are numbers of a scenario.
+
+    Attributes:
+        scenario: at the parameters' nominal values.
     """
-    mask = np.isin(measurements.episode, episodes)
-    if not mask.any():
-        raise DisasmError("no episode is left to fit; hold out fewer")
-    return mask
+
+    scenario: Scenario
+
+    def freeze(self, values: Mapping[str, float]) -> Self:
+        """See LogModel."""
+        return self._changed(
+            scenario=with_values(self.scenario, by_path(self.parameters, values)),
+            parameters=tuple(p for p in self.parameters if p.name not in values),
+        )
+
+    def scenario_at(self, theta: Array) -> Scenario:
+        """Returns the scenario with the parameters' values (p,) in it."""
+        values = by_name(self.parameters, theta)
+        return with_values(self.scenario, by_path(self.parameters, values))
 
 
 def even_chunks(rows: int, size: int) -> list[slice]:

@@ -1,15 +1,16 @@
 """An arm's joint torques from its motion: rigid bodies, of any URDF."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drake_disasm.errors import DisasmError
 from drake_disasm.quantity import closest
 from sysid.logs import Episode, Log
 from sysid.logs.refusal import refusal
-from sysid.models.base import Array, Channel, LogModel, Measurements, row_mask
+from sysid.models.base import Array, Channel, LogModel, Measurements
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
 from sysid.parameters import Parameter, by_name
 
@@ -67,17 +68,6 @@ class JointMotionModel(LogModel):
         torque: Array = self._Y[rows] @ beta
         return torque
 
-    def chunks(self) -> list[slice]:
-        """See LogModel."""
-        return [slice(0, self.measurements.rows)]
-
-    def of_episodes(self, episodes: Sequence[int]) -> Self:
-        """See LogModel."""
-        mask = row_mask(self.measurements, episodes)
-        return self._changed(
-            _Y=self._Y[mask], measurements=self.measurements.select(mask)
-        )
-
     def freeze(self, values: Mapping[str, float]) -> Self:
         """See LogModel."""
         names = [p.name for p in self.parameters]
@@ -91,10 +81,6 @@ class JointMotionModel(LogModel):
             _free=self._free[free],
             parameters=tuple(self.parameters[i] for i in free),
         )
-
-    def with_measurements(self, measurements: Measurements) -> Self:
-        """See LogModel."""
-        return self._changed(measurements=measurements)
 
     def only(self, names: Sequence[str]) -> Self:
         """Returns the same model with all but the named parameters at the URDF's.
@@ -135,10 +121,10 @@ class JointMotionModel(LogModel):
             for i, value in enumerate(self._beta)
         )
 
-    def _changed(self, **attributes: Any) -> Self:
-        changed = type(self).__new__(type(self))
-        changed.__dict__.update(self.__dict__ | attributes)
-        return changed
+    def _selected(self, mask: NDArray[np.bool_]) -> Self:
+        return self._changed(
+            _Y=self._Y[mask], measurements=self.measurements.select(mask)
+        )
 
 
 def _refuse_other_logs(

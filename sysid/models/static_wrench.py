@@ -1,22 +1,23 @@
 """Static readings of a force/torque sensor: payload, bias, and any sensor effect."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.math import RotationMatrix
 from pydrake.multibody.tree import UniformGravityFieldElement
 
 from drake_disasm.effects import PayloadError, Sensing, SensorEffect
 from drake_disasm.errors import DisasmError
-from drake_disasm.scenario import Scenario, with_values
+from drake_disasm.scenario import Scenario
 from drake_disasm.spatial import weight_wrench
 from drake_disasm.tool import Tool
 from sysid.logs import Episode, Log, rotation_matrices, sensor_wrench
 from sysid.logs.refusal import refusal
 from sysid.logs.schema import WRENCH
-from sysid.models.base import Array, Channel, LogModel, Measurements, row_mask
-from sysid.parameters import Parameter, by_name, by_path
+from sysid.models.base import Array, Channel, Measurements, ScenarioModel
+from sysid.parameters import Parameter
 
 #: Weight, first moment and bias: all that a rigid load on an ideal sensor can do.
 DEFAULT_PARAMETERS = tuple(
@@ -31,7 +32,7 @@ DEFAULT_PARAMETERS = tuple(
 _GRAVITY_W = UniformGravityFieldElement().gravity_vector()
 
 
-class StaticWrenchModel(LogModel):
+class StaticWrenchModel(ScenarioModel):
     """The reading at rest: the known payload's weight, through the sensor's effects.
 
     The effects are those of the simulated sensor, the same code. Channels are the
@@ -110,35 +111,6 @@ class StaticWrenchModel(LogModel):
         """
         return tuple(channel.unit for channel in self.measurements.channels)
 
-    def chunks(self) -> list[slice]:
-        """See LogModel."""
-        return [slice(0, self.measurements.rows)]
-
-    def of_episodes(self, episodes: Sequence[int]) -> Self:
-        """See LogModel."""
-        mask = row_mask(self.measurements, episodes)
-        return self._changed(
-            _R_WS=self._R_WS[mask],
-            _time=self._time[mask],
-            measurements=self.measurements.select(mask),
-        )
-
-    def freeze(self, values: Mapping[str, float]) -> Self:
-        """See LogModel."""
-        return self._changed(
-            scenario=with_values(self.scenario, by_path(self.parameters, values)),
-            parameters=tuple(p for p in self.parameters if p.name not in values),
-        )
-
-    def with_measurements(self, measurements: Measurements) -> Self:
-        """See LogModel."""
-        return self._changed(measurements=measurements)
-
-    def scenario_at(self, theta: Array) -> Scenario:
-        """Returns the scenario with the parameters' values (p,) in it."""
-        values = by_name(self.parameters, theta)
-        return with_values(self.scenario, by_path(self.parameters, values))
-
     def describe(self, theta: Array) -> dict[str, tuple[float, str]]:
         """Returns weight and centre of mass of what PayloadError stands for."""
         for effect in self.scenario_at(theta).effects:
@@ -163,10 +135,12 @@ class StaticWrenchModel(LogModel):
                     "it; name sensor effects, such as PayloadError.mass SensorBias.fx"
                 )
 
-    def _changed(self, **attributes: Any) -> Self:
-        changed = type(self).__new__(type(self))
-        changed.__dict__.update(self.__dict__ | attributes)
-        return changed
+    def _selected(self, mask: NDArray[np.bool_]) -> Self:
+        return self._changed(
+            _R_WS=self._R_WS[mask],
+            _time=self._time[mask],
+            measurements=self.measurements.select(mask),
+        )
 
 
 def _payload(scenario: Scenario) -> tuple[float, np.ndarray]:

@@ -1,7 +1,7 @@
 """The digital twin as a model of measured transitions (thesis, eq. 4.8)."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from drake_disasm.coordinates import BoltCoordinates
 from drake_disasm.errors import DisasmError
 from drake_disasm.mdp import STATE_NAMES
-from drake_disasm.scenario import Scenario, with_values
+from drake_disasm.scenario import Scenario
 from drake_disasm.spatial import pose_from_vector
 from drake_disasm.task.replay import TwinReplay
 from drake_disasm.tool import Tool
@@ -22,13 +22,12 @@ from sysid.logs.transitions import observations
 from sysid.models.base import (
     Array,
     Channel,
-    LogModel,
     Measurements,
     PredictionError,
+    ScenarioModel,
     even_chunks,
-    row_mask,
 )
-from sysid.parameters import Parameter, by_name, by_path
+from sysid.parameters import Parameter
 
 #: How well a robot's own encoders repeat within an episode, m and rad: below its
 #: repeatability (0.1 mm, against an outside frame), above their resolution.
@@ -62,7 +61,7 @@ class Steps:
         )
 
 
-class TwinModel(LogModel):
+class TwinModel(ScenarioModel):
     """The twin replays measured commands; its next states are compared.
 
     Channels are the bolt's pose in G (x, y, z, u, v, w) and the processed wrench,
@@ -131,10 +130,6 @@ class TwinModel(LogModel):
         ends = [*starts[1:], self.measurements.rows]
         return [slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True)]
 
-    def of_episodes(self, episodes: Sequence[int]) -> Self:
-        """See LogModel."""
-        return self._selected(row_mask(self.measurements, episodes))
-
     def first(self, rows: int) -> Self:
         """Returns the same model of the first transitions alone."""
         return self._selected(np.arange(self.measurements.rows) < rows)
@@ -145,32 +140,11 @@ class TwinModel(LogModel):
         of = self.measurements.episode if self.rollout else rows
         return self._selected(of % every == 0)
 
-    def freeze(self, values: Mapping[str, float]) -> Self:
-        """See LogModel."""
-        return self._changed(
-            scenario=with_values(self.scenario, by_path(self.parameters, values)),
-            parameters=tuple(p for p in self.parameters if p.name not in values),
-        )
-
-    def with_measurements(self, measurements: Measurements) -> Self:
-        """See LogModel."""
-        return self._changed(measurements=measurements)
-
-    def scenario_at(self, theta: Array) -> Scenario:
-        """Returns the scenario with the parameters' values (p,) in it."""
-        values = by_name(self.parameters, theta)
-        return with_values(self.scenario, by_path(self.parameters, values))
-
     def _selected(self, mask: NDArray[np.bool_]) -> Self:
         return self._changed(
             steps=self.steps.select(mask),
             measurements=self.measurements.select(mask),
         )
-
-    def _changed(self, **attributes: Any) -> Self:
-        changed = type(self).__new__(type(self))
-        changed.__dict__.update(self.__getstate__() | attributes)
-        return changed
 
     def _replay_at(self, theta: Array) -> TwinReplay:
         """Returns the twin at parameters (p,); a change takes some 10 ms."""

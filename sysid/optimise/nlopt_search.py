@@ -47,6 +47,7 @@ def nlopt_search(
     errors: list[BaseException] = []
 
     def value(x: Array, gradient: Array) -> float:
+        """Evaluates one point for NLopt."""
         if errors or trace.evaluations >= last:  # some overrun their own limit
             solver.force_stop()
             return np.inf

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from sysid.models import Channel, LogModel, Measurements, PredictionError
-from sysid.models.base import even_chunks, row_mask
+from sysid.models.base import even_chunks
 from sysid.parameters import Parameter, by_name
 
 NOISE = 0.1
@@ -62,8 +62,7 @@ class Decay(LogModel):
     def chunks(self):
         return even_chunks(self.measurements.rows, 16)
 
-    def of_episodes(self, episodes: Sequence[int]) -> Self:
-        mask = row_mask(self.measurements, episodes)
+    def _selected(self, mask) -> Self:
         return self._changed(
             x=self.x[mask], measurements=self.measurements.select(mask)
         )
@@ -71,11 +70,3 @@ class Decay(LogModel):
     def freeze(self, values: Mapping[str, float]) -> Self:
         left = tuple(p for p in self.parameters if p.name not in values)
         return self._changed(parameters=left, fixed=self.fixed | dict(values))
-
-    def with_measurements(self, measurements: Measurements) -> Self:
-        return self._changed(measurements=measurements)
-
-    def _changed(self, **attributes: Any) -> Self:
-        changed = type(self).__new__(type(self))
-        changed.__dict__.update(self.__dict__ | attributes)
-        return changed
