@@ -150,43 +150,59 @@ class Search:
         scale = max(valley.value, 1e-9)
         white = Whitened(valley.u, scale * valley.factor, box)
         function = white.wrap(self._function(label, self._full))
+        centre = np.zeros((1, len(valley.u)))
         found = self._searched(
-            label, function, white.box, self._effort.close, _WHITENED_STEP
+            label, function, white.box, self._effort.close, _WHITENED_STEP, centre
         )
         points = [white.to_x(z) for z in found.points]
         trace = Trace(points, found.values, found.cycle_ends, found.stopped)
         return SearchPart(label, self._full.model.measurements.rows, trace)
 
     def _searched(
-        self, label: str, function: BatchFunction, box: Box, budget: int, step: float
+        self,
+        label: str,
+        function: BatchFunction,
+        box: Box,
+        budget: int,
+        step: float,
+        start: Array | None = None,
     ) -> Trace:
-        """Spends a budget: the method, then SBPLX from its best."""
+        """Spends a budget: the method, then SBPLX from its best.
+
+        Args:
+            label: of this part.
+            function: to minimise.
+            box: to search.
+            budget: evaluations.
+            step: SBPLX's first, over the box.
+            start: (1, p) a point that is known to be good.
+        """
         polish = int(_POLISH * budget)
 
         def tell(trace: Trace) -> None:
             """Passes the news on."""
             self._news(label, trace.evaluations, budget, trace.best_value)
 
-        trace = self._explored(function, box, budget - polish, tell)
+        trace = self._explored(function, box, budget - polish, start, tell)
         left = budget - trace.evaluations
-        start = trace.best if trace.evaluations else None
-        return nlopt_search(
-            function, box, "LN_SBPLX", left, start, 0, step, trace, tell
-        )
+        best = trace.best if trace.evaluations else None
+        return nlopt_search(function, box, "LN_SBPLX", left, best, 0, step, trace, tell)
 
     def _explored(
         self,
         function: BatchFunction,
         box: Box,
         budget: int,
+        start: Array | None,
         tell: Callable[[Trace], None],
     ) -> Trace:
         effort = self._effort
         if self._method == "nlopt":
+            first = None if start is None else start[0]
             return nlopt_search(
-                function, box, "GN_CRS2_LM", budget, seed=effort.seed, callback=tell
+                function, box, "GN_CRS2_LM", budget, first, effort.seed, callback=tell
             )
-        bees = BeesAlgorithm(box, effort.bees, effort.seed, effort.propose)
+        bees = BeesAlgorithm(box, effort.bees, effort.seed, effort.propose, start)
         stop = Stop(evaluations=budget)
         return bees.run(function, stop=stop, callback=lambda b: tell(b.trace))
 

@@ -145,7 +145,18 @@ class BeesAlgorithm:
         settings: BeesSettings | None = None,
         seed: int = 0,
         propose: Propose | None = None,
+        start: Array | None = None,
     ) -> None:
+        """Prepares a search; nothing is evaluated yet.
+
+        Args:
+            box: to search.
+            settings: of the colony.
+            seed: of all its random numbers.
+            propose: chooses points in place of scouts.
+            start: (k, p) points that are known to be good, among the first ones.
+        """
+        self._start = np.zeros((0, box.size)) if start is None else box.clip(start)
         self.box, self.settings = box, settings or BeesSettings()
         self.sites: list[Site] = []
         self.trace = Trace()
@@ -248,6 +259,7 @@ class BeesAlgorithm:
             self._search(function)
         else:
             points = self._scouts(self.settings.initial)
+            points[: len(self._start)] = self._start[: len(points)]
             self.sites = [self._site(x, f) for x, f in self._evaluate(function, points)]
         self.sites.sort(key=lambda site: site.value)
         del self.sites[self.settings.sites :]

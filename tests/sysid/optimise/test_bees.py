@@ -199,3 +199,10 @@ def test_refuses_a_colony_that_cannot_work(bad, word):
 def test_refuses_bounds_that_are_no_box(low, high, word):
     with pytest.raises(DisasmError, match=word):
         Box.of(low, high)
+
+
+def test_points_that_are_known_to_be_good_are_among_the_first():
+    start = np.array([[0.1, 0.2, 0.3], [9.0, 0.0, 0.0]])
+    trace = BeesAlgorithm(BOX, BeesSettings(), 0, start=start).run(sphere, cycles=0)
+    assert trace.evaluations == BeesSettings().initial
+    np.testing.assert_array_equal(trace.points[:2], [[0.1, 0.2, 0.3], [3.0, 0.0, 0.0]])
