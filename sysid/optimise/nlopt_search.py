@@ -62,12 +62,8 @@ def nlopt_search(
             return np.inf
         return trace.values[-1]
 
-    solver = nlopt.opt(getattr(nlopt, algorithm), box.size)
-    solver.set_lower_bounds(box.low)
-    solver.set_upper_bounds(box.high)
+    solver = _solver(algorithm, box, evaluations, step * box.width)
     solver.set_min_objective(value)
-    solver.set_maxeval(evaluations)
-    solver.set_initial_step(step * box.width)
     nlopt.srand(seed)
     begin = (box.low + box.high) / 2 if start is None else start
     trace.stopped = _outcome(solver, box.clip(begin))
@@ -75,6 +71,15 @@ def nlopt_search(
         raise errors[0]
     trace.cycle_ends.append(trace.evaluations)
     return trace
+
+
+def _solver(algorithm: str, box: Box, evaluations: int, step: Array) -> nlopt.opt:
+    solver = nlopt.opt(getattr(nlopt, algorithm), box.size)
+    solver.set_lower_bounds(box.low)
+    solver.set_upper_bounds(box.high)
+    solver.set_maxeval(evaluations)
+    solver.set_initial_step(step)
+    return solver
 
 
 def _outcome(solver: nlopt.opt, start: Array) -> str:

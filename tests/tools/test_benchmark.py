@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.tools.programs import ROOT
 
 
@@ -14,7 +16,7 @@ def _benchmark(*arguments: str) -> subprocess.CompletedProcess[str]:
         [sys.executable, str(ROOT / "tools/benchmark.py"), *arguments],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=280,
         check=False,
     )
 
@@ -40,3 +42,14 @@ def test_unknown_key_is_one_line() -> None:
     assert done.returncode == 2
     assert "error: --only twin_reset: no such figure" in done.stderr
     assert "twin_reset_ms" in done.stderr
+
+
+@pytest.mark.slow
+def test_the_objectives_keys(tmp_path: Path) -> None:
+    file = tmp_path / "figures.json"
+    keys = ["objective_883_s", "objective_1776_s", "objective_883_one_core_s"]
+    done = _benchmark("--only", *keys, "--json", str(file))
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(file.read_text())
+    assert set(figures) == set(keys) and min(figures.values()) > 0.0
+    assert "the thesis's 10 minutes" in done.stdout

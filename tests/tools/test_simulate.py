@@ -237,3 +237,9 @@ def test_help_teaches(simulate: Runner) -> None:
         "admittance",
     ):
         assert word in done.stdout
+
+
+def test_negative_exploration_is_refused(simulate: Runner, tmp_path: Path) -> None:
+    done = simulate(*TWIN, "--explore", "-1", "--record", str(tmp_path / "log"))
+    assert done.returncode == 2 and "millimetres" in done.stderr
+    assert not (tmp_path / "log").exists()
