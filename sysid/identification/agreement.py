@@ -1,12 +1,12 @@
 """A verdict on two searches: did they find the same, and what it means if not."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from sysid.identification.sensitivity import Sensitivity
 from sysid.identification.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ def verdict(
     values: tuple[float, float],
     residuals: int,
     spread: Uncertainty,
-    identifiable: Sensitivity,
+    parameters: Sequence[str],
 ) -> Verdict:
     """Compares two optima.
 
@@ -53,7 +53,7 @@ def verdict(
         values: of the objective.
         residuals: how many numbers the objective is the rms of.
         spread: at the better one.
-        identifiable: at the better one.
+        parameters: their names.
     """
     size = len(points[0])
     edge = float(chi2.ppf(0.95, size))
@@ -67,36 +67,36 @@ def verdict(
     sigma = np.sqrt(np.maximum(np.diagonal(C), 1e-300))
     same_value, same_point = gap <= 1.0, distance <= 1.0
     worse = names[int(values[1] > values[0])]
-    text = _text(names, worse, same_value, same_point, values, identifiable)
+    if not same_value:
+        text = _stuck(names, worse, values)
+    elif not same_point:
+        text = _elsewhere(names, parameters, difference / sigma)
+    else:
+        text = (
+            f"{names[0]} and {names[1]} agree: the same objective ({values[0]:.4f} and "
+            f"{values[1]:.4f}) and the same parameters within their uncertainty."
+        )
     return Verdict(
         same_value and same_point, float(gap), difference / sigma, distance, text
     )
 
 
-def _text(
-    names: tuple[str, str],
-    worse: str,
-    same_value: bool,
-    same_point: bool,
-    values: tuple[float, float],
-    identifiable: Sensitivity,
-) -> str:
-    first, second = names
-    if same_value and same_point:
-        return (
-            f"{first} and {second} agree: the same objective ({values[0]:.4f} and "
-            f"{values[1]:.4f}) and the same parameters within their uncertainty."
-        )
-    if not same_value:
-        better = second if worse == first else first
-        return (
-            f"{worse} is stuck: it ended at {max(values):.4f}, {better} at "
-            f"{min(values):.4f}, which is more than noise explains. Take {better}'s "
-            "values; a larger --budget or narrower bounds help the other."
-        )
-    loose = identifiable.combinations[-1].text(identifiable.names)
+def _stuck(names: tuple[str, str], worse: str, values: tuple[float, float]) -> str:
+    better = names[1] if worse == names[0] else names[0]
     return (
-        f"{first} and {second} reach the same objective with different parameters: "
-        f"the log does not fix them. What it fixes least is {loose}. Freeze one of "
-        "these, or record motions that tell them apart."
+        f"{worse} is stuck: it ended at {max(values):.4f}, {better} at "
+        f"{min(values):.4f}, which is more than noise explains. Take {better}'s "
+        "values; a larger --budget or narrower bounds help the other."
+    )
+
+
+def _elsewhere(names: tuple[str, str], parameters: Sequence[str], gap: Array) -> str:
+    """Says what differs, the most first."""
+    order = [i for i in np.argsort(-np.abs(gap)) if abs(gap[i]) > 2.0][:3]
+    listed = ", ".join(f"{parameters[i]} by {abs(gap[i]):.0f}" for i in order)
+    return (
+        f"{names[0]} and {names[1]} reach the same objective with different parameters "
+        f"(in standard deviations: {listed or 'all together'}): the log fixes these "
+        "less closely than the intervals say. Take the distance between the two as "
+        "the uncertainty, freeze one, or record motions that tell them apart."
     )

@@ -270,7 +270,7 @@ class _Judgement:
             (first.value, second.value),
             self._full.model.measurements.values.size,
             self._spread,
-            self._after,
+            self._after.names,
         )
 
     def _derived(self) -> dict[str, tuple[float, str, tuple[float, float]]]:

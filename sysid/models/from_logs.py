@@ -104,7 +104,8 @@ def _with_noise(model: LogModel, noise: dict[str, float]) -> LogModel:
     for name, value in noise.items():
         if name not in known:
             raise DisasmError(
-                f"--noise {name}: no such channel; {closest(name, known)}"
+                f"--noise {name}: no such channel, the model does not predict it; "
+                f"{closest(name, known)}"
             )
         if not value > 0.0:
             raise DisasmError(f"--noise {name}={value:g}: give a number above zero")
