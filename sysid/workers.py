@@ -2,6 +2,7 @@
 
 import hashlib
 import multiprocessing
+import os
 import pickle
 import signal
 import threading
@@ -108,10 +109,20 @@ class Workers:
 def _spawned(count: int) -> Executor:
     """Returns a pool of fresh interpreters: Drake's threads do not survive a fork."""
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(count, context, signal.signal, _IGNORE_CTRL_C)
+    return ProcessPoolExecutor(count, context, _begin_worker)
 
 
-_IGNORE_CTRL_C = (signal.SIGINT, signal.SIG_IGN)  # the parent tells when to stop
+def _begin_worker() -> None:
+    """Leaves Ctrl-C to the parent, and the world with it, should it be killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_leave_with_parent, daemon=True).start()
+
+
+def _leave_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _predict(key: str, payload: bytes, theta: Array, rows: slice) -> Array | str:

@@ -1,6 +1,12 @@
+import os
+import subprocess
+import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from drake_disasm.errors import DisasmError
@@ -8,6 +14,7 @@ from sysid.objective import FAILED_RESIDUAL, Objective, huber_weights, rms, temp
 from sysid.workers import Workers
 from tests.sysid.toys import NOISE, Decay
 
+ROOT = Path(__file__).parents[2]
 TRUTH = np.array([2.0, 1.5, 0.3])
 THETAS = np.array([TRUTH, [1.0, 1.0, 1.0], [2.0, 2.95, 0.3], [0.5, 0.1, 0.0]])
 
@@ -93,3 +100,33 @@ def test_predictions_come_back_in_si():
 
 def test_rms():
     assert rms(np.array([[3.0, -4.0]])) == pytest.approx(np.sqrt(12.5))
+
+
+_ORPHANS = """
+import os, numpy as np
+from sysid.objective import Objective
+from sysid.workers import Workers
+from tests.sysid.toys import Decay
+if __name__ == "__main__":
+    workers = Workers(2)
+    Objective(Decay(), workers)(np.ones((2, 3)))
+    print(*workers._executor._processes, flush=True)
+    os.kill(os.getpid(), 9)
+"""
+
+
+def test_workers_leave_with_a_parent_that_is_killed(tmp_path):
+    script = tmp_path / "parent.py"
+    script.write_text(_ORPHANS)
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+    children = [int(word) for word in done.stdout.split()]
+    assert len(children) == 2, done.stderr
+    deadline = time.monotonic() + 30
+    while any(psutil.pid_exists(child) for child in children):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
