@@ -35,7 +35,7 @@ from sysid.workers import Workers
 
 Array = NDArray[np.float64]
 
-_THIN_ROWS = 64  # that a global search simulates
+_THIN_ROWS = (64, 220)  # that a global search and a first descent simulate
 _EDGE = 1e-3  # of the range: an optimum this near a bound is on it
 _PROFILE_REACH = 3.0  # standard deviations
 
@@ -90,10 +90,10 @@ def identify(
     first = sensitivity(*_at_start(Objective(fitted, workers, settings.huber)))
     frozen = _frozen(first, fitted, settings)
     model, fitted = model.freeze(frozen), fitted.freeze(frozen)
-    full = Objective(fitted, workers, settings.huber)
-    thin = Objective(thinned(fitted), workers, settings.huber)
+    ladder = [Objective(m, workers, settings.huber) for m in thinned(fitted)]
+    full = ladder[-1]
     methods = {
-        name: Search(name, full, thin, settings.effort, journal, news).run()
+        name: Search(name, ladder, settings.effort, journal, news).run()
         for name in settings.methods
     }
     held_out = (
@@ -105,17 +105,22 @@ def identify(
         frozen=dict(frozen),
         before=first,
         profiles=judged.profiles(workers, news),
-        evaluations=full.evaluations + thin.evaluations,
-        failures=len(full.failures) + len(thin.failures),
+        evaluations=sum(objective.evaluations for objective in ladder),
+        failures=sum(len(objective.failures) for objective in ladder),
         notes=judged.notes(frozen) + list(dict.fromkeys(workers.notes)),
         **judged.findings(),
     )
 
 
-def thinned(model: LogModel) -> LogModel:
-    """Returns a model of about _THIN_ROWS rows, spread evenly; all, if it is cheap."""
-    every = model.measurements.rows // _THIN_ROWS
-    return model if model.affine or every < 2 else model.thin(every)
+def thinned(model: LogModel) -> list[LogModel]:
+    """Returns a model of few rows, spread evenly, of more, and of all.
+
+    The last alone if there are few rows, or evaluating them costs nothing.
+    """
+    steps = [model.measurements.rows // rows for rows in _THIN_ROWS]
+    if model.affine:
+        return [model]
+    return [model.thin(every) for every in steps if every >= 2] + [model]
 
 
 def noise_floor(huber: float) -> float:

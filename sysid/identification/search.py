@@ -2,11 +2,11 @@
 
 The measured optimum of a five-parameter fit is a valley a ten-thousandth of the box
 wide. A global search finds the region of it, and needs no more than some sixty rows
-for that, at a tenth of the time. Gauss-Newton then goes down, and gives coordinates in
-which the valley is round, where the method searches again, on all rows.
+for that, at a tenth of the time. A descent follows, on more and more rows, and gives
+coordinates in which the valley is round, where the method searches again, on all rows.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,9 +27,10 @@ Array = NDArray[np.float64]
 METHODS = ("bees", "nlopt")
 
 _POLISH = 0.25  # part of a search that SBPLX gets at its end
-_CLOSE = 0.25  # part of the budget for the close search
 _STARTS = 6  # of descents: the lowest point found need not lie in the right valley
 _HALVING = ((2, 3), (1, 15))  # so many of them go on after so many iterations
+_ITERATIONS = 10  # of a descent on more rows
+_LAST_ITERATIONS = 4  # on all of them
 _APART = 0.25  # of the box, between them
 _WHITENED_STEP = 0.05  # SBPLX's first step over the box of z
 
@@ -89,19 +90,27 @@ class Search:
     def __init__(
         self,
         method: str,
-        full: Objective,
-        thin: Objective,
+        ladder: Sequence[Objective],
         effort: Effort,
         journal: Journal,
         news: News,
     ) -> None:
-        self._method, self._full, self._effort = method, full, effort
-        self._thin = thin if effort.close else full
+        """Prepares a search.
+
+        Args:
+            method: one of METHODS.
+            ladder: the objective on few rows, on more, and last on all of them.
+            effort: how hard to try.
+            journal: keeps what was evaluated.
+            news: called while it works.
+        """
+        self._method, self._full, self._effort = method, ladder[-1], effort
+        self._ladder = tuple(ladder) if effort.close else (ladder[-1],)
         self._journal, self._news = journal, news
 
     def run(self) -> MethodResult:
         """Returns where the method ends."""
-        part = self._part("global", self._thin)
+        part = self._part("global", self._ladder[0])
         if not self._effort.close:
             best = part.trace.best, part.trace.best_value
             return MethodResult(self._method, (part,), *best)
@@ -121,7 +130,7 @@ class Search:
         return SearchPart(label, objective.model.measurements.rows, trace)
 
     def _descended(self, starts: list[Array]) -> _Valley:
-        """Goes down from several points on few rows, from the lowest end on all."""
+        """Goes down from several points on few rows, from the lowest end on more."""
         name = f"{self._method}, descent"
         kept = self._journal.stage(name)
         if kept is not None:
@@ -132,11 +141,16 @@ class Search:
             """Passes the news on."""
             self._news(name, 0, 0, value)
 
+        first, *others = self._ladder
         for count, iterations in _HALVING:
-            valleys = [gauss_newton(self._thin, u, iterations, tell) for u in starts]
-            valleys.sort(key=lambda here: self._thin.value(here.residual))
+            valleys = [gauss_newton(first, u, iterations, tell) for u in starts]
+            valleys.sort(key=lambda here: first.value(here.residual))
             starts = [here.u for here in valleys[:count]]
-        here = gauss_newton(self._full, starts[0], 6, tell)
+        here = valleys[0]
+        for objective in others:
+            last = objective is self._full
+            iterations = _LAST_ITERATIONS if last else _ITERATIONS
+            here = gauss_newton(objective, here.u, iterations, tell)
         valley = _Valley(here.u, self._full.value(here.residual), _factor(here))
         self._journal.finish(
             name, [valley.u.tolist(), valley.value, valley.factor.tolist()]

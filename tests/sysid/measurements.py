@@ -208,7 +208,7 @@ def _thesis_run(job: tuple) -> list[float]:
     effort = Effort(cycles=cycles, close=0, bees=colony, seed=seed)
     with tempfile.TemporaryDirectory() as scratch:
         journal = Journal(Path(scratch), {}, False)
-        search = Search(method, objective, objective, effort, journal, lambda *_: None)
+        search = Search(method, [objective], effort, journal, lambda *_: None)
         found: MethodResult = search.run()
     print(job[1:4], f"{found.value:.2f}", flush=True)
     return found.parts[0].trace.values
