@@ -111,12 +111,13 @@ class TwinStation(SimulatedStation):
                 "the twin can't take this scenario in place; build a station of it"
             )
         self.scenario = scenario
-        reshape_groove(
-            self.lock,
-            scenario.lock,
-            self.scene_graph,
-            self.part_context(self.scene_graph, context),
-        )
+        if self.impact is None:  # a new shape would forget the collision filter
+            reshape_groove(
+                self.lock,
+                scenario.lock,
+                self.scene_graph,
+                self.part_context(self.scene_graph, context),
+            )
         self.lock = dataclasses.replace(
             self.lock,
             config=scenario.lock,
@@ -191,10 +192,11 @@ class TwinStation(SimulatedStation):
         self.scene_graph.collision_filter_manager().Apply(declaration)
 
     def _set_environment(self, context: Context, environment: Environment) -> None:
-        super()._set_environment(context, environment)
         if self.impact is None:
+            super()._set_environment(context, environment)
             return
         plant_context = self.part_context(self.plant, context)
+        self.lock.frame.SetPoseInParentFrame(plant_context, environment.X_GnG)
         gains = [self._actuators[axis].get_controller_gains() for axis in _JOINT_ORDER]
         conditions = ImpactConditions(
             law=ImpactLaw.of(self.scenario.contact.impact),

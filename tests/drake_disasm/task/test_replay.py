@@ -100,3 +100,26 @@ def test_a_station_refuses_in_place_what_needs_another_plant():
         station.become(context, thick)
     with pytest.raises(DisasmError, match=r"contact\.friction"):
         station.become(context, with_values(TURNED, {"contact.friction": 7.0}))
+
+
+def test_impact_too_changes_in_place():
+    first = load_scenario(
+        "removal_turned", ["contact.model=impact", "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"]
+    )
+    second = with_values(
+        first,
+        {
+            "contact.impact.stiffness": 50.0,
+            "contact.impact.exponent": 1.3,
+            "contact.friction": 0.1,
+            "lock.clearance": 0.0005,
+            "twin.stiffness.2": 9e3,
+            "effects.0.ry": 0.01,
+        },
+    )
+    replay = TwinReplay(first)
+    before = replayed(replay)
+    replay.become(second)
+    assert replayed(replay).tobytes() == replayed(TwinReplay(second)).tobytes()
+    replay.become(first)
+    assert replayed(replay).tobytes() == before.tobytes()
