@@ -116,7 +116,7 @@ def measure_recovery(model: str, seeds: int = 10) -> None:
                 f"block {spread.block}, {time.perf_counter() - begin:.0f} s",
                 flush=True,
             )
-    _print_recovery(parameters, truth, rows)
+            _print_recovery(parameters, truth, rows)
 
 
 def _print_recovery(
@@ -134,7 +134,7 @@ def _print_recovery(
             f"{by_gn[:, i].sum()}/{len(theta)} | "
             f"{by_bootstrap[:, i].sum()}/{len(theta)} |"
         )
-    print(f"coverage: {by_gn.mean():.2f} and {by_bootstrap.mean():.2f}")
+    print(f"coverage: {by_gn.mean():.2f} and {by_bootstrap.mean():.2f}", flush=True)
 
 
 def measure_steps() -> None:
