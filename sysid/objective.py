@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.models.base import Array, LogModel
-from sysid.parameters import Scaling
+from sysid.parameters import Scaling, nominal_values
 from sysid.workers import Workers
 
 #: What every weighted residual counts as where the simulation failed: a million
@@ -71,8 +71,17 @@ class Objective:
 
     def predictions(self, theta: Array) -> Array:
         """Returns what the model says at (p,), in SI units, (rows, channels)."""
+        return self.predicted(self.residuals(theta)[0])
+
+    def predicted(self, residual: Array) -> Array:
+        """Returns the prediction (rows, channels), SI, that a residual belongs to."""
         measured = self.model.measurements
-        return measured.values + self.residuals(theta)[0] * measured.noise
+        return measured.values + residual * measured.noise
+
+    @property
+    def start(self) -> Array:
+        """Where a fit begins: the nominal values (p,) in the unit box."""
+        return self.scaling.to_unit(nominal_values(self.model.parameters))
 
     def _weighted(self, theta: Array, parts: Sequence[Array | str]) -> Array:
         measured = self.model.measurements

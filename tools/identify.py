@@ -224,7 +224,8 @@ def _settings(args: argparse.Namespace, model: LogModel) -> Settings:
         propose=_surrogate() if args.surrogate else None,
     )
     # Where the model is affine, plain squares have one exact optimum.
-    huber = args.huber or (np.inf if thesis or model.affine else 3.0)
+    usual = np.inf if thesis or model.affine else 3.0
+    huber = usual if args.huber is None else args.huber
     if not huber > 0.0:
         raise DisasmError("--huber: give a number above zero, or inf")
     methods = METHODS if args.method == "both" else (args.method,)

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from drake_disasm.policies import Exploring, make_policy
-from drake_disasm.scenario import load_scenario, scenario_to_mapping
-from drake_disasm.task.episode import EpisodeRecorder, run_episode
+from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
-from sysid.logs import LogHeader, LogWriter, flat_columns, read_log
+from sysid.logs import read_log
+from sysid.logs.recording import record_transitions
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.parameters import nominal_values
@@ -34,20 +34,7 @@ def recorded_log(transitions: int) -> Iterator[Path]:
     policy = Exploring(make_policy("admittance"), _NOISE, 0)
     simulation = TaskSimulation(scenario, "twin", policy)
     with tempfile.TemporaryDirectory() as folder:
-        header = LogHeader(
-            kind="transitions",
-            task=scenario.name,
-            provenance={"simulated": True},
-            period=scenario.task.period,
-            scenario=scenario_to_mapping(scenario),
-        )
-        writer, count, seed = LogWriter(Path(folder) / "log", header), 0, 0
-        while count < transitions:
-            recorder = EpisodeRecorder(simulation)
-            count += run_episode(simulation, seed, recorder).steps
-            writer.write_episode(flat_columns("transitions", recorder.columns()))
-            seed += 1
-        yield writer.folder
+        yield record_transitions(Path(folder) / "log", simulation, transitions).folder
 
 
 def evaluation_time(log: Path, transitions: int, workers: int, repeats: int) -> float:

@@ -10,12 +10,10 @@ from drake_disasm.learning.experiment import Experiment
 from drake_disasm.learning.replay import Replay
 from drake_disasm.learning.run import News, learn_offline, run_training
 from drake_disasm.learning.training import Training, action_map
-from drake_disasm.scenario import scenario_to_mapping
 from drake_disasm.task.episode import EpisodeRecorder
-from sysid.logs import LogHeader, LogWriter, flat_columns, read_logs
+from sysid.logs import LogWriter, flat_columns, read_logs
+from sysid.logs.recording import transitions_header
 from sysid.logs.transitions import observations
-
-_JOINTS = tuple(f"iiwa_joint_{i}" for i in range(1, 8))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,14 +36,10 @@ class _Log:
 
     def __init__(self, job: SeedJob) -> None:
         experiment = job.experiment
-        origin = {"simulated": True, "model": experiment.model, "seed": job.seed}
-        header = LogHeader(
-            kind="transitions",
-            task=experiment.scenario.name,
-            provenance=experiment.provenance | origin,
-            period=experiment.scenario.task.period,
-            joints=_JOINTS if experiment.model == "cell" else (),
-            scenario=scenario_to_mapping(experiment.scenario),
+        header = transitions_header(
+            experiment.scenario,
+            experiment.model,
+            experiment.provenance | {"seed": job.seed},
         )
         self._writer = LogWriter(job.folder / "log", header, resume=True)
 

@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 from drake_disasm.errors import DisasmError
 from drake_disasm.policies import Exploring
-from drake_disasm.scenario import Scenario, load_scenario, scenario_to_mapping
+from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import MODELS
 from drake_disasm.task.episode import (
     EpisodeRecorder,
@@ -26,7 +26,8 @@ from drake_disasm.task.episode import (
 from drake_disasm.task.simulation import TaskSimulation
 from drake_disasm.visualization import MeshcatView, start_meshcat
 from drake_disasm.writing import make_folder
-from sysid.logs import LogHeader, LogWriter, flat_columns
+from sysid.logs import LogWriter, flat_columns
+from sysid.logs.recording import transitions_header
 
 _MM = 1e-3
 _EXAMPLES = """examples:
@@ -205,17 +206,10 @@ def _keep(writer: LogWriter | None, recorder: EpisodeRecorder | None) -> None:
 def _open_log(
     args: argparse.Namespace, arguments: Sequence[str], scenario: Scenario
 ) -> LogWriter:
-    joints = tuple(f"iiwa_joint_{i}" for i in range(1, 8))
-    origin = {"simulated": True, "model": args.model, "policy": args.policy}
-    origin |= {"explore_mm": args.explore, "hidden": bool(args.hidden)}
-    header = LogHeader(
-        kind="transitions",
-        task=scenario.name,
-        provenance=cli.provenance("simulate", arguments, args.seed) | origin,
-        period=scenario.task.period,
-        joints=joints if args.model == "cell" else (),
-        scenario=scenario_to_mapping(scenario),
-    )
+    origin = {"policy": args.policy, "explore_mm": args.explore}
+    provenance = cli.provenance("simulate", arguments, args.seed) | origin
+    provenance["hidden"] = bool(args.hidden)
+    header = transitions_header(scenario, args.model, provenance)
     return LogWriter(args.record, header, resume=args.resume)
 
 

@@ -130,7 +130,6 @@ class _Step:
         c = self._c = conditions
         self._h = h
         q, v = state[:6], state[6:]
-        self._v = v
         self._A = c.M + np.diag(h * c.D + h**2 * c.K)
         pull = c.K * (desired[:6] - q) + c.D * desired[6:]
         self._b = c.M @ v + h * pull

@@ -42,6 +42,9 @@ class TwinReplay:
     """
 
     def __init__(self, scenario: Scenario, coarse: bool = False) -> None:
+        self._build(scenario, coarse)
+
+    def _build(self, scenario: Scenario, coarse: bool) -> None:
         self._fine = _ReplayDiagram(scenario)
         self._fine.zero()
         self._coarse: _ReplayDiagram | None = None
@@ -59,7 +62,7 @@ class TwinReplay:
             DisasmError: the scenario is out of bounds.
         """
         if not self._fine.station.can_become(noise_free(scenario)):
-            self.__init__(scenario, self._coarse is not None)  # type: ignore[misc]
+            self._build(scenario, self._coarse is not None)
             return
         self._fine.become(scenario)
         self._fine.zero()

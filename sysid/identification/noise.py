@@ -7,7 +7,6 @@ import numpy as np
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models.base import Array, LogModel
 from sysid.objective import Objective
-from sysid.parameters import nominal_values
 from sysid.workers import Workers
 
 _LEAST = 1e-12  # of the channel's spread: a channel that is fitted exactly
@@ -32,8 +31,7 @@ def with_estimated_noise(model: LogModel, workers: Workers, huber: float) -> Log
     noise = np.where(unknown, spread, measured.noise)
     first = model.with_measurements(measured.with_noise(noise, "spread"))
     objective = Objective(first, workers, huber)
-    start = objective.scaling.to_unit(nominal_values(model.parameters))
-    residual = gauss_newton(objective, start).residual * noise
+    residual = gauss_newton(objective, objective.start).residual * noise
     found = np.maximum(_pooled(residual, model.noise_groups), _LEAST * spread)
     estimated = np.where(unknown, found, measured.noise)
     return model.with_measurements(measured.with_noise(estimated, "first fit"))

@@ -87,7 +87,8 @@ def identify(
     _refuse_small_logs(fitted)
     _refuse_unknown_profiles(fitted, settings.profiles)
     news("sensitivities", 0, 0, np.nan)
-    first = sensitivity(*_at_start(Objective(fitted, workers, settings.huber)))
+    whole = Objective(fitted, workers, settings.huber)
+    first = sensitivity(whole, whole.start)
     frozen = _frozen(first, fitted, settings)
     model, fitted = model.freeze(frozen), fitted.freeze(frozen)
     ladder = [Objective(m, workers, settings.huber) for m in thinned(fitted)]
@@ -149,12 +150,6 @@ def _refuse_unknown_profiles(model: LogModel, names: Sequence[str]) -> None:
             raise DisasmError(
                 f"--profile {name}: is not fitted; {closest(name, known)}"
             )
-
-
-def _at_start(objective: Objective) -> tuple[Objective, Array]:
-    """Returns an objective and where its search begins, in the unit box."""
-    nominal = nominal_values(objective.model.parameters)
-    return objective, objective.scaling.to_unit(nominal)
 
 
 def _frozen(
@@ -302,11 +297,10 @@ def _linearised(objective: Objective, u: Array) -> Linearisation:
 def _comparison(objective: Objective, start: Array, theta: Array) -> Comparison:
     measured = objective.model.measurements
     residuals = objective.residuals(np.array([start, theta]))
-    before, after = (measured.values + r * measured.noise for r in residuals)
     return Comparison(
         measured.values,
-        before,
-        after,
+        objective.predicted(residuals[0]),
+        objective.predicted(residuals[1]),
         measured.episode,
         measured.names,
         objective.value(residuals[0]),

@@ -21,7 +21,7 @@ class SearchPart:
     """One part of a method's search.
 
     Attributes:
-        name: such as "Bees, thinned log".
+        name: such as "bees, global".
         rows: of the log that each evaluation simulated.
         trace: values of the objective of those rows, points in the unit box.
     """

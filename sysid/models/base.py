@@ -2,7 +2,7 @@
 
 import abc
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from drake_disasm.errors import DisasmError
 from drake_disasm.scenario import Scenario, with_values
+from sysid.logs import Episode, Log
 from sysid.parameters import Parameter, by_name, by_path
 
 Array = NDArray[np.float64]
@@ -51,6 +52,29 @@ class Measurements:
     channels: tuple[Channel, ...]
     episode: NDArray[np.int64]
     names: tuple[str, ...]
+
+    @classmethod
+    def of_logs(
+        cls,
+        logs: Sequence[Log],
+        channels: tuple[Channel, ...],
+        values: Callable[[Log, Episode], Array],
+    ) -> Self:
+        """Returns what logs measured, all episodes of all of them.
+
+        Args:
+            logs: in their order.
+            channels: what the columns are.
+            values: of one episode, (rows, channels).
+        """
+        episodes = [(log, episode) for log in logs for episode in log.episodes]
+        parts = [values(log, episode) for log, episode in episodes]
+        return cls(
+            np.concatenate(parts),
+            channels,
+            np.repeat(np.arange(len(parts)), [len(part) for part in parts]),
+            tuple(f"{log.folder.name}/{episode.name}" for log, episode in episodes),
+        )
 
     @property
     def rows(self) -> int:

@@ -53,11 +53,9 @@ class JointMotionModel(LogModel):
         self._fixed = np.zeros(len(self._beta))
         self._free = np.arange(len(self._beta))
         self.affine = True
-        self.measurements = Measurements(
-            np.concatenate([episode["tau"] for _, episode in episodes]),
-            tuple(Channel(j, "N m", np.nan, "estimated") for j in header.joints),
-            np.repeat(np.arange(len(episodes)), [e.rows for _, e in episodes]),
-            tuple(f"{log.folder.name}/{e.name}" for log, e in episodes),
+        channels = tuple(Channel(j, "N m", np.nan, "estimated") for j in header.joints)
+        self.measurements = Measurements.of_logs(
+            logs, channels, lambda _, episode: episode["tau"]
         )
         self.parameters = self._base_parameters(arm, base)
 

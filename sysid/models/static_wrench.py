@@ -72,16 +72,13 @@ class StaticWrenchModel(ScenarioModel):
         payload = _payload(scenario) if known_payload else (0.0, np.zeros(3))
         self._mass: float = payload[0]
         self._p_SoScm_S: Array = payload[1]
-        episodes = [(log, episode) for log in logs for episode in log.episodes]
+        episodes = [episode for log in logs for episode in log.episodes]
         self._R_WS = np.concatenate(
-            [rotation_matrices(episode["R_WS"]) for _, episode in episodes]
+            [rotation_matrices(episode["R_WS"]) for episode in episodes]
         )
-        self._time = np.concatenate([_clock(episode) for _, episode in episodes])
-        self.measurements = Measurements(
-            np.concatenate([sensor_wrench(log.header, e) for log, e in episodes]),
-            _channels(),
-            np.repeat(np.arange(len(episodes)), [e.rows for _, e in episodes]),
-            tuple(f"{log.folder.name}/{e.name}" for log, e in episodes),
+        self._time = np.concatenate([_clock(episode) for episode in episodes])
+        self.measurements = Measurements.of_logs(
+            logs, _channels(), lambda log, e: sensor_wrench(log.header, e)
         )
         self._refuse_other_parameters()
 

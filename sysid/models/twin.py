@@ -98,16 +98,14 @@ class TwinModel(ScenarioModel):
         self.parameters = tuple(parameters)
         self.scenario, self.rollout, self.coarse = scenario, rollout, coarse
         self._X_SB = Tool.from_models(scenario).X_SB
-        episodes = [(log, episode) for log in logs for episode in log.episodes]
         for log in logs:
             _refuse_other_logs(log, scenario)
-        self.steps = _concatenated([_steps(e, scenario) for _, e in episodes])
-        states = [observations(episode)[1:] for _, episode in episodes]
-        self.measurements = Measurements(
-            at_sensor(np.concatenate(states), self._X_SB),
+        episodes = [episode for log in logs for episode in log.episodes]
+        self.steps = _concatenated([_steps(e, scenario) for e in episodes])
+        self.measurements = Measurements.of_logs(
+            logs,
             _channels(scenario),
-            np.repeat(np.arange(len(states)), [len(s) for s in states]),
-            tuple(f"{log.folder.name}/{episode.name}" for log, episode in episodes),
+            lambda _, episode: at_sensor(observations(episode)[1:], self._X_SB),
         )
         self._replay: TwinReplay | None = None
         self._theta: bytes | None = None

@@ -25,7 +25,7 @@ from sysid.optimise.trace import Trace
 
 Array = NDArray[np.float64]
 
-_LEARNT_FROM = 200  # best and newest points: the cost grows with the cube
+_LEARNT_FROM = 200  # best points: the cost grows with the cube
 _CANDIDATES = 2000
 _LOCAL = (0.1, 0.03, 0.01)  # spreads about the best point, over the box
 

@@ -20,15 +20,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from drake_disasm.policies import Exploring, make_policy
-from drake_disasm.scenario import Scenario, load_scenario, scenario_to_mapping
-from drake_disasm.task.episode import EpisodeRecorder, run_episode
+from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.task.simulation import TaskSimulation
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.identification.journal import Journal
 from sysid.identification.result import MethodResult
 from sysid.identification.search import Effort, Search
 from sysid.identification.uncertainty import uncertainty
-from sysid.logs import Log, LogHeader, LogWriter, flat_columns, read_log
+from sysid.logs import Log, read_log
+from sysid.logs.recording import record_transitions
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.optimise import BeesAlgorithm, BeesSettings, Box
@@ -59,23 +59,7 @@ def record(
     """Records episodes of `admittance` with exploration until there are enough."""
     policy = Exploring(make_policy("admittance"), EXPLORATION, seed)
     simulation = TaskSimulation(scenario, model, policy)
-    joints = tuple(f"iiwa_joint_{i}" for i in range(1, 8)) if model == "cell" else ()
-    header = LogHeader(
-        "transitions",
-        scenario.name,
-        {"simulated": True},
-        period=scenario.task.period,
-        joints=joints,
-        scenario=scenario_to_mapping(scenario),
-    )
-    count = 0
-    with LogWriter(folder, header) as writer:
-        while count < transitions:
-            recorder = EpisodeRecorder(simulation)
-            count += run_episode(simulation, seed, recorder).steps
-            writer.write_episode(flat_columns("transitions", recorder.columns()))
-            seed += 1
-    return read_log(folder)
+    return record_transitions(folder, simulation, transitions, seed)
 
 
 def twin_model(log: Log, transitions: int, coarse: bool = True) -> TwinModel:

@@ -1,7 +1,5 @@
 """Real measurements, where they are there, become logs and come back."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -13,20 +11,13 @@ from sysid.logs import (
     sensor_wrench,
     write_static_wrench,
 )
-
-DATA = Path(__file__).parents[3].parent / "shared" / "data"
-
-
-def _folder(name: str) -> Path:
-    if not (DATA / name).is_dir():
-        pytest.skip(f"no real data in {DATA / name}")
-    return DATA / name
+from tests.sysid.real_data import real_folder
 
 
 @pytest.mark.parametrize("rows", [7, 100])
 @pytest.mark.parametrize("file_format", ["parquet", "csv"])
 def test_static_readings_of_a_real_sensor(rows, file_format, tmp_path):
-    folder = _folder("ft_static")
+    folder = real_folder("ft_static")
     pose = np.loadtxt(folder / f"pose_{rows}.txt", delimiter=",")
     wrench = np.loadtxt(folder / f"wrench_{rows}.txt", delimiter=",")
     wxyz = pose[:, [6, 3, 4, 5]]
@@ -51,7 +42,7 @@ def test_the_sensors_frame_shows_its_constant_bias(tmp_path):
     Weight -10.80391 N along the world's z, bias (-2.13583, -2.76399, -13.07675) N
     in the sensor's frame: `f_S = R_WS' [0, 0, weight] + bias`.
     """
-    folder = _folder("ft_static")
+    folder = real_folder("ft_static")
     pose = np.loadtxt(folder / "pose_7.txt", delimiter=",")
     wrench = np.loadtxt(folder / "wrench_7.txt", delimiter=",")
     write_static_wrench(
@@ -69,7 +60,7 @@ def test_the_sensors_frame_shows_its_constant_bias(tmp_path):
 
 @pytest.mark.parametrize("file_format", ["parquet", "csv"])
 def test_two_recordings_of_a_real_arm(file_format, tmp_path):
-    folder = _folder("kuka_lwr4")
+    folder = real_folder("kuka_lwr4")
     names = {
         "time": "times",
         "q": "positions",

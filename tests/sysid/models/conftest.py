@@ -5,29 +5,18 @@ from pathlib import Path
 import pytest
 
 from drake_disasm.policies import Exploring, make_policy
-from drake_disasm.scenario import Scenario, load_scenario, scenario_to_mapping
-from drake_disasm.task.episode import EpisodeRecorder, run_episode
+from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.task.simulation import TaskSimulation
-from sysid.logs import Log, LogHeader, LogWriter, flat_columns, read_log
+from sysid.logs import Log
+from sysid.logs.recording import record_transitions
 
 
 def record(folder: Path, scenario: Scenario, episodes: int) -> Log:
     """Records episodes of the twin with exploration noise."""
     policy = Exploring(make_policy("admittance"), 1.5e-4, 0)
     simulation = TaskSimulation(scenario, "twin", policy)
-    header = LogHeader(
-        "transitions",
-        "removal",
-        {"simulated": True},
-        period=scenario.task.period,
-        scenario=scenario_to_mapping(scenario),
-    )
-    with LogWriter(folder, header) as writer:
-        for seed in range(episodes):
-            recorder = EpisodeRecorder(simulation)
-            run_episode(simulation, seed, recorder)
-            writer.write_episode(flat_columns("transitions", recorder.columns()))
-    return read_log(folder)
+    transitions = episodes * scenario.task.steps  # too short to end otherwise
+    return record_transitions(folder, simulation, transitions)
 
 
 @pytest.fixture(scope="session")
