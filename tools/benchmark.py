@@ -191,19 +191,19 @@ def measure_memory() -> Iterator[Figure]:
     )
 
 
-def measure_objective() -> Iterator[Figure]:
+def measure_objective(contact: str, prefix: str) -> Iterator[Figure]:
     """Yields the time of one evaluation of the objective, beside the thesis's."""
     with recorded_log(max(SIZES)) as log:
         both = {}
         for size in SIZES:
-            both[size] = evaluation_time(log, size, cores(), 3)
+            both[size] = evaluation_time(log, size, cores(), 3, contact)
             reference = "the thesis's 10 minutes"
             ratio = both[size] / THESIS_S
-            yield Figure(f"objective_{size}_s", both[size], "s", reference, ratio)
-        alone = evaluation_time(log, SIZES[0], 1, 2)
+            yield Figure(f"{prefix}_{size}_s", both[size], "s", reference, ratio)
+        alone = evaluation_time(log, SIZES[0], 1, 2, contact)
     reference = f"{cores()} cores"
     ratio = alone / both[SIZES[0]]
-    yield Figure("objective_883_one_core_s", alone, "s", reference, ratio)
+    yield Figure(f"{prefix}_883_one_core_s", alone, "s", reference, ratio)
 
 
 def measure_update_speed(name: str) -> Iterator[Figure]:
@@ -299,9 +299,15 @@ MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
         )
         for name in ("chapter3", "chapter4", "chapter5")
     },
-    ("objective_883_s", "objective_1776_s", "objective_883_one_core_s"): (
-        measure_objective
-    ),
+    **{
+        tuple(f"{prefix}_{of}_s" for of in ("883", "1776", "883_one_core")): (
+            functools.partial(measure_objective, contact, prefix)
+        )
+        for contact, prefix in (
+            ("hydroelastic", "objective"),
+            ("impact", "objective_impact"),
+        )
+    },
     ("peak_mib_simulate", "peak_mib_train", "peak_mib_identify"): measure_memory,
 }
 

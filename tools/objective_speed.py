@@ -23,7 +23,13 @@ from sysid.workers import Workers
 SIZES = (883, 1776)  # the thesis's, for which it gives about ten minutes
 THESIS_S = 600.0
 _SCENARIO = "removal_turned"
-_PARAMETERS = ("contact.friction", "lock.clearance", "GroovePose.ry")
+PARAMETERS = {
+    "hydroelastic": ("contact.friction", "lock.clearance", "GroovePose.ry"),
+    "impact": tuple(
+        f"contact.impact.{name}"
+        for name in ("stiffness", "exponent", "damping", "depth")
+    ),
+}
 _NOISE = 1.5e-4  # m, of exploration
 
 
@@ -37,10 +43,21 @@ def recorded_log(transitions: int) -> Iterator[Path]:
         yield record_transitions(Path(folder) / "log", simulation, transitions).folder
 
 
-def evaluation_time(log: Path, transitions: int, workers: int, repeats: int) -> float:
-    """Returns the time [s] of one evaluation, the median of some; workers are warm."""
+def evaluation_time(
+    log: Path, transitions: int, workers: int, repeats: int, contact: str
+) -> float:
+    """Returns the time [s] of one evaluation, the median of some; workers are warm.
+
+    Args:
+        log: of transitions.
+        transitions: how many of them.
+        workers: processes.
+        repeats: evaluations, each at other parameters.
+        contact: the twin's `contact.model`.
+    """
     scenario, parameters = scenario_parameters(
-        load_scenario(_SCENARIO), [Request(name) for name in _PARAMETERS]
+        load_scenario(_SCENARIO, [f"contact.model={contact}"]),
+        [Request(name) for name in PARAMETERS[contact]],
     )
     model = TwinModel([read_log(log)], scenario, parameters).first(transitions)
     theta = nominal_values(parameters)

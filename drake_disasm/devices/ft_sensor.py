@@ -98,25 +98,24 @@ class ForceTorqueSensor(LeafSystem):
 
         Whenever it is taken, zeroing is time 0 for the effects: the episode begins.
         """
-        effects = [e for e in self._get_effects(context) if e.present_at_zeroing]
+        effects = [e for e in self.effects(context) if e.present_at_zeroing]
         return self._through(context, effects, time=0.0)
 
-    def _get_effects(self, context: Context) -> Sequence[SensorEffect]:
+    def effects(self, context: Context) -> Sequence[SensorEffect]:
+        """Returns what `set_effects` put there."""
         return context.get_abstract_parameter(self._effects).get_value()
 
     def _through(
         self, context: Context, effects: Sequence[SensorEffect], time: float
     ) -> np.ndarray:
-        wrench = -wrench_from_spatial_force(self._reaction.Eval(context)[self._joint])
-        if effects:
-            R_WBody = self._poses.Eval(context)[self._body].rotation()
-            sensing = Sensing(time, R_WBody @ self._R_BodyS, self._g_W)
-            for effect in effects:
-                wrench = effect.apply(wrench, sensing)
-        return wrench
+        load = -wrench_from_spatial_force(self._reaction.Eval(context)[self._joint])
+        if not effects:
+            return load
+        R_WBody = self._poses.Eval(context)[self._body].rotation()
+        return sensed(load, effects, Sensing(time, R_WBody @ self._R_BodyS, self._g_W))
 
     def _calc_wrench(self, context: Context, output: BasicVector) -> None:
-        effects = self._get_effects(context)
+        effects = self.effects(context)
         wrench = self._through(context, effects, self._sample_time(context))
         wrench = wrench + self._noise * self._noise_port.Eval(context)
         output.SetFromVector(quantise(wrench, self._quantum))
@@ -131,6 +130,15 @@ class ForceTorqueSensor(LeafSystem):
 
     def _sample_time(self, context: Context) -> float:
         return newest_step(context.get_time(), self._time_step)
+
+
+def sensed(
+    load: np.ndarray, effects: Sequence[SensorEffect], sensing: Sensing
+) -> np.ndarray:
+    """Returns what a sensor with effects reads of a load, (6,) [f; tau] in S."""
+    for effect in effects:
+        load = effect.apply(load, sensing)
+    return load
 
 
 def quantise(values: np.ndarray, quantum: np.ndarray) -> np.ndarray:

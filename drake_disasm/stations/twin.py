@@ -26,7 +26,7 @@ from pydrake.systems.primitives import (
 from drake_disasm.coordinates import BoltCoordinates
 from drake_disasm.effects import Environment
 from drake_disasm.errors import DisasmError
-from drake_disasm.impact import ImpactLaw, LockShape
+from drake_disasm.impact import ImpactConditions, ImpactLaw, LockShape
 from drake_disasm.lock import (
     GROOVE_FIELDS,
     add_lock,
@@ -36,7 +36,7 @@ from drake_disasm.lock import (
 from drake_disasm.ports import TWIN_PORTS
 from drake_disasm.scenario import ImpactConfig, Scenario, TwinConfig, validate
 from drake_disasm.stations.simulated import SimulatedStation
-from drake_disasm.systems.impact_contact import ImpactConditions, ImpactContact
+from drake_disasm.systems.impact_contact import ImpactContact
 from drake_disasm.tool import Tool
 
 _AXES = np.eye(3)

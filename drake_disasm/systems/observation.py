@@ -150,19 +150,24 @@ class ObservationProcessor(LeafSystem):
             offset = reading - self._mounting.weight(self._mounting.X_BS.rotation())
         context.get_mutable_numeric_parameter(self._offset).SetFromVector(offset)
 
-    def _calc_observation(self, context: Context, output: BasicVector) -> None:
-        X_GB = self._coordinates.pose(self._position.Eval(context))
+    def observation(
+        self, context: Context, X_GB: RigidTransform, reading: np.ndarray
+    ) -> np.ndarray:
+        """Returns the state (12,) of a pose and a raw reading (6,), as zeroed."""
         offset = context.get_numeric_parameter(self._offset).value()
         process = contact_wrench if self._exact else small_angle_contact_wrench
-        wrench = process(
-            self._wrench.Eval(context), offset, X_GB.rotation(), self._mounting
-        )
+        wrench = process(reading, offset, X_GB.rotation(), self._mounting)
         rotation = (
             rotation_vector(X_GB.rotation())
             if self._exact
             else RollPitchYaw(X_GB.rotation()).vector()
         )
-        output.SetFromVector(np.concatenate([X_GB.translation(), rotation, wrench]))
+        return np.concatenate([X_GB.translation(), rotation, wrench])
+
+    def _calc_observation(self, context: Context, output: BasicVector) -> None:
+        X_GB = self._coordinates.pose(self._position.Eval(context))
+        reading = self._wrench.Eval(context)
+        output.SetFromVector(self.observation(context, X_GB, reading))
 
     def _calc_pose(self, context: Context, output: BasicVector) -> None:
         X_GB = self._coordinates.pose(self._position.Eval(context))

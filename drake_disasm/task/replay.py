@@ -7,14 +7,23 @@ alone in fine steps: `TwinReplay` can take the rest in coarse ones, at half the 
 """
 
 import dataclasses
+from typing import Self
 
 import numpy as np
+from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
+from drake_disasm.devices.ft_sensor import sensed
+from drake_disasm.effects import Sensing
+from drake_disasm.impact import ImpactConditions
 from drake_disasm.scenario import Scenario
-from drake_disasm.spatial import pose_from_vector, rotation_vector
+from drake_disasm.spatial import (
+    pose_from_vector,
+    rotation_vector,
+    shift_and_express,
+)
 from drake_disasm.stations import TwinStation
 from drake_disasm.task.simulation import add_motion, make_processor
 from drake_disasm.timing import boundary
@@ -23,6 +32,34 @@ from drake_disasm.timing import boundary
 _State = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 _COARSE = 0.02  # s, what validity allows at most
+
+
+@dataclasses.dataclass(frozen=True)
+class Steps:
+    """Steps of the MDP in the twin's coordinates (see `TwinReplay`); a row is a step.
+
+    Attributes:
+        index: (n,) periods since the episode began.
+        q, v: (n, 6) measured coordinates at the step's start, and their rates, by
+            difference from the step before.
+        qd, qd_rate: (n, 6) commanded coordinates then, and their rate in the step.
+    """
+
+    index: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    qd: np.ndarray
+    qd_rate: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def select(self, which: np.ndarray | slice) -> Self:
+        """Returns some of the steps, by a mask (n,) or a slice."""
+        return dataclasses.replace(
+            self,
+            **{f.name: getattr(self, f.name)[which] for f in dataclasses.fields(self)},
+        )
 
 
 class TwinReplay:
@@ -45,14 +82,14 @@ class TwinReplay:
         self._build(scenario, coarse)
 
     def _build(self, scenario: Scenario, coarse: bool) -> None:
-        self._fine = _ReplayDiagram(scenario)
+        self._fine = ReplayDiagram(scenario)
         self._fine.zero()
-        self._coarse: _ReplayDiagram | None = None
+        self._coarse: ReplayDiagram | None = None
         self._period = scenario.task.period
         self._switch = 0.0
         time_step = coarse_step(scenario) if coarse else 0.0
         if time_step:
-            self._coarse = _ReplayDiagram(with_time_step(scenario, time_step))
+            self._coarse = ReplayDiagram(with_time_step(scenario, time_step))
             self._switch = self._period - time_step
 
     def become(self, scenario: Scenario) -> None:
@@ -61,13 +98,37 @@ class TwinReplay:
         Raises:
             DisasmError: the scenario is out of bounds.
         """
-        if not self._fine.station.can_become(noise_free(scenario)):
+        if not self._fine.can_become(scenario):
             self._build(scenario, self._coarse is not None)
             return
         self._fine.become(scenario)
         self._fine.zero()
         if self._coarse:
             self._coarse.become(with_time_step(scenario, self._coarse.time_step))
+
+    def transitions(self, steps: Steps) -> np.ndarray:
+        """Returns the states (n, 12) after steps that stand alone, each from its q, v.
+
+        Raises:
+            RuntimeError: Drake's solver gave up.
+        """
+        states = []
+        for i in range(len(steps)):
+            self._start(steps, i)
+            states.append(self.advance(steps.qd_rate[i]))
+        return np.array(states)
+
+    def episode(self, steps: Steps) -> np.ndarray:
+        """Returns the states (n, 12) after steps that follow on the first one's state.
+
+        Raises:
+            RuntimeError: Drake's solver gave up.
+        """
+        self._start(steps, 0)
+        return np.array([self.advance(rate) for rate in steps.qd_rate])
+
+    def _start(self, steps: Steps, i: int) -> None:
+        self.start(int(steps.index[i]), steps.q[i], steps.v[i], steps.qd[i])
 
     def start(self, step: int, q: np.ndarray, v: np.ndarray, qd: np.ndarray) -> None:
         """Puts the twin into a state.
@@ -103,8 +164,13 @@ class TwinReplay:
         return self._fine.observation()
 
 
-class _ReplayDiagram:
-    """The twin with a command that moves at a constant rate, and its observation."""
+class ReplayDiagram:
+    """The twin with a command that moves at a constant rate, and its observation.
+
+    Attributes:
+        station, station_context: the twin.
+        processor, processor_context: of its observations.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         self._build(noise_free(scenario))
@@ -114,19 +180,23 @@ class _ReplayDiagram:
         """Of the plant [s]."""
         return self.station.time_step
 
+    def can_become(self, scenario: Scenario) -> bool:
+        """Returns whether `become` can take a scenario's parameters."""
+        return self.station.can_become(noise_free(scenario))
+
     def become(self, scenario: Scenario) -> None:
         """Takes a scenario's parameters in place, from a clean Context."""
         self._simulator.reset_context(self._clean.Clone())
         self._find_contexts()
-        self.station.become(self._station_context, noise_free(scenario))
+        self.station.become(self.station_context, noise_free(scenario))
 
     def zero(self) -> None:
         """Lets the bolt settle at A and zeroes the sensor, as an episode does."""
         rest = np.zeros(6)
         self.start(boundary(0, 1.0), rest, rest, self.station.start)
         self.advance(rest, self.station.settling_time)
-        reading = self.station.reading_at_zeroing(self._station_context)
-        self._processor.zero(self._processor_context, reading)
+        reading = self.station.reading_at_zeroing(self.station_context)
+        self.processor.zero(self.processor_context, reading)
 
     def start(self, time: float, q: np.ndarray, v: np.ndarray, qd: np.ndarray) -> None:
         """Puts the twin into a state (see `TwinReplay`) at a time [s]."""
@@ -151,46 +221,79 @@ class _ReplayDiagram:
             self._motion_context.get_discrete_state_vector().CopyToVector(),
         )
 
+    def impact_conditions(self) -> ImpactConditions:
+        """Returns what IMPACT depends on now; the scenario has that contact."""
+        impact = self.station.impact
+        assert impact is not None
+        return impact.conditions(
+            self.station.part_context(impact, self.station_context)
+        )
+
+    def observed(self, time: float, q: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """Returns the state (12,) of the task at coordinates under a load.
+
+        Args:
+            time: of the sensor's sample, since the episode began [s].
+            q: (6,) coordinates.
+            load: (6,) of the bolt on the sensor, [f; tau] at Bo in Gn.
+        """
+        station, sensor = self.station, self.station.sensor
+        X_GB = station.coordinates.pose(q)
+        X_SGn = station.X_SB @ RigidTransform(X_GB.rotation().inverse(), np.zeros(3))
+        reading = shift_and_express(load, X_SGn)
+        effects = sensor.effects(station.part_context(sensor, self.station_context))
+        if effects:
+            R_WS = station.X_WG.rotation() @ X_SGn.rotation().inverse()
+            g_W = station.plant.gravity_field().gravity_vector()
+            reading = sensed(reading, effects, Sensing(time, R_WS, g_W))
+        observation = self.processor.observation(self.processor_context, X_GB, reading)
+        return _with_rotation_vector(observation, X_GB)
+
     def observation(self) -> np.ndarray:
         """Returns the state (12,) of the task now, its rotation as a vector."""
-        wrench = self._observation.Eval(self._processor_context)[6:]
-        X_GB = pose_from_vector(self._pose.Eval(self._processor_context))
-        turn = rotation_vector(X_GB.rotation())
-        return np.concatenate([X_GB.translation(), turn, wrench])
+        observation = self._observation.Eval(self.processor_context)
+        X_GB = pose_from_vector(self._pose.Eval(self.processor_context))
+        return _with_rotation_vector(observation, X_GB)
 
     def _build(self, scenario: Scenario) -> None:
         builder = DiagramBuilder()
         self.station = builder.AddNamedSystem("station", TwinStation(scenario))
         self._source = builder.AddNamedSystem("rate", ConstantVectorSource(np.zeros(6)))
         self._motion = add_motion(builder, self._source.get_output_port(), self.station)
-        self._processor = builder.AddNamedSystem(
+        self.processor = builder.AddNamedSystem(
             "observation_processor",
             make_processor(self.station, scenario.observation.variant),
         )
         builder.Connect(
             self.station.GetOutputPort("bolt.position_measured"),
-            self._processor.GetInputPort("position_measured"),
+            self.processor.GetInputPort("position_measured"),
         )
         builder.Connect(
             self.station.GetOutputPort("ft_sensor.wrench"),
-            self._processor.GetInputPort("wrench"),
+            self.processor.GetInputPort("wrench"),
         )
         self._simulator = Simulator(builder.Build())
         self._clean: Context = self._simulator.get_context().Clone()
-        self._observation = self._processor.GetOutputPort("observation")
-        self._pose = self._processor.GetOutputPort("X_GB")
+        self._observation = self.processor.GetOutputPort("observation")
+        self._pose = self.processor.GetOutputPort("X_GB")
         self._find_contexts()
-        self.station.set_effects(self._station_context, scenario.effects)
+        self.station.set_effects(self.station_context, scenario.effects)
 
     def _find_contexts(self) -> None:
         root = self._simulator.get_mutable_context()
         self._context = root
-        self._station_context = self.station.GetMyMutableContextFromRoot(root)
+        self.station_context = self.station.GetMyMutableContextFromRoot(root)
         self._plant_context = self.station.plant.GetMyMutableContextFromRoot(root)
         self._motion_context = self._motion.GetMyMutableContextFromRoot(root)
-        self._processor_context = self._processor.GetMyMutableContextFromRoot(root)
+        self.processor_context = self.processor.GetMyMutableContextFromRoot(root)
         source_context = self._source.GetMyMutableContextFromRoot(root)
         self._rate = self._source.get_mutable_source_value(source_context)
+
+
+def _with_rotation_vector(observation: np.ndarray, X_GB: RigidTransform) -> np.ndarray:
+    """Returns a state (12,) whose rotation is a vector, whatever the variant."""
+    turn = rotation_vector(X_GB.rotation())
+    return np.concatenate([observation[:3], turn, observation[6:]])
 
 
 def coarse_step(scenario: Scenario) -> float:

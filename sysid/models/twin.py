@@ -14,7 +14,8 @@ from drake_disasm.errors import DisasmError
 from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.scenario import Scenario
 from drake_disasm.spatial import pose_from_vector
-from drake_disasm.task.replay import TwinReplay
+from drake_disasm.task.impact_replay import ImpactReplay
+from drake_disasm.task.replay import Steps, TwinReplay
 from drake_disasm.tool import Tool
 from sysid.logs import Episode, Log
 from sysid.logs.refusal import refusal
@@ -34,31 +35,7 @@ from sysid.parameters import Parameter
 POSE_NOISE = (2e-5, 1e-4)
 
 _CHUNK = 32  # transitions: a tenth of a second of work
-
-
-@dataclasses.dataclass(frozen=True)
-class Steps:
-    """Measured steps as the twin's coordinates; a row is a step.
-
-    Attributes:
-        index: (n,) periods since the episode began.
-        q, v: (n, 6) measured coordinates at the step's start, and their rates, by
-            difference from the step before.
-        qd, qd_rate: (n, 6) commanded coordinates then, and their rate in the step.
-    """
-
-    index: NDArray[np.int64]
-    q: Array
-    v: Array
-    qd: Array
-    qd_rate: Array
-
-    def select(self, mask: NDArray[np.bool_]) -> Self:
-        """Returns the steps where the mask (n,) is true."""
-        return dataclasses.replace(
-            self,
-            **{f.name: getattr(self, f.name)[mask] for f in dataclasses.fields(self)},
-        )
+_IMPACT_CHUNK = 128  # large enough for arrays, small enough to share
 
 
 class TwinModel(ScenarioModel):
@@ -107,14 +84,16 @@ class TwinModel(ScenarioModel):
             _channels(scenario),
             lambda _, episode: at_sensor(observations(episode)[1:], self._X_SB),
         )
-        self._replay: TwinReplay | None = None
+        self._replay: TwinReplay | ImpactReplay | None = None
         self._theta: bytes | None = None
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
         try:
             replay = self._replay_at(theta)
-            return at_sensor(self._simulate(replay, rows), self._X_SB)
+            return at_sensor(
+                self._simulate(replay, self.steps.select(rows)), self._X_SB
+            )
         except (RuntimeError, DisasmError, ValueError) as error:
             self._replay = self._theta = None
             text = " ".join(str(error).split())
@@ -123,7 +102,8 @@ class TwinModel(ScenarioModel):
     def chunks(self) -> list[slice]:
         """See LogModel; a rollout can't be cut within an episode."""
         if not self.rollout:
-            return even_chunks(self.measurements.rows, _CHUNK)
+            size = _IMPACT_CHUNK if self._has_impact else _CHUNK
+            return even_chunks(self.measurements.rows, size)
         starts = np.flatnonzero(np.diff(self.measurements.episode, prepend=-1))
         ends = [*starts[1:], self.measurements.rows]
         return [slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True)]
@@ -144,24 +124,30 @@ class TwinModel(ScenarioModel):
             measurements=self.measurements.select(mask),
         )
 
-    def _replay_at(self, theta: Array) -> TwinReplay:
+    def _replay_at(self, theta: Array) -> TwinReplay | ImpactReplay:
         """Returns the twin at parameters (p,); a change takes some 10 ms."""
         if self._replay is None:
-            scenario, coarse = self.scenario_at(theta), self.coarse and not self.rollout
-            self._replay = TwinReplay(scenario, coarse)
+            self._replay = self._new_replay(self.scenario_at(theta))
         elif self._theta != theta.tobytes():
             self._replay.become(self.scenario_at(theta))
         self._theta = theta.tobytes()
         return self._replay
 
-    def _simulate(self, replay: TwinReplay, rows: slice) -> Array:
-        """Returns the states (len(rows), 12) after each step."""
-        steps, states = self.steps, []
-        for i in range(rows.start, rows.stop):
-            if not self.rollout or i == rows.start:
-                replay.start(int(steps.index[i]), steps.q[i], steps.v[i], steps.qd[i])
-            states.append(replay.advance(steps.qd_rate[i]))
-        return np.array(states)
+    def _new_replay(self, scenario: Scenario) -> TwinReplay | ImpactReplay:
+        if self.rollout:
+            return TwinReplay(scenario)
+        kind = ImpactReplay if self._has_impact else TwinReplay
+        return kind(scenario, self.coarse)
+
+    @property
+    def _has_impact(self) -> bool:
+        return self.scenario.contact.model == "impact"
+
+    def _simulate(self, replay: TwinReplay | ImpactReplay, steps: Steps) -> Array:
+        """Returns the states (len(steps), 12) after each step."""
+        if isinstance(replay, ImpactReplay) or not self.rollout:
+            return replay.transitions(steps)
+        return replay.episode(steps)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leaves the diagram out: each worker builds its own."""

@@ -3,12 +3,14 @@
 python -m tests.sysid.measurements steps            time steps against accuracy
 python -m tests.sysid.measurements recovery twin    ten noise seeds, known truth
 python -m tests.sysid.measurements recovery cell
+python -m tests.sysid.measurements recovery impact  a twin with IMPACT
 python -m tests.sysid.measurements thesis FIGURE    the thesis's three settings
 python -m tests.sysid.measurements package          Bees beside bees_algorithm
 python -m tests.sysid.measurements surrogate        with and without, equal budget
 """
 
 import argparse
+import dataclasses
 import json
 import tempfile
 import time
@@ -17,6 +19,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from drake_disasm.policies import Exploring, make_policy
@@ -47,6 +50,12 @@ BOUNDS = (
     Request("GroovePose.z", -5e-4, 5e-4),
     Request("twin.stiffness.2", 4e3, 4e4),
 )
+#: The thesis's contact in the twin, and the parameters of its table 4.2.
+IMPACT = load_scenario("removal_turned", ["contact.model=impact"])
+IMPACT_BOUNDS = tuple(
+    Request(f"contact.impact.{name}")
+    for name in ("stiffness", "exponent", "damping", "depth")
+)
 #: Off the truth by some ten times what a log fixes: the valley, not the bottom.
 START = np.array([0.23, 4.3e-4, 0.0365, 2e-5, 14.5e3])
 EXPLORATION = 1.5e-4  # m
@@ -62,31 +71,66 @@ def record(
     return record_transitions(folder, simulation, transitions, seed)
 
 
-def twin_model(log: Log, transitions: int, coarse: bool = True) -> TwinModel:
-    """Returns the model of the removal scenario, to be turned, for a log."""
-    scenario, parameters = scenario_parameters(load_scenario("removal"), BOUNDS)
-    return TwinModel([log], scenario, parameters, coarse=coarse).first(transitions)
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """What is recovered from what.
+
+    Attributes:
+        truth: scenario that is recorded.
+        station: that records it, "cell" or "twin".
+        model: scenario that is fitted, at its nominal values.
+        requests: its free parameters.
+        start: of the descent, near the truth.
+    """
+
+    truth: Scenario
+    station: str
+    model: Scenario
+    requests: tuple[Request, ...]
+    start: np.ndarray
+
+    def fitted(self, log: Log, transitions: int, coarse: bool = True) -> TwinModel:
+        """Returns the model of a log."""
+        scenario, parameters = scenario_parameters(self.model, self.requests)
+        model = TwinModel([log], scenario, parameters, coarse=coarse)
+        return model.first(transitions)
+
+    def true_values(self) -> tuple[tuple[Parameter, ...], np.ndarray]:
+        """Returns the parameters and their true values."""
+        _, parameters = scenario_parameters(self.truth, self.requests)
+        return parameters, np.array([p.nominal for p in parameters])
 
 
-def true_values() -> tuple[tuple[Parameter, ...], np.ndarray]:
-    """Returns the parameters and their true values."""
-    _, parameters = scenario_parameters(TRUTH, BOUNDS)
-    return parameters, np.array([p.nominal for p in parameters])
+REMOVAL = load_scenario("removal")
+CASES = {
+    "twin": Case(TRUTH, "twin", REMOVAL, BOUNDS, START),
+    "cell": Case(TRUTH, "cell", REMOVAL, BOUNDS, START),
+    "impact": Case(
+        IMPACT,
+        "twin",
+        load_scenario("removal", ["contact.model=impact"]),
+        (*BOUNDS[:3], *IMPACT_BOUNDS),
+        np.array([0.23, 4.3e-4, 0.0365, 1200.0, 1.05, 10.0, 0.2]),
+    ),
+}
 
 
-def measure_recovery(model: str, seeds: int = 10) -> None:
+def measure_recovery(name: str, seeds: int = 10) -> None:
     """Prints values and intervals for logs of ten noise seeds, and their coverage."""
-    parameters, truth = true_values()
+    case = CASES[name]
+    parameters, truth = case.true_values()
     rows = []
     with tempfile.TemporaryDirectory() as folder, Workers(2) as workers:
         for seed in range(seeds):
             begin = time.perf_counter()
-            log = record(Path(folder) / str(seed), TRUTH, model, 883, 1000 * seed)
+            log = record(
+                Path(folder) / str(seed), case.truth, case.station, 883, 1000 * seed
+            )
             # A twin's log in the twin's own steps: what is left is the sensor's noise.
-            fitted = twin_model(log, 883, coarse=model == "cell")
+            fitted = case.fitted(log, 883, coarse=case.station == "cell")
             objective = Objective(fitted, workers, HUBER)
             quarter = Objective(objective.model.thin(4), workers, HUBER)
-            near = gauss_newton(quarter, quarter.scaling.to_unit(START), 10)
+            near = gauss_newton(quarter, quarter.scaling.to_unit(case.start), 10)
             here = gauss_newton(objective, near.u, 3)
             spread = uncertainty(here, objective.model.measurements.episode)
             scaling, theta = objective.scaling, objective.scaling.from_unit(here.u)
@@ -162,63 +206,83 @@ def _print_step(log: Log, time_step: float, coarse: bool) -> None:
     )
 
 
+THESIS_SETTINGS = {
+    "883 transitions, 10 cycles": (883, 10, BeesSettings.thesis()),
+    "1776 transitions, 10 cycles": (1776, 10, BeesSettings.thesis()),
+    "883 transitions, 20 cycles": (883, 20, BeesSettings.thesis()),
+    "883 transitions, 20 cycles of 16": (883, 20, BeesSettings()),
+}
+THESIS_LOGS = {
+    "log of the cell": Case(TRUTH, "cell", IMPACT, IMPACT_BOUNDS, START),
+    "log of the twin": Case(IMPACT, "twin", IMPACT, IMPACT_BOUNDS, START),
+}
+
+
 def measure_thesis(figure: Path) -> None:
     """Draws objective against evaluations for the thesis's settings, five seeds."""
-    settings = {
-        "883 transitions, 10 cycles": (883, 10, BeesSettings.thesis()),
-        "1776 transitions, 10 cycles": (1776, 10, BeesSettings.thesis()),
-        "883 transitions, 20 cycles": (883, 20, BeesSettings.thesis()),
-        "883 transitions, larger colony": (883, 20, BeesSettings()),
-    }
     with tempfile.TemporaryDirectory() as folder:
-        log = record(Path(folder) / "log", TRUTH, "cell", 1776, 0)
+        for name, case in THESIS_LOGS.items():
+            record(Path(folder) / name, case.truth, case.station, 1776, 0)
         jobs = [
-            (str(log.folder), name, method, seed, *settings[name])
-            for name in settings
+            (str(Path(folder) / log), log, setting, method, seed)
+            for log in THESIS_LOGS
+            for setting in THESIS_SETTINGS
             for seed in range(5)
             for method in ("bees", "nlopt")
         ]
-        context = get_context("spawn")
-        with ProcessPoolExecutor(2, context) as pool:
+        with ProcessPoolExecutor(2, get_context("spawn")) as pool:
             traces = list(pool.map(_thesis_run, jobs))
     kept = [
-        {"setting": job[1], "method": job[2], "seed": job[3], "values": values}
-        for job, values in zip(jobs, traces, strict=True)
+        dict(zip(("log", "setting", "method", "seed"), job[1:], strict=True)) | found
+        for job, found in zip(jobs, traces, strict=True)
     ]
     figure.with_suffix(".json").write_text(json.dumps(kept))
     draw_thesis(figure)
 
 
-def _thesis_run(job: tuple) -> list[float]:
-    """Returns the values of one search, on one core."""
-    folder, _, method, seed, transitions, cycles, colony = job
-    objective = Objective(twin_model(read_log(folder), transitions), Workers(), HUBER)
+def _thesis_run(job: tuple) -> dict:
+    """Returns the values and the best point of one search, on one core."""
+    folder, name, setting, method, seed = job
+    transitions, cycles, colony = THESIS_SETTINGS[setting]
+    model = THESIS_LOGS[name].fitted(read_log(folder), transitions)
+    objective = Objective(model, Workers())
     effort = Effort(cycles=cycles, close=0, bees=colony, seed=seed)
     with tempfile.TemporaryDirectory() as scratch:
         journal = Journal(Path(scratch), {}, False)
         search = Search(method, [objective], effort, journal, lambda *_: None)
         found: MethodResult = search.run()
-    print(job[1:4], f"{found.value:.2f}", flush=True)
-    return found.parts[0].trace.values
+    theta = objective.scaling.from_unit(found.u).tolist()
+    print(*job[1:], f"{found.value:.2f}", np.round(theta, 3), flush=True)
+    return {"values": found.parts[0].trace.values, "theta": theta}
 
 
 def draw_thesis(figure: Path) -> None:
     """Draws the traces that `measure_thesis` kept."""
     kept = json.loads(figure.with_suffix(".json").read_text())
-    names = list(dict.fromkeys(entry["setting"] for entry in kept))
-    drawn = Figure(figsize=(4.0 * len(names), 3.6), layout="constrained")
-    for ax, name in zip(drawn.subplots(1, len(names), sharey=True), names, strict=True):
-        for entry in (e for e in kept if e["setting"] == name):
-            colour = {"bees": "#d98c00", "nlopt": "#2060a0"}[entry["method"]]
-            best = np.minimum.accumulate(entry["values"])
-            label = entry["method"] if entry["seed"] == 0 else None
-            ax.step(range(1, len(best) + 1), best, color=colour, label=label, lw=1.0)
-        ax.set_title(name, fontsize=9)
+    drawn = Figure(figsize=(13.0, 6.0), layout="constrained")
+    axes = drawn.subplots(
+        len(THESIS_LOGS), len(THESIS_SETTINGS), sharex="col", sharey="row"
+    )
+    for row, log in zip(axes, THESIS_LOGS, strict=True):
+        for ax, setting in zip(row, THESIS_SETTINGS, strict=True):
+            for entry in kept:
+                if entry["log"] == log and entry["setting"] == setting:
+                    _draw_trace(ax, entry)
+            ax.set_yscale("log")
+        row[0].set_ylabel(f"{log}\nobjective, best so far")
+        row[0].legend(fontsize=8)
+    for ax, setting in zip(axes[0], THESIS_SETTINGS, strict=True):
+        ax.set_title(setting, fontsize=9)
+    for ax in axes[-1]:
         ax.set_xlabel("evaluations")
-        ax.set_yscale("log")
-        ax.legend(fontsize=8)
-    drawn.axes[0].set_ylabel("objective, best so far")
     drawn.savefig(figure, dpi=110)
+
+
+def _draw_trace(ax: Axes, entry: dict) -> None:
+    colour = {"bees": "#d98c00", "nlopt": "#2060a0"}[entry["method"]]
+    best = np.minimum.accumulate(entry["values"])
+    label = entry["method"] if entry["seed"] == 0 else None
+    ax.step(range(1, len(best) + 1), best, color=colour, label=label, lw=1.0)
 
 
 def measure_package(seeds: int = 10) -> None:
@@ -239,7 +303,8 @@ def measure_surrogate(seeds: int = 5) -> None:
     colony, stop = BeesSettings(4, 2, 2, 0, 0), Stop(evaluations=128)
     with tempfile.TemporaryDirectory() as folder, Workers(2) as workers:
         log = record(Path(folder) / "log", TRUTH, "twin", 883, 0)
-        objective = Objective(twin_model(log, 883).thin(14), workers, HUBER)
+        model = CASES["twin"].fitted(log, 883).thin(14)
+        objective = Objective(model, workers, HUBER)
         for seed in range(seeds):
             values = []
             for hook in (None, propose):

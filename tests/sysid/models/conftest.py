@@ -39,3 +39,15 @@ def silent_log(turned, tmp_path_factory) -> Log:
     found = record(tmp_path_factory.mktemp("silent") / "log", turned, 2)
     turned.ft_sensor.noise, turned.ft_sensor.quantum = noise, quantum
     return found
+
+
+@pytest.fixture(scope="session")
+def impact() -> Scenario:
+    """The thesis's contact in the twin, in a turned groove."""
+    return load_scenario("removal_turned", ["task.steps=24", "contact.model=impact"])
+
+
+@pytest.fixture(scope="session")
+def impact_log(impact, tmp_path_factory) -> Log:
+    """Two episodes of that twin, with sensor noise."""
+    return record(tmp_path_factory.mktemp("impact") / "log", impact, 2)

@@ -81,6 +81,33 @@ def test_recovers_parameters_from_nearby(log, turned):
     np.testing.assert_allclose(found, [0.2, 0.0349], rtol=0.03)
 
 
+def test_recovers_the_law_of_impact(impact_log, impact):
+    """From six times too soft: no worse than the truth, and nearly its force."""
+    names = ["contact.impact.stiffness", "contact.impact.exponent"]
+    objective = Objective(make(impact_log, impact, names, coarse=False), Workers())
+    at_truth = objective(truth(objective.model))[0]
+    assert at_truth == pytest.approx(0.707, abs=0.07)
+    here = gauss_newton(objective, objective.scaling.to_unit([160.0, 1.3]), 9)
+    assert objective.value(here.residual) < at_truth
+    stiffness, exponent = objective.scaling.from_unit(here.u)
+    assert stiffness * 0.02**exponent == pytest.approx(1000.0 * 0.02, rel=0.2)
+
+
+def test_with_impact_too_chunks_do_not_change_a_bit(impact_log, impact, monkeypatch):
+    model = make(impact_log, impact)
+    whole = Objective(model, Workers()).residuals(truth(model))[0]
+    monkeypatch.setattr("sysid.models.twin._IMPACT_CHUNK", 7)
+    assert len(model.chunks()) == 7
+    cut = Objective(model, Workers()).residuals(truth(model))[0]
+    assert whole.tobytes() == cut.tobytes()
+
+
+def test_a_rollout_with_impact_is_the_diagrams(impact_log, impact):
+    model = make(impact_log, impact, rollout=True).of_episodes([0])
+    residual = Objective(model, Workers()).residuals(truth(model))[0]
+    assert np.sqrt(np.mean(residual[:, 6:] ** 2)) == pytest.approx(1.0, abs=0.15)
+
+
 def test_channels_are_weighted_by_the_sensors_noise(log, turned):
     channels = make(log, turned).measurements.channels
     assert [c.name for c in channels[6:9]] == ["fx", "fy", "fz"]

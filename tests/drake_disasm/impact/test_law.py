@@ -1,10 +1,10 @@
-"""IMPACT against its closed form, and the lock as circles and planes."""
+"""IMPACT against its closed form."""
 
 import numpy as np
 import pytest
 
-from drake_disasm.impact import ImpactLaw, LockShape
-from drake_disasm.scenario import ImpactConfig, LockConfig
+from drake_disasm.impact import ImpactLaw
+from drake_disasm.scenario import ImpactConfig
 
 LAW = ImpactLaw(stiffness=2000.0, exponent=1.5, damping=4.0, depth=0.2)
 MM = 1e-3
@@ -58,34 +58,3 @@ def test_slopes_are_the_derivatives():
 def test_takes_the_scenarios_section():
     config = ImpactConfig(stiffness=7.0, exponent=2.0, damping=3.0, depth=0.5)
     assert ImpactLaw.of(config) == ImpactLaw(7.0, 2.0, 3.0, 0.5)
-
-
-def deepest(position):
-    found = LockShape(LockConfig()).contacts(np.eye(3), np.array(position) * MM)
-    i = int(np.argmax(found.penetration))
-    return found.penetration[i] / MM, found.normal[i]
-
-
-def test_in_the_middle_nothing_touches():
-    assert deepest([20.0, 0.0, 0.0])[0] == pytest.approx(-0.2)  # half the clearance
-
-
-@pytest.mark.parametrize(
-    ("position", "depth", "normal"),
-    [
-        ([20.0, 0.0, 0.25], 0.05, [0, 0, -1]),  # neck on the lip at +z
-        ([20.0, 0.0, -0.3], 0.1, [0, 0, 1]),
-        ([20.0, 0.25, 0.0], 0.05, [0, -1, 0]),  # head under the lips
-        ([20.0, -0.3, 0.0], 0.1, [0, 1, 0]),  # head on the floor
-        ([60.6, 0.0, 0.0], 0.1, [-1, 0, 0]),  # head at stop B
-        ([-0.7, 0.0, 0.0], 0.2, [1, 0, 0]),  # head at stop A
-    ],
-)
-def test_touches_where_the_lock_is(position, depth, normal):
-    found, direction = deepest(position)
-    assert found == pytest.approx(depth, abs=1e-9)
-    np.testing.assert_array_equal(direction, normal)
-
-
-def test_at_the_keyhole_the_lips_hold_nothing():
-    assert deepest([60.0, 10.0, 0.4])[0] < 0.0

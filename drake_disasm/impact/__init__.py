@@ -1,0 +1,14 @@
+"""The thesis's contact law between bolt and groove, and the twin's step with it."""
+
+from drake_disasm.impact.law import ImpactLaw
+from drake_disasm.impact.shape import Contacts, LockShape
+from drake_disasm.impact.step import ImpactConditions, ImpactStep, turning
+
+__all__ = [
+    "Contacts",
+    "ImpactConditions",
+    "ImpactLaw",
+    "ImpactStep",
+    "LockShape",
+    "turning",
+]

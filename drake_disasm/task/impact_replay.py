@@ -1,0 +1,100 @@
+"""The twin with IMPACT, many steps of the task at once.
+
+Without the hydroelastic query a step of this twin is a small system of equations
+(`ImpactStep`); for all measured steps together it is a few array operations, and one
+evaluation of the objective takes a fraction of the diagram's time
+(docs/identification.md has the figures).
+"""
+
+import numpy as np
+
+from drake_disasm.impact import ImpactStep, turning
+from drake_disasm.scenario import Scenario
+from drake_disasm.task.replay import ReplayDiagram, Steps, coarse_step
+
+
+class ImpactReplay:
+    """What `TwinReplay.transitions` says of a scenario with IMPACT, faster.
+
+    The diagram stays the reference: it holds the parameters, zeroes the sensor and
+    processes observations; only the steps themselves are taken here, by the equation
+    with which the diagram's `ImpactContact` foresees them. What that leaves out (the
+    change of inertia with the angles, Coriolis forces) is far below the sensor's noise.
+
+    Args:
+        scenario: what the twin is, `contact.model` being impact.
+        coarse: whether all but the end of a step may be simulated in coarse steps.
+    """
+
+    def __init__(self, scenario: Scenario, coarse: bool = False) -> None:
+        self._coarse = coarse
+        self._build(scenario)
+
+    def _build(self, scenario: Scenario) -> None:
+        self._diagram = ReplayDiagram(scenario)
+        self._diagram.zero()
+        self._scenario = scenario
+        station = self._diagram.station
+        M_B = station.lock.bolt.default_spatial_inertia()
+        I_B = M_B.CalcRotationalInertia().CopyToFullMatrix3()
+        R_WGn, g_W = station.X_WG.rotation(), station.plant.gravity_field()
+        g_Gn = R_WGn.matrix().T @ g_W.gravity_vector()
+        self._bolt = (M_B.get_mass(), M_B.get_com(), I_B, g_Gn)
+
+    def become(self, scenario: Scenario) -> None:
+        """See TwinReplay."""
+        if not self._diagram.can_become(scenario):
+            self._build(scenario)
+            return
+        self._diagram.become(scenario)
+        self._diagram.zero()
+        self._scenario = scenario
+
+    def transitions(self, steps: Steps) -> np.ndarray:
+        """See TwinReplay.
+
+        Raises:
+            RuntimeError: no force balances a step.
+        """
+        conditions = self._diagram.impact_conditions()
+        q, v, qd = steps.q, steps.v, steps.qd
+        for h in self._time_steps():
+            qd = qd + h * steps.qd_rate
+            step = ImpactStep(conditions, h, q, v, qd, steps.qd_rate)
+            begin, v_begin = q, v
+            v, contact = step.solve()
+            q = q + h * v
+        loads = self._loads(begin, (v - v_begin) / h, contact)
+        times = (steps.index + 1) * self._scenario.task.period
+        rows = zip(times, q, loads, strict=True)
+        return np.array([self._diagram.observed(*row) for row in rows])
+
+    def _time_steps(self) -> list[float]:
+        """Returns the plant's steps within a period [s]."""
+        period = self._scenario.task.period
+        fine = self._scenario.simulation.twin_time_step
+        coarse = coarse_step(self._scenario) if self._coarse else 0.0
+        first = round(period / coarse) - 1 if coarse else 0
+        rest = round((period - first * coarse) / fine)
+        return [coarse] * first + [fine] * rest
+
+    def _loads(
+        self, q: np.ndarray, vdot: np.ndarray, contact: np.ndarray
+    ) -> np.ndarray:
+        """Returns what the bolt loads the sensor with, (n, 6) [f; tau] at Bo in Gn.
+
+        Newton's and Euler's laws for the bolt, without products of velocities.
+
+        Args:
+            q, vdot: (n, 6) coordinates and their second derivatives.
+            contact: (n, 6) wrench on the bolt at Bo in Gn.
+        """
+        mass, p_BoBcm_B, I_Bo_B, g_Gn = self._bolt
+        E, R = turning(q[:, 3:])
+        alpha = np.einsum("nij,nj->ni", E, vdot[:, 3:])
+        p_BoBcm = np.einsum("nij,j->ni", R, p_BoBcm_B)
+        spin = np.einsum("nij,jk,nlk,nl->ni", R, I_Bo_B, R, alpha)
+        pull = mass * (g_Gn - vdot[:, :3])
+        f = contact[:, :3] + pull - mass * np.cross(alpha, p_BoBcm)
+        t = contact[:, 3:] + np.cross(p_BoBcm, pull) - spin
+        return np.hstack([f, t])
