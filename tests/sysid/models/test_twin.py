@@ -81,16 +81,14 @@ def test_recovers_parameters_from_nearby(log, turned):
     np.testing.assert_allclose(found, [0.2, 0.0349], rtol=0.03)
 
 
-def test_recovers_the_law_of_impact(impact_log, impact):
-    """From three times too soft: as good as the truth, and nearly its force."""
-    names = ["contact.impact.stiffness", "contact.impact.exponent"]
+def test_recovers_the_stiffness_of_impact(impact_log, impact):
+    names = ["contact.impact.stiffness"]
     objective = Objective(make(impact_log, impact, names, coarse=False), Workers())
     at_truth = objective(truth(objective.model))[0]
     assert at_truth == pytest.approx(0.707, abs=0.07)
-    here = gauss_newton(objective, objective.scaling.to_unit([300.0, 1.2]), 9)
-    assert objective.value(here.residual) < at_truth + 0.002
-    stiffness, exponent = objective.scaling.from_unit(here.u)
-    assert stiffness * 0.02**exponent == pytest.approx(1000.0 * 0.02, rel=0.2)
+    here = gauss_newton(objective, objective.scaling.to_unit(np.array([400.0])), 6)
+    assert objective.value(here.residual) < at_truth + 1e-3
+    assert objective.scaling.from_unit(here.u)[0] == pytest.approx(1000.0, rel=0.1)
 
 
 def test_with_impact_too_chunks_do_not_change_a_bit(impact_log, impact, monkeypatch):
