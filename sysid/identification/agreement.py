@@ -44,8 +44,8 @@ def verdict(
     """Compares two optima.
 
     The region is that of the likelihood: n (f1^2 - f2^2) / f2^2 <= chi2(0.95, p),
-    stretched by how much wider the bootstrap is than Gauss-Newton, for residuals
-    that are not independent.
+    stretched by how much wider the bootstrap is than the curvature says, for
+    residuals that are not independent or not alike.
 
     Args:
         names: of the methods.
@@ -58,7 +58,7 @@ def verdict(
     size = len(points[0])
     edge = float(chi2.ppf(0.95, size))
     C = spread.bootstrap_covariance
-    stretch = max(1.0, float(np.trace(C @ np.linalg.pinv(spread.covariance))) / size)
+    stretch = max(1.0, float(np.trace(C @ np.linalg.pinv(spread.curvature))) / size)
     low, high = sorted(values)
     gap = residuals * (high**2 - low**2) / max(low**2, 1e-300) / edge / stretch
     difference = points[0] - points[1]

@@ -11,6 +11,7 @@ Array = NDArray[np.float64]
 
 _DRAWS = 2000
 _Z95 = 1.959963984540054
+_SMALL = 1e-2  # of the largest channel's power
 
 
 @dataclass(frozen=True)
@@ -18,15 +19,17 @@ class Uncertainty:
     """Spread of an estimate, in the unit box.
 
     Attributes:
-        scale: rms weighted residual, by which a noise of one is stretched.
-        covariance: (p, p) by Gauss-Newton: right if residuals are white.
+        covariance: (p, p) by Gauss-Newton: right if residuals are white, however
+            large they are in each channel.
+        curvature: (p, p) what the objective's curvature alone says: right if all
+            channels are alike, too.
         draws: (b, p) block bootstrap of the estimate: right if residuals further
             apart than a block are independent.
         block: length of a block in rows.
     """
 
-    scale: float
     covariance: Array
+    curvature: Array
     draws: Array
     block: int
 
@@ -68,14 +71,12 @@ def uncertainty(
         episode: (rows,) of each row; a block never spans two.
         seed: of the draws.
     """
-    r, w = here.residual, here.weights
-    dof = max(1, r.size - len(here.u))
-    scale = float(np.sqrt(np.sum(w * r**2) / dof))
-    block = block_length(r, episode)
+    block = block_length(here.residual, episode)
     blocks = block_numbers(episode, block)
+    inverse: Array = np.array(np.linalg.pinv(here.information, hermitian=True))
     return Uncertainty(
-        scale,
-        np.array(scale**2 * np.linalg.pinv(here.information, hermitian=True)),
+        _white(here, inverse),
+        np.array(_mean_square(here) * inverse),
         _block_bootstrap(here, blocks, seed),
         block,
     )
@@ -85,14 +86,15 @@ def block_length(residual: Array, episode: NDArray[np.int64]) -> int:
     """Returns twice the rows over which residuals (rows, channels) are correlated.
 
     The longest over channels of the integrated autocorrelation time, summed until
-    it first falls below 0.05; at most a tenth of the rows.
+    it first falls below 0.05; at most a tenth of the rows. A channel that is fitted
+    far better than the others moves no estimate, and does not count.
     """
     limit = max(1, len(residual) // 10)
     longest = 1.0
     centred = residual - residual.mean(axis=0)
     power = np.mean(centred**2, axis=0)
     time = np.ones(residual.shape[1])
-    falling = power > 0.0
+    falling = power > _SMALL * power.max()
     for lag in range(1, limit):
         same = episode[lag:] == episode[:-lag]
         product = np.mean((centred[lag:] * centred[:-lag])[same], axis=0)
@@ -114,6 +116,24 @@ def block_numbers(episode: NDArray[np.int64], length: int) -> NDArray[np.int64]:
     _, blocks = np.unique(np.column_stack([episode, row]), axis=0, return_inverse=True)
     numbers: NDArray[np.int64] = np.asarray(blocks).reshape(-1)
     return numbers
+
+
+def _mean_square(here: Linearisation) -> float:
+    r, w = here.residual, here.weights
+    return float(np.sum(w * r**2) / max(1, r.size - len(here.u)))
+
+
+def _white(here: Linearisation, inverse: Array) -> Array:
+    """Returns the covariance (p, p) of an estimate from white residuals.
+
+    H^-1 (sum_c s_c^2 J_c^T J_c) H^-1 with H = J^T W J and s_c^2 = mean (w r)^2 of
+    channel c (Huber 1981, 7.6); s^2 H^-1 where all channels are alike.
+    """
+    J, w, r = here.jacobian, here.weights, here.residual
+    dof = max(1, r.size - len(here.u))
+    power = np.mean((w * r) ** 2, axis=0) * r.size / dof
+    B = np.einsum("rci,c,rcj->ij", J, power, J)
+    return np.array(inverse @ B @ inverse)
 
 
 def _block_bootstrap(

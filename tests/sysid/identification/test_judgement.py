@@ -17,7 +17,10 @@ from sysid.identification.uncertainty import (
 from sysid.identification.whiteness import autocorrelation, ljung_box
 
 SPREAD = Uncertainty(
-    1.0, 1e-4 * np.eye(2), 1e-2 * np.random.default_rng(0).normal(size=(2000, 2)), 1
+    1e-4 * np.eye(2),
+    1e-4 * np.eye(2),
+    1e-2 * np.random.default_rng(0).normal(size=(2000, 2)),
+    1,
 )
 
 
@@ -116,3 +119,16 @@ def test_the_bootstrap_has_the_spread_of_a_mean(rho):
     assert np.std(spread.draws) == pytest.approx(truth, rel=0.3)
     white = np.sqrt(spread.covariance[0, 0])
     assert white == pytest.approx(np.std(r) / np.sqrt(n), rel=0.01)
+
+
+def test_channels_may_have_noise_of_any_size():
+    """An exact channel neither narrows the interval nor lengthens the blocks."""
+    n = 2000
+    noisy, exact = coloured(n, 0.0), 1e-3 * np.sin(np.arange(n) / 300.0)
+    J = np.stack([np.ones(n), 1e-3 * np.ones(n)], axis=1)[:, :, None]
+    r = np.column_stack([noisy, exact])
+    here = Linearisation(np.array([0.5]), r, J, np.ones((n, 2)))
+    spread = uncertainty(here, np.zeros(n, dtype=int))
+    assert spread.block <= 4
+    for deviation in (np.sqrt(spread.covariance[0, 0]), np.std(spread.draws)):
+        assert deviation == pytest.approx(1.0 / np.sqrt(n), rel=0.1)
