@@ -35,7 +35,7 @@ from sysid.parameters import Parameter
 POSE_NOISE = (2e-5, 1e-4)
 
 _CHUNK = 32  # transitions: a tenth of a second of work
-_IMPACT_CHUNK = 128  # large enough for arrays, small enough to share
+_IMPACT_CHUNK = 512  # large enough for arrays, small enough to share
 
 
 class TwinModel(ScenarioModel):

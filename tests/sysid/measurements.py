@@ -19,7 +19,6 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from drake_disasm.policies import Exploring, make_policy
@@ -213,28 +212,23 @@ THESIS_SETTINGS = {
     "883 transitions, 20 cycles": (883, 20, BeesSettings.thesis()),
     "883 transitions, 20 cycles of 16": (883, 20, BeesSettings()),
 }
-THESIS_LOGS = {
-    "log of the cell": Case(TRUTH, "cell", IMPACT, IMPACT_BOUNDS, START),
-    "log of the twin": Case(IMPACT, "twin", IMPACT, IMPACT_BOUNDS, START),
-}
+THESIS = Case(TRUTH, "cell", IMPACT, IMPACT_BOUNDS, START)
 
 
 def measure_thesis(figure: Path) -> None:
     """Draws objective against evaluations for the thesis's settings, five seeds."""
     with tempfile.TemporaryDirectory() as folder:
-        for name, case in THESIS_LOGS.items():
-            record(Path(folder) / name, case.truth, case.station, 1776, 0)
+        log = record(Path(folder) / "log", THESIS.truth, THESIS.station, 1776, 0)
         jobs = [
-            (str(Path(folder) / log), log, setting, method, seed)
-            for log in THESIS_LOGS
-            for setting in THESIS_SETTINGS
+            (str(log.folder), setting, method, seed)
+            for setting in reversed(THESIS_SETTINGS)  # the longest first
             for seed in range(5)
             for method in ("bees", "nlopt")
         ]
         with ProcessPoolExecutor(2, get_context("spawn")) as pool:
             traces = list(pool.map(_thesis_run, jobs))
     kept = [
-        dict(zip(("log", "setting", "method", "seed"), job[1:], strict=True)) | found
+        dict(zip(("setting", "method", "seed"), job[1:], strict=True)) | found
         for job, found in zip(jobs, traces, strict=True)
     ]
     figure.with_suffix(".json").write_text(json.dumps(kept))
@@ -243,10 +237,9 @@ def measure_thesis(figure: Path) -> None:
 
 def _thesis_run(job: tuple) -> dict:
     """Returns the values and the best point of one search, on one core."""
-    folder, name, setting, method, seed = job
+    folder, setting, method, seed = job
     transitions, cycles, colony = THESIS_SETTINGS[setting]
-    model = THESIS_LOGS[name].fitted(read_log(folder), transitions)
-    objective = Objective(model, Workers())
+    objective = Objective(THESIS.fitted(read_log(folder), transitions), Workers())
     effort = Effort(cycles=cycles, close=0, bees=colony, seed=seed)
     with tempfile.TemporaryDirectory() as scratch:
         journal = Journal(Path(scratch), {}, False)
@@ -260,30 +253,20 @@ def _thesis_run(job: tuple) -> dict:
 def draw_thesis(figure: Path) -> None:
     """Draws the traces that `measure_thesis` kept."""
     kept = json.loads(figure.with_suffix(".json").read_text())
-    drawn = Figure(figsize=(13.0, 6.0), layout="constrained")
-    axes = drawn.subplots(
-        len(THESIS_LOGS), len(THESIS_SETTINGS), sharex="col", sharey="row"
-    )
-    for row, log in zip(axes, THESIS_LOGS, strict=True):
-        for ax, setting in zip(row, THESIS_SETTINGS, strict=True):
-            for entry in kept:
-                if entry["log"] == log and entry["setting"] == setting:
-                    _draw_trace(ax, entry)
-            ax.set_yscale("log")
-        row[0].set_ylabel(f"{log}\nobjective, best so far")
-        row[0].legend(fontsize=8)
-    for ax, setting in zip(axes[0], THESIS_SETTINGS, strict=True):
+    drawn = Figure(figsize=(13.0, 3.6), layout="constrained")
+    axes = drawn.subplots(1, len(THESIS_SETTINGS), sharey=True)
+    for ax, setting in zip(axes, THESIS_SETTINGS, strict=True):
+        for entry in (e for e in kept if e["setting"] == setting):
+            colour = {"bees": "#d98c00", "nlopt": "#2060a0"}[entry["method"]]
+            best = np.minimum.accumulate(entry["values"])
+            label = entry["method"] if entry["seed"] == 0 else None
+            ax.step(range(1, len(best) + 1), best, color=colour, label=label, lw=1.0)
         ax.set_title(setting, fontsize=9)
-    for ax in axes[-1]:
         ax.set_xlabel("evaluations")
+        ax.set_yscale("log")
+        ax.legend(fontsize=8)
+    axes[0].set_ylabel("objective, best so far")
     drawn.savefig(figure, dpi=110)
-
-
-def _draw_trace(ax: Axes, entry: dict) -> None:
-    colour = {"bees": "#d98c00", "nlopt": "#2060a0"}[entry["method"]]
-    best = np.minimum.accumulate(entry["values"])
-    label = entry["method"] if entry["seed"] == 0 else None
-    ax.step(range(1, len(best) + 1), best, color=colour, label=label, lw=1.0)
 
 
 def measure_package(seeds: int = 10) -> None:
