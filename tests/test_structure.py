@@ -1,6 +1,7 @@
 """The house's rules: which package may import which."""
 
 import ast
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -47,3 +48,14 @@ def test_sysid_does_not_import_tools() -> None:
     for file in (ROOT / "sysid").rglob("*.py"):
         packages = {name.split(".")[0] for name in _imports(file)}
         assert not packages & {"tools", "tests"}, file
+
+
+def test_every_package_is_installed() -> None:
+    with (ROOT / "pyproject.toml").open("rb") as stream:
+        listed = tomllib.load(stream)["tool"]["setuptools"]["packages"]
+    found = {
+        ".".join(file.parent.relative_to(ROOT).parts)
+        for top in ("drake_disasm", "sysid")
+        for file in (ROOT / top).rglob("__init__.py")
+    }
+    assert found | {"disasm_models"} == set(listed)
