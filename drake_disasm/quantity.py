@@ -17,6 +17,7 @@ def quantity(
     low: float = -math.inf,
     high: float = math.inf,
     choices: tuple[str, ...] = (),
+    grid: tuple[float, ...] = (),
 ) -> Any:
     """Returns a dataclass field holding a number, a list of numbers or a word.
 
@@ -26,9 +27,10 @@ def quantity(
         doc: one line that says what it is.
         low, high: inclusive bounds, in `unit`, of each element.
         choices: the words allowed, for a word.
+        grid: values from which a search may begin, where the default is not enough.
     """
     metadata = {"unit": unit, "doc": doc, "low": low, "high": high}
-    metadata["choices"] = choices
+    metadata |= {"choices": choices, "grid": grid}
     if isinstance(default, list):
         return dataclasses.field(
             default_factory=lambda: list(default),

@@ -26,6 +26,7 @@ class Parameter:
             decades.
         path: where it stands in a scenario, such as `effects.0.ry`; the name itself
             if it is left out.
+        is_shape: whether it says how an effect looks and not how large it is.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Parameter:
     doc: str = ""
     log_scale: bool = False
     path: str = ""
+    is_shape: bool = False
 
     def __post_init__(self) -> None:
         """Refuses bounds that no search can use."""

@@ -159,6 +159,7 @@ def _parameter(
         metadata["doc"],
         scale == "log",
         path,
+        bool(metadata.get("grid")),
     )
 
 

@@ -112,7 +112,8 @@ class ForceTorqueSensor(LeafSystem):
         if not effects:
             return load
         R_WBody = self._poses.Eval(context)[self._body].rotation()
-        return sensed(load, effects, Sensing(time, R_WBody @ self._R_BodyS, self._g_W))
+        R_WS = (R_WBody @ self._R_BodyS).matrix()
+        return sensed(load, effects, Sensing(np.array(time), R_WS, self._g_W))
 
     def _calc_wrench(self, context: Context, output: BasicVector) -> None:
         effects = self.effects(context)
@@ -135,7 +136,7 @@ class ForceTorqueSensor(LeafSystem):
 def sensed(
     load: np.ndarray, effects: Sequence[SensorEffect], sensing: Sensing
 ) -> np.ndarray:
-    """Returns what a sensor with effects reads of a load, (6,) [f; tau] in S."""
+    """Returns what a sensor with effects reads of loads, (..., 6) [f; tau] in S."""
     for effect in effects:
         load = effect.apply(load, sensing)
     return load

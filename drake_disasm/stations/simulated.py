@@ -27,11 +27,13 @@ from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 from drake_disasm.coordinates import Coordinates
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor
 from drake_disasm.effects import (
+    ArmEffect,
     Effect,
     Environment,
     EnvironmentEffect,
-    SensorEffect,
+    sensor_chain,
 )
+from drake_disasm.errors import DisasmError
 from drake_disasm.lock import Lock, set_environment
 from drake_disasm.ports import Health, Port, check_ports
 from drake_disasm.scenario import PlacementConfig, Scenario, validate
@@ -176,12 +178,17 @@ class SimulatedStation(Station):
         """
         environment = self.lock.nominal
         for effect in effects:
+            if isinstance(effect, ArmEffect):
+                raise DisasmError(
+                    f"{type(effect).__name__}: acts on logs of joint torques; no "
+                    "simulated station carries it yet, take it out of effects"
+                )
             if isinstance(effect, EnvironmentEffect):
                 environment = effect.apply(environment)
         self._set_environment(context, environment)
         self.sensor.set_effects(
             self.part_context(self.sensor, context),
-            [e for e in effects if isinstance(e, SensorEffect)],
+            sensor_chain(effects),
         )
 
     def _set_environment(self, context: Context, environment: Environment) -> None:

@@ -243,9 +243,9 @@ class ReplayDiagram:
         reading = shift_and_express(load, X_SGn)
         effects = sensor.effects(station.part_context(sensor, self.station_context))
         if effects:
-            R_WS = station.X_WG.rotation() @ X_SGn.rotation().inverse()
+            R_WS = (station.X_WG.rotation() @ X_SGn.rotation().inverse()).matrix()
             g_W = station.plant.gravity_field().gravity_vector()
-            reading = sensed(reading, effects, Sensing(time, R_WS, g_W))
+            reading = sensed(reading, effects, Sensing(np.array(time), R_WS, g_W))
         observation = self.processor.observation(self.processor_context, X_GB, reading)
         return _with_rotation_vector(observation, X_GB)
 

@@ -162,6 +162,10 @@ class LogModel(abc.ABC):
             raise DisasmError("no episode is left to fit; hold out fewer")
         return self._selected(mask)
 
+    def of_rows(self, mask: NDArray[np.bool_]) -> Self:
+        """Returns the same model of the rows where the mask (rows,) is true."""
+        return self._selected(mask)
+
     def with_measurements(self, measurements: Measurements) -> Self:
         """Returns the same model compared with other measurements of the same rows."""
         return self._changed(measurements=measurements)
@@ -172,6 +176,10 @@ class LogModel(abc.ABC):
 
     def describe(self, theta: Array) -> dict[str, tuple[float, str]]:
         """Returns quantities that people ask for, with units, by name; none here."""
+        return {}
+
+    def covariates(self, channel: int) -> dict[str, Array]:
+        """Returns what a channel's residual might depend on, (rows,) each, by name."""
         return {}
 
     def _changed(self, **attributes: Any) -> Self:
@@ -199,6 +207,12 @@ class ScenarioModel(LogModel):
         return self._changed(
             scenario=with_values(self.scenario, by_path(self.parameters, values)),
             parameters=tuple(p for p in self.parameters if p.name not in values),
+        )
+
+    def extended(self, scenario: Scenario, parameters: Sequence[Parameter]) -> Self:
+        """Returns the same model in another scenario, with more parameters of it."""
+        return self._changed(
+            scenario=scenario, parameters=(*self.parameters, *parameters)
         )
 
     def scenario_at(self, theta: Array) -> Scenario:

@@ -6,32 +6,41 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.effects import ArmEffect, JointSamples
 from drake_disasm.errors import DisasmError
 from drake_disasm.quantity import closest
+from drake_disasm.scenario import Scenario, with_values
 from sysid.logs import Episode, Log
 from sysid.logs.refusal import refusal
-from sysid.models.base import Array, Channel, LogModel, Measurements
+from sysid.models.base import Array, Channel, Measurements, ScenarioModel
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
-from sysid.parameters import Parameter, by_name
+from sysid.parameters import Parameter, by_name, by_path
 
 _NEEDED = ("q", "v", "vd", "tau")
 _REACH = 5.0  # times what a parameter would need to explain all torque alone
 
 
-class JointMotionModel(LogModel):
+class JointMotionModel(ScenarioModel):
     """tau = Y(q, v, vd) beta, with beta the identifiable base parameters.
 
     Of ten inertial parameters per link, many never show in joint torques, and
     others only in sums. `parameters` are the sums that do show; each is named by
-    the first of its terms, and `doc` has them all.
+    the first of its terms, and `doc` has them all. Of a scenario, its arm effects
+    act, and their parameters come after the base parameters.
     """
 
-    def __init__(self, logs: Sequence[Log], urdf: str | None = None) -> None:
+    def __init__(
+        self,
+        logs: Sequence[Log],
+        urdf: str | None = None,
+        scenario: Scenario | None = None,
+    ) -> None:
         """Takes the motion out of the logs.
 
         Args:
             logs: of joint motion, with q, v, vd and tau, of one arm.
             urdf: the arm; by default what the first log names.
+            scenario: whose arm effects act.
 
         Raises:
             DisasmError: a log is of another kind or arm, lacks a quantity, or there
@@ -48,6 +57,11 @@ class JointMotionModel(LogModel):
         arm = ArmDynamics(urdf, header.joints)
         base = base_set(arm.random_regressor())
         parts = [arm.regressor(e["q"], e["v"], e["vd"]) for _, e in episodes]
+        self.scenario = scenario or Scenario()
+        self._motion = {
+            name: np.concatenate([e[name] for _, e in episodes])
+            for name in ("q", "v", "vd")
+        }
         self._Y = np.concatenate(parts)[:, :, base.independent]
         self._beta = base.beta(arm.inertia)
         self._fixed = np.zeros(len(self._beta))
@@ -61,24 +75,46 @@ class JointMotionModel(LogModel):
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
-        beta = self._fixed.copy()
-        beta[self._free] = theta
-        torque: Array = self._Y[rows] @ beta
+        beta, count = self._fixed.copy(), len(self._free)
+        beta[self._free] = theta[:count]
+        load: Array = self._Y[rows] @ beta
+        torque = load.copy()
+        joints = [channel.name for channel in self.measurements.channels]
+        for effect in self.scenario_at(theta).effects:
+            if isinstance(effect, ArmEffect):
+                i = joints.index(effect.joint)
+                motion = {name: all_[rows, i] for name, all_ in self._motion.items()}
+                samples = JointSamples(**motion, load=load[:, i])
+                torque[:, i] += effect.torque(samples)
         return torque
+
+    def scenario_at(self, theta: Array) -> Scenario:
+        """See ScenarioModel; base parameters are no part of a scenario."""
+        count = len(self._free)
+        own = self.parameters[count:]
+        return with_values(self.scenario, by_path(own, by_name(own, theta[count:])))
 
     def freeze(self, values: Mapping[str, float]) -> Self:
         """See LogModel."""
-        names = [p.name for p in self.parameters]
-        free = [i for i, name in enumerate(names) if name not in values]
-        fixed = self._fixed.copy()
-        for i, name in enumerate(names):
-            if name in values:
-                fixed[self._free[i]] = values[name]
+        base = self.parameters[: len(self._free)]
+        fixed, free = self._fixed.copy(), []
+        for number, parameter in zip(self._free, base, strict=True):
+            if parameter.name in values:
+                fixed[number] = values[parameter.name]
+            else:
+                free.append(number)
+        own = self.parameters[len(base) :]
         return self._changed(
             _fixed=fixed,
-            _free=self._free[free],
-            parameters=tuple(self.parameters[i] for i in free),
+            _free=np.array(free, dtype=np.int64),
+            scenario=with_values(self.scenario, by_path(own, values)),
+            parameters=tuple(p for p in self.parameters if p.name not in values),
         )
+
+    def covariates(self, channel: int) -> dict[str, Array]:
+        """See LogModel: the joint's own motion."""
+        names = {"q": "position", "v": "velocity", "vd": "acceleration"}
+        return {word: self._motion[key][:, channel] for key, word in names.items()}
 
     def only(self, names: Sequence[str]) -> Self:
         """Returns the same model with all but the named parameters at the URDF's.
@@ -86,19 +122,21 @@ class JointMotionModel(LogModel):
         Raises:
             DisasmError: there is no such base parameter.
         """
-        known = [p.name for p in self.parameters]
+        base = self.parameters[: len(self._free)]
+        known = [p.name for p in base]
         for name in names:
             if name not in known:
                 raise DisasmError(
                     f"parameter {name}: is no base parameter of this arm; "
                     f"{closest(name, known)}"
                 )
-        rest = {p.name: p.nominal for p in self.parameters if p.name not in names}
+        rest = {p.name: p.nominal for p in base if p.name not in names}
         return self.freeze(rest)
 
     def urdf_values(self) -> Mapping[str, float]:
         """Returns the base parameters that the URDF's inertias amount to, by name."""
-        return by_name(self.parameters, self._beta[self._free])
+        base = self.parameters[: len(self._free)]
+        return by_name(base, self._beta[self._free])
 
     def _base_parameters(
         self, arm: ArmDynamics, base: BaseSet
@@ -121,7 +159,9 @@ class JointMotionModel(LogModel):
 
     def _selected(self, mask: NDArray[np.bool_]) -> Self:
         return self._changed(
-            _Y=self._Y[mask], measurements=self.measurements.select(mask)
+            _Y=self._Y[mask],
+            _motion={name: values[mask] for name, values in self._motion.items()},
+            measurements=self.measurements.select(mask),
         )
 
 

@@ -5,13 +5,12 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RotationMatrix
 from pydrake.multibody.tree import UniformGravityFieldElement
 
-from drake_disasm.effects import PayloadError, Sensing, SensorEffect
+from drake_disasm.devices.ft_sensor import sensed
+from drake_disasm.effects import PayloadError, Sensing, SensorEffect, sensor_chain
 from drake_disasm.errors import DisasmError
 from drake_disasm.scenario import Scenario
-from drake_disasm.spatial import weight_wrench
 from drake_disasm.tool import Tool
 from sysid.logs import Episode, Log, rotation_matrices, sensor_wrench
 from sysid.logs.refusal import refusal
@@ -84,21 +83,12 @@ class StaticWrenchModel(ScenarioModel):
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
-        effects = [
-            effect
-            for effect in self.scenario_at(theta).effects
-            if isinstance(effect, SensorEffect)
-        ]
-        readings = []
-        for R_WS, time in zip(self._R_WS[rows], self._time[rows], strict=True):
-            sensing = Sensing(float(time), RotationMatrix(R_WS), _GRAVITY_W)
-            reading = weight_wrench(
-                self._mass, self._p_SoScm_S, sensing.R_WS, _GRAVITY_W
-            )
-            for effect in effects:
-                reading = effect.apply(reading, sensing)
-            readings.append(reading)
-        return np.array(readings)
+        effects = sensor_chain(self.scenario_at(theta).effects)
+        sensing = Sensing(self._time[rows], self._R_WS[rows], _GRAVITY_W)
+        weight = self._mass * sensing.g_S
+        torque = np.cross(self._p_SoScm_S, weight)
+        load = np.concatenate([weight, torque], axis=1)
+        return sensed(load, effects, sensing)
 
     @property
     def noise_groups(self) -> tuple[str, ...]:
@@ -120,6 +110,12 @@ class StaticWrenchModel(ScenarioModel):
                 }
                 return {"weight": (weight, "N"), **centre}
         return {}
+
+    def covariates(self, channel: int) -> dict[str, Array]:
+        """See LogModel: time, and gravity's direction in S."""
+        down = np.einsum("nji,j->ni", self._R_WS, _GRAVITY_W)
+        axes = {f"gravity along {a}_S": down[:, i] for i, a in enumerate("xyz")}
+        return {"time": self._time, **axes}
 
     def _refuse_other_parameters(self) -> None:
         for parameter in self.parameters:

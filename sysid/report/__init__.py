@@ -1,5 +1,6 @@
 """Reports that open offline: one HTML page with its pictures inside."""
 
+from sysid.report.closing import closing_page
 from sysid.report.page import report_page
 
-__all__ = ["report_page"]
+__all__ = ["closing_page", "report_page"]

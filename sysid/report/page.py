@@ -3,26 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-import jinja2
-
 from sysid.identification.plain import to_mapping
 from sysid.identification.result import Identified
 from sysid.report import figures
-
-_ENVIRONMENT = jinja2.Environment(
-    loader=jinja2.PackageLoader("sysid.report", "."),
-    autoescape=True,
-    trim_blocks=True,
-    lstrip_blocks=True,
-    undefined=jinja2.StrictUndefined,
-)
-
-
-def _number(value: float) -> str:
-    return f"{value:.5g}"
-
-
-_ENVIRONMENT.filters["number"] = _number
+from sysid.report.templates import render
 
 
 def report_page(found: Identified, origin: Mapping[str, Any]) -> str:
@@ -33,8 +17,8 @@ def report_page(found: Identified, origin: Mapping[str, Any]) -> str:
         origin: where it is from, as `result.json` has it.
     """
     shown = found.held_out or found.fitted
-    template = _ENVIRONMENT.get_template("identification.html.j2")
-    return template.render(
+    return render(
+        "identification.html.j2",
         result=to_mapping(found),
         shown="held-out" if found.held_out else "fitted",
         pictures=_pictures(found, shown),

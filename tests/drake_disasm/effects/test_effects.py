@@ -8,15 +8,32 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from drake_disasm.effects import (
     EFFECTS,
+    ArmEffect,
     Effect,
     Environment,
     EnvironmentEffect,
     GrooveFriction,
     GroovePose,
+    JointAsymmetricFriction,
+    JointCoulombFriction,
+    JointLoadFriction,
+    JointSamples,
+    JointStribeckFriction,
+    JointViscousFriction,
     PayloadError,
+    RotorInertia,
     Sensing,
     SensorBias,
+    SensorCrossTalk,
+    SensorDrift,
     SensorEffect,
+    SensorGain,
+    SensorMounting,
+    SensorWarmUp,
+    TorqueGain,
+    TorqueOffset,
+    sensor_chain,
+    sizes,
 )
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
@@ -28,19 +45,34 @@ ORIENTATIONS = [(0, 0, 0), (np.pi, 0, 0), (0.3, -0.8, 2.0), (np.pi / 2, 0, 0)]
 ENVIRONMENT = Environment(RigidTransform([0.001, 0, 0]), 0.2, 1e9, 1e8, 20.0)
 
 
+IN_CELL = [e for e in EFFECTS if not issubclass(e, ArmEffect)]
+SAMPLES = JointSamples(
+    q=np.zeros(3),
+    v=np.array([-0.5, 0.0, 2.0]),
+    vd=np.array([1.0, -1.0, 3.0]),
+    load=np.array([10.0, -20.0, 30.0]),
+)
+
+
 def _sensing(rpy: tuple[float, float, float], time: float = 1.0) -> Sensing:
-    return Sensing(time, RollPitchYaw(np.array(rpy)).ToRotationMatrix(), G_W)
+    R_WS = RollPitchYaw(np.array(rpy)).ToRotationMatrix().matrix()
+    return Sensing(np.array(time), R_WS, G_W)
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_is_declared_in_full(effect: type[Effect]) -> None:
+    """A size is zero at null; a shape has a grid within its bounds."""
     assert "Equation:" in (effect.__doc__ or "")
     assert "Where it acts:" in (effect.__doc__ or "")
+    assert sizes(effect)
     for field in dataclasses.fields(effect):  # type: ignore[arg-type]
         data = field.metadata
-        assert data["unit"] and data["doc"]
-        assert field.default == 0.0
-        assert data["low"] < 0.0 < data["high"]
+        assert data["doc"]
+        if field.name in sizes(effect):
+            assert data["unit"] and field.default == 0.0
+            assert data["low"] <= 0.0 < data["high"]
+        for value in (field.default, *data["grid"]) if data["grid"] else ():
+            assert data["low"] <= value <= data["high"]
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
@@ -54,6 +86,8 @@ def test_vanishes_at_null_as_a_function(effect: type[Effect]) -> None:
         wrench = np.array([1.1, -2.2, 3.3, 0.1, -0.2, 0.3])
         read = null.apply(wrench, _sensing((0.3, -0.8, 2.0)))
         assert np.array_equal(read, wrench)
+    if isinstance(null, ArmEffect):
+        assert not null.torque(SAMPLES).any()
 
 
 def _trajectory(effects: list[Effect], steps: int) -> np.ndarray:
@@ -71,16 +105,16 @@ def without() -> np.ndarray:
     return _trajectory([], 20)
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", IN_CELL)
 def test_vanishes_at_null_bit_for_bit(
     effect: type[Effect], without: np.ndarray
 ) -> None:
     assert np.array_equal(_trajectory([effect()], 20), without)
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", IN_CELL)
 def test_shows_away_from_null(effect: type[Effect], without: np.ndarray) -> None:
-    values = {f.name: 5e-4 for f in dataclasses.fields(effect)}  # type: ignore[arg-type]
+    values = dict.fromkeys(sizes(effect), 5e-4)
     with_effect = _trajectory([effect(**values)], 20)
     assert not np.allclose(with_effect, without, atol=1e-6)
 
@@ -103,6 +137,58 @@ def test_sensor_bias_adds_and_zeroing_does_not_see_it() -> None:
     np.testing.assert_array_equal(read, 1 + bias)
     assert not SensorBias.present_at_zeroing
     assert PayloadError.present_at_zeroing
+
+
+def test_drift_grows_and_warm_up_settles() -> None:
+    for time in (0.0, 2.0, 1e4):
+        sensing = _sensing((0, 0, 0), time)
+        drift = SensorDrift(fz=0.1, tx=-0.01).apply(np.zeros(6), sensing)
+        np.testing.assert_allclose(drift[2:4], [0.1 * time, -0.01 * time])
+        warm = SensorWarmUp(fz=2.0, time_constant=2.0).apply(np.zeros(6), sensing)
+        assert warm[2] == pytest.approx(2.0 * (1 - np.exp(-time / 2.0)))
+    assert not SensorDrift.present_at_zeroing and not SensorWarmUp.present_at_zeroing
+
+
+def test_gain_and_cross_talk_are_the_two_parts_of_a_matrix() -> None:
+    wrench, still = np.arange(1.0, 7.0), _sensing((0, 0, 0))
+    np.testing.assert_allclose(
+        SensorGain(fy=0.1, tz=-0.5).apply(wrench, still), [1, 2.2, 3, 4, 5, 3]
+    )
+    mixed = SensorCrossTalk(fx_ty=0.2, tz_fy=-0.05).apply(wrench, still)
+    np.testing.assert_allclose(mixed, [1 + 0.2 * 5, 2, 3, 4, 5, 6 - 0.05 * 2])
+
+
+def test_a_turned_sensor_reads_in_its_own_axes() -> None:
+    """Turned a quarter about z, its x axis is where y_S was."""
+    wrench = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    read = SensorMounting(rz=np.pi / 2).apply(wrench, _sensing((0, 0, 0)))
+    np.testing.assert_allclose(read, [2, -1, 3, 5, -4, 6], atol=1e-12)
+
+
+def test_the_chain_goes_from_the_load_to_the_electronics() -> None:
+    """A bias that is listed first still acts behind the gain."""
+    listed = [SensorBias(fz=1.0), SensorGain(fz=1.0), PayloadError(mass=-1.0)]
+    kinds = [type(effect) for effect in sensor_chain(listed)]
+    assert kinds == [PayloadError, SensorGain, SensorBias]
+
+
+@pytest.mark.parametrize(
+    ("effect", "expected"),
+    [
+        (JointViscousFriction(coefficient=2.0), [-1.0, 0.0, 4.0]),
+        (JointCoulombFriction(size=3.0, creep=0.001), [-3.0, 0.0, 3.0]),
+        (JointStribeckFriction(size=3.0, speed=2.0, creep=0.001),
+         [-3 * np.exp(-1 / 16), 0.0, 3 * np.exp(-1)]),
+        (JointAsymmetricFriction(coulomb=1.0, viscous=2.0, creep=0.001),
+         [2.0, 0.0, 5.0]),
+        (JointLoadFriction(coefficient=0.1, creep=0.001), [-1.0, 0.0, 3.0]),
+        (TorqueOffset(size=-0.7), [-0.7, -0.7, -0.7]),
+        (TorqueGain(share=0.1), [1.0, -2.0, 3.0]),
+        (RotorInertia(inertia=2.0), [2.0, -2.0, 6.0]),
+    ],
+)  # fmt: skip
+def test_arm_effects_are_their_equations(effect: ArmEffect, expected: list) -> None:
+    np.testing.assert_allclose(effect.torque(SAMPLES), expected, atol=1e-12)
 
 
 def test_groove_friction_adds_and_stops_at_zero() -> None:

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 
 from drake_disasm.effects.base import Sensing, SensorEffect, parameter
-from drake_disasm.spatial import cross
 
 
 @dataclasses.dataclass
@@ -26,8 +25,10 @@ class PayloadError(SensorEffect):
     cy: float = parameter("kg m", -2.0, 2.0, "first moment lacking, along y_S")
     cz: float = parameter("kg m", -2.0, 2.0, "first moment lacking, along z_S")
 
+    stage = 0
+
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
         """Adds the weight of what was not accounted for."""
-        g_S = sensing.R_WS.matrix().T @ sensing.g_W
-        torque = cross(np.array([self.cx, self.cy, self.cz]), g_S)
-        return wrench_S + np.concatenate([self.mass * g_S, torque])
+        g_S = sensing.g_S
+        torque = np.cross([self.cx, self.cy, self.cz], g_S)
+        return wrench_S + np.concatenate([self.mass * g_S, torque], axis=-1)

@@ -1,0 +1,1 @@
+"""Effects at an arm's joints."""

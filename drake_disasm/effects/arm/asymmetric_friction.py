@@ -1,0 +1,35 @@
+"""The joint rubs otherwise forwards than backwards."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import (
+    ArmEffect,
+    JointSamples,
+    joint_name,
+    parameter,
+    shape,
+)
+
+#: Below it a joint rests, for all that filtered velocities can tell.
+_CREEP = (0.005, 0.02, 0.08)
+
+
+@dataclasses.dataclass
+class JointAsymmetricFriction(ArmEffect):
+    """What friction forwards exceeds friction backwards by, half of it.
+
+    Equation: tau = c tanh(v / e)^2 + b |v|: even in v, and zero at rest.
+    Where it acts: one joint of the arm, on the torque that its sensor measures.
+    """
+
+    joint: str = joint_name()
+    coulomb: float = parameter("N m", -200.0, 200.0, "dry part")
+    viscous: float = parameter("N m s/rad", -500.0, 500.0, "viscous part")
+    creep: float = shape(0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP)
+
+    def torque(self, samples: JointSamples) -> np.ndarray:
+        """See ArmEffect."""
+        dry = self.coulomb * np.tanh(samples.v / self.creep) ** 2
+        return dry + self.viscous * np.abs(samples.v)

@@ -1,0 +1,33 @@
+"""The joint rubs."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import (
+    ArmEffect,
+    JointSamples,
+    joint_name,
+    parameter,
+    shape,
+)
+
+#: Below it a joint rests, for all that filtered velocities can tell.
+_CREEP = (0.005, 0.02, 0.08)
+
+
+@dataclasses.dataclass
+class JointCoulombFriction(ArmEffect):
+    """Dry friction of constant size against the motion.
+
+    Equation: tau = c tanh(v / e), e the speed below which the joint creeps.
+    Where it acts: one joint of the arm, on the torque that its sensor measures.
+    """
+
+    joint: str = joint_name()
+    size: float = parameter("N m", 0.0, 200.0, "friction torque")
+    creep: float = shape(0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP)
+
+    def torque(self, samples: JointSamples) -> np.ndarray:
+        """See ArmEffect."""
+        return self.size * np.tanh(samples.v / self.creep)

@@ -1,0 +1,34 @@
+"""The joint rubs more under load."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import (
+    ArmEffect,
+    JointSamples,
+    joint_name,
+    parameter,
+    shape,
+)
+
+#: Below it a joint rests, for all that filtered velocities can tell.
+_CREEP = (0.005, 0.02, 0.08)
+
+
+@dataclasses.dataclass
+class JointLoadFriction(ArmEffect):
+    """Dry friction in proportion to the torque that the gear transmits.
+
+    Equation: tau = k |tau_load| tanh(v / e).
+    Where it acts: one joint of the arm, on the torque that its sensor measures.
+    """
+
+    joint: str = joint_name()
+    coefficient: float = parameter("1", 0.0, 1.0, "share of the load")
+    creep: float = shape(0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP)
+
+    def torque(self, samples: JointSamples) -> np.ndarray:
+        """See ArmEffect."""
+        direction = np.tanh(samples.v / self.creep)
+        return self.coefficient * np.abs(samples.load) * direction

@@ -1,0 +1,23 @@
+"""The motor's rotor takes torque, too."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import ArmEffect, JointSamples, joint_name, parameter
+
+
+@dataclasses.dataclass
+class RotorInertia(ArmEffect):
+    """Inertia of rotor and gear, as the joint feels it.
+
+    Equation: tau = I_a vd: unlike a link's inertia it couples to no other joint.
+    Where it acts: one joint of the arm, on the torque that its sensor measures.
+    """
+
+    joint: str = joint_name()
+    inertia: float = parameter("kg m^2", 0.0, 50.0, "reflected to the joint")
+
+    def torque(self, samples: JointSamples) -> np.ndarray:
+        """See ArmEffect."""
+        return self.inertia * samples.vd

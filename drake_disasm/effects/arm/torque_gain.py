@@ -1,0 +1,23 @@
+"""The torque sensor reads too much or too little."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import ArmEffect, JointSamples, joint_name, parameter
+
+
+@dataclasses.dataclass
+class TorqueGain(ArmEffect):
+    """A share of the torque, too much.
+
+    Equation: tau = g tau_load.
+    Where it acts: one joint of the arm, on the torque that its sensor measures.
+    """
+
+    joint: str = joint_name()
+    share: float = parameter("1", -0.9, 0.9, "too much")
+
+    def torque(self, samples: JointSamples) -> np.ndarray:
+        """See ArmEffect."""
+        return self.share * samples.load

@@ -1,0 +1,23 @@
+"""The torque sensor's zero is off."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import ArmEffect, JointSamples, joint_name, parameter
+
+
+@dataclasses.dataclass
+class TorqueOffset(ArmEffect):
+    """A constant in the reading of a joint's torque sensor.
+
+    Equation: tau = c.
+    Where it acts: one joint of the arm, on the torque that its sensor measures.
+    """
+
+    joint: str = joint_name()
+    size: float = parameter("N m", -200.0, 200.0, "offset")
+
+    def torque(self, samples: JointSamples) -> np.ndarray:
+        """See ArmEffect."""
+        return np.full_like(samples.v, self.size)

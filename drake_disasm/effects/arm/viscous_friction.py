@@ -1,0 +1,23 @@
+"""The joint rubs in its grease."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import ArmEffect, JointSamples, joint_name, parameter
+
+
+@dataclasses.dataclass
+class JointViscousFriction(ArmEffect):
+    """Friction that grows with the joint's speed.
+
+    Equation: tau = b v.
+    Where it acts: one joint of the arm, on the torque that its sensor measures.
+    """
+
+    joint: str = joint_name()
+    coefficient: float = parameter("N m s/rad", 0.0, 500.0, "viscous coefficient")
+
+    def torque(self, samples: JointSamples) -> np.ndarray:
+        """See ArmEffect."""
+        return self.coefficient * samples.v

@@ -1,0 +1,1 @@
+"""Effects in the world around the bolt."""

@@ -1,0 +1,1 @@
+"""Effects in the chain of the force/torque sensor."""

@@ -1,0 +1,31 @@
+"""The sensor's zero wanders evenly."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import Sensing, SensorEffect, parameter
+
+
+@dataclasses.dataclass
+class SensorDrift(SensorEffect):
+    """An offset that grows with the time since zeroing, or since the log began.
+
+    Equation: F_read = F + d t with d = [fx, fy, fz, tx, ty, tz] in S, t in seconds.
+    (Readings that only have an order count one second each.)
+    Where it acts: the reading of the force/torque sensor, after zeroing.
+    """
+
+    fx: float = parameter("N/s", -5.0, 5.0, "drift of the force along x_S")
+    fy: float = parameter("N/s", -5.0, 5.0, "drift of the force along y_S")
+    fz: float = parameter("N/s", -5.0, 5.0, "drift of the force along z_S")
+    tx: float = parameter("N m/s", -0.5, 0.5, "drift of the torque about x_S")
+    ty: float = parameter("N m/s", -0.5, 0.5, "drift of the torque about y_S")
+    tz: float = parameter("N m/s", -0.5, 0.5, "drift of the torque about z_S")
+
+    present_at_zeroing = False
+
+    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+        """Adds the offset of this moment."""
+        rate = [self.fx, self.fy, self.fz, self.tx, self.ty, self.tz]
+        return wrench_S + np.multiply.outer(sensing.time, rate)

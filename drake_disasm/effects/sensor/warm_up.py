@@ -1,0 +1,36 @@
+"""The sensor's zero settles while it warms up."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import Sensing, SensorEffect, parameter, shape
+
+_GRID = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+
+
+@dataclasses.dataclass
+class SensorWarmUp(SensorEffect):
+    """An offset that settles like a first-order system: strain gauges warm up.
+
+    Equation: F_read = F + b (1 - exp(-t / T)) with b = [fx, fy, fz, tx, ty, tz] in S,
+    t the time since zeroing, or since the log began (readings that only have an order
+    count one second each).
+    Where it acts: the reading of the force/torque sensor, after zeroing.
+    """
+
+    fx: float = parameter("N", -50.0, 50.0, "final offset of the force along x_S")
+    fy: float = parameter("N", -50.0, 50.0, "final offset of the force along y_S")
+    fz: float = parameter("N", -50.0, 50.0, "final offset of the force along z_S")
+    tx: float = parameter("N m", -5.0, 5.0, "final offset of the torque about x_S")
+    ty: float = parameter("N m", -5.0, 5.0, "final offset of the torque about y_S")
+    tz: float = parameter("N m", -5.0, 5.0, "final offset of the torque about z_S")
+    time_constant: float = shape(30.0, "s", 0.1, 1e4, "T", _GRID)
+
+    present_at_zeroing = False
+
+    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+        """Adds the offset of this moment."""
+        final = [self.fx, self.fy, self.fz, self.tx, self.ty, self.tz]
+        settled = -np.expm1(-sensing.time / self.time_constant)
+        return wrench_S + np.multiply.outer(settled, final)

@@ -1,0 +1,1 @@
+"""Closing the loop: which physical effect a model lacks."""

@@ -1,0 +1,91 @@
+"""From a model of a log to the effect that the model lacks."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from drake_disasm.effects import EFFECTS, Effect
+from drake_disasm.errors import DisasmError
+from sysid.identification.noise import with_estimated_noise
+from sysid.models.base import ScenarioModel
+from sysid.parameters import nominal_values
+from sysid.tracing.candidates import candidates
+from sysid.tracing.held_out import HeldOut, held_out
+from sysid.tracing.selection import Fit, Round, Survey, Tracer
+from sysid.tracing.verdict import Verdict, verdict
+from sysid.workers import Workers
+
+_LEAST_BLOCKS = 6
+
+
+@dataclass(frozen=True)
+class Closed:
+    """What closing the loop found.
+
+    Attributes:
+        verdict: the answer.
+        first, last: the model fitted without and with the effects.
+        rounds: how the effects were chosen.
+        begin, end: what spoke for each candidate before the first and after the last.
+        errors: before and after, on rows that were not fitted.
+    """
+
+    verdict: Verdict
+    first: Fit
+    last: Fit
+    rounds: tuple[Round, ...]
+    begin: Survey
+    end: Survey
+    errors: HeldOut
+
+
+def close_loop(
+    model: ScenarioModel,
+    train: Sequence[int],
+    test: Sequence[int],
+    huber: float,
+    workers: Workers,
+    tell: Callable[[str], None],
+    library: Sequence[type[Effect]] = EFFECTS,
+) -> Closed:
+    """Finds what a model lacks to explain its log.
+
+    Args:
+        model: of the whole log, with the parameters that are identified anyway.
+        train, test: numbers of its episodes; `test` may be empty: contiguous blocks
+            are then held out in turn.
+        huber: where squares end, in units of the noise.
+        workers: to evaluate with.
+        tell: called with a line after each step.
+        library: effects that may be named.
+
+    Raises:
+        DisasmError: the log is too short to decide anything.
+    """
+    whole = with_estimated_noise(model, workers, huber)
+    assert isinstance(whole, ScenarioModel)
+    base = whole.of_episodes(train)
+    tracer = Tracer(base, candidates(base, library), workers, huber, tell)
+    tell("the model as it is")
+    first = tracer.fit((), nominal_values(base.parameters))
+    begin = tracer.survey(first)
+    _refuse_short_logs(base, begin)
+    last, end = tracer.forward()
+    pruned = tracer.backward(last)
+    if pruned is not last:
+        last, end = pruned, tracer.survey(pruned)
+    kept = whole.of_episodes(test) if test else None
+    errors = held_out(tracer, first, last, kept)
+    found = verdict(tracer, first, last, end, errors)
+    return Closed(found, first, last, tuple(tracer.rounds), begin, end, errors)
+
+
+def _refuse_short_logs(model: ScenarioModel, begin: Survey) -> None:
+    """Refuses to guess where there are too few independent pieces of data."""
+    if begin.blocks >= _LEAST_BLOCKS:
+        return
+    rows = model.measurements.rows
+    needed = -(-rows * _LEAST_BLOCKS // max(begin.blocks, 1))
+    raise DisasmError(
+        f"the log is too short to decide: its {rows} rows are {begin.blocks} "
+        f"independent blocks, {_LEAST_BLOCKS} are needed; record some {needed} rows"
+    )

@@ -1,0 +1,93 @@
+"""A verdict as plain data, for `result.json`."""
+
+import dataclasses
+from typing import Any
+
+from sysid.tracing.diagnosis import diagnose
+from sysid.tracing.held_out import HeldOut
+from sysid.tracing.pipeline import Closed
+from sysid.tracing.selection import Evidence, Survey
+
+
+def to_mapping(closed: Closed) -> dict[str, Any]:
+    """Returns everything that a program may want of a verdict."""
+    found = closed.verdict
+    return {
+        "ending": found.ending,
+        "effects": list(found.names),
+        "ties": {
+            name: list(tie) for name, tie in zip(found.names, found.ties, strict=False)
+        },
+        "parameters": {
+            value.name: {
+                "value": value.value,
+                "unit": value.unit,
+                "interval_95": list(value.interval),
+                "excludes_null": value.matters,
+            }
+            for value in found.values
+        },
+        "dependence_left": found.dependence,
+        "share_explained": found.explained,
+        "text": found.text,
+        "errors": _errors(closed.errors),
+        "residual_before": [
+            dataclasses.asdict(d) for d in diagnose(closed.first, closed.begin)
+        ],
+        "residual_after": [
+            dataclasses.asdict(d) for d in diagnose(closed.last, closed.end)
+        ],
+        "rounds": [
+            {
+                "added": r.chosen.name,
+                "objective": r.value,
+                "ties": [tie.name for tie in r.ties],
+                **_survey(r.survey),
+            }
+            for r in closed.rounds
+        ],
+        "end": _survey(closed.end),
+    }
+
+
+def _errors(errors: HeldOut) -> dict[str, Any]:
+    ends = {"before": errors.before, "after": errors.after}
+    return {
+        "rows": errors.how,
+        "in_noise": {k: errors.in_noise(p) for k, p in ends.items()},
+        "relative": {k: errors.relative(p) for k, p in ends.items()},
+        "rms": {k: errors.rms_by_unit(p) for k, p in ends.items()},
+        "channels": {
+            channel.name: {
+                "unit": channel.unit,
+                "noise": channel.noise,
+                **{
+                    key: {
+                        "rms": float(errors.rms(p)[i]),
+                        "interval_95": errors.interval(p)[i].tolist(),
+                    }
+                    for key, p in ends.items()
+                },
+            }
+            for i, channel in enumerate(errors.channels)
+        },
+    }
+
+
+def _survey(survey: Survey) -> dict[str, Any]:
+    return {
+        "blocks": survey.blocks,
+        "candidates": [_evidence(e) for e in survey.effects],
+        "dependences": [_evidence(e) for e in survey.dependences[:10]],
+    }
+
+
+def _evidence(evidence: Evidence) -> dict[str, Any]:
+    return {
+        "name": evidence.name,
+        "gain": evidence.gain,
+        "p": evidence.p,
+        "share_of_blocks": evidence.share,
+        "parameters": evidence.cost,
+        "passes": evidence.accepted,
+    }
