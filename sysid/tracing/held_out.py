@@ -1,6 +1,6 @@
 """Errors before and after, on rows that were not fitted."""
 
-from collections.abc import Sequence
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -113,25 +113,16 @@ def _predicted(test: ScenarioModel, fit: Fit) -> Array:
 def _cross_predicted(tracer: Tracer, fit: Fit, folds: NDArray[np.int64]) -> Array:
     found = np.zeros(tracer.base.measurements.values.shape)
     for fold in range(int(folds.max()) + 1):
-        kept = Tracer(
-            tracer.base.of_rows(folds != fold),
-            tracer.library,
-            tracer.workers,
-            tracer.huber,
-            tracer.tell,
-        ).fit(fit.effects, fit.theta)
+        others = dataclasses.replace(tracer, base=tracer.base.of_rows(folds != fold))
+        kept = others.fit(fit.effects, fit.theta)
         found[folds == fold] = _predicted(tracer.base.of_rows(folds == fold), kept)
     return found
 
 
-def improvement(found: HeldOut, unit_names: Sequence[str] = ()) -> str:
+def improvement(found: HeldOut) -> str:
     """Returns the error before and after in words."""
     before, after = (found.rms_by_unit(p) for p in (found.before, found.after))
-    parts = [
-        f"{before[unit]:.3g} -> {after[unit]:.3g} {unit}"
-        for unit in before
-        if not unit_names or unit in unit_names
-    ]
+    parts = [f"{before[unit]:.3g} -> {after[unit]:.3g} {unit}" for unit in before]
     relative = [found.relative(p) for p in (found.before, found.after)]
     return (
         ", ".join(parts)

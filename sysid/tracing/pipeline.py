@@ -69,7 +69,7 @@ def close_loop(
     first = tracer.fit((), nominal_values(base.parameters))
     begin = tracer.survey(first)
     _refuse_short_logs(base, begin)
-    last, end = tracer.forward()
+    last, end = tracer.forward(first, begin)
     pruned = tracer.backward(last)
     if pruned is not last:
         last, end = pruned, tracer.survey(pruned)

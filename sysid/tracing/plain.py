@@ -52,6 +52,8 @@ def to_mapping(closed: Closed) -> dict[str, Any]:
 
 def _errors(errors: HeldOut) -> dict[str, Any]:
     ends = {"before": errors.before, "after": errors.after}
+    rms = {key: errors.rms(p) for key, p in ends.items()}
+    intervals = {key: errors.interval(p) for key, p in ends.items()}
     return {
         "rows": errors.how,
         "in_noise": {k: errors.in_noise(p) for k, p in ends.items()},
@@ -63,10 +65,10 @@ def _errors(errors: HeldOut) -> dict[str, Any]:
                 "noise": channel.noise,
                 **{
                     key: {
-                        "rms": float(errors.rms(p)[i]),
-                        "interval_95": errors.interval(p)[i].tolist(),
+                        "rms": float(rms[key][i]),
+                        "interval_95": intervals[key][i].tolist(),
                     }
-                    for key, p in ends.items()
+                    for key in ends
                 },
             }
             for i, channel in enumerate(errors.channels)

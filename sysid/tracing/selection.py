@@ -135,11 +135,14 @@ class Tracer:
     tell: Callable[[str], None]
     rounds: list[Round] = field(default_factory=list)
 
-    def forward(self) -> tuple[Fit, Survey]:
-        """Returns the fit with all effects that pass, and the survey that ended it."""
-        fit = self.fit((), nominal_values(self.base.parameters))
+    def forward(self, fit: Fit, survey: Survey) -> tuple[Fit, Survey]:
+        """Returns the fit with all effects that pass, and the survey that ended it.
+
+        Args:
+            fit: without effects.
+            survey: beside it.
+        """
         while True:
-            survey = self.survey(fit)
             accepted = [e for e in survey.effects if e.accepted]
             accepted = accepted or self._pairs(fit, survey)
             if not accepted:
@@ -151,6 +154,7 @@ class Tracer:
             ties = tuple(e for e in accepted if e is not best and _rivals(e, best))
             self.rounds.append(Round(best, ties, survey, fit.value))
             self.tell(f"{best.name}: objective {fit.value:.4g}")
+            survey = self.survey(fit)
 
     def backward(self, fit: Fit) -> Fit:
         """Returns the fit without effects that later ones have made needless."""
@@ -186,11 +190,8 @@ class Tracer:
         objective = Objective(model, self.workers, self.huber)
         u = objective.scaling.to_unit(np.concatenate([start, rest]))
         here = gauss_newton(objective, u, _ITERATIONS)
-        theta, value = (
-            objective.scaling.from_unit(here.u),
-            objective.value(here.residual),
-        )
-        return Fit(effects, model, theta, here, value)
+        theta = objective.scaling.from_unit(here.u)
+        return Fit(effects, model, theta, here, objective.value(here.residual))
 
     def survey(self, fit: Fit) -> Survey:
         """Returns what speaks for each candidate that the fit does not have."""
