@@ -20,6 +20,7 @@ FLOORS = (
     {"stations", "policies"},
     {"task"},
     {"visualization", "learning"},
+    {"studies"},
 )
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 MODULES = sorted((ROOT / "drake_disasm").rglob("*.py"))

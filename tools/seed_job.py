@@ -1,15 +1,21 @@
-"""One seed of tools/train.py, in whatever process it runs."""
+"""Trains the seeds of an experiment, each in whatever process it runs."""
 
 import dataclasses
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any
+
+import cli
+from tqdm import tqdm
 
 from drake_disasm.learning.dataset import remember
 from drake_disasm.learning.experiment import Experiment
 from drake_disasm.learning.replay import Replay
 from drake_disasm.learning.run import News, learn_offline, run_training
 from drake_disasm.learning.training import Training, action_map
+from drake_disasm.learning.transfer import start_checkpoint, start_hash
+from drake_disasm.mdp import Outcome
+from drake_disasm.parallel import run_jobs
 from drake_disasm.task.episode import EpisodeRecorder
 from sysid.logs import LogWriter, flat_columns, read_logs
 from sysid.logs.recording import transitions_header
@@ -29,6 +35,46 @@ class SeedJob:
     experiment: Experiment
     seed: int
     folder: Path
+
+
+def seed_jobs(
+    experiment: Experiment, seeds: Iterable[int], folder: Path
+) -> list[SeedJob]:
+    """Returns one job for each seed, in a folder of its own within the folder."""
+    return [SeedJob(experiment, s, folder / f"seed_{s:03d}") for s in seeds]
+
+
+def train_seeds(jobs: Sequence[SeedJob], workers: int, title: str = "") -> None:
+    """Trains all of them, with a progress bar of this title."""
+    total = sum(job.experiment.config.episodes for job in jobs)
+    unit = "round" if jobs[0].experiment.logs else "episode"
+    with tqdm(total=total, unit=unit, desc=title or None) as bar:
+        for _ in run_jobs(train_seed, jobs, workers, _Progress(bar)):
+            pass
+
+
+class _Progress:
+    """A bar over all seeds' episodes, with the latest rewards and successes."""
+
+    def __init__(self, bar: tqdm) -> None:
+        self._bar = bar
+        self._done: dict[int, int] = {}
+        self._rewards: list[float] = []
+        self._successes: list[bool] = []
+
+    def __call__(self, news: News) -> None:
+        cli.stop_if_interrupted()
+        self._done[news.seed] = news.number
+        if news.summary is not None:
+            self._rewards.append(news.summary.reward)
+            self._successes.append(news.summary.outcome is Outcome.SUCCESS)
+            recent = self._successes[-20:]
+            self._bar.set_postfix(
+                reward=f"{sum(self._rewards[-20:]) / len(recent):.1f}",
+                success=f"{sum(recent)}/{len(recent)}",
+                refresh=False,
+            )
+        self._bar.update(sum(self._done.values()) - self._bar.n)
 
 
 class _Log:
@@ -64,6 +110,11 @@ def train_seed(job: SeedJob, report: Callable[[News | None], None]) -> dict[str,
     demonstrations = _memory(experiment, experiment.demonstrations)
     dataset = _memory(experiment, experiment.logs)
     training = Training(experiment.spec(job.seed), demonstrations, dataset)
+    if experiment.start:
+        training.start_from(start_checkpoint(experiment.start, job.seed))
+        provenance["start"] = {
+            experiment.start: start_hash(experiment.start, job.seed),
+        }
     end = (provenance, experiment.validation, report)
     if dataset:
         updates = experiment.updates or dataset.size

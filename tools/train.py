@@ -14,8 +14,7 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # processes work in parallel, not threads
 
 import cli
-from seed_job import SeedJob, train_seed
-from tqdm import tqdm
+from seed_job import seed_jobs, train_seeds
 
 from drake_disasm.learning.experiment import (
     Experiment,
@@ -28,9 +27,7 @@ from drake_disasm.learning.hyperparameters import (
     override,
     preset,
 )
-from drake_disasm.learning.run import News
-from drake_disasm.mdp import Outcome
-from drake_disasm.parallel import run_jobs
+from drake_disasm.learning.transfer import check_start
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import MODELS
 from sysid.logs import read_logs
@@ -44,6 +41,8 @@ _EXAMPLES = """examples:
       --hyper layer_norm=true 'hidden=[64, 64]'
   python tools/train.py --from-logs out/sliding/seed_*/log --scenario sliding \\
       --preset chapter3 --out out/offline                      without acting
+  python tools/train.py --model cell --start-from out/turned --scenario \\
+      removal_turned --out out/in_the_cell                     from the twin to the cell
   python tools/train.py ... --out out/sliding --resume         go on after Ctrl-C
 """
 
@@ -123,6 +122,12 @@ def _add_agent_arguments(add: Callable[..., object]) -> None:
         help="logs to mix into each batch; their share is the hyper-parameter "
         "demonstrations",
     )
+    add(
+        "--start-from",
+        type=Path,
+        metavar="DIR",
+        help="go on with what the same seeds learned in this training, elsewhere",
+    )
 
 
 def _add_run_arguments(add: Callable[..., object]) -> None:
@@ -164,11 +169,13 @@ def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
     experiment = _experiment(args, arguments)
-    experiment = open_experiment(experiment, args.out, args.resume)
     seeds = range(args.first_seed, args.first_seed + args.seeds)
-    jobs = [SeedJob(experiment, seed, args.out / f"seed_{seed:03d}") for seed in seeds]
+    if experiment.start:
+        check_start(experiment, seeds)
+    experiment = open_experiment(experiment, args.out, args.resume)
+    jobs = seed_jobs(experiment, seeds, args.out)
     try:
-        _train(jobs, args.workers or os.cpu_count() or 1)
+        train_seeds(jobs, args.workers or os.cpu_count() or 1)
     finally:
         print(write_summary(args.out))
     print(f"all of it: {args.out}")
@@ -193,6 +200,7 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
         logs=_hashes(args.from_logs),
         updates=args.updates or 0,
         demonstrations=_hashes(args.demonstrations),
+        start=str(args.start_from or ""),
         provenance=cli.provenance("train", arguments, args.first_seed),
     )
 
@@ -202,38 +210,6 @@ def _hashes(folders: Sequence[Path]) -> dict[str, str]:
     if not folders:
         return {}
     return {str(log.folder): log.data_hash for log in read_logs(folders)}
-
-
-def _train(jobs: list[SeedJob], workers: int) -> None:
-    total = sum(job.experiment.config.episodes for job in jobs)
-    unit = "round" if jobs[0].experiment.logs else "episode"
-    with tqdm(total=total, unit=unit) as bar:
-        for _ in run_jobs(train_seed, jobs, workers, _Progress(bar)):
-            pass
-
-
-class _Progress:
-    """A bar over all seeds' episodes, with the latest rewards and successes."""
-
-    def __init__(self, bar: tqdm) -> None:
-        self._bar = bar
-        self._done: dict[int, int] = {}
-        self._rewards: list[float] = []
-        self._successes: list[bool] = []
-
-    def __call__(self, news: News) -> None:
-        cli.stop_if_interrupted()
-        self._done[news.seed] = news.number
-        if news.summary is not None:
-            self._rewards.append(news.summary.reward)
-            self._successes.append(news.summary.outcome is Outcome.SUCCESS)
-            recent = self._successes[-20:]
-            self._bar.set_postfix(
-                reward=f"{sum(self._rewards[-20:]) / len(recent):.1f}",
-                success=f"{sum(recent)}/{len(recent)}",
-                refresh=False,
-            )
-        self._bar.update(sum(self._done.values()) - self._bar.n)
 
 
 if __name__ == "__main__":

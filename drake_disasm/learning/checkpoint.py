@@ -37,18 +37,33 @@ def load_checkpoint(path: Path, agent: Agent, replay: Replay) -> dict[str, Any]:
     Raises:
         DisasmError: the file is damaged, or of another kind of agent.
     """
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        own = json.loads(arrays["text"].tobytes())
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise DisasmError(
-            f"{path}: is no whole checkpoint ({error}); delete it to begin anew"
-        ) from None
+    arrays, own = _read(path)
     _restore_state(path, agent, arrays)
     replay.restore(arrays["replay"], own["following"])
     agent.updates = own["updates"]
     return own["notes"]
+
+
+def load_agent(path: Path, agent: Agent) -> None:
+    """Gives an agent what another has learned: networks, targets, Adam's memory.
+
+    Raises:
+        DisasmError: the file is damaged, or of another kind of agent.
+    """
+    arrays, _ = _read(path)
+    _restore_state(path, agent, arrays)
+
+
+def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Returns the arrays of a checkpoint and the text among them."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        return arrays, json.loads(arrays["text"].tobytes())
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise DisasmError(
+            f"{path}: is no whole checkpoint ({error}); delete it to begin anew"
+        ) from None
 
 
 def _restore_state(path: Path, agent: Agent, arrays: dict[str, np.ndarray]) -> None:

@@ -35,6 +35,8 @@ class Experiment:
             them; empty to act.
         updates: gradient updates on those; 0 for one per transition.
         demonstrations: folders of logs to mix into each batch, and hashes.
+        start: folder of a training whose agents, seed by seed, these go on from
+            (see transfer.py); empty to begin anew.
         provenance: command, date, versions, commit.
     """
 
@@ -48,6 +50,7 @@ class Experiment:
     logs: dict[str, str] = dataclasses.field(default_factory=dict)
     updates: int = 0
     demonstrations: dict[str, str] = dataclasses.field(default_factory=dict)
+    start: str = ""
     provenance: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     def spec(self, seed: int) -> TrainingSpec:
@@ -85,7 +88,7 @@ def open_experiment(experiment: Experiment, folder: Path, resume: bool) -> Exper
         raise DisasmError(
             f"{folder}: holds a training already; add --resume, or name a new folder"
         )
-    found = _read(path)
+    found = read_json(path)
     for key in wanted:
         if key != "provenance" and found.get(key) != wanted[key]:
             raise DisasmError(
@@ -104,7 +107,12 @@ def _difference(found: dict[str, Any], wanted: dict[str, Any], key: str) -> str:
     return f"{key} ({old}, not {new})"
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_json(path: Path) -> dict[str, Any]:
+    """Returns what one of a training's files says.
+
+    Raises:
+        DisasmError: it can't be read.
+    """
     try:
         return json.loads(path.read_text())
     except (OSError, ValueError) as error:
@@ -115,7 +123,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 def write_summary(folder: Path) -> str:
     """Writes summary and learning curve of what is finished; returns it as text."""
-    results = [_read(path) for path in sorted(folder.glob("seed_*/result.json"))]
+    results = [read_json(path) for path in sorted(folder.glob("seed_*/result.json"))]
     if not results:
         return "no seed is finished yet"
     summary = _summarised(results)
@@ -124,7 +132,7 @@ def write_summary(folder: Path) -> str:
     if all(len(episodes) > 1 for episodes in seeds):
         from drake_disasm.learning.learning_curve import plot_learning_curves
 
-        name = _read(folder / "training.json")
+        name = read_json(folder / "training.json")
         label = f"{name['config']['algorithm']}, {name['preset']}"
         plot_learning_curves({label: seeds}, folder / "learning_curve.png")
     return _table(results, summary)

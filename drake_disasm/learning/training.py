@@ -18,7 +18,11 @@ import torch
 
 from drake_disasm.errors import DisasmError
 from drake_disasm.learning.agent import Agent
-from drake_disasm.learning.checkpoint import load_checkpoint, save_checkpoint
+from drake_disasm.learning.checkpoint import (
+    load_agent,
+    load_checkpoint,
+    save_checkpoint,
+)
 from drake_disasm.learning.environment import DisassemblyEnv
 from drake_disasm.learning.hyperparameters import Hyperparameters
 from drake_disasm.learning.replay import Replay
@@ -107,6 +111,16 @@ class Training:
         self._demonstrations = demonstrations
         self._scale = np.array(config.observation_scale)
         self._observation = np.zeros(12)
+
+    def start_from(self, path: Path) -> None:
+        """Begins with what another training's agent has learned, memory empty.
+
+        What was remembered there is not taken along: it is true of another model.
+
+        Raises:
+            DisasmError: the checkpoint is damaged or of another agent.
+        """
+        load_agent(path, self.agent)
 
     def restore(self, path: Path) -> None:
         """Goes on from a checkpoint.

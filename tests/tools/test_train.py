@@ -212,6 +212,30 @@ def test_demonstrations_are_mixed_in(undisturbed: Path, tmp_path: Path) -> None:
     assert policy.description.hyperparameters["demonstrations"] == 0.5
 
 
+def test_a_training_goes_on_from_another(undisturbed: Path, tmp_path: Path) -> None:
+    """On another model, with the networks that the same seed came to."""
+    out, start = tmp_path / "on", f"--start-from={undisturbed}"
+    _finished(out, "--episodes=1", "--first-seed=1", "--psi=0.0003", start)
+    _finished(tmp_path / "new", "--episodes=1", "--first-seed=1", "--psi=0.0003")
+    policy = load_policy(out / "seed_001/policy.npz")
+    assert list(policy.description.provenance["start"]) == [str(undisturbed)]
+    new = _content(tmp_path / "new/seed_001")
+    assert _content(out / "seed_001")["log"] != new["log"]
+
+
+def test_a_start_that_does_not_fit_is_named(undisturbed: Path, tmp_path: Path) -> None:
+    start = f"--start-from={undisturbed}"
+    changes = ["--hyper", *SMALL[SMALL.index("--hyper") + 1 :], "force_scale=9"]
+    for arguments, message in (
+        (["--seeds=3"], "has not finished seed 2"),
+        (changes, "was trained with force_scale 5.0, not 9.0"),
+        (["--set", "task.period=0.2"], "was trained with task.period 0.1, not 0.2"),
+    ):
+        run = _train(tmp_path / "on", start, *arguments)
+        assert run.returncode == 2 and message in run.stderr
+        assert not (tmp_path / "on").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

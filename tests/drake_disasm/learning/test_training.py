@@ -238,6 +238,22 @@ def test_a_checkpoint_of_other_networks_is_refused(tmp_path: Path) -> None:
         _training(hidden=[9]).restore(tmp_path / "c.npz")
 
 
+def test_a_start_from_elsewhere_takes_the_agent_and_nothing_else(
+    tmp_path: Path,
+) -> None:
+    first = _training("td3")
+    for _ in range(2):
+        first.run_episode()
+    first.save(tmp_path / "c.npz")
+    second = _training("td3")
+    second.start_from(tmp_path / "c.npz")
+    states = [tree_leaves(t.agent.state) for t in (first, second)]
+    for a, b in zip(*states, strict=True):
+        np.testing.assert_array_equal(a.numpy(), b.numpy())
+    assert second.replay.size == 0 and not second.summaries
+    assert second.run_episode()[0] != _training("td3").run_episode()[0]
+
+
 def test_a_folder_is_trained_in_by_one_program_at_a_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,0 +1,1 @@
+"""Studies: several trainings whose comparison answers a question."""

@@ -1,0 +1,218 @@
+"""Does closing the loop help the policy? (thesis 4.4.2, table 4.3)
+
+Agents are trained on the twin as first identified and on the twin after closing the
+loop. Each, and one that is new, then goes on learning in a stand-in for the robot: a
+simulation with effects that the first twin lacks. P is the mean episodic reward over
+that second training, so it rewards good policies and getting there soon.
+
+folder/
+  twin_before/ twin_after/                trainings on the twins (see learning/run.py)
+  untrained/ from_before/ from_after/     trainings in the stand-in
+  from_*/seed_*/deployed.json             greedy episodes there before learning went on
+  result.json  transfer.png
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drake_disasm.learning.evaluation import evaluate, summed_up
+from drake_disasm.learning.experiment import Experiment, read_json
+from drake_disasm.learning.learning_curve import plot_learning_curves
+from drake_disasm.learning.run import read_episodes, write_json
+from drake_disasm.learning.training import Purpose, seed_for
+from drake_disasm.policies import load_policy
+from drake_disasm.scenario import Scenario
+from drake_disasm.task.simulation import TaskSimulation
+
+
+@dataclasses.dataclass(frozen=True)
+class Branch:
+    """One way for an agent to come into the stand-in.
+
+    Attributes:
+        folder: of its training in the stand-in.
+        start: folder of its training on a twin; empty for none.
+        label: as people read it.
+        thesis: P of the thesis's like (table 4.3), on its robot.
+    """
+
+    folder: str
+    start: str
+    label: str
+    thesis: str
+
+
+BRANCHES = (
+    Branch("untrained", "", "without transfer", "-1.86"),
+    Branch("from_before", "twin_before", "twin as first identified", "-11.34"),
+    Branch("from_after", "twin_after", "twin, loop closed", "19.80, 10.66"),
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class TransferStudy:
+    """What is compared with what.
+
+    Attributes:
+        before, after: scenarios of the twin, before and after closing the loop.
+        stand_in: scenario of what stands for the robot.
+        model: "cell" or "twin", of the stand-in.
+        common: everything else of the trainings; its scenario and model are unused.
+        episodes: of each training in the stand-in.
+        folder: for all of it.
+    """
+
+    before: Scenario
+    after: Scenario
+    stand_in: Scenario
+    model: str
+    common: Experiment
+    episodes: int
+    folder: Path
+
+    def experiments(self) -> dict[str, Experiment]:
+        """Returns each training by its folder, in an order in which they can run."""
+        twins = {"twin_before": self.before, "twin_after": self.after}
+        trained = {
+            name: dataclasses.replace(self.common, scenario=scenario, model="twin")
+            for name, scenario in twins.items()
+        }
+        return trained | {b.folder: self._in_stand_in(b) for b in BRANCHES}
+
+    def _in_stand_in(self, branch: Branch) -> Experiment:
+        config = dataclasses.replace(self.common.config, episodes=self.episodes)
+        return dataclasses.replace(
+            self.common,
+            scenario=self.stand_in,
+            model=self.model,
+            config=config,
+            start=str(self.folder / branch.start) if branch.start else "",
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Deployment:
+    """A policy from a twin that is to act in the stand-in, as it is.
+
+    Attributes:
+        experiment: of the training there that goes on from it.
+        seed: of both trainings.
+        folder: of this seed of that training.
+    """
+
+    experiment: Experiment
+    seed: int
+    folder: Path
+
+
+def deploy(job: Deployment, report: Callable[[Any], None]) -> None:
+    """Writes how the policy does before it learns on, unless that is known.
+
+    Args:
+        job: what to do.
+        report: called after each episode; may raise to stop.
+    """
+    path = job.folder / "deployed.json"
+    if path.exists():
+        return
+    trained = Path(job.experiment.start) / job.folder.name / "policy.npz"
+    policy, scenario = load_policy(trained), job.experiment.scenario
+    policy.check_fits(scenario)
+    simulation = TaskSimulation(scenario, job.experiment.model, policy)
+    count = range(job.experiment.validation)
+    seeds = [seed_for(job.seed, Purpose.VALIDATION, i) for i in count]
+    figures = summed_up(evaluate(simulation, seeds, on_episode=lambda _: report(1)))
+    job.folder.mkdir(parents=True, exist_ok=True)
+    write_json(path, dataclasses.asdict(figures))
+
+
+def results(folder: Path) -> list[dict[str, Any]]:
+    """Returns the figures of each branch over the seeds that are finished.
+
+    Returns:
+        For each of BRANCHES that has a finished seed: label, thesis, seeds, and with
+        one entry per seed P, first_success (number of the episode, or None), success
+        (share of the training's episodes), greedy (P of the final policy's
+        validation), and deployed and deployed_success (the same before learning
+        went on; empty without transfer).
+    """
+    found = []
+    for branch in BRANCHES:
+        paths = sorted((folder / branch.folder).glob("seed_*/result.json"))
+        if paths:
+            found.append(_figures(branch, paths))
+    return found
+
+
+def _figures(branch: Branch, paths: Sequence[Path]) -> dict[str, Any]:
+    ends = [read_json(path) for path in paths]
+    first = [read_json(p.with_name("deployed.json")) for p in paths if branch.start]
+    return {
+        "folder": branch.folder,
+        "label": branch.label,
+        "thesis": branch.thesis,
+        "seeds": [end["seed"] for end in ends],
+        "P": [end["training"]["performance"] for end in ends],
+        "first_success": [end["first_success"] for end in ends],
+        "success": [_share(end["training"]) for end in ends],
+        "greedy": [end["validation"]["performance"] for end in ends],
+        "greedy_success": [_share(end["validation"]) for end in ends],
+        "deployed": [figures["performance"] for figures in first],
+        "deployed_success": [_share(figures) for figures in first],
+    }
+
+
+def _share(figures: dict[str, Any]) -> float:
+    return figures["successes"] / figures["episodes"]
+
+
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """Returns the figures of `results` as a table for a terminal."""
+    width = max(len(branch.label) for branch in BRANCHES)
+    lines = [
+        f"{'':{width}}       P  (each seed)                success  first  "
+        "greedy before: P, success  after: P, success  thesis: P"
+    ]
+    for row in rows:
+        each = ", ".join(f"{P:.1f}" for P in row["P"])
+        first = ", ".join(str(f or "-") for f in row["first_success"])
+        lines.append(
+            f"{row['label']:{width}}  {np.mean(row['P']):6.1f}  ({each})".ljust(
+                width + 38
+            )
+            + f"{_percent(row['success'])}  {first:>5}  "
+            f"{_greedy(row, 'deployed'):>25}  {_greedy(row, 'greedy'):>17}  "
+            f"{row['thesis']}"
+        )
+    return "\n".join(lines)
+
+
+def _percent(shares: Sequence[float]) -> str:
+    return f"{100 * np.mean(shares):5.0f} %"
+
+
+def _greedy(row: dict[str, Any], name: str) -> str:
+    if not row[name]:
+        return "-"
+    return f"{np.mean(row[name]):.1f}, {_percent(row[f'{name}_success'])}"
+
+
+def write_results(folder: Path, provenance: dict[str, Any]) -> str:
+    """Writes result and figure of what is finished; returns it as a table."""
+    rows = results(folder)
+    if not rows:
+        return "no training in the stand-in is finished yet"
+    write_json(folder / "result.json", {"branches": rows, "provenance": provenance})
+    curves = {
+        row["label"]: [
+            read_episodes(path)
+            for path in sorted((folder / row["folder"]).glob("seed_*/episodes.csv"))
+        ]
+        for row in rows
+    }
+    plot_learning_curves(curves, folder / "transfer.png")
+    return table(rows)

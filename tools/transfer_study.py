@@ -1,0 +1,188 @@
+"""Compares how agents learn in a stand-in for the robot (thesis, table 4.3).
+
+One agent has learned on the twin as first identified, one on the twin after closing
+the loop, one nothing; all go on learning in the stand-in, which is simulated, too, and
+has effects that the first twin lacks. P is the mean episodic reward over the training
+there. Every training is one of tools/train.py, in a folder of its own within --out. A
+study that was interrupted goes on with --resume.
+"""
+
+import argparse
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # processes work in parallel, not threads
+
+import cli
+from seed_job import seed_jobs, train_seeds
+from tqdm import tqdm
+
+from drake_disasm.learning.experiment import Experiment, open_experiment
+from drake_disasm.learning.hyperparameters import (
+    ALGORITHMS,
+    PRESETS,
+    override,
+    preset,
+)
+from drake_disasm.learning.transfer import check_start
+from drake_disasm.parallel import run_jobs
+from drake_disasm.scenario import load_scenario
+from drake_disasm.stations import MODELS
+from drake_disasm.studies.transfer import (
+    Deployment,
+    TransferStudy,
+    deploy,
+    write_results,
+)
+
+_EXAMPLES = """examples:
+  python tools/transfer_study.py --before removal --after out/closed/scenario.yaml \\
+      --stand-in hidden.yaml --seeds 3 --out out/transfer
+  python tools/transfer_study.py ... --out out/transfer --resume   go on after Ctrl-C
+"""
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    parser = argparse.ArgumentParser(
+        prog="transfer_study.py",
+        description=__doc__,
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    _add_scenario_arguments(parser.add_argument)
+    _add_agent_arguments(parser.add_argument)
+    _add_run_arguments(parser.add_argument)
+    return parser.parse_args(arguments)
+
+
+def _add_scenario_arguments(add: Callable[..., object]) -> None:
+    for name, text in (
+        ("before", "the twin as first identified"),
+        ("after", "the twin after closing the loop"),
+        ("stand-in", "what stands for the robot"),
+    ):
+        add(f"--{name}", required=True, metavar="NAME|FILE", help=text)
+    add(
+        "--model",
+        default="cell",
+        choices=sorted(MODELS),
+        help="what simulates the stand-in (default: cell)",
+    )
+
+
+def _add_agent_arguments(add: Callable[..., object]) -> None:
+    add("--preset", default="best", choices=list(PRESETS), help="(default: best)")
+    add("--agent", choices=ALGORITHMS, default="", help="(default: the preset's)")
+    add(
+        "--hyper",
+        nargs="+",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change hyper-parameters, of all trainings",
+    )
+    add(
+        "--episodes",
+        type=cli.positive,
+        default=150,
+        metavar="N",
+        help="on the twins (default: 150, as in the thesis)",
+    )
+    add(
+        "--stand-in-episodes",
+        type=cli.positive,
+        default=100,
+        metavar="N",
+        help="in the stand-in (default: 100, as on the thesis's robot)",
+    )
+
+
+def _add_run_arguments(add: Callable[..., object]) -> None:
+    add("--out", type=Path, required=True, metavar="DIR", help="folder for all of it")
+    add("--seeds", type=cli.positive, default=3, metavar="N", help="(default: 3)")
+    add("--first-seed", type=int, default=0, metavar="S", help="(default: 0)")
+    add(
+        "--validation",
+        type=cli.positive,
+        default=10,
+        metavar="N",
+        help="greedy episodes before and after learning in the stand-in (default: 10)",
+    )
+    add("--workers", type=cli.positive, metavar="N", help="(default: one per core)")
+    add("--eager", action="store_true", help="don't compile the updates")
+    add("--resume", action="store_true", help="go on with what is in --out")
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the program; returns its exit status."""
+    args = parse(arguments)
+    study = _study(args, arguments)
+    seeds = range(args.first_seed, args.first_seed + args.seeds)
+    workers = args.workers or os.cpu_count() or 1
+    try:
+        for name, experiment in study.experiments().items():
+            _train(name, experiment, seeds, study.folder / name, args.resume, workers)
+    finally:
+        print(write_results(study.folder, study.common.provenance))
+    print(f"all of it: {args.out}")
+    return 0
+
+
+def _study(args: argparse.Namespace, arguments: Sequence[str]) -> TransferStudy:
+    before = load_scenario(args.before)
+    changes = [*args.hyper, f"episodes={args.episodes}"]
+    common = Experiment(
+        scenario=before,
+        model="twin",
+        preset=args.preset,
+        config=override(preset(args.preset, args.agent), changes),
+        compiled=not args.eager,
+        validation=args.validation,
+        provenance=cli.provenance("transfer_study", arguments, args.first_seed),
+    )
+    return TransferStudy(
+        before=before,
+        after=load_scenario(args.after),
+        stand_in=load_scenario(args.stand_in),
+        model=args.model,
+        common=common,
+        episodes=args.stand_in_episodes,
+        folder=args.out,
+    )
+
+
+def _train(
+    name: str,
+    experiment: Experiment,
+    seeds: range,
+    folder: Path,
+    resume: bool,
+    workers: int,
+) -> None:
+    """Trains the seeds of one part; before, deploys what they start from as it is."""
+    if experiment.start:
+        check_start(experiment, seeds)
+    experiment = open_experiment(experiment, folder, resume)
+    jobs = seed_jobs(experiment, seeds, folder)
+    if experiment.start:
+        _deploy([Deployment(experiment, j.seed, j.folder) for j in jobs], workers, name)
+    train_seeds(jobs, workers, name)
+
+
+def _deploy(jobs: Sequence[Deployment], workers: int, title: str) -> None:
+    total = sum(job.experiment.validation for job in jobs)
+
+    def show(_: Any) -> None:
+        """Moves the bar by one episode."""
+        cli.stop_if_interrupted()
+        bar.update()
+
+    with tqdm(total=total, unit="episode", desc=f"{title}, as it is") as bar:
+        for _ in run_jobs(deploy, jobs, workers, show):
+            pass
+
+
+if __name__ == "__main__":
+    cli.run(main)
