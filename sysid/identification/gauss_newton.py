@@ -24,6 +24,8 @@ def gauss_newton(
     u: Array,
     iterations: int = 6,
     callback: Callable[[float], None] | None = None,
+    start: Linearisation | None = None,
+    central: bool = True,
 ) -> Linearisation:
     """Returns the linearisation where Gauss-Newton steps from u lead to.
 
@@ -37,32 +39,38 @@ def gauss_newton(
         u: (p,) where to begin, in the unit box.
         iterations: at most.
         callback: called with the value after each.
+        start: the linearisation at u, if it is known.
+        central: whether differences are central, or one-sided at half the price.
     """
-    here = linearise(objective, u)
+    here = linearise(objective, u, central=central) if start is None else start
     for _ in range(iterations):
         value = objective.value(here.residual)
         if callback:
             callback(value)
-        steps = np.array([_step(here, damping) for damping in _DAMPING])
-        points = np.clip(here.u + steps, 0.0, 1.0)
+        points = np.clip(here.u + _steps(here), 0.0, 1.0)
         values = objective(objective.scaling.from_unit(points))
         best = int(np.argmin(values))
         if values[best] >= value:
             break
-        here = linearise(objective, points[best], fitting_steps(here))
+        here = linearise(objective, points[best], fitting_steps(here), central)
         if values[best] > (1.0 - _GAIN) * value:
             break
     return here
 
 
-def _step(here: Linearisation, damping: float) -> Array:
-    """Returns the weighted, damped least-squares step (p,) that stays in the box."""
+def _steps(here: Linearisation) -> Array:
+    """Returns weighted least-squares steps (d, p) that stay in the box, one for each
+    damping.
+    """
     root = np.sqrt(here.weights).reshape(-1)
-    J, r = root[:, None] * here.flat_jacobian, root * here.residual.reshape(-1)
-    Q, R = np.linalg.qr(J)
+    system = np.column_stack([here.flat_jacobian, here.residual.reshape(-1)])
+    factor = np.asarray(np.linalg.qr(root[:, None] * system, mode="r"))
+    R, Qr = factor[:, :-1], factor[:, -1]
     size = np.linalg.norm(R, axis=0)
-    ridge = np.sqrt(damping) * size + 1e-9 * max(1.0, float(size.max()))
-    A = np.vstack([R, np.diag(ridge)])
-    b = np.concatenate([-Q.T @ r, np.zeros(len(here.u))])
-    step: Array = lsq_linear(A, b, (-here.u - 1e-12, 1.0 - here.u + 1e-12)).x
-    return step
+    least = 1e-9 * max(1.0, float(size.max()))
+    b = np.concatenate([-Qr, np.zeros(len(here.u))])
+    bounds = (-here.u - 1e-12, 1.0 - here.u + 1e-12)
+    ridges = [np.sqrt(damping) * size + least for damping in _DAMPING]
+    return np.array(
+        [lsq_linear(np.vstack([R, np.diag(r)]), b, bounds).x for r in ridges]
+    )

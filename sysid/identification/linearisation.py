@@ -50,19 +50,24 @@ class Linearisation:
 
 
 def linearise(
-    objective: Objective, u: Array, steps: Array | None = None
+    objective: Objective,
+    u: Array,
+    steps: Array | None = None,
+    central: bool = True,
 ) -> Linearisation:
-    """Returns the linearisation at a point (p,) of the unit box, 2 p + 1 evaluations.
-
-    Central differences; at a bound one-sided.
+    """Returns the linearisation at a point (p,) of the unit box.
 
     Args:
         objective: whose residuals.
         u: where.
         steps: (p,) of the differences, in the unit box.
+        central: central differences, 2 p + 1 evaluations, one-sided at a bound; or
+            all one-sided, p + 1 evaluations.
     """
     size = len(u)
     steps = np.full(size, FIRST_STEP) if steps is None else steps
+    if not central:
+        return extend(_at(objective, u), objective, u, steps)
     ahead = np.clip(u + np.diag(steps), 0.0, 1.0)
     behind = np.clip(u - np.diag(steps), 0.0, 1.0)
     points = np.vstack([u[None], ahead, behind])
@@ -74,6 +79,38 @@ def linearise(
     return Linearisation(u, found[0], jacobian, weights)
 
 
+def extend(
+    here: Linearisation, objective: Objective, u: Array, steps: Array | None = None
+) -> Linearisation:
+    """Returns a linearisation with more parameters, one evaluation for each.
+
+    Args:
+        here: of the first parameters, at this point.
+        objective: of all parameters, with the same residuals there.
+        u: (p,) the point.
+        steps: (k,) of the one-sided differences by the new ones, away from the bound
+            that is nearer.
+    """
+    known = len(here.u)
+    steps = np.full(len(u) - known, FIRST_STEP) if steps is None else steps
+    if not len(steps):
+        return here
+    way = np.where(u[known:] > 0.5, -steps, steps)
+    points = np.tile(u, (len(way), 1))
+    points[:, known:] += np.diag(way)
+    found = objective.residuals(objective.scaling.from_unit(points))
+    columns = [(r - here.residual) / w for r, w in zip(found, way, strict=True)]
+    jacobian = np.concatenate([here.jacobian, np.stack(columns, axis=-1)], axis=-1)
+    return Linearisation(u, here.residual, jacobian, here.weights)
+
+
+def _at(objective: Objective, u: Array) -> Linearisation:
+    """Returns the residuals at a point (p,), with no parameter."""
+    residual = objective.residuals(objective.scaling.from_unit(u))[0]
+    weights = huber_weights(residual, objective.huber)
+    return Linearisation(u[:0], residual, np.zeros((*residual.shape, 0)), weights)
+
+
 def fitting_steps(linearisation: Linearisation) -> Array:
     """Returns steps (p,) that the log can just notice, for the next linearisation.
 
@@ -82,6 +119,7 @@ def fitting_steps(linearisation: Linearisation) -> Array:
     large, contact comes and goes along a step, and a longer one sees past that.
     """
     level = np.sqrt(np.mean(linearisation.weights * linearisation.residual**2))
-    norm = np.sqrt(np.diagonal(linearisation.information))
+    J, w = linearisation.jacobian, linearisation.weights
+    norm = np.sqrt(np.einsum("rcp,rc,rcp->p", J, w, J))
     steps = _NOTICEABLE * max(1.0, float(level)) / np.maximum(norm, 1e-300)
     return np.clip(steps, _LEAST_STEP, WIDE_STEP)

@@ -8,10 +8,11 @@ from matplotlib.figure import Figure
 
 from sysid.report.figures import as_data_url
 from sysid.report.templates import render
+from sysid.tracing.evidence import Evidence
 from sysid.tracing.held_out import HeldOut
 from sysid.tracing.pipeline import Closed
 from sysid.tracing.plain import to_mapping
-from sysid.tracing.selection import Evidence, Survey
+from sysid.tracing.selection import Survey
 
 _BEFORE, _AFTER, _DARK = "#b0b0b0", "#c03030", "#202020"
 _PASSES, _FAILS = "#2060a0", "#c8d0d8"

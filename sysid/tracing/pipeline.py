@@ -4,17 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from drake_disasm.effects import EFFECTS, Effect
-from drake_disasm.errors import DisasmError
 from sysid.identification.noise import with_estimated_noise
 from sysid.models.base import ScenarioModel
-from sysid.parameters import nominal_values
 from sysid.tracing.candidates import candidates
+from sysid.tracing.enough import refuse_few_rows, refuse_short_logs
 from sysid.tracing.held_out import HeldOut, held_out
 from sysid.tracing.selection import Fit, Round, Survey, Tracer
 from sysid.tracing.verdict import Verdict, verdict
 from sysid.workers import Workers
-
-_LEAST_BLOCKS = 6
 
 
 @dataclass(frozen=True)
@@ -66,26 +63,12 @@ def close_loop(
     base = whole.of_episodes(train)
     tracer = Tracer(base, candidates(base, library), workers, huber, tell)
     tell("the model as it is")
-    first = tracer.fit((), nominal_values(base.parameters))
+    refuse_few_rows(base)
+    first = tracer.fit(())
     begin = tracer.survey(first)
-    _refuse_short_logs(base, begin)
     last, end = tracer.forward(first, begin)
-    pruned = tracer.backward(last)
-    if pruned is not last:
-        last, end = pruned, tracer.survey(pruned)
+    refuse_short_logs(last, end)
     kept = whole.of_episodes(test) if test else None
     errors = held_out(tracer, first, last, kept)
     found = verdict(tracer, first, last, end, errors)
     return Closed(found, first, last, tuple(tracer.rounds), begin, end, errors)
-
-
-def _refuse_short_logs(model: ScenarioModel, begin: Survey) -> None:
-    """Refuses to guess where there are too few independent pieces of data."""
-    if begin.blocks >= _LEAST_BLOCKS:
-        return
-    rows = model.measurements.rows
-    needed = -(-rows * _LEAST_BLOCKS // max(begin.blocks, 1))
-    raise DisasmError(
-        f"the log is too short to decide: its {rows} rows are {begin.blocks} "
-        f"independent blocks, {_LEAST_BLOCKS} are needed; record some {needed} rows"
-    )

@@ -4,9 +4,10 @@ import dataclasses
 from typing import Any
 
 from sysid.tracing.diagnosis import diagnose
+from sysid.tracing.evidence import Evidence
 from sysid.tracing.held_out import HeldOut
 from sysid.tracing.pipeline import Closed
-from sysid.tracing.selection import Evidence, Survey
+from sysid.tracing.selection import Survey
 
 
 def to_mapping(closed: Closed) -> dict[str, Any]:
@@ -15,9 +16,12 @@ def to_mapping(closed: Closed) -> dict[str, Any]:
     return {
         "ending": found.ending,
         "effects": list(found.names),
+        "rise_without": dict(zip(found.names, found.worth, strict=True)),
         "ties": {
-            name: list(tie) for name, tie in zip(found.names, found.ties, strict=False)
+            name: {tie.name: tie.experiment for tie in ties}
+            for name, ties in zip(found.names, found.ties, strict=True)
         },
+        "contradictions": [dataclasses.asdict(c) for c in found.contradictions],
         "parameters": {
             value.name: {
                 "value": value.value,

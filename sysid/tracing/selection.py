@@ -1,64 +1,37 @@
 """Adds one effect at a time, as long as data that were not fitted get better by it."""
 
 import dataclasses
-import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.identification.gauss_newton import gauss_newton
-from sysid.identification.linearisation import Linearisation, linearise
+from sysid.identification.linearisation import Linearisation, extend
 from sysid.models.base import ScenarioModel
 from sysid.objective import Objective
-from sysid.parameters import nominal_values
+from sysid.parameters import Scaling, nominal_values
 from sysid.tracing.candidates import Candidate, extended
-from sysid.tracing.empirical import Dependence, curves
-from sysid.tracing.study import Study, blocks_of, family_p
+from sysid.tracing.empirical import curves
+from sysid.tracing.evidence import (
+    FEW,
+    LEAST_GAIN,
+    Bench,
+    Evidence,
+    evidence,
+    simplest,
+    together,
+)
+from sysid.tracing.study import Study, blocks_of
 from sysid.workers import Workers
 
 Array = NDArray[np.float64]
 
-ALPHA = 0.05  # family-wise, in each round
-LEAST_GAIN = 0.01  # of the loss
-_LEAST_SHARE = 0.8  # of the blocks
-_LEAST_FIELD = 0.005  # of the loss, that a size must be worth
 _ITERATIONS = 8
-_TIE = 0.05  # of the gain, by which a rival may be worse
-_PAIRS_OF = 8
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """What speaks for something that explains a residual.
-
-    Attributes:
-        what: the effects, or the dependence.
-        gain: share of the loss of blocks that were not fitted, that it takes away.
-        p: family-wise, that it explains nothing.
-        share: of the blocks that get better.
-        cost: number of its parameters.
-    """
-
-    what: tuple[Candidate, ...] | Dependence
-    gain: float
-    p: float
-    share: float
-    cost: int
-
-    @property
-    def accepted(self) -> bool:
-        """Whether it is more than chance."""
-        significant = self.p < ALPHA and self.gain >= LEAST_GAIN
-        return significant and self.share >= _LEAST_SHARE
-
-    @property
-    def name(self) -> str:
-        """What it is, in words."""
-        if isinstance(self.what, Dependence):
-            return self.what.text
-        return " and ".join(candidate.text for candidate in self.what)
+_AT_BOUND = 1e-6  # of a parameter's range
+_Z95 = 1.959963984540054
+_TRIES = 3  # of effects that pass and then do not keep what they promised
 
 
 @dataclass(frozen=True)
@@ -84,6 +57,12 @@ class Fit:
         """Sum of the weighted squares."""
         return float(np.sum(self.here.weights * self.here.residual**2))
 
+    def columns_of(self, effect: Candidate) -> NDArray[np.int64]:
+        """Returns which of the parameters are an effect's sizes."""
+        names = [f"{effect.name}.{field}" for field in effect.fields]
+        own = [i for i, p in enumerate(self.model.parameters) if p.name in names]
+        return np.array(own, dtype=np.int64)
+
 
 @dataclass(frozen=True)
 class Survey:
@@ -92,11 +71,13 @@ class Survey:
     Attributes:
         effects, dependences: the best first.
         blocks: how many there were.
+        bench: what it was made of; None in a survey that is only kept as a record.
     """
 
     effects: list[Evidence]
     dependences: list[Evidence]
     blocks: int
+    bench: Bench | None
 
 
 @dataclass(frozen=True)
@@ -120,6 +101,10 @@ class Round:
 class Tracer:
     """Searches for what a model lacks.
 
+    Each round linearises once: the fit's own derivatives are known, and each
+    candidate costs one evaluation for each of its sizes. A fit begins with that
+    linearisation.
+
     Attributes:
         base: the model, with the parameters that it has anyway.
         library: candidates.
@@ -138,164 +123,202 @@ class Tracer:
     def forward(self, fit: Fit, survey: Survey) -> tuple[Fit, Survey]:
         """Returns the fit with all effects that pass, and the survey that ended it.
 
+        Some effects show only together: where nothing passes alone, pairs are tried.
+
         Args:
             fit: without effects.
             survey: beside it.
         """
         while True:
+            assert survey.bench is not None
             accepted = [e for e in survey.effects if e.accepted]
-            accepted = accepted or self._pairs(fit, survey)
-            if not accepted:
+            if not accepted and not fit.effects:
+                accepted = survey.bench.pairs(survey.effects)
+            found = self._added(fit, survey, accepted)
+            if found is None:
                 return fit, survey
-            best = _simplest(accepted)
-            assert isinstance(best.what, tuple)
-            added = self._pruned(fit, best.what)
-            fit = self.fit((*fit.effects, *added), fit.theta)
-            ties = tuple(e for e in accepted if e is not best and _rivals(e, best))
-            self.rounds.append(Round(best, ties, survey, fit.value))
-            self.tell(f"{best.name}: objective {fit.value:.4g}")
-            survey = self.survey(fit)
+            fit, survey = found, self.survey(found)
+
+    def _added(
+        self, fit: Fit, survey: Survey, accepted: Sequence[Evidence]
+    ) -> Fit | None:
+        """Returns the fit with the best that passes and keeps what it promised."""
+        for _ in range(_TRIES):
+            if not accepted:
+                break
+            best = simplest(accepted)
+            found = self.backward(self._with(fit, survey, best))
+            if found.loss <= (1.0 - LEAST_GAIN) * fit.loss and _all_show(found, best):
+                ties = tuple(e for e in accepted if e.ties_with(best))
+                record = dataclasses.replace(survey, bench=None)
+                self.rounds.append(Round(best, ties, record, found.value))
+                self.tell(f"{best.name}: objective {found.value:.4g}")
+                return found
+            self.tell(f"{best.name}: does not keep what it promised")
+            accepted = [e for e in accepted if e.effects != best.effects]
+        return None
+
+    def _with(self, fit: Fit, survey: Survey, chosen: Evidence) -> Fit:
+        """Returns the fit with what was chosen; it begins where the survey was."""
+        bench = survey.bench
+        assert bench is not None and isinstance(chosen.what, tuple)
+        added = bench.pruned(chosen.what)
+        known = {
+            f"{candidate.name}.{bench.fields[column]}": bench.here.jacobian[..., column]
+            for candidate in added
+            for column in bench.groups[candidate.text]
+        }
+        while True:
+            found = self.fit((*fit.effects, *added), fit, known)
+            kept = _physical(found, added)
+            if kept == added or not kept:
+                return found
+            added = kept
 
     def backward(self, fit: Fit) -> Fit:
         """Returns the fit without effects that later ones have made needless."""
-        for candidate in fit.effects[:-1]:
-            if candidate in fit.effects and not self._is_needed(fit, candidate):
-                rest = tuple(c for c in fit.effects if c is not candidate)
-                start = fit.theta[: len(self.base.parameters)]
-                fit = self.fit(rest, start)
-                self.tell(f"without {candidate.text}: objective {fit.value:.4g}")
-        return fit
+        while True:
+            worth = self.worth(fit)
+            needless = [c for c in fit.effects if worth[c.name] < LEAST_GAIN]
+            if not needless:
+                return fit
+            least = min(needless, key=lambda c: worth[c.name])
+            fit = self.fit(tuple(c for c in fit.effects if c is not least), fit)
+            self.tell(f"without {least.text}: objective {fit.value:.4g}")
 
-    def _is_needed(self, fit: Fit, candidate: Candidate) -> bool:
-        """Returns whether blocks that are not fitted get worse without an effect."""
-        names = [p.name for p in fit.model.parameters]
-        fields = [f"{candidate.name}.{field}" for field in candidate.fields]
-        own = np.array([name in fields for name in names])
-        columns = np.flatnonzero(own)
-        scaling = Objective(fit.model, self.workers, self.huber).scaling
-        null = np.where(own, nominal_values(fit.model.parameters), fit.theta)
-        change = scaling.to_unit(null) - fit.here.u
-        without = dataclasses.replace(
-            fit.here, residual=fit.here.residual + fit.here.jacobian @ change
-        )
+    def worth(self, fit: Fit) -> dict[str, float]:
+        """Returns by how much the loss would rise without each effect, by its name.
+
+        As a share of the loss without it, of blocks that are not fitted; all else is
+        fitted again.
+        """
+        if not fit.effects:
+            return {}
+        scaling = Scaling(fit.model.parameters)
+        null = scaling.to_unit(nominal_values(fit.model.parameters))
         blocks = blocks_of(fit.here, fit.model.measurements.episode)
         empty = np.zeros((*fit.here.residual.shape, 0))
-        study = Study.of(without, empty, blocks).beside(np.flatnonzero(~own))
-        return _evidence(study, [((candidate,), columns)])[0].gain >= LEAST_GAIN
+        study = Study.of(fit.here, empty, blocks)
+        found = {}
+        for effect in fit.effects:
+            own = np.isin(np.arange(len(null)), fit.columns_of(effect))
+            without = study.moved(np.where(own, null - fit.here.u, 0.0))
+            without = dataclasses.replace(without, side=np.zeros(len(null)))
+            beside = without.beside(np.flatnonzero(~own))
+            found[effect.name] = evidence(beside, [((effect,), np.flatnonzero(own))])[
+                0
+            ].gain
+        return found
 
-    def fit(self, effects: tuple[Candidate, ...], start: Array) -> Fit:
-        """Returns a model with effects, fitted from a start (k,) and from null."""
+    def fit(
+        self,
+        effects: tuple[Candidate, ...],
+        start: Fit | None = None,
+        known: Mapping[str, Array] | None = None,
+    ) -> Fit:
+        """Returns a model with effects, fitted.
+
+        Args:
+            effects: of the model.
+            start: where to begin; what it does not have begins at null.
+            known: derivatives (rows, channels) by what is new beside the start, if
+                everything of the start is kept; shapes have none at null.
+        """
         model, _ = extended(self.base, effects, with_shapes=True)
-        rest = nominal_values(model.parameters)[len(start) :]
+        values = _values_of(start) if start else {}
+        theta = [values.get(p.name, p.nominal) for p in model.parameters]
         objective = Objective(model, self.workers, self.huber)
-        u = objective.scaling.to_unit(np.concatenate([start, rest]))
-        here = gauss_newton(objective, u, _ITERATIONS)
-        theta = objective.scaling.from_unit(here.u)
-        return Fit(effects, model, theta, here, objective.value(here.residual))
+        u = objective.scaling.to_unit(np.array(theta))
+        here = None
+        if start and known is not None:
+            names = [p.name for p in model.parameters[len(start.theta) :]]
+            zero = np.zeros_like(start.here.residual)
+            more = [known.get(name, zero) for name in names]
+            jacobian = np.concatenate(
+                [start.here.jacobian, np.stack(more, axis=-1)], axis=-1
+            )
+            here = dataclasses.replace(start.here, u=u, jacobian=jacobian)
+        here = gauss_newton(objective, u, _ITERATIONS, start=here, central=False)
+        found = objective.scaling.from_unit(here.u)
+        return Fit(effects, model, found, here, objective.value(here.residual))
 
     def survey(self, fit: Fit) -> Survey:
         """Returns what speaks for each candidate that the fit does not have."""
         names = {candidate.name for candidate in fit.effects}
         rest = [c for c in self.library if c.name not in names]
-        study, groups, dependences = self._study(fit, rest)
-        effects = [((c,), group) for c, group in zip(rest, groups, strict=True)]
+        bench = self._bench(fit, rest)
         return Survey(
-            _evidence(study, [(what, g) for what, g in effects if len(g)]),
-            _evidence(study, dependences),
-            len(study.count),
+            bench.of_effects([(c,) for c in rest] + together(rest)),
+            bench.of_dependences(),
+            len(bench.study.energy),
+            bench,
         )
 
-    def _pairs(self, fit: Fit, survey: Survey) -> list[Evidence]:
-        """Returns pairs that pass: some effects show only together."""
-        promising: dict[str, Candidate] = {}
-        for evidence in survey.effects:
-            assert isinstance(evidence.what, tuple)
-            promising.setdefault(evidence.what[0].name, evidence.what[0])
-        best = list(promising.values())[:_PAIRS_OF]
-        if len(best) < 2:
-            return []
-        study, groups, _ = self._study(fit, best)
-        pairs = [
-            ((best[i], best[j]), np.concatenate([groups[i], groups[j]]))
-            for i, j in itertools.combinations(range(len(best)), 2)
-        ]
-        return [e for e in _evidence(study, pairs) if e.accepted]
-
-    def _pruned(self, fit: Fit, added: Sequence[Candidate]) -> list[Candidate]:
-        """Returns effects with only those sizes free that blocks get better by."""
-        study, groups, _ = self._study(fit, added)
-        kept = [int(column) for group in groups for column in group]
-        while len(kept) > 1:
-            losses = {
-                c: study.losses(np.array([k for k in kept if k != c])).sum()
-                for c in kept
-            }
-            now = study.losses(np.array(kept)).sum()
-            least = min(losses, key=lambda c: losses[c])
-            if losses[least] > (1.0 + _LEAST_FIELD) * now:
-                break
-            kept.remove(least)
-        found = []
-        for candidate, group in zip(added, groups, strict=True):
-            own = zip(candidate.fields, group, strict=True)
-            fields = [field for field, column in own if int(column) in kept]
-            if fields:
-                found.append(candidate.only(fields))
-        return found
-
-    def _study(
-        self, fit: Fit, library: Sequence[Candidate]
-    ) -> tuple[Study, list[NDArray[np.int64]], list]:
-        """Returns the study of candidates and curves beside a fit, and the columns."""
+    def _bench(self, fit: Fit, library: Sequence[Candidate]) -> Bench:
+        """Returns the linearisation beside a fit, and its normal equations."""
         model, groups = extended(fit.model, library)
         count = len(fit.theta)
-        rest = nominal_values(model.parameters)[count:]
         objective = Objective(model, self.workers, self.huber)
+        rest = nominal_values(model.parameters)[count:]
         u = objective.scaling.to_unit(np.concatenate([fit.theta, rest]))
-        here = linearise(objective, u)
+        here = extend(fit.here, objective, u)
+        episode = model.measurements.episode
         extra, dependences = curves(model)
-        blocks = blocks_of(here, model.measurements.episode)
-        study = Study.of(here, extra, blocks).beside(np.arange(count))
+        blocks = blocks_of(here, episode)
+        raw = Study.of(here, extra, blocks)
         begin = len(model.parameters)
-        return (
-            study,
-            [np.array(group, dtype=np.int64) for group in groups],
+        return Bench(
+            here,
+            tuple(p.name.rpartition(".")[2] for p in model.parameters),
+            raw,
+            raw.beside(np.arange(count)),
+            {
+                c.text: np.array(group, dtype=np.int64)
+                for c, group in zip(library, groups, strict=True)
+            },
             [(d, begin + np.array(d.columns, dtype=np.int64)) for d in dependences],
+            episode[np.unique(blocks, return_index=True)[1]],
         )
 
 
-def _evidence(study: Study, columns: Sequence[tuple]) -> list[Evidence]:
-    """Returns the evidence for groups of columns, the highest gain first."""
-    if not columns:
-        return []
-    gains = np.array([study.energy - study.losses(group) for _, group in columns]).T
-    p, total = family_p(gains), study.energy.sum()
-    found = [
-        Evidence(
-            what,
-            float(gains[:, i].sum() / total),
-            float(p[i]),
-            float(np.mean(gains[:, i] > 0.0)),
-            len(group) + _shape_count(what),
-        )
-        for i, (what, group) in enumerate(columns)
-    ]
-    return sorted(found, key=lambda evidence: -evidence.gain)
+def _physical(fit: Fit, added: Sequence[Candidate]) -> list[Candidate]:
+    """Returns new effects without sizes that end at a bound, unphysical or null.
+
+    Of several that were added because they are alike, those go that do not show.
+    """
+    found = []
+    shows = _shows(fit)
+    for effect in added:
+        columns = fit.columns_of(effect)
+        u = fit.here.u[columns]
+        kept = (u > _AT_BOUND) & (u < 1.0 - _AT_BOUND)
+        fields = [f for f, keep in zip(effect.fields, kept, strict=True) if keep]
+        if fields and (len(added) <= FEW or shows[columns].any()):
+            found.append(effect.only(fields))
+    return found
 
 
-def _shape_count(what: tuple[Candidate, ...] | Dependence) -> int:
-    return 0 if isinstance(what, Dependence) else sum(len(c.shape) for c in what)
+def _all_show(fit: Fit, added: Evidence) -> bool:
+    """Returns whether each new effect has a size whose interval excludes null."""
+    shows = _shows(fit)
+    new = [effect for effect in fit.effects if effect.name in added.effects]
+    return bool(new) and all(shows[fit.columns_of(effect)].any() for effect in new)
 
 
-def _rivals(evidence: Evidence, best: Evidence) -> bool:
-    """Returns whether something else explains nearly as much."""
-    return evidence.gain >= (1.0 - _TIE) * best.gain and evidence.name != best.name
+def _shows(fit: Fit) -> NDArray[np.bool_]:
+    """Returns which parameters' (p,) intervals exclude their null value.
+
+    95 %, by the sums of the gradient over blocks (a sandwich): right whatever the
+    correlation within a block.
+    """
+    blocks = blocks_of(fit.here, fit.model.measurements.episode)
+    empty = np.zeros((*fit.here.residual.shape, 0))
+    study = Study.of(fit.here, empty, blocks)
+    scaling = Scaling(fit.model.parameters)
+    away = fit.here.u - scaling.to_unit(nominal_values(fit.model.parameters))
+    return np.asarray(np.abs(away) > _Z95 * study.spread())
 
 
-def _simplest(accepted: Sequence[Evidence]) -> Evidence:
-    """Returns the one with the fewest parameters among the best."""
-    best = accepted[0]
-    return min(
-        (e for e in accepted if _rivals(e, best) or e is best),
-        key=lambda e: (e.cost, -e.gain),
-    )
+def _values_of(fit: Fit) -> dict[str, float]:
+    names = [p.name for p in fit.model.parameters]
+    return dict(zip(names, fit.theta.tolist(), strict=True))

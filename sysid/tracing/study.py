@@ -6,12 +6,13 @@ it explain of data that it was not fitted to) follows from the normal equations 
 block of rows, so that hundreds of candidates cost no more simulations than one.
 """
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata
+from scipy.stats import rankdata, wilcoxon
 
 from sysid.identification.linearisation import Linearisation
 from sysid.identification.uncertainty import block_length, block_numbers
@@ -24,6 +25,8 @@ _DRAWS = 4000
 _LEAST_BLOCKS = 8
 _NEW = 1e-3  # share of a column that the base can't do
 _MOST_BLOCKS = 40
+_SAME = 1e-6  # of a block's gain, that is no difference
+_AT_BOUND = 1e-9  # of a parameter's range
 
 
 @dataclass(frozen=True)
@@ -34,13 +37,15 @@ class Study:
         H: (B, P, P) A^T W A of each block.
         g: (B, P) A^T W r.
         energy: (B,) r^T W r.
-        count: (B,) residuals in each.
+        scale: (P,) what columns were divided by.
+        side: (P,) 1 or -1 where a parameter can go up or down only, else 0.
     """
 
     H: Array
     g: Array
     energy: Array
-    count: Array
+    scale: Array
+    side: Array
 
     @classmethod
     def of(cls, here: Linearisation, extra: Array, blocks: NDArray[np.int64]) -> Self:
@@ -52,19 +57,28 @@ class Study:
             blocks: (rows,) number of each row's block.
         """
         A = np.concatenate([here.jacobian, extra], axis=2)
-        scale = np.sqrt(np.mean(A**2, axis=(0, 1)))
-        A = A / np.maximum(scale, 1e-300)
+        scale = np.maximum(np.sqrt(np.mean(A**2, axis=(0, 1))), 1e-300)
+        A /= scale
         parts = [cls._block(here, A, blocks == b) for b in range(int(blocks.max()) + 1)]
-        return cls(*(np.array(part) for part in zip(*parts, strict=True)))
+        H, g, energy = (np.array(part) for part in zip(*parts, strict=True))
+        side = (here.u < _AT_BOUND).astype(float) - (here.u > 1.0 - _AT_BOUND)
+        return cls(H, g, energy, scale, np.append(side, np.zeros(extra.shape[2])))
 
     @staticmethod
     def _block(
         here: Linearisation, A: Array, mask: NDArray[np.bool_]
-    ) -> tuple[Array, Array, float, int]:
+    ) -> tuple[Array, Array, float]:
         a = A[mask].reshape(-1, A.shape[2])
         r, w = here.residual[mask].reshape(-1), here.weights[mask].reshape(-1)
         wa = w[:, None] * a
-        return a.T @ wa, wa.T @ r, float(w @ r**2), len(r)
+        return a.T @ wa, wa.T @ r, float(w @ r**2)
+
+    def moved(self, change: Array) -> "Study":
+        """Returns the study of residuals elsewhere, a change (P,) of u away."""
+        phi = change * self.scale
+        Hphi = self.H @ phi
+        energy = self.energy + 2.0 * self.g @ phi + Hphi @ phi
+        return dataclasses.replace(self, g=self.g + Hphi, energy=energy)
 
     def beside(self, base: Columns) -> "Study":
         """Returns the study of all columns with some projected out, fitted to all rows.
@@ -74,33 +88,72 @@ class Study:
         that the base can do are zero.
         """
         H = self.H.sum(axis=0)
-        K = _solve(H[np.ix_(base, base)][None], H[base][None])[0]
-        phi = -_solve(H[np.ix_(base, base)][None], self.g[:, base].sum(axis=0)[None])[0]
-        cross = np.einsum("ib,nij->nbj", K, self.H[:, base])
-        inner = np.einsum("ib,nij,jc->nbc", K, self.H[:, base][:, :, base], K)
-        g = self.g + np.einsum("nij,j->ni", self.H[:, :, base], phi)
-        energy = (
-            self.energy
-            + 2.0 * self.g[:, base] @ phi
-            + np.einsum("i,nij,j->n", phi, self.H[:, base][:, :, base], phi)
-        )
-        projected = self.H - cross - cross.swapaxes(1, 2) + inner
+        inner = H[np.ix_(base, base)][None]
+        K = _solve(inner, H[base][None])[0]
+        phi = np.zeros(len(self.scale))
+        phi[base] = -_solve(inner, self.g[:, base].sum(axis=0)[None])[0]
+        there = self.moved(phi / self.scale)
+        cross = K.T @ self.H[:, base]
+        projected = self.H - cross - cross.swapaxes(1, 2)
+        projected += K.T @ self.H[:, base][:, :, base] @ K
         left, size = (np.diagonal(each.sum(axis=0)) for each in (projected, self.H))
         new = (left > _NEW**2 * size).astype(float)
-        return Study(
-            projected * new[:, None] * new,
-            (g - g[:, base] @ K) * new,
-            energy,
-            self.count,
+        return dataclasses.replace(
+            there,
+            H=projected * new[:, None] * new,
+            g=(there.g - there.g[:, base] @ K) * new,
         )
 
     def losses(self, columns: Columns) -> Array:
         """Returns what each block costs, (B,), if columns are fitted to all others."""
-        H, g = self.H[:, columns][:, :, columns], self.g[:, columns]
-        rest_H, rest_g = H.sum(axis=0) - H, g.sum(axis=0) - g
-        phi = -_solve(rest_H, rest_g)
-        fit = np.einsum("bi,bij,bj->b", phi, H, phi) + 2.0 * np.sum(phi * g, axis=1)
-        return self.energy + fit
+        H, g = self._parts(self._possible(columns))
+        return self.energy + _change(H, g, H.sum(axis=0) - H, g.sum(axis=0) - g)
+
+    def spread(self) -> Array:
+        """Returns the standard deviation (P,) of all parameters, fitted together."""
+        size = np.sqrt(np.diagonal(self.H.sum(axis=0)))
+        size = np.where(size > 0.0, size, 1.0)
+        H = self.H.sum(axis=0) / np.outer(size, size)
+        gradient = np.linalg.pinv(H, hermitian=True) @ (self.g / size).T
+        return np.asarray(np.linalg.norm(gradient, axis=1) / size / self.scale)
+
+    def disagreement(self, columns: Columns, own: NDArray[np.bool_]) -> Array:
+        """Returns what blocks gain, (b,), if columns are fitted to their like only.
+
+        Args:
+            columns: to fit.
+            own: (B,) which blocks are alike; they are predicted by a fit to the others
+                of them, and by a fit to all that are not.
+        """
+        H, g = self._parts(columns)
+        mine, rest = (H[own].sum(axis=0), g[own].sum(axis=0)), (H[~own], g[~own])
+        alone = _change(H[own], g[own], mine[0] - H[own], mine[1] - g[own])
+        theirs = (part.sum(axis=0)[None] for part in rest)
+        return np.asarray(_change(H[own], g[own], *theirs) - alone)
+
+    def _parts(self, columns: Columns) -> tuple[Array, Array]:
+        """Returns the normal equations of some columns only."""
+        return self.H[:, columns[:, None], columns], self.g[:, columns]
+
+    def _possible(self, columns: Columns) -> Columns:
+        """Returns the columns without those that a bound keeps from helping."""
+        H, g = self.H.sum(axis=0), self.g.sum(axis=0)
+        while len(columns):
+            inner = H[np.ix_(columns, columns)][None]
+            phi = -_solve(inner, g[columns][None])[0]
+            barred = phi * self.side[columns] < 0.0
+            if not barred.any():
+                break
+            columns = columns[~barred]
+        return columns
+
+
+def _change(H: Array, g: Array, fit_H: Array, fit_g: Array) -> Array:
+    """Returns the change of blocks' losses, (b,), by fits to other normal equations."""
+    phi = -_solve(fit_H, fit_g)
+    phi = np.broadcast_to(phi, g.shape)
+    Hphi = np.einsum("bij,bj->bi", H, phi)
+    return np.asarray(np.sum(phi * (Hphi + 2.0 * g), axis=1))
 
 
 def family_p(gains: Array, seed: int = 0) -> Array:
@@ -131,6 +184,18 @@ def blocks_of(here: Linearisation, episode: NDArray[np.int64]) -> NDArray[np.int
     length = block_length(here.residual, episode)
     length = max(length, rows // _MOST_BLOCKS)
     return block_numbers(episode, int(min(length, max(1, rows // _LEAST_BLOCKS))))
+
+
+def worse_p(gains: Array, best: Array) -> float:
+    """Returns the p-value that gains (B,) are no less than the best's, block by block.
+
+    Wilcoxon's signed ranks of the differences: two candidates that explain the same
+    blocks by as much can't be told apart, whatever their totals.
+    """
+    difference = best - gains
+    if not np.abs(difference).max(initial=0.0) > _SAME * np.abs(best).max(initial=0.0):
+        return 1.0
+    return float(wilcoxon(difference, alternative="greater").pvalue)
 
 
 def _solve(H: Array, g: Array) -> Array:

@@ -1,5 +1,6 @@
 """What is to be said: nothing, an effect, or that no effect explains it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,9 @@ from numpy.typing import NDArray
 
 from sysid.identification.uncertainty import uncertainty
 from sysid.objective import Objective
+from sysid.tracing.episodes import Contradiction, contradictions, in_words
+from sysid.tracing.evidence import FEW, Evidence
+from sysid.tracing.experiments import separating
 from sysid.tracing.held_out import HeldOut, improvement
 from sysid.tracing.selection import Fit, Round, Survey, Tracer
 
@@ -14,6 +18,7 @@ Array = NDArray[np.float64]
 
 #: Share of what can be explained that effects must explain to be believed.
 _BELIEVED = 0.75
+_SHOWN = 3  # of anything, in three lines
 
 
 @dataclass(frozen=True)
@@ -49,25 +54,43 @@ class Value:
 
 
 @dataclass(frozen=True)
+class Tie:
+    """Something that explains as much as an effect that was found.
+
+    Attributes:
+        name: of the other effect, or effects.
+        experiment: that would tell the two apart.
+    """
+
+    name: str
+    experiment: str
+
+
+@dataclass(frozen=True)
 class Verdict:
     """What the log says of the model.
 
     Attributes:
         ending: "none", "explained" or "unexplained".
         names: of the effects that are missing, the most important first.
-        ties: for each, effects that explain as much.
+        worth: for each, the share by which the loss would rise without it, of that.
+        ties: for each, effects that explain as much, each with the experiment that
+            would separate the two.
         values: of their parameters.
         dependence: the strongest that is left, in words; empty if none is.
         explained: share of what could be explained that the effects do.
+        contradictions: episodes that no common effect explains.
         text: three lines.
     """
 
     ending: str
     names: tuple[str, ...]
-    ties: tuple[tuple[str, ...], ...]
+    worth: tuple[float, ...]
+    ties: tuple[tuple[Tie, ...], ...]
     values: tuple[Value, ...]
     dependence: str
     explained: float
+    contradictions: tuple[Contradiction, ...]
     text: str
 
 
@@ -86,23 +109,40 @@ def verdict(
     gained = max(first.loss - last.loss, 0.0)
     missing = left[0].gain * last.loss if left else 0.0
     explained = gained / (gained + missing) if gained + missing > 0.0 else 1.0
-    rounds = [r for r in tracer.rounds if _is_kept(r, last)]
-    names = tuple(c.name for c in last.effects)
+    worth = tracer.worth(last)
+    names = tuple(sorted(worth, key=lambda name: -worth[name]))
+    ties = tuple(_tied(name, tracer.rounds) for name in names)
     values = values_of(tracer, last)
-    if not names and not left:
-        ending = "none"
-    elif names and explained >= _BELIEVED:
-        ending = "explained"
-    else:
-        ending = "unexplained"
-    ties = tuple(_tied(r) for r in rounds)
     dependence = left[0].name if left else ""
+    ending = _ending(names, dependence, explained)
+    assert end.bench is not None
+    against = contradictions(last, end.bench, len(tracer.base.parameters))
     lines = [
-        _missing_line(ending, names, ties, dependence),
-        _value_line(values),
+        "; ".join(
+            part
+            for part in (_missing(ending, names, ties, dependence), in_words(against))
+            if part
+        ),
+        _value_line(names, values),
         f"error on held-out data: {improvement(errors)}",
     ]
-    return Verdict(ending, names, ties, values, dependence, explained, "\n".join(lines))
+    return Verdict(
+        ending,
+        names,
+        tuple(worth[name] for name in names),
+        ties,
+        values,
+        dependence,
+        explained,
+        against,
+        "\n".join(lines),
+    )
+
+
+def _ending(names: tuple[str, ...], dependence: str, explained: float) -> str:
+    if not names and not dependence:
+        return "none"
+    return "explained" if names and explained >= _BELIEVED else "unexplained"
 
 
 def values_of(tracer: Tracer, fit: Fit) -> tuple[Value, ...]:
@@ -125,36 +165,38 @@ def values_of(tracer: Tracer, fit: Fit) -> tuple[Value, ...]:
     )
 
 
-def _is_kept(found: Round, last: Fit) -> bool:
-    assert isinstance(found.chosen.what, tuple)
-    names = [c.name for c in last.effects]
-    return any(c.name in names for c in found.chosen.what)
+def _tied(name: str, rounds: Sequence[Round]) -> tuple[Tie, ...]:
+    """Returns what explained as much when an effect was added, each once."""
+    joint = name.partition(".")[2]
+    for found in rounds:
+        if name in found.chosen.effects:
+            others = [_other(tie, joint) for tie in found.ties]
+            return tuple(
+                Tie(other, separating(name, other))
+                for other in dict.fromkeys(others)
+                if name not in other.split(" and ")
+            )
+    return ()
 
 
-def _tied(found: Round) -> tuple[str, ...]:
-    """Returns the other effects that explain as much, each once."""
-    own = (
-        {c.name for c in found.chosen.what}
-        if isinstance(found.chosen.what, tuple)
-        else set()
-    )
-    names = [
-        " and ".join(c.name for c in tie.what)
-        for tie in found.ties
-        if isinstance(tie.what, tuple)
-    ]
-    return tuple(name for name in dict.fromkeys(names) if name not in own)
+def _other(tie: Evidence, joint: str) -> str:
+    """Returns what a tie names: at a joint, where it acts alike at several."""
+    here = [name for name in tie.effects if joint and name.endswith(f".{joint}")]
+    return " and ".join(here if len(tie.effects) > FEW and here else tie.effects)
 
 
-def _missing_line(
-    ending: str, names: tuple[str, ...], ties: tuple[tuple[str, ...], ...], left: str
+def _missing(
+    ending: str, names: tuple[str, ...], ties: tuple[tuple[Tie, ...], ...], left: str
 ) -> str:
     if ending == "none":
         return "missing: none; the residual shows nothing beyond chance"
     effects = ", then ".join(
-        name + (f" (or {' or '.join(tie)}: these data can't tell)" if tie else "")
-        for name, tie in zip(names, ties, strict=False)
+        name + (f" (or {_alternatives(name, tie)})" if tie else "")
+        for name, tie in zip(names, ties, strict=True)
     )
+    tests = list(dict.fromkeys(tie.experiment for each in ties for tie in each))
+    if tests:
+        effects += f"; these data can't tell, this would: {_or_else(tests)}"
     if ending == "unexplained":
         near = f"; the nearest is {effects}" if effects else ""
         return f"missing: unexplained, no effect in the library does it: {left}{near}"
@@ -162,6 +204,22 @@ def _missing_line(
     return f"missing: {effects}{more}"
 
 
-def _value_line(values: tuple[Value, ...]) -> str:
-    shown = [value.text for value in values if value.matters]
+def _alternatives(name: str, ties: tuple[Tie, ...]) -> str:
+    """Returns the other effects of a tie, without the joint if it is the same."""
+    joint = name.partition(".")[2]
+    names = [tie.name.removesuffix(f".{joint}") for tie in ties]
+    return _or_else(names)
+
+
+def _or_else(words: Sequence[str]) -> str:
+    """Returns some alternatives, and how many more there are."""
+    more = [f"{len(words) - _SHOWN} more"] if len(words) > _SHOWN else []
+    return " or ".join([*words[:_SHOWN], *more])
+
+
+def _value_line(names: Sequence[str], values: tuple[Value, ...]) -> str:
+    """Returns the parameters in the order of their effects."""
+    own = [v for name in names for v in values if v.name.startswith(f"{name}.")]
+    brief = len(names) > _SHOWN  # then shapes are in the report only
+    shown = [v.text for v in own if v.matters and not (brief and v.null is None)]
     return "parameters: " + ("; ".join(shown) if shown else "none")

@@ -4,15 +4,19 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, parameter
+from drake_disasm.effects.base import Sensing, SensorEffect, parameter, shape
+
+_NEVER = 1e6  # s
+_GRID = (10.0, 30.0, 50.0, 100.0, 300.0, _NEVER)
 
 
 @dataclasses.dataclass
 class SensorDrift(SensorEffect):
     """An offset that grows with the time since zeroing, or since the log began.
 
-    Equation: F_read = F + d t with d = [fx, fy, fz, tx, ty, tz] in S, t in seconds.
-    (Readings that only have an order count one second each.)
+    Equation: F_read = F + d min(t, T) with d = [fx, fy, fz, tx, ty, tz] in S, t in
+    seconds. (Readings that only have an order count one second each.) With the
+    default T it never ends.
     Where it acts: the reading of the force/torque sensor, after zeroing.
     """
 
@@ -22,10 +26,12 @@ class SensorDrift(SensorEffect):
     tx: float = parameter("N m/s", -0.5, 0.5, "drift of the torque about x_S")
     ty: float = parameter("N m/s", -0.5, 0.5, "drift of the torque about y_S")
     tz: float = parameter("N m/s", -0.5, 0.5, "drift of the torque about z_S")
+    duration: float = shape(_NEVER, "s", 1.0, _NEVER, "T, when it ends", _GRID)
 
     present_at_zeroing = False
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
         """Adds the offset of this moment."""
+        elapsed = np.minimum(sensing.time, self.duration)
         rate = [self.fx, self.fy, self.fz, self.tx, self.ty, self.tz]
-        return wrench_S + np.multiply.outer(sensing.time, rate)
+        return wrench_S + np.multiply.outer(elapsed, rate)

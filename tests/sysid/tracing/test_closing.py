@@ -13,7 +13,7 @@ def test_names_the_effect_or_a_tie_with_it(kind, tmp_path):
     found = closed(static_log(tmp_path, [kind], 2.0, seed=0).folder)
     verdict = found.verdict
     assert verdict.ending == "explained"
-    assert kind.__name__ in (verdict.names[0], *verdict.ties[0])
+    assert kind.__name__ in (verdict.names[0], *(t.name for t in verdict.ties[0]))
     errors = found.errors
     assert errors.in_noise(errors.after) < 0.9 * errors.in_noise(errors.before)
 

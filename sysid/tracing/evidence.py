@@ -1,0 +1,192 @@
+"""What speaks for each candidate beside a fit: all of it from one linearisation."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.identification.linearisation import Linearisation
+from sysid.tracing.candidates import Candidate
+from sysid.tracing.empirical import Dependence
+from sysid.tracing.study import Columns, Study, family_p, worse_p
+
+Array = NDArray[np.float64]
+What = tuple[Candidate, ...] | Dependence
+
+ALPHA = 0.05  # family-wise, in each round
+LEAST_GAIN = 0.01  # of the loss
+_LEAST_SHARE = 0.8  # of the blocks
+_LEAST_FIELD = 0.005  # of the loss, that a size must be worth
+_SIMPLER = 0.05  # of the gain, that fewer parameters may cost
+_RIVAL = 0.5  # of the gain, below which nothing is a tie
+_PAIRS_OF = 8
+#: Effects that are listed by their names; more are alike, one for each joint.
+FEW = 2
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What speaks for something that explains a residual.
+
+    Attributes:
+        what: the effects, or the dependence.
+        gain: share of the loss of blocks that were not fitted, that it takes away.
+        p: family-wise, that it explains nothing.
+        share: of the blocks that get better.
+        cost: number of its parameters.
+        gains: (B,) of each block.
+    """
+
+    what: What
+    gain: float
+    p: float
+    share: float
+    cost: int
+    gains: Array
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it is more than chance."""
+        significant = self.p < ALPHA and self.gain >= LEAST_GAIN
+        return significant and self.share >= _LEAST_SHARE
+
+    @property
+    def name(self) -> str:
+        """What it is, in words."""
+        if isinstance(self.what, Dependence):
+            return self.what.text
+        if len(self.what) > FEW:
+            return f"{_kind_text(self.what[0])} of {len(self.what)} joints"
+        return " and ".join(candidate.text for candidate in self.what)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects, whatever their shapes; none of a dependence."""
+        if isinstance(self.what, Dependence):
+            return ()
+        return tuple(candidate.name for candidate in self.what)
+
+    def ties_with(self, best: "Evidence") -> bool:
+        """Returns whether blocks can't tell something else from the best."""
+        if self.effects == best.effects or self.gain < _RIVAL * best.gain:
+            return False
+        return worse_p(self.gains, best.gains) >= ALPHA
+
+
+@dataclass(frozen=True)
+class Bench:
+    """The one linearisation beside a fit, and what was made of it.
+
+    Attributes:
+        here: at the fit, with the candidates at null.
+        fields: of each parameter, the last part of its name.
+        raw: its normal equations.
+        study: the same with the fit's parameters projected out.
+        groups: columns of each candidate, by its text.
+        dependences: curves, and the columns of each.
+        episodes: (B,) the episode that each block is of.
+    """
+
+    here: Linearisation
+    fields: tuple[str, ...]
+    raw: Study
+    study: Study
+    groups: Mapping[str, Columns]
+    dependences: Sequence[tuple[Dependence, Columns]]
+    episodes: NDArray[np.int64]
+
+    def of_effects(self, sets: Sequence[tuple[Candidate, ...]]) -> list[Evidence]:
+        """Returns the evidence for sets of candidates, the best first."""
+        columns = [np.concatenate([self.groups[c.text] for c in s]) for s in sets]
+        return evidence(
+            self.study, [(s, c) for s, c in zip(sets, columns, strict=True) if len(c)]
+        )
+
+    def of_dependences(self) -> list[Evidence]:
+        """Returns the evidence for curves, the best first."""
+        return evidence(self.study, self.dependences)
+
+    def pairs(self, singles: Sequence[Evidence]) -> list[Evidence]:
+        """Returns pairs of the best that pass: some effects show only together."""
+        promising: dict[str, Candidate] = {}
+        for one in singles:
+            assert isinstance(one.what, tuple)
+            if len(one.what) > 1:
+                continue
+            promising.setdefault(one.what[0].name, one.what[0])
+        best = list(promising.values())[:_PAIRS_OF]
+        pairs = list(itertools.combinations(best, 2))
+        return [e for e in self.of_effects(pairs) if e.accepted]
+
+    def pruned(self, added: Sequence[Candidate]) -> list[Candidate]:
+        """Returns effects with only those sizes free that blocks get better by."""
+        kept = [int(c) for candidate in added for c in self.groups[candidate.text]]
+        now = self.study.losses(np.array(kept)).sum()
+        while len(kept) > 1:
+            losses = {
+                c: self.study.losses(np.array([k for k in kept if k != c])).sum()
+                for c in kept
+            }
+            least = min(losses, key=lambda c: losses[c])
+            if losses[least] > (1.0 + _LEAST_FIELD) * now:
+                break
+            kept.remove(least)
+            now = losses[least]
+        found = []
+        for candidate in added:
+            own = [c for c in self.groups[candidate.text] if c in kept]
+            if own:
+                found.append(candidate.only([self.fields[c] for c in own]))
+        return found
+
+
+def evidence(study: Study, columns: Sequence[tuple[What, Columns]]) -> list[Evidence]:
+    """Returns the evidence for groups of columns, the highest gain first."""
+    if not columns:
+        return []
+    gains = np.array([study.energy - study.losses(group) for _, group in columns]).T
+    p, total = family_p(gains), study.energy.sum()
+    found = [
+        Evidence(
+            what,
+            float(gains[:, i].sum() / total),
+            float(p[i]),
+            float(np.mean(gains[:, i] > 0.0)),
+            len(group) + _shape_count(what),
+            gains[:, i],
+        )
+        for i, (what, group) in enumerate(columns)
+    ]
+    return sorted(found, key=lambda each: -each.gain)
+
+
+def simplest(accepted: Sequence[Evidence]) -> Evidence:
+    """Returns the one with the fewest parameters of those as good as the best."""
+    best = accepted[0]
+    enough = (1.0 - _SIMPLER) * best.gain
+    as_good = [e for e in accepted if e.gain >= enough]
+    return min(as_good, key=lambda e: (e.cost, -e.gain))
+
+
+def together(library: Sequence[Candidate]) -> list[tuple[Candidate, ...]]:
+    """Returns what acts alike at several joints: what one joint has, others may.
+
+    An arm that lacks friction at one joint lacks it at the others, and one alone would
+    take up what the others lack through the rigid bodies in between.
+    """
+    alike: dict[str, list[Candidate]] = {}
+    for candidate in library:
+        alike.setdefault(_kind_text(candidate), []).append(candidate)
+    return [tuple(group) for group in alike.values() if len(group) > 1]
+
+
+def _kind_text(candidate: Candidate) -> str:
+    """Returns the effect and its shape, whatever its joint."""
+    kind = type(candidate.effect).__name__
+    return candidate.text.replace(candidate.name, kind)
+
+
+def _shape_count(what: What) -> int:
+    return 0 if isinstance(what, Dependence) else sum(len(c.shape) for c in what)
