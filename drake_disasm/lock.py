@@ -112,7 +112,7 @@ def add_lock(
 ) -> Lock:
     """Adds groove (welded to a movable frame in Gn) and bolt (free) to the plant."""
     frame = plant.AddFrame(FixedOffsetFrame("groove_pose", frame_Gn, RigidTransform()))
-    nominal = nominal_environment(contact)
+    nominal = nominal_environment(lock, contact)
     groove = plant.AddRigidBody(
         "groove", plant.AddModelInstance("lock"), _groove_inertia(lock)
     )
@@ -127,7 +127,7 @@ def add_lock(
     )
 
 
-def nominal_environment(contact: ContactConfig) -> Environment:
+def nominal_environment(lock: LockConfig, contact: ContactConfig) -> Environment:
     """Returns the environment that a scenario denotes before effects."""
     return Environment(
         X_GnG=RigidTransform(),
@@ -135,6 +135,9 @@ def nominal_environment(contact: ContactConfig) -> Environment:
         modulus=contact.modulus,
         head_modulus=contact.head_modulus,
         dissipation=contact.dissipation,
+        clearance=lock.clearance,
+        impact_stiffness=contact.impact.stiffness,
+        impact_exponent=contact.impact.exponent,
     )
 
 
@@ -168,8 +171,14 @@ def set_environment(
     scene_graph: SceneGraph,
     scene_graph_context: Context,
 ) -> None:
-    """Writes the environment into plant's and scene graph's Contexts."""
+    """Writes the environment into plant's and scene graph's Contexts.
+
+    A clearance that is not the lock's own stays in the scene graph's Context.
+    """
     lock.frame.SetPoseInParentFrame(plant_context, environment.X_GnG)
+    if environment.clearance != lock.config.clearance:
+        config = dataclasses.replace(lock.config, clearance=environment.clearance)
+        reshape_groove(lock, config, scene_graph, scene_graph_context)
     source = lock.groove.GetParentPlant().get_source_id()
     materials = _bolt_materials(environment, lock.config, lock.resolution)
     groove = _groove_material(environment)

@@ -61,12 +61,18 @@ class Objective:
         """
         thetas = np.atleast_2d(thetas)
         chunks = self.model.chunks()
-        work = [(theta, rows) for theta in thetas for rows in chunks]
-        parts = self._workers.predict(self.model, work)
+        _, first, which = np.unique(
+            thetas[:, self.model.simulated],
+            axis=0,
+            return_index=True,
+            return_inverse=True,
+        )
+        work = [(thetas[i], rows) for i in first for rows in chunks]
+        parts = self._workers.simulate(self.model, work)
         self.evaluations += len(thetas)
         return [
             self._weighted(theta, parts[i * len(chunks) : (i + 1) * len(chunks)])
-            for i, theta in enumerate(thetas)
+            for theta, i in zip(thetas, which.reshape(-1), strict=True)
         ]
 
     def predictions(self, theta: Array) -> Array:
@@ -85,13 +91,15 @@ class Objective:
 
     def _weighted(self, theta: Array, parts: Sequence[Array | str]) -> Array:
         measured = self.model.measurements
-        predicted: list[Array] = []
+        simulated: list[Array] = []
         for part in parts:
             if isinstance(part, str):
                 self.failures.append((theta, part))
                 return np.full(measured.values.shape, FAILED_RESIDUAL)
-            predicted.append(part)
-        residual = (np.concatenate(predicted) - measured.values) / measured.noise
+            simulated.append(part)
+        whole = slice(0, measured.rows)
+        predicted = self.model.read(theta, whole, np.concatenate(simulated))
+        residual = (predicted - measured.values) / measured.noise
         return np.clip(residual, -FAILED_RESIDUAL, FAILED_RESIDUAL)
 
 

@@ -47,13 +47,13 @@ class Workers:
         self._executor: Executor | None = None
         self.notes: list[str] = []
 
-    def predict(
+    def simulate(
         self, model: LogModel, work: Sequence[tuple[Array, slice]]
     ) -> list[Array | str]:
-        """Returns predictions, or why there is none, in the order of the work.
+        """Returns simulations, or why there is none, in the order of the work.
 
         Args:
-            model: predicts.
+            model: simulates.
             work: parameters (p,) and rows of each piece.
 
         Raises:
@@ -87,7 +87,7 @@ class Workers:
             assert self._make is not None
             self._executor = self._make()
         futures = [
-            self._executor.submit(_predict, key, payload, theta, rows)
+            self._executor.submit(_simulate, key, payload, theta, rows)
             for theta, rows in work
         ]
         return [future.result() for future in futures]
@@ -125,20 +125,20 @@ def _leave_with_parent() -> None:
         os._exit(1)
 
 
-def _predict(key: str, payload: bytes, theta: Array, rows: slice) -> Array | str:
-    """Returns what this worker's copy of a model predicts."""
+def _simulate(key: str, payload: bytes, theta: Array, rows: slice) -> Array | str:
+    """Returns what this worker's copy of a model simulates."""
     return _outcome(_model(key, payload), theta, rows)
 
 
 def _outcome(model: LogModel, theta: Array, rows: slice) -> Array | str:
-    """Returns what the model predicts for the rows, or why it can't."""
+    """Returns what the model simulates for the rows, or why it can't."""
     try:
-        prediction = model.predict(theta, rows)
+        simulated = model.simulate(theta, rows)
     except PredictionError as error:
         return str(error)
-    if not np.isfinite(prediction).all():
+    if not np.isfinite(simulated).all():
         return "the prediction is not finite"
-    return prediction
+    return simulated
 
 
 def _model(key: str, payload: bytes) -> LogModel:

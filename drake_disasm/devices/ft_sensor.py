@@ -1,5 +1,6 @@
 """The force/torque sensor, as the simulated stations carry it."""
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -7,13 +8,48 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.tree import BodyIndex, JointIndex
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiscreteValues,
+    EventStatus,
+    LeafSystem,
+)
 
-from drake_disasm.effects import Sensing, SensorEffect
+from drake_disasm.effects import Sensing, SensorEffect, SensorMemoryEffect
+from drake_disasm.errors import DisasmError
 from drake_disasm.ports import Health
 from drake_disasm.scenario import SensorConfig
 from drake_disasm.spatial import wrench_from_spatial_force
 from drake_disasm.timing import newest_step
+
+#: For how many effects with a memory a sensor has room.
+MOST_MEMORIES = 4
+
+
+@dataclasses.dataclass(frozen=True)
+class Payload:
+    """What is known to hang on the sensor.
+
+    Attributes:
+        mass: [kg].
+        p_SoScm_S: (3,) its centre of mass [m].
+        g_W: gravity (3,) [m/s^2].
+    """
+
+    mass: float
+    p_SoScm_S: np.ndarray
+    g_W: np.ndarray
+
+    def sensing(self, time: np.ndarray, R_WS: np.ndarray) -> Sensing:
+        """Returns the circumstances of readings.
+
+        Args:
+            time: (...,) [s].
+            R_WS: (..., 3, 3) orientations of the sensor.
+        """
+        x, y, z = self.p_SoScm_S
+        return Sensing(time, R_WS, self.g_W, self.mass, (x, y, z))
 
 
 class ForceTorqueSensor(LeafSystem):
@@ -40,7 +76,7 @@ class ForceTorqueSensor(LeafSystem):
         config: noise and quantum per channel.
         joint: the joint whose reaction is read, its child frame being S.
         body: a body that S is fixed to, and X_BodyS its pose there.
-        g_W: gravity (3,) [m/s^2].
+        payload: that hangs on the sensor.
         time_step: of the plant whose reaction is read [s].
     """
 
@@ -50,13 +86,13 @@ class ForceTorqueSensor(LeafSystem):
         joint: JointIndex,
         body: BodyIndex,
         X_BodyS: RigidTransform,
-        g_W: np.ndarray,
+        payload: Payload,
         time_step: float,
     ) -> None:
         super().__init__()
         self._noise, self._quantum = np.array(config.noise), np.array(config.quantum)
         self._joint, self._body = int(joint), int(body)
-        self._R_BodyS, self._g_W = X_BodyS.rotation(), g_W
+        self._R_BodyS, self._payload = X_BodyS.rotation(), payload
         self._time_step = time_step
         self._effects = self.DeclareAbstractParameter(Value[object](()))
         self._reaction = self.DeclareAbstractInputPort(
@@ -66,6 +102,9 @@ class ForceTorqueSensor(LeafSystem):
             "body_poses", Value[list[RigidTransform]]()
         )
         self._noise_port = self.DeclareVectorInputPort("noise", 6)
+        self._memory = self.DeclareDiscreteState(6 * MOST_MEMORIES)
+        self._remembered = self.DeclareDiscreteState([np.nan])  # when [s]
+        self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._update)
         self._declare_outputs()
 
     def _declare_outputs(self) -> None:
@@ -80,6 +119,7 @@ class ForceTorqueSensor(LeafSystem):
                 reaction,
                 self._poses.ticket(),
                 self._noise_port.ticket(),
+                self.xd_ticket(),
                 self.all_parameters_ticket(),
             },
         )
@@ -89,7 +129,16 @@ class ForceTorqueSensor(LeafSystem):
         self.DeclareVectorOutputPort("time_measured", 1, self._calc_time)
 
     def set_effects(self, context: Context, effects: Sequence[SensorEffect]) -> None:
-        """Puts the effects, in their order, into this system's Context."""
+        """Puts the effects, in their order, into this system's Context.
+
+        Raises:
+            DisasmError: more of them have a memory than the sensor has room for.
+        """
+        if sum(isinstance(e, SensorMemoryEffect) for e in effects) > MOST_MEMORIES:
+            raise DisasmError(
+                f"effects: more than {MOST_MEMORIES} of the sensor's have a memory; "
+                "take some out"
+            )
         parameter = context.get_mutable_abstract_parameter(self._effects)
         parameter.set_value(tuple(effects))
 
@@ -99,25 +148,44 @@ class ForceTorqueSensor(LeafSystem):
         Whenever it is taken, zeroing is time 0 for the effects: the episode begins.
         """
         effects = [e for e in self.effects(context) if e.present_at_zeroing]
-        return self._through(context, effects, time=0.0)
+        sensing = self._sensing(context, 0.0)
+        return sensed(self._load(context), effects, sensing)
 
     def effects(self, context: Context) -> Sequence[SensorEffect]:
         """Returns what `set_effects` put there."""
         return context.get_abstract_parameter(self._effects).get_value()
 
-    def _through(
-        self, context: Context, effects: Sequence[SensorEffect], time: float
-    ) -> np.ndarray:
-        load = -wrench_from_spatial_force(self._reaction.Eval(context)[self._joint])
-        if not effects:
-            return load
+    def _load(self, context: Context) -> np.ndarray:
+        """Returns the load on the sensor (6,) at So in S."""
+        return -wrench_from_spatial_force(self._reaction.Eval(context)[self._joint])
+
+    def _sensing(self, context: Context, time: float) -> Sensing:
         R_WBody = self._poses.Eval(context)[self._body].rotation()
-        R_WS = (R_WBody @ self._R_BodyS).matrix()
-        return sensed(load, effects, Sensing(np.array(time), R_WS, self._g_W))
+        return self._payload.sensing(np.array(time), (R_WBody @ self._R_BodyS).matrix())
+
+    def _chain(self, context: Context, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the reading (6,) without noise, and the memories (k, 6) up to now."""
+        load, effects = self._load(context), self.effects(context)
+        memories = context.get_discrete_state(self._memory).value().reshape(-1, 6)
+        if not effects:
+            return load, memories
+        interval = time - context.get_discrete_state(self._remembered).value()[0]
+        if np.isnan(interval):
+            memories = np.full_like(memories, np.nan)
+        sensing = self._sensing(context, time)
+        return through_chain(load, effects, sensing, memories, max(interval, 0.0))
+
+    def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
+        if not any(isinstance(e, SensorMemoryEffect) for e in self.effects(context)):
+            return EventStatus.DidNothing()
+        time = self._sample_time(context)
+        _, memories = self._chain(context, time)
+        state.set_value(self._memory, memories.reshape(-1))
+        state.set_value(self._remembered, [time])
+        return EventStatus.Succeeded()
 
     def _calc_wrench(self, context: Context, output: BasicVector) -> None:
-        effects = self.effects(context)
-        wrench = self._through(context, effects, self._sample_time(context))
+        wrench, _ = self._chain(context, self._sample_time(context))
         wrench = wrench + self._noise * self._noise_port.Eval(context)
         output.SetFromVector(quantise(wrench, self._quantum))
 
@@ -138,8 +206,40 @@ def sensed(
 ) -> np.ndarray:
     """Returns what a sensor with effects reads of loads, (..., 6) [f; tau] in S."""
     for effect in effects:
+        sensing = effect.circumstances(sensing)
         load = effect.apply(load, sensing)
     return load
+
+
+def through_chain(
+    load: np.ndarray,
+    effects: Sequence[SensorEffect],
+    sensing: Sensing,
+    memories: np.ndarray,
+    interval: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns what a sensor with memory reads, (..., 6), and remembers, (k, ..., 6).
+
+    Args:
+        load: (..., 6) [f; tau] in S.
+        effects: in the order of the chain.
+        sensing: of the loads.
+        memories: (k, ..., 6) of the sample before, one for each effect that has one,
+            and maybe more; NaN where there was none.
+        interval: since then [s].
+    """
+    memories, number = np.array(memories), 0
+    for effect in effects:
+        sensing = effect.circumstances(sensing)
+        if isinstance(effect, SensorMemoryEffect):
+            before = memories[number]
+            before = np.where(np.isnan(before), effect.begin(load), before)
+            memories[number] = effect.remember(before, load, interval)
+            load = effect.read(load, memories[number])
+            number += 1
+        else:
+            load = effect.apply(load, sensing)
+    return load, memories
 
 
 def quantise(values: np.ndarray, quantum: np.ndarray) -> np.ndarray:

@@ -9,38 +9,78 @@ from drake_disasm.effects.arm.torque_gain import TorqueGain
 from drake_disasm.effects.arm.torque_offset import TorqueOffset
 from drake_disasm.effects.arm.viscous_friction import JointViscousFriction
 from drake_disasm.effects.base import (
+    AT_REST,
     ArmEffect,
+    BoltMotion,
     Effect,
     Environment,
     EnvironmentEffect,
     JointSamples,
+    MotionEffect,
     Sensing,
     SensorEffect,
+    SensorMemoryEffect,
+    environment_at,
+    motion_chain,
     sensor_chain,
     shapes,
     sizes,
 )
+from drake_disasm.effects.environment.chain_pull import ChainPull
+from drake_disasm.effects.environment.contact_exponent import ContactExponent
+from drake_disasm.effects.environment.contact_stiffness import ContactStiffness
+from drake_disasm.effects.environment.groove_bend import GrooveBend
+from drake_disasm.effects.environment.groove_clearance import GrooveClearance
 from drake_disasm.effects.environment.groove_friction import GrooveFriction
 from drake_disasm.effects.environment.groove_pose import GroovePose
+from drake_disasm.effects.environment.rusty_patch import RustyPatch
+from drake_disasm.effects.environment.stribeck_friction import GrooveStribeckFriction
+from drake_disasm.effects.environment.viscous_friction import GrooveViscousFriction
+from drake_disasm.effects.motion.backlash import Backlash
+from drake_disasm.effects.motion.command_gain import CommandGain
+from drake_disasm.effects.motion.compliance import Compliance
+from drake_disasm.effects.motion.lag import MotionLag
+from drake_disasm.effects.motion.slip import BoltSlip
+from drake_disasm.effects.sensor.base_tilt import BaseTilt
 from drake_disasm.effects.sensor.bias import SensorBias
 from drake_disasm.effects.sensor.cross_talk import SensorCrossTalk
 from drake_disasm.effects.sensor.drift import SensorDrift
 from drake_disasm.effects.sensor.gain import SensorGain
+from drake_disasm.effects.sensor.hysteresis import SensorHysteresis
+from drake_disasm.effects.sensor.lag import SensorLag
 from drake_disasm.effects.sensor.mounting import SensorMounting
 from drake_disasm.effects.sensor.payload_error import PayloadError
+from drake_disasm.effects.sensor.saturation import SensorSaturation
 from drake_disasm.effects.sensor.warm_up import SensorWarmUp
 
 #: Every effect that a scenario may name, in the order of the documentation.
 EFFECTS: tuple[type[Effect], ...] = (
     GroovePose,
+    GrooveBend,
+    GrooveClearance,
     GrooveFriction,
+    GrooveViscousFriction,
+    GrooveStribeckFriction,
+    RustyPatch,
+    ContactStiffness,
+    ContactExponent,
+    ChainPull,
+    CommandGain,
+    MotionLag,
+    Backlash,
+    Compliance,
+    BoltSlip,
     SensorBias,
     SensorDrift,
     SensorWarmUp,
     SensorGain,
     SensorCrossTalk,
+    SensorLag,
+    SensorHysteresis,
+    SensorSaturation,
     SensorMounting,
     PayloadError,
+    BaseTilt,
     JointViscousFriction,
     JointCoulombFriction,
     JointStribeckFriction,
@@ -52,31 +92,54 @@ EFFECTS: tuple[type[Effect], ...] = (
 )
 
 __all__ = [
+    "AT_REST",
     "EFFECTS",
     "ArmEffect",
+    "Backlash",
+    "BaseTilt",
+    "BoltMotion",
+    "BoltSlip",
+    "ChainPull",
+    "CommandGain",
+    "Compliance",
+    "ContactExponent",
+    "ContactStiffness",
     "Effect",
     "Environment",
     "EnvironmentEffect",
+    "GrooveBend",
+    "GrooveClearance",
     "GrooveFriction",
     "GroovePose",
+    "GrooveStribeckFriction",
+    "GrooveViscousFriction",
     "JointAsymmetricFriction",
     "JointCoulombFriction",
     "JointLoadFriction",
     "JointSamples",
     "JointStribeckFriction",
     "JointViscousFriction",
+    "MotionEffect",
+    "MotionLag",
     "PayloadError",
     "RotorInertia",
+    "RustyPatch",
     "Sensing",
     "SensorBias",
     "SensorCrossTalk",
     "SensorDrift",
     "SensorEffect",
     "SensorGain",
+    "SensorHysteresis",
+    "SensorLag",
+    "SensorMemoryEffect",
     "SensorMounting",
+    "SensorSaturation",
     "SensorWarmUp",
     "TorqueGain",
     "TorqueOffset",
+    "environment_at",
+    "motion_chain",
     "sensor_chain",
     "shapes",
     "sizes",

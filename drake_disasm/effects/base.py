@@ -20,6 +20,9 @@ from pydrake.math import RigidTransform
 
 from drake_disasm.quantity import quantity
 
+#: What an effect remembers from one step to the next: six numbers.
+Memory = np.ndarray
+
 
 def parameter(unit: str, low: float, high: float, doc: str) -> Any:
     """Returns a field of an effect; its default and null value is zero."""
@@ -62,6 +65,10 @@ class Environment:
         friction: Coulomb coefficient between bolt and groove (static = dynamic).
         modulus, head_modulus: hydroelastic moduli of the bolt's neck and head [Pa].
         dissipation: Hunt-Crossley dissipation of the contact [s/m].
+        clearance: slot width minus neck diameter [m].
+        impact_stiffness, impact_exponent: IMPACT's k [N/mm^e] and e.
+        force_Gn: (fx, fy, fz) that pulls on the bolt at Bo beside the contact, in
+            Gn [N].
     """
 
     X_GnG: RigidTransform
@@ -69,6 +76,29 @@ class Environment:
     modulus: float
     head_modulus: float
     dissipation: float
+    clearance: float
+    impact_stiffness: float
+    impact_exponent: float
+    force_Gn: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class BoltMotion:
+    """Where the bolt is, and how fast it is to go: what its surroundings depend on.
+
+    It is that of the beginning of a step of the MDP, and holds for the whole step.
+
+    Attributes:
+        p: (3,) Bo in Gn [m].
+        v: (3,) its commanded velocity in Gn [m/s].
+    """
+
+    p: np.ndarray
+    v: np.ndarray
+
+
+#: As an episode begins: at A, at rest.
+AT_REST = BoltMotion(np.zeros(3), np.zeros(3))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,11 +111,15 @@ class Sensing:
         time: (...,) seconds since the episode (or the log) began.
         R_WS: (..., 3, 3) orientation of the sensor in the world.
         g_W: gravity vector, (3,) [m/s^2].
+        mass: of what is known to hang on the sensor [kg].
+        p_SoScm_S: (3,) its centre of mass [m].
     """
 
     time: np.ndarray
     R_WS: np.ndarray
     g_W: np.ndarray
+    mass: float = 0.0
+    p_SoScm_S: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def g_S(self) -> np.ndarray:
@@ -100,9 +134,36 @@ class Effect:
 class EnvironmentEffect(Effect, abc.ABC):
     """Acts on the world around the bolt."""
 
+    #: Whether it depends on where the bolt is or how fast it goes.
+    is_local: bool = False
+
     @abc.abstractmethod
-    def apply(self, environment: Environment) -> Environment:
+    def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Returns the environment with this effect in it."""
+
+
+class MotionEffect(Effect, abc.ABC):
+    """Acts between the pose that is commanded and the one that the arm goes for.
+
+    Both are displacements from the start, (6,) position and rotation vector of B in
+    G, at the boundaries of the MDP's steps; between them the arm moves evenly.
+    """
+
+    #: Where on the way: 0 scale, 1 time, 2 gears, 3 what yields.
+    stage: int = 0
+
+    @abc.abstractmethod
+    def execute(
+        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
+    ) -> tuple[np.ndarray, Memory]:
+        """Returns what is executed (6,), and what to remember for the next step.
+
+        Args:
+            commanded: (6,) for the end of the step [m, rad].
+            wrench: (6,) [f; tau] on the bolt at Bo in G, measured at its beginning.
+            memory: (6,) of the step before; zeros at first.
+            period: of the MDP [s].
+        """
 
 
 class SensorEffect(Effect, abc.ABC):
@@ -125,6 +186,42 @@ class SensorEffect(Effect, abc.ABC):
             wrench_S: (..., 6) [f; tau] the load on the sensor at So in S [N, N m].
             sensing: time and orientation of the readings.
         """
+
+    def circumstances(self, sensing: Sensing) -> Sensing:
+        """Returns the circumstances that later effects see; the same for most."""
+        return sensing
+
+
+class SensorMemoryEffect(SensorEffect, abc.ABC):
+    """A sensor effect that depends on what was there before.
+
+    A sensor goes from sample to sample: `remember`, then `read`. Readings at rest know
+    nothing of it.
+    """
+
+    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+        """Returns the readings as they are after long rest."""
+        return wrench_S
+
+    @abc.abstractmethod
+    def begin(self, wrench_S: np.ndarray) -> np.ndarray:
+        """Returns the memory (..., 6) after long rest under a load (..., 6)."""
+
+    @abc.abstractmethod
+    def remember(
+        self, memory: np.ndarray, wrench_S: np.ndarray, interval: float
+    ) -> np.ndarray:
+        """Returns the memory (..., 6) after a load (..., 6) that held for an interval.
+
+        Args:
+            memory: (..., 6) before.
+            wrench_S: (..., 6) the load now.
+            interval: since the sample before [s].
+        """
+
+    @abc.abstractmethod
+    def read(self, wrench_S: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """Returns the reading (..., 6) of a load with the memory up to now."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -154,6 +251,22 @@ class ArmEffect(Effect, abc.ABC):
     @abc.abstractmethod
     def torque(self, samples: JointSamples) -> np.ndarray:
         """Returns what the measured torque has beside the rigid bodies', (n,) [N m]."""
+
+
+def motion_chain(effects: Sequence[Effect]) -> tuple[MotionEffect, ...]:
+    """Returns the effects on the motion in the order in which they act."""
+    chosen = [effect for effect in effects if isinstance(effect, MotionEffect)]
+    return tuple(sorted(chosen, key=lambda effect: effect.stage))
+
+
+def environment_at(
+    nominal: Environment, effects: Sequence[Effect], bolt: BoltMotion = AT_REST
+) -> Environment:
+    """Returns the environment with the effects in it, in the scenario's order."""
+    for effect in effects:
+        if isinstance(effect, EnvironmentEffect):
+            nominal = effect.apply(nominal, bolt)
+    return nominal
 
 
 def joint_name() -> Any:

@@ -2,7 +2,12 @@
 
 from drake_disasm.impact.law import ImpactLaw
 from drake_disasm.impact.shape import Contacts, LockShape
-from drake_disasm.impact.step import ImpactConditions, ImpactStep, turning
+from drake_disasm.impact.step import (
+    ImpactConditions,
+    ImpactStep,
+    Surroundings,
+    turning,
+)
 
 __all__ = [
     "Contacts",
@@ -10,5 +15,6 @@ __all__ = [
     "ImpactLaw",
     "ImpactStep",
     "LockShape",
+    "Surroundings",
     "turning",
 ]

@@ -1,11 +1,13 @@
 """One step of the twin with IMPACT contact, for many states at once."""
 
 import dataclasses
+from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
-from pydrake.math import RigidTransform
 from scipy.spatial.transform import Rotation
 
+from drake_disasm.effects import Environment
 from drake_disasm.impact.law import ImpactLaw
 from drake_disasm.impact.shape import LockShape
 
@@ -16,22 +18,55 @@ _STICTION = 1e-4  # m/s: creep at which friction is three quarters
 
 
 @dataclasses.dataclass(frozen=True)
+class Surroundings:
+    """What may differ from state to state; m is their number, or 1 for all alike.
+
+    Attributes:
+        friction: (m,) Coulomb coefficient.
+        R_GnG, p_GnG: (m, 3, 3), (m, 3) the true groove in the nominal frame.
+        f_Gn: (m, 3) what pulls on the bolt at Bo beside the contact, in Gn [N].
+    """
+
+    friction: np.ndarray
+    R_GnG: np.ndarray
+    p_GnG: np.ndarray
+    f_Gn: np.ndarray
+
+    @classmethod
+    def of(cls, environments: Sequence[Environment]) -> Self:
+        """Returns those of environments, one for each state or one for all."""
+        return cls(
+            np.array([e.friction for e in environments]),
+            np.array([e.X_GnG.rotation().matrix() for e in environments]),
+            np.array([e.X_GnG.translation() for e in environments]),
+            np.array([e.force_Gn for e in environments]),
+        )
+
+    def spread(self, count: int) -> Self:
+        """Returns the same for each of `count` states."""
+        return type(self)(
+            *(
+                np.broadcast_to(value, (count, *value.shape[1:]))
+                for value in (self.friction, self.R_GnG, self.p_GnG, self.f_Gn)
+            )
+        )
+
+
+@dataclasses.dataclass(frozen=True)
 class ImpactConditions:
     """All that the contact depends on beside the state.
 
     Attributes:
         law: of the normal force.
         shape: of the lock.
-        friction: Coulomb coefficient.
-        X_GnG: the true groove in the nominal frame.
+        around: what may differ from state to state.
         M: (6, 6) mass matrix of the twin's joints, at their zero.
         K, D: (6,) their stiffness and damping.
     """
 
     law: ImpactLaw
     shape: LockShape
-    friction: float
-    X_GnG: RigidTransform
+    around: Surroundings
     M: np.ndarray
     K: np.ndarray
     D: np.ndarray
@@ -93,7 +128,9 @@ class ImpactStep:
         c = self._c = conditions
         self._h = h
         self._A = c.M + np.diag(h * c.D + h**2 * c.K)
+        self._around = c.around.spread(len(q))
         pull = c.K * (qd - q) + c.D * vd
+        pull[:, :3] += self._around.f_Gn
         self._b = _times(c.M, v) + h * pull
         self.E, R_GnB = turning(q[:, 3:])
         self._place(R_GnB, q[:, :3])
@@ -152,26 +189,26 @@ class ImpactStep:
 
     def _place(self, R_GnB: np.ndarray, p_GnBo: np.ndarray) -> None:
         """Finds the places that could touch, and their Jacobians."""
-        R_GnG = self._c.X_GnG.rotation().matrix()
-        p_GBo = _times(R_GnG.T, p_GnBo - self._c.X_GnG.translation())
-        found = self._c.shape.contacts(np.einsum("ji,njk->nik", R_GnG, R_GnB), p_GBo)
+        R_GnG = self._around.R_GnG
+        p_GBo = np.einsum("nji,nj->ni", R_GnG, p_GnBo - self._around.p_GnG)
+        found = self._c.shape.contacts(np.einsum("nji,njk->nik", R_GnG, R_GnB), p_GBo)
         self._p = found.penetration
-        self._n = found.normal @ R_GnG.T
-        self._arm = _times(R_GnG, found.arm)
+        self._n = np.einsum("nij,kj->nki", R_GnG, found.normal)
+        self._arm = np.einsum("nij,nkj->nki", R_GnG, found.arm)
         lever = np.cross(self._arm, self._n)
         turn = np.einsum("nki,nij->nkj", lever, self.E)
-        push = np.broadcast_to(self._n, turn.shape)
-        self._Jn = np.concatenate([push, turn], axis=2)
+        self._Jn = np.concatenate([self._n, turn], axis=2)
 
     def _balance(self, rows: np.ndarray, v: np.ndarray) -> _Balance:
         """Returns the balance of some states, at v+ = v (m, 6)."""
-        h, mu = self._h, self._c.friction
+        h = self._h
         rate = -np.einsum("nkj,nj->nk", self._Jn[rows], v)
         depth = self._p[rows] + h * rate
         state, place = np.nonzero(depth > 0.0)  # a pair is a touching place
         F, kp, kd = self._c.law.force_and_slopes(
             depth[state, place], rate[state, place]
         )
+        mu = self._around.friction[rows[state]]
         Jn = self._Jn[rows[state], place]
         Jt = self._tangent(rows[state], place, Jn)
         slip = np.einsum("nij,nj->ni", Jt, v[state])
@@ -182,7 +219,7 @@ class ImpactStep:
         turning = np.einsum("ni,nij->nj", along, Jt)
         d_slip = Jt - along[:, :, None] * turning[:, None, :]
         rubbing = drag[:, None, None] * d_slip
-        rubbing += mu * along[:, :, None] * dF[:, None, :]
+        rubbing += (mu[:, None] * along)[:, :, None] * dF[:, None, :]
         dQ = Jn[:, :, None] * dF[:, None, :] - Jt.swapaxes(1, 2) @ rubbing
         total, slope = (_sums(part, state, len(rows)) for part in (Q, dQ))
         r = _times(self._A, v) - self._b[rows] - h * total
@@ -195,7 +232,7 @@ class ImpactStep:
         J = np.empty((len(row), 3, 6))
         J[:, :, :3] = np.eye(3)
         J[:, :, 3:] = -_skew(self._arm[row, place]) @ self.E[row]
-        return J - self._n[place][:, :, None] * Jn[:, None, :]
+        return J - self._n[row, place][:, :, None] * Jn[:, None, :]
 
 
 def turning(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

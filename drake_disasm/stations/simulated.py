@@ -20,23 +20,27 @@ from pydrake.systems.framework import (
     Diagram,
     DiagramBuilder,
     LeafSystem,
+    OutputPort,
     System,
 )
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
 from drake_disasm.coordinates import Coordinates
-from drake_disasm.devices.ft_sensor import ForceTorqueSensor
+from drake_disasm.devices.ft_sensor import ForceTorqueSensor, Payload
 from drake_disasm.effects import (
     ArmEffect,
+    BoltMotion,
     Effect,
     Environment,
     EnvironmentEffect,
+    environment_at,
     sensor_chain,
 )
 from drake_disasm.errors import DisasmError
 from drake_disasm.lock import Lock, set_environment
 from drake_disasm.ports import Health, Port, check_ports
 from drake_disasm.scenario import PlacementConfig, Scenario, validate
+from drake_disasm.systems.outside_force import OutsideForce
 from drake_disasm.timing import newest_step
 
 
@@ -121,7 +125,7 @@ class SimulatedStation(Station):
                 joint.index(),
                 frame_S.body().index(),
                 frame_S.GetFixedPoseInBodyFrame(),
-                plant.gravity_field().gravity_vector(),
+                self.payload,
                 self.time_step,
             ),
         )
@@ -142,6 +146,12 @@ class SimulatedStation(Station):
             builder.ExportOutput(
                 self.sensor.GetOutputPort(quantity), f"ft_sensor.{quantity}"
             )
+
+    @property
+    def payload(self) -> Payload:
+        """What is known to hang on the sensor."""
+        g_W = self.plant.gravity_field().gravity_vector()
+        return Payload(self.payload_mass, self.p_SoScm_S, g_W)
 
     def _add_ready_device(self, builder: DiagramBuilder, name: str) -> None:
         """Exports health and sample time of a device that never fails."""
@@ -167,32 +177,66 @@ class SimulatedStation(Station):
         check_ports(self, self.table)
 
     def _wire_applied_forces(self, builder: DiagramBuilder) -> None:
-        """Exports the input for forces from outside."""
+        """Exports the input for forces from outside; adds what pulls on the bolt."""
+        self.outside_force = builder.AddNamedSystem(
+            "outside_force",
+            OutsideForce(self.lock.bolt.index(), self.X_WG.rotation()),
+        )
+        outside = self.outside_force.GetInputPort("applied_spatial_force")
+        builder.ExportInput(outside, "applied_spatial_force")
+        self._apply_forces(builder, self.outside_force.get_output_port())
+
+    def _apply_forces(self, builder: DiagramBuilder, forces: OutputPort) -> None:
+        """Connects what pulls on the bolt to the plant."""
         applied = self.plant.get_applied_spatial_force_input_port()
-        builder.ExportInput(applied, "applied_spatial_force")
+        builder.Connect(forces, applied)
 
     def set_effects(self, context: Context, effects: Sequence[Effect]) -> None:
         """Puts effects into this station's Context; nothing is rebuilt.
 
         The bolt stays where it was: `settled` gives a state that fits them.
         """
-        environment = self.lock.nominal
-        for effect in effects:
-            if isinstance(effect, ArmEffect):
-                raise DisasmError(
-                    f"{type(effect).__name__}: acts on logs of joint torques; no "
-                    "simulated station carries it yet, take it out of effects"
-                )
-            if isinstance(effect, EnvironmentEffect):
-                environment = effect.apply(environment)
-        self._set_environment(context, environment)
+        arm = [effect for effect in effects if isinstance(effect, ArmEffect)]
+        self._set_arm_effects(context, arm)
+        self._set_environment(context, environment_at(self.lock.nominal, effects))
         self.sensor.set_effects(
             self.part_context(self.sensor, context),
             sensor_chain(effects),
         )
 
+    def follow(
+        self, context: Context, effects: Sequence[Effect], bolt: BoltMotion
+    ) -> None:
+        """Brings what depends on the bolt's motion up to date, if anything does.
+
+        Args:
+            context: this station's, in which `effects` are set.
+            effects: the same.
+            bolt: its motion in the step to come.
+        """
+        if any(isinstance(e, EnvironmentEffect) and e.is_local for e in effects):
+            environment = environment_at(self.lock.nominal, effects, bolt)
+            self._set_environment(context, environment)
+
+    def _set_arm_effects(self, context: Context, effects: Sequence[ArmEffect]) -> None:
+        """Puts effects on the arm's joints into this station's Context."""
+        for effect in effects:
+            raise DisasmError(
+                f"{type(effect).__name__}: acts on logs of joint torques; no "
+                "simulated station carries it yet, take it out of effects"
+            )
+
     def _set_environment(self, context: Context, environment: Environment) -> None:
         """Puts the world around the bolt into this station's Context."""
+        if environment.impact_exponent != self.lock.nominal.impact_exponent:
+            raise DisasmError(
+                "ContactExponent: hydroelastic contact has none; set contact.model to "
+                "impact, on the twin"
+            )
+        self.outside_force.set_force(
+            self.part_context(self.outside_force, context),
+            np.array(environment.force_Gn),
+        )
         set_environment(
             self.lock,
             environment,

@@ -16,7 +16,7 @@ from pydrake.multibody.tree import (
     RigidBody,
     SpatialInertia,
 )
-from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import (
     ConstantVectorSource,
     Demultiplexer,
@@ -26,7 +26,12 @@ from pydrake.systems.primitives import (
 from drake_disasm.coordinates import BoltCoordinates
 from drake_disasm.effects import Environment
 from drake_disasm.errors import DisasmError
-from drake_disasm.impact import ImpactConditions, ImpactLaw, LockShape
+from drake_disasm.impact import (
+    ImpactConditions,
+    ImpactLaw,
+    LockShape,
+    Surroundings,
+)
 from drake_disasm.lock import (
     GROOVE_FIELDS,
     add_lock,
@@ -121,7 +126,7 @@ class TwinStation(SimulatedStation):
         self.lock = dataclasses.replace(
             self.lock,
             config=scenario.lock,
-            nominal=nominal_environment(scenario.contact),
+            nominal=nominal_environment(scenario.lock, scenario.contact),
         )
         self._set_springs(scenario.twin, self.part_context(self.plant, context))
         self.set_effects(context, scenario.effects)
@@ -162,11 +167,11 @@ class TwinStation(SimulatedStation):
             actuator.SetRotorInertia(plant_context, _inertia(twin, axis))
             actuator.set_controller_gains(_gains(twin, axis))
 
-    def _wire_applied_forces(self, builder: DiagramBuilder) -> None:
-        """Sums forces from outside and IMPACT's, if that is the contact's model."""
+    def _apply_forces(self, builder: DiagramBuilder, forces: OutputPort) -> None:
+        """Adds IMPACT's force, if that is the contact's model."""
         self.impact: ImpactContact | None = None
         if self.scenario.contact.model == "hydroelastic":
-            super()._wire_applied_forces(builder)
+            super()._apply_forces(builder, forces)
             return
         self._part_bolt_and_groove()
         self.impact = builder.AddNamedSystem(
@@ -177,10 +182,8 @@ class TwinStation(SimulatedStation):
         builder.Connect(state, self.impact.GetInputPort("state"))
         desired = builder.GetSubsystemByName("desired_state").get_output_port()
         builder.Connect(desired, self.impact.GetInputPort("desired_state"))
-        outside = self.impact.GetInputPort("applied_spatial_force")
-        builder.ExportInput(outside, "applied_spatial_force")
-        applied = self.plant.get_applied_spatial_force_input_port()
-        builder.Connect(self.impact.get_output_port(), applied)
+        builder.Connect(forces, self.impact.GetInputPort("applied_spatial_force"))
+        super()._apply_forces(builder, self.impact.get_output_port())
 
     def _part_bolt_and_groove(self) -> None:
         """Leaves their contact to IMPACT."""
@@ -196,18 +199,27 @@ class TwinStation(SimulatedStation):
             super()._set_environment(context, environment)
             return
         plant_context = self.part_context(self.plant, context)
+        force_context = self.part_context(self.outside_force, context)
+        self.outside_force.set_force(force_context, np.array(environment.force_Gn))
         self.lock.frame.SetPoseInParentFrame(plant_context, environment.X_GnG)
         gains = [self._actuators[axis].get_controller_gains() for axis in _JOINT_ORDER]
         conditions = ImpactConditions(
-            law=ImpactLaw.of(self.scenario.contact.impact),
-            shape=LockShape(self.scenario.lock),
-            friction=environment.friction,
-            X_GnG=environment.X_GnG,
+            law=dataclasses.replace(
+                ImpactLaw.of(self.scenario.contact.impact),
+                stiffness=environment.impact_stiffness,
+                exponent=environment.impact_exponent,
+            ),
+            shape=self._shape(environment.clearance),
+            around=Surroundings.of([environment]),
             M=self._mass_matrix(plant_context),
             K=np.array([gain.p for gain in gains]),
             D=np.array([gain.d for gain in gains]),
         )
         self.impact.set_conditions(self.part_context(self.impact, context), conditions)
+
+    def _shape(self, clearance: float) -> LockShape:
+        """Returns the lock's shape with a clearance [m]."""
+        return LockShape(dataclasses.replace(self.scenario.lock, clearance=clearance))
 
     def _mass_matrix(self, plant_context: Context) -> np.ndarray:
         """Returns the joints' mass matrix at their zero."""

@@ -15,8 +15,9 @@ class ImpactContact(LeafSystem):
 
     The plant's step without contact is linear in the twin's six joints, so this system
     can foresee it: `ImpactStep` finds the force at the velocities after the step, and
-    with that force the plant arrives at them. Forces from outside (an optional port)
-    are passed on; the foresight leaves them out.
+    with that force the plant arrives at them. The conditions know the environment's
+    pull on the bolt; other forces from outside (an optional port) are passed on, and
+    the foresight leaves them out.
 
     @system
     name: ImpactContact

@@ -1,6 +1,9 @@
 """Integrates movement commands into a pose target, and that into coordinates."""
 
+from collections.abc import Sequence
+
 import numpy as np
+from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import (
     BasicVector,
@@ -11,12 +14,18 @@ from pydrake.systems.framework import (
 )
 
 from drake_disasm.coordinates import Coordinates
+from drake_disasm.effects import MotionEffect
+from drake_disasm.errors import DisasmError
 from drake_disasm.spatial import (
     pose_from_vector,
     pose_to_vector,
     rotation_from_vector,
+    rotation_vector,
 )
 from drake_disasm.timing import MOTION_DELAY
+
+#: For how many effects the pose target has room.
+MOST_MOTION_EFFECTS = 6
 
 
 class PoseTarget(LeafSystem):
@@ -24,14 +33,17 @@ class PoseTarget(LeafSystem):
 
     At each period: X_GB <- X_GB moved by the action's translation and turned by
     its rotation vector (both in G, about Bo), counted from the last *command*;
-    then the station's coordinates for it, by inverse kinematics. In between,
-    `velocity` leads from the last coordinates to the next in one period, so that
-    an integrator behind it (Drake's, in C++) moves the station evenly.
+    then the station's coordinates for it, by inverse kinematics. Effects on the
+    motion act on the way from the command to those coordinates: `X_GB_commanded`
+    knows nothing of them. In between, `velocity` leads from the last coordinates to
+    the next in one period, so that an integrator behind it (Drake's, in C++) moves
+    the station evenly.
 
     @system
     name: PoseTarget
     input_ports:
     - action
+    - observation
     output_ports:
     - velocity
     - X_GB_commanded
@@ -50,6 +62,9 @@ class PoseTarget(LeafSystem):
         super().__init__()
         self._coordinates, self._period = coordinates, period
         self._action = self.DeclareVectorInputPort("action", 6)
+        self._observation = self.DeclareVectorInputPort("observation", 12)
+        self._effects = self.DeclareAbstractParameter(Value[object](()))
+        self._memory = self.DeclareDiscreteState(6 * MOST_MOTION_EFFECTS)
         pose = pose_to_vector(coordinates.pose(start))
         self._from = self.DeclareDiscreteState(start)
         self._to = self.DeclareDiscreteState(start)
@@ -69,11 +84,46 @@ class PoseTarget(LeafSystem):
         X_GB = moved(
             pose_from_vector(context.get_discrete_state(self._pose).value()), action
         )
+        executed, memory = self._executed_pose(context, X_GB)
+        state.set_value(self._memory, memory)
         state.set_value(self._from, near)
-        state.set_value(self._to, self._coordinates.solve(X_GB, near))
+        state.set_value(self._to, self._coordinates.solve(executed, near))
         state.set_value(self._pose, pose_to_vector(X_GB))
         state.set_value(self._executed, action)
         return EventStatus.Succeeded()
+
+    def set_effects(self, context: Context, effects: Sequence[MotionEffect]) -> None:
+        """Puts effects, in the order of the chain, into this system's Context.
+
+        Raises:
+            DisasmError: there are more than it can remember.
+        """
+        if len(effects) > MOST_MOTION_EFFECTS:
+            raise DisasmError(
+                f"effects: {len(effects)} act on the motion, {MOST_MOTION_EFFECTS} "
+                "at most can; take some out"
+            )
+        parameter = context.get_mutable_abstract_parameter(self._effects)
+        parameter.set_value(tuple(effects))
+
+    def _executed_pose(
+        self, context: Context, X_GB: RigidTransform
+    ) -> tuple[RigidTransform, np.ndarray]:
+        """Returns where a command leads, and what the effects remember."""
+        effects = context.get_abstract_parameter(self._effects).get_value()
+        memory = context.get_discrete_state(self._memory).value()
+        if not effects:
+            return X_GB, memory
+        turn = rotation_vector(X_GB.rotation())
+        commanded = np.concatenate([X_GB.translation(), turn])
+        wrench = self._observation.Eval(context)[6:]
+        executed, memories = through_motion(
+            effects, commanded, wrench, memory.reshape(-1, 6), self._period
+        )
+        if np.array_equal(executed, commanded):
+            return X_GB, memories.reshape(-1)
+        R = rotation_from_vector(executed[3:])
+        return RigidTransform(R, executed[:3]), memories.reshape(-1)
 
     def _calc_velocity(self, context: Context, output: BasicVector) -> None:
         way = (
@@ -81,6 +131,28 @@ class PoseTarget(LeafSystem):
             - context.get_discrete_state(self._from).value()
         )
         output.SetFromVector(way / self._period)
+
+
+def through_motion(
+    effects: Sequence[MotionEffect],
+    commanded: np.ndarray,
+    wrench: np.ndarray,
+    memories: np.ndarray,
+    period: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns what is executed (6,) of a command, and what effects remember (k, 6).
+
+    Args:
+        effects: in the order of the chain.
+        commanded: (6,) position and rotation vector of B in G [m, rad].
+        wrench: (6,) [f; tau] on the bolt at Bo in G, at the step's beginning.
+        memories: (k, 6) of the step before, one for each effect and maybe more.
+        period: of the MDP [s].
+    """
+    memories = np.array(memories)
+    for i, effect in enumerate(effects):
+        commanded, memories[i] = effect.execute(commanded, wrench, memories[i], period)
+    return commanded, memories
 
 
 def moved(X_GB: RigidTransform, action: np.ndarray) -> RigidTransform:

@@ -6,9 +6,17 @@ evaluation of the objective takes a fraction of the diagram's time
 (docs/identification.md has the figures).
 """
 
+import dataclasses
+
 import numpy as np
 
-from drake_disasm.impact import ImpactStep, turning
+from drake_disasm.effects import EnvironmentEffect, environment_at
+from drake_disasm.impact import (
+    ImpactConditions,
+    ImpactStep,
+    Surroundings,
+    turning,
+)
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.replay import ReplayDiagram, Steps, coarse_step
 
@@ -50,13 +58,18 @@ class ImpactReplay:
         self._diagram.zero()
         self._scenario = scenario
 
+    @property
+    def reading_at_zeroing(self) -> np.ndarray:
+        """See TwinReplay."""
+        return self._diagram.reading_at_zeroing
+
     def transitions(self, steps: Steps) -> np.ndarray:
         """See TwinReplay.
 
         Raises:
             RuntimeError: no force balances a step.
         """
-        conditions = self._diagram.impact_conditions()
+        conditions = self._conditions(steps)
         q, v, qd = steps.q, steps.v, steps.qd
         for h in self._time_steps():
             qd = qd + h * steps.qd_rate
@@ -64,10 +77,22 @@ class ImpactReplay:
             begin, v_begin = q, v
             v, contact = step.solve()
             q = q + h * v
+        contact[:, :3] += conditions.around.f_Gn
         loads = self._loads(begin, (v - v_begin) / h, contact)
         times = (steps.index + 1) * self._scenario.task.period
         rows = zip(times, q, loads, strict=True)
         return np.array([self._diagram.observed(*row) for row in rows])
+
+    def _conditions(self, steps: Steps) -> ImpactConditions:
+        """Returns what the contact depends on, step by step if an effect asks so."""
+        conditions, effects = self._diagram.impact_conditions(), self._scenario.effects
+        if not any(isinstance(e, EnvironmentEffect) and e.is_local for e in effects):
+            return conditions
+        nominal = self._diagram.station.lock.nominal
+        around = Surroundings.of(
+            [environment_at(nominal, effects, motion) for motion in steps.motions()]
+        )
+        return dataclasses.replace(conditions, around=around)
 
     def _time_steps(self) -> list[float]:
         """Returns the plant's steps within a period [s]."""

@@ -16,7 +16,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_disasm.devices.ft_sensor import sensed
-from drake_disasm.effects import Sensing
+from drake_disasm.effects import BoltMotion
 from drake_disasm.impact import ImpactConditions
 from drake_disasm.scenario import Scenario
 from drake_disasm.spatial import (
@@ -54,6 +54,11 @@ class Steps:
     def __len__(self) -> int:
         return len(self.index)
 
+    def motions(self) -> list[BoltMotion]:
+        """Returns the bolt's motion in each of the steps, for local effects."""
+        pairs = zip(self.q[:, :3], self.qd_rate[:, :3], strict=True)
+        return [BoltMotion(p, v) for p, v in pairs]
+
     def select(self, which: np.ndarray | slice) -> Self:
         """Returns some of the steps, by a mask (n,) or a slice."""
         return dataclasses.replace(
@@ -66,9 +71,11 @@ class TwinReplay:
     """Simulates measured steps of the task, each from a state that is given.
 
     It is `TaskSimulation` without policy, reward and imprecision, and without
-    sensor noise: what a noise-free sensor would read, effects included. Motion is
-    Drake's own; Python is called once a step, at its end. `become` changes the
-    parameters in place, so that one diagram serves a whole identification.
+    sensor noise: what a noise-free sensor would read. Of the scenario's effects, those
+    on the environment act, and those on the sensor that have no memory; effects on
+    the motion are to be in the steps' commands. Motion is Drake's own; Python is
+    called once a step, at its end. `become` changes the parameters in place, so that
+    one diagram serves a whole identification.
 
     The coordinates are the twin's: x, y, z [m], yaw, pitch, roll [rad] of B in Gn
     (`BoltCoordinates`).
@@ -105,6 +112,11 @@ class TwinReplay:
         self._fine.zero()
         if self._coarse:
             self._coarse.become(with_time_step(scenario, self._coarse.time_step))
+
+    @property
+    def reading_at_zeroing(self) -> np.ndarray:
+        """What the sensor read (6,) when it was zeroed, [f; tau] in S."""
+        return self._fine.reading_at_zeroing
 
     def transitions(self, steps: Steps) -> np.ndarray:
         """Returns the states (n, 12) after steps that stand alone, each from its q, v.
@@ -152,13 +164,20 @@ class TwinReplay:
         """
         begin, end = (boundary(self._step + i, self._period) for i in (0, 1))
         self._step += 1
+        q, _, _ = self._state or self._fine.state()
+        motion = BoltMotion(q[:3], qd_rate[:3])
         if self._coarse:
             switch = begin + self._switch
+            self._coarse.follow(motion)
             self._coarse.start(begin, *(self._state or self._fine.state()))
             self._coarse.advance(qd_rate, switch)
+            self._fine.follow(motion)
             self._fine.start(switch, *self._coarse.state())
         elif self._state:
+            self._fine.follow(motion)
             self._fine.start(begin, *self._state)
+        else:
+            self._fine.follow(motion)
         self._state = None
         self._fine.advance(qd_rate, end)
         return self._fine.observation()
@@ -170,6 +189,8 @@ class ReplayDiagram:
     Attributes:
         station, station_context: the twin.
         processor, processor_context: of its observations.
+        effects: that are set.
+        reading_at_zeroing: (6,) what the sensor read then, [f; tau] in S.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -188,6 +209,7 @@ class ReplayDiagram:
         """Takes a scenario's parameters in place, from a clean Context."""
         self._simulator.reset_context(self._clean.Clone())
         self._find_contexts()
+        self.effects = scenario.effects
         self.station.become(self.station_context, noise_free(scenario))
 
     def zero(self) -> None:
@@ -196,7 +218,12 @@ class ReplayDiagram:
         self.start(boundary(0, 1.0), rest, rest, self.station.start)
         self.advance(rest, self.station.settling_time)
         reading = self.station.reading_at_zeroing(self.station_context)
+        self.reading_at_zeroing = reading
         self.processor.zero(self.processor_context, reading)
+
+    def follow(self, motion: BoltMotion) -> None:
+        """Brings effects that depend on the bolt's motion up to date."""
+        self.station.follow(self.station_context, self.effects, motion)
 
     def start(self, time: float, q: np.ndarray, v: np.ndarray, qd: np.ndarray) -> None:
         """Puts the twin into a state (see `TwinReplay`) at a time [s]."""
@@ -244,8 +271,8 @@ class ReplayDiagram:
         effects = sensor.effects(station.part_context(sensor, self.station_context))
         if effects:
             R_WS = (station.X_WG.rotation() @ X_SGn.rotation().inverse()).matrix()
-            g_W = station.plant.gravity_field().gravity_vector()
-            reading = sensed(reading, effects, Sensing(np.array(time), R_WS, g_W))
+            sensing = station.payload.sensing(np.array(time), R_WS)
+            reading = sensed(reading, effects, sensing)
         observation = self.processor.observation(self.processor_context, X_GB, reading)
         return _with_rotation_vector(observation, X_GB)
 
@@ -277,6 +304,7 @@ class ReplayDiagram:
         self._observation = self.processor.GetOutputPort("observation")
         self._pose = self.processor.GetOutputPort("X_GB")
         self._find_contexts()
+        self.effects = scenario.effects
         self.station.set_effects(self.station_context, scenario.effects)
 
     def _find_contexts(self) -> None:

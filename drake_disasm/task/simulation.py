@@ -10,10 +10,11 @@ policy -> imprecision -> pose target -> motion -> station -> observation
 import copy
 import dataclasses
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from pydrake.common import RandomDistribution, RandomGenerator
+from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import (
     Context,
@@ -30,7 +31,12 @@ from pydrake.systems.primitives import (
     RandomSource,
 )
 
-from drake_disasm.effects import Effect
+from drake_disasm.effects import (
+    BoltMotion,
+    Effect,
+    EnvironmentEffect,
+    motion_chain,
+)
 from drake_disasm.lock import lift_needed
 from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
 from drake_disasm.scenario import Scenario, draw, with_values
@@ -40,7 +46,7 @@ from drake_disasm.systems.observation import Mounting, ObservationProcessor
 from drake_disasm.systems.policy import Policy, PolicySystem
 from drake_disasm.systems.pose_target import PoseTarget
 from drake_disasm.systems.task_monitor import TaskMonitor
-from drake_disasm.timing import boundary
+from drake_disasm.timing import MOTION_DELAY, POLICY_DELAY, boundary
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,7 +120,7 @@ class TaskSimulation:
         self.context = self.simulator.get_mutable_context()
         self._ports: dict[tuple[int, str], tuple[OutputPort, Context]] = {}
         self._start: Context | None = None
-        self._effects: list[Effect] | None = None
+        self._set: list[Effect] = []
 
     def set_target_realtime_rate(self, rate: float) -> None:
         """Slows the simulation down to `rate` times real time; 0 is full speed."""
@@ -137,8 +143,8 @@ class TaskSimulation:
         wanted = copy.deepcopy(
             list(self._built.effects if effects is None else effects)
         )
-        if self._start is None or wanted != self._effects:
-            self._start, self._effects = self._starting_context(wanted), wanted
+        if self._start is None or wanted != self._set:
+            self._start, self._set = self._starting_context(wanted), wanted
         self.context.SetTimeStateAndParametersFrom(self._start)
         seeds = np.random.SeedSequence(seed).generate_state(len(self._random_sources))
         for source, number in zip(self._random_sources, seeds, strict=True):
@@ -170,6 +176,7 @@ class TaskSimulation:
         """
         if action is not None:
             self._set_action(action)
+        self._follow()
         self.steps += 1
         self.simulator.AdvanceTo(boundary(self.steps, self.scenario.task.period))
         terms = self.evaluate(self.monitor, "reward_terms")
@@ -183,6 +190,20 @@ class TaskSimulation:
         context = self._action_source.GetMyMutableContextFromRoot(self.context)
         value = self._action_source.get_mutable_source_value(context)
         value.SetFromVector(clamped(action, self.bounds))
+
+    def _follow(self) -> None:
+        """Brings effects that depend on the bolt's motion up to date for a step."""
+        if not any(isinstance(e, EnvironmentEffect) and e.is_local for e in self._set):
+            return
+        # The policy has acted then, and the motion not yet begun.
+        period = self.scenario.task.period
+        between = (MOTION_DELAY - POLICY_DELAY) / 2.0
+        self.simulator.AdvanceTo(boundary(self.steps, period) + between)
+        X_GnB: RigidTransform = self.evaluate(self.station, "bolt_pose")
+        action = self.evaluate(self.imprecision, "action_executed")
+        motion = BoltMotion(X_GnB.translation(), action[:3] / period)
+        context = self.station.GetMyMutableContextFromRoot(self.context)
+        self.station.follow(context, self._set, motion)
 
     def observation(self) -> np.ndarray:
         """Returns the present state (12,)."""
@@ -204,7 +225,7 @@ class TaskSimulation:
             return np.zeros(0)
         return self.evaluate(self.station, "iiwa.position_measured")
 
-    def evaluate(self, system: Diagram | LeafSystem, port: str) -> np.ndarray:
+    def evaluate(self, system: Diagram | LeafSystem, port: str) -> Any:
         """Returns the present value of a system's output port."""
         key = (id(system), port)
         if key not in self._ports:
@@ -250,7 +271,14 @@ class TaskSimulation:
         )
         connect(self.processor.get_output_port(0), self.monitor.get_input_port())
         connect(noise.get_output_port(), self.imprecision.GetInputPort("noise"))
-        connect(self.imprecision.get_output_port(), self.pose_target.get_input_port())
+        connect(
+            self.imprecision.get_output_port(),
+            self.pose_target.GetInputPort("action"),
+        )
+        connect(
+            self.processor.GetOutputPort("observation"),
+            self.pose_target.GetInputPort("observation"),
+        )
         velocity = self.pose_target.GetOutputPort("velocity")
         self._integrator = add_motion(builder, velocity, station)
         if station.grip_command is not None:
@@ -283,6 +311,9 @@ class TaskSimulation:
         mine = self.station.GetMyMutableContextFromRoot(root)
         self.station.set_effects(mine, effects)
         copy_state(settled, mine)
+        self.pose_target.set_effects(
+            self.pose_target.GetMyMutableContextFromRoot(root), motion_chain(effects)
+        )
         self._integrator.GetMyMutableContextFromRoot(root).SetDiscreteState(
             self.station.start
         )

@@ -139,6 +139,35 @@ class LogModel(abc.ABC):
             PredictionError: the simulation failed.
         """
 
+    def simulate(self, theta: Array, rows: slice) -> Array:
+        """Returns what a prediction takes long for, (len(rows), k).
+
+        Parameters that `simulated` leaves out do not change it: many predictions
+        may share one.
+
+        Raises:
+            PredictionError: the simulation failed.
+        """
+        return self.predict(theta, rows)
+
+    def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
+        """Returns the prediction that follows from what `simulate` gave."""
+        return simulated
+
+    def predictions(self, theta: Array) -> Array:
+        """Returns what the model says of all rows, (rows, channels), in this process.
+
+        Raises:
+            PredictionError: the simulation failed.
+        """
+        parts = [self.simulate(theta, rows) for rows in self.chunks()]
+        return self.read(theta, slice(0, self.measurements.rows), np.concatenate(parts))
+
+    @property
+    def simulated(self) -> NDArray[np.bool_]:
+        """Which parameters (p,) `simulate` depends on."""
+        return np.ones(len(self.parameters), dtype=bool)
+
     @abc.abstractmethod
     def freeze(self, values: Mapping[str, float]) -> Self:
         """Returns the same model with some parameters fixed at values, by name."""

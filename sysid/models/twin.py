@@ -6,10 +6,15 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform
-from scipy.spatial.transform import Rotation
 
 from drake_disasm.coordinates import BoltCoordinates
+from drake_disasm.effects import (
+    EnvironmentEffect,
+    MotionEffect,
+    SensorEffect,
+    motion_chain,
+    sensor_chain,
+)
 from drake_disasm.errors import DisasmError
 from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.scenario import Scenario
@@ -28,6 +33,8 @@ from sysid.models.base import (
     ScenarioModel,
     even_chunks,
 )
+from sysid.models.commands import Commands, twin_coordinates
+from sysid.models.sensor_reading import SensorReading, at_sensor
 from sysid.parameters import Parameter
 
 #: How well a robot's own encoders repeat within an episode, m and rad: below its
@@ -74,30 +81,102 @@ class TwinModel(ScenarioModel):
         """
         self.parameters = tuple(parameters)
         self.scenario, self.rollout, self.coarse = scenario, rollout, coarse
-        self._X_SB = Tool.from_models(scenario).X_SB
+        tool = Tool.from_models(scenario)
+        self._X_SB = tool.X_SB
         for log in logs:
             _refuse_other_logs(log, scenario)
         episodes = [episode for log in logs for episode in log.episodes]
+        period = scenario.task.period
+        self._commands = [Commands.of(e, period) for e in episodes]
+        self._readings = [at_sensor(observations(e), self._X_SB) for e in episodes]
         self.steps = _concatenated([_steps(e, scenario) for e in episodes])
+        self._rows = np.arange(len(self.steps))
         self.measurements = Measurements.of_logs(
             logs,
             _channels(scenario),
             lambda _, episode: at_sensor(observations(episode)[1:], self._X_SB),
         )
+        self._sensing = SensorReading(scenario, tool)
         self._replay: TwinReplay | ImpactReplay | None = None
-        self._theta: bytes | None = None
+        self._simulated: bytes | None = None
+        self._moved: tuple[str, Steps] | None = None
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
+        return self.read(theta, rows, self.simulate(theta, rows))
+
+    def simulate(self, theta: Array, rows: slice) -> Array:
+        """Returns the states, the wrench at the sensor, and the reading at zeroing.
+
+        (len(rows), 18), as the sensor would read them without effects.
+        """
+        scenario = self.scenario_at(theta)
         try:
-            replay = self._replay_at(theta)
-            return at_sensor(
-                self._simulate(replay, self.steps.select(rows)), self._X_SB
-            )
+            replay = self._replay_at(theta, scenario)
+            steps = self._steps_of(motion_chain(scenario.effects)).select(rows)
+            states = at_sensor(self._states(replay, steps), self._X_SB)
         except (RuntimeError, DisasmError, ValueError) as error:
-            self._replay = self._theta = None
+            self._replay = self._simulated = None
             text = " ".join(str(error).split())
             raise PredictionError(text) from None
+        zero = np.broadcast_to(replay.reading_at_zeroing, (len(states), 6))
+        return np.hstack([states, zero])
+
+    def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
+        """Returns the states as the sensor's effects let them be read."""
+        effects = sensor_chain(self.scenario_at(theta).effects)
+        states, zero = simulated[:, :12], simulated[0, 12:]
+        if not effects:
+            return states
+        times = (self.steps.index[rows] + 1) * self.scenario.task.period
+        return self._sensing.read(effects, states, zero, times)
+
+    @property
+    def simulated(self) -> NDArray[np.bool_]:
+        """All parameters but those of the sensor's effects."""
+        paths = [parameter.path.split(".") for parameter in self.parameters]
+        return np.array(
+            [
+                part[0] != "effects"
+                or not isinstance(self.scenario.effects[int(part[1])], SensorEffect)
+                for part in paths
+            ],
+            dtype=bool,
+        )
+
+    def covariates(self, channel: int) -> dict[str, Array]:
+        """See LogModel: time, travel, its rate, force, and the action."""
+        steps, rows = self.steps, self._rows
+        before = np.concatenate([r[:-1] for r in self._readings])[rows]
+        turn = np.concatenate([c.path[:-1, 3:] for c in self._commands])[rows]
+        found = {
+            "time": steps.index * self.scenario.task.period,
+            "order of steps": rows.astype(float),
+            "travel x": steps.q[:, 0],
+            "position y": steps.q[:, 1],
+            "position z": steps.q[:, 2],
+            "commanded rate along x": steps.qd_rate[:, 0],
+            "commanded rate along y": steps.qd_rate[:, 1],
+            "commanded rate along z": steps.qd_rate[:, 2],
+        }
+        found |= {f"force along {a}_S": before[:, 6 + i] for i, a in enumerate("xyz")}
+        return found | {f"rotation about {a}": turn[:, i] for i, a in enumerate("xyz")}
+
+    def _steps_of(self, effects: Sequence[MotionEffect]) -> Steps:
+        """Returns the steps as effects on the motion would have them executed."""
+        if not effects:
+            return self.steps
+        if self._moved is None or self._moved[0] != repr(effects):
+            paths = [twin_coordinates(c.executed(effects)) for c in self._commands]
+            period = self.scenario.task.period
+            steps = dataclasses.replace(
+                self.steps,
+                qd=np.concatenate([p[:-1] for p in paths])[self._rows],
+                qd_rate=np.concatenate([np.diff(p, axis=0) for p in paths])[self._rows]
+                / period,
+            )
+            self._moved = (repr(effects), steps)
+        return self._moved[1]
 
     def chunks(self) -> list[slice]:
         """See LogModel; a rollout can't be cut within an episode."""
@@ -121,16 +200,18 @@ class TwinModel(ScenarioModel):
     def _selected(self, mask: NDArray[np.bool_]) -> Self:
         return self._changed(
             steps=self.steps.select(mask),
+            _rows=self._rows[mask],
             measurements=self.measurements.select(mask),
         )
 
-    def _replay_at(self, theta: Array) -> TwinReplay | ImpactReplay:
+    def _replay_at(self, theta: Array, scenario: Scenario) -> TwinReplay | ImpactReplay:
         """Returns the twin at parameters (p,); a change takes some 10 ms."""
+        key = theta[self.simulated].tobytes()
         if self._replay is None:
-            self._replay = self._new_replay(self.scenario_at(theta))
-        elif self._theta != theta.tobytes():
-            self._replay.become(self.scenario_at(theta))
-        self._theta = theta.tobytes()
+            self._replay = self._new_replay(_environment_alone(scenario))
+        elif self._simulated != key:
+            self._replay.become(_environment_alone(scenario))
+        self._simulated = key
         return self._replay
 
     def _new_replay(self, scenario: Scenario) -> TwinReplay | ImpactReplay:
@@ -143,7 +224,7 @@ class TwinModel(ScenarioModel):
     def _has_impact(self) -> bool:
         return self.scenario.contact.model == "impact"
 
-    def _simulate(self, replay: TwinReplay | ImpactReplay, steps: Steps) -> Array:
+    def _states(self, replay: TwinReplay | ImpactReplay, steps: Steps) -> Array:
         """Returns the states (len(steps), 12) after each step."""
         if isinstance(replay, ImpactReplay) or not self.rollout:
             return replay.transitions(steps)
@@ -151,26 +232,15 @@ class TwinModel(ScenarioModel):
 
     def __getstate__(self) -> dict[str, Any]:
         """Leaves the diagram out: each worker builds its own."""
-        return self.__dict__ | {"_replay": None, "_theta": None}
+        return self.__dict__ | {"_replay": None, "_simulated": None, "_moved": None}
 
 
-def at_sensor(states: Array, X_SB: RigidTransform) -> Array:
-    """Returns states with the wrench at So in S in place of that at Bo in G.
-
-    The inverse of the last step of observation processing.
-
-    Args:
-        states: (n, 12), position, rotation vector and wrench [f; tau] at Bo, in G.
-        X_SB: the bolt in the sensor's frame.
-    """
-    X_BS = X_SB.inverse()
-    R_GB = Rotation.from_rotvec(states[:, 3:6]).as_matrix()
-    p_BoSo_G = R_GB @ X_BS.translation()
-    f_G, t_Bo_G = states[:, 6:9], states[:, 9:12]
-    t_So_G = t_Bo_G - np.cross(p_BoSo_G, f_G)
-    R_GS = R_GB @ X_BS.rotation().matrix()
-    in_S = [np.einsum("nij,ni->nj", R_GS, vector) for vector in (f_G, t_So_G)]
-    return np.hstack([states[:, :6], *in_S])
+def _environment_alone(scenario: Scenario) -> Scenario:
+    """Returns a scenario with those effects alone that a replay simulates."""
+    effects: list[Any] = [
+        e for e in scenario.effects if isinstance(e, EnvironmentEffect)
+    ]
+    return dataclasses.replace(scenario, effects=effects)
 
 
 def _channels(scenario: Scenario) -> tuple[Channel, ...]:

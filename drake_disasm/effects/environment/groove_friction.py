@@ -2,7 +2,12 @@
 
 import dataclasses
 
-from drake_disasm.effects.base import Environment, EnvironmentEffect, parameter
+from drake_disasm.effects.base import (
+    BoltMotion,
+    Environment,
+    EnvironmentEffect,
+    parameter,
+)
 
 
 @dataclasses.dataclass
@@ -16,7 +21,7 @@ class GrooveFriction(EnvironmentEffect):
 
     coefficient: float = parameter("1", -1.0, 1.0, "added to the nominal mu")
 
-    def apply(self, environment: Environment) -> Environment:
+    def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds the coefficient, never below a frictionless groove."""
         friction = max(0.0, environment.friction + self.coefficient)
         return dataclasses.replace(environment, friction=friction)

@@ -5,7 +5,12 @@ import dataclasses
 import numpy as np
 from pydrake.math import RigidTransform
 
-from drake_disasm.effects.base import Environment, EnvironmentEffect, parameter
+from drake_disasm.effects.base import (
+    BoltMotion,
+    Environment,
+    EnvironmentEffect,
+    parameter,
+)
 from drake_disasm.spatial import rotation_from_vector
 
 
@@ -29,7 +34,7 @@ class GroovePose(EnvironmentEffect):
     y: float = parameter("m", -0.001, 0.001, "shifted out of the plate")
     z: float = parameter("m", -0.002, 0.002, "shifted across the groove")
 
-    def apply(self, environment: Environment) -> Environment:
+    def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Composes the true groove frame onto the pose so far."""
         R = rotation_from_vector(np.array([self.rx, self.ry, self.rz]))
         X_GnG = environment.X_GnG @ RigidTransform(R, [self.x, self.y, self.z])

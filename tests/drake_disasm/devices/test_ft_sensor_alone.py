@@ -11,7 +11,7 @@ from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.tree import BodyIndex, JointIndex
 from pydrake.systems.framework import Context
 
-from drake_disasm.devices.ft_sensor import ForceTorqueSensor, quantise
+from drake_disasm.devices.ft_sensor import ForceTorqueSensor, Payload, quantise
 from drake_disasm.effects import PayloadError, Sensing, SensorBias, SensorEffect
 from drake_disasm.ports import Health
 from drake_disasm.scenario import SensorConfig, load_scenario
@@ -31,7 +31,9 @@ def _sensor(
     config = SensorConfig(noise=[noise] * 6, quantum=[quantum] * 6)
     X_BodyS = RigidTransform(R_BODY_S, [1, 2, 3])
     joint, body = JointIndex(JOINT), BodyIndex(BODY)
-    sensor = ForceTorqueSensor(config, joint, body, X_BodyS, G_W, time_step=0.25)
+    sensor = ForceTorqueSensor(
+        config, joint, body, X_BodyS, Payload(0.0, np.zeros(3), G_W), time_step=0.25
+    )
     context = sensor.CreateDefaultContext()
     other = SpatialForce(tau=[9, 9, 9], f=[9, 9, 9])
     reaction = SpatialForce(tau=-load[3:], f=-load[:3])

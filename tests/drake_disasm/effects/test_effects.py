@@ -7,8 +7,11 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from drake_disasm.effects import (
+    AT_REST,
     EFFECTS,
     ArmEffect,
+    BoltMotion,
+    ContactExponent,
     Effect,
     Environment,
     EnvironmentEffect,
@@ -35,14 +38,18 @@ from drake_disasm.effects import (
     sensor_chain,
     sizes,
 )
-from drake_disasm.policies import make_policy
+from drake_disasm.errors import DisasmError
+from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation, SimulatedStation, TwinStation
 from drake_disasm.task.simulation import TaskSimulation
 
 G_W = np.array([0.0, 0.0, -9.81])
 ORIENTATIONS = [(0, 0, 0), (np.pi, 0, 0), (0.3, -0.8, 2.0), (np.pi / 2, 0, 0)]
-ENVIRONMENT = Environment(RigidTransform([0.001, 0, 0]), 0.2, 1e9, 1e8, 20.0)
+ENVIRONMENT = Environment(
+    RigidTransform([0.001, 0, 0]), 0.2, 1e9, 1e8, 20.0, 4e-4, 1e3, 1.0
+)
+MOVING = BoltMotion(np.array([0.03, 0.001, -0.001]), np.array([0.02, 0.0, 0.005]))
 
 
 IN_CELL = [e for e in EFFECTS if not issubclass(e, ArmEffect)]
@@ -79,7 +86,7 @@ def test_is_declared_in_full(effect: type[Effect]) -> None:
 def test_vanishes_at_null_as_a_function(effect: type[Effect]) -> None:
     null = effect()
     if isinstance(null, EnvironmentEffect):
-        changed = null.apply(ENVIRONMENT)
+        changed = null.apply(ENVIRONMENT, MOVING)
         assert changed.X_GnG.IsExactlyEqualTo(ENVIRONMENT.X_GnG)
         assert dataclasses.replace(changed, X_GnG=ENVIRONMENT.X_GnG) == ENVIRONMENT
     if isinstance(null, SensorEffect):
@@ -90,11 +97,15 @@ def test_vanishes_at_null_as_a_function(effect: type[Effect]) -> None:
         assert not null.torque(SAMPLES).any()
 
 
-def _trajectory(effects: list[Effect], steps: int) -> np.ndarray:
-    """An episode in contact: the groove is turned and rubs."""
+def _trajectory(
+    effects: list[Effect], steps: int, model: str = "hydroelastic"
+) -> np.ndarray:
+    """An episode in contact, with some turning: the groove is turned and rubs."""
     scenario = load_scenario("removal_turned")
     scenario.effects = [*scenario.effects, *effects]
-    simulation = TaskSimulation(scenario, "twin", make_policy("straight"))
+    scenario.contact.model = model
+    policy = Exploring(make_policy("straight"), 2e-4, 0)
+    simulation = TaskSimulation(scenario, "twin", policy)
     simulation.reset(7)
     return np.array([simulation.step().observation for _ in range(steps)])
 
@@ -114,8 +125,15 @@ def test_vanishes_at_null_bit_for_bit(
 
 @pytest.mark.parametrize("effect", IN_CELL)
 def test_shows_away_from_null(effect: type[Effect], without: np.ndarray) -> None:
-    values = dict.fromkeys(sizes(effect), 5e-4)
-    with_effect = _trajectory([effect(**values)], 20)
+    fields = {f.name: f for f in dataclasses.fields(effect)}  # type: ignore[arg-type]
+    sized = {name: 0.05 * fields[name].metadata["high"] for name in sizes(effect)}
+    if effect is ContactExponent:
+        with pytest.raises(DisasmError, match="ContactExponent"):
+            _trajectory([effect(**sized)], 1)
+        without = _trajectory([], 20, "impact")
+        with_effect = _trajectory([effect(**sized)], 20, "impact")
+    else:
+        with_effect = _trajectory([effect(**sized)], 20)
     assert not np.allclose(with_effect, without, atol=1e-6)
 
 
@@ -192,13 +210,13 @@ def test_arm_effects_are_their_equations(effect: ArmEffect, expected: list) -> N
 
 
 def test_groove_friction_adds_and_stops_at_zero() -> None:
-    assert GrooveFriction(0.15).apply(ENVIRONMENT).friction == 0.2 + 0.15
-    assert GrooveFriction(-0.5).apply(ENVIRONMENT).friction == 0.0
+    assert GrooveFriction(0.15).apply(ENVIRONMENT, AT_REST).friction == 0.2 + 0.15
+    assert GrooveFriction(-0.5).apply(ENVIRONMENT, AT_REST).friction == 0.0
 
 
 def test_groove_pose_turns_about_a_and_shifts() -> None:
     nominal = dataclasses.replace(ENVIRONMENT, X_GnG=RigidTransform())
-    X_GnG = GroovePose(ry=0.1, x=0.001, z=0.002).apply(nominal).X_GnG
+    X_GnG = GroovePose(ry=0.1, x=0.001, z=0.002).apply(nominal, AT_REST).X_GnG
     np.testing.assert_allclose(X_GnG.translation(), [0.001, 0, 0.002])
     end = X_GnG.rotation() @ np.array([0.06, 0, 0])
     expected = 0.06 * np.array([np.cos(0.1), 0, -np.sin(0.1)])
@@ -216,7 +234,7 @@ def test_groove_pose_moves_body_and_geometry(
     before = RigidTransform(query.Eval(context).GetPoseInWorld(geometry))
     effect = GroovePose(ry=0.05, y=0.003)
     station.set_effects(context, [effect])
-    X_GnG = effect.apply(station.lock.nominal).X_GnG
+    X_GnG = effect.apply(station.lock.nominal, AT_REST).X_GnG
     assert station.true_groove_pose(context).IsExactlyEqualTo(X_GnG)
     after = query.Eval(context).GetPoseInWorld(geometry)
     X_WG = station.X_WG

@@ -7,6 +7,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from drake_disasm.effects import (
+    AT_REST,
     Effect,
     EnvironmentEffect,
     GrooveFriction,
@@ -113,7 +114,7 @@ def test_environment_effects_add_up_in_their_order() -> None:
     environment = station.lock.nominal
     for effect in effects:
         assert isinstance(effect, EnvironmentEffect)
-        environment = effect.apply(environment)
+        environment = effect.apply(environment, AT_REST)
     assert environment.friction == pytest.approx(0.3)
 
 
@@ -121,8 +122,8 @@ def test_apply_leaves_its_input_alone() -> None:
     """Pure: the nominal environment is the same after any effect."""
     nominal = TaskSimulation(load_scenario("removal"), "twin").station.lock.nominal
     before = dataclasses.replace(nominal)
-    GrooveFriction(0.5).apply(nominal)
-    GroovePose(ry=0.1, y=0.001).apply(nominal)
+    GrooveFriction(0.5).apply(nominal, AT_REST)
+    GroovePose(ry=0.1, y=0.001).apply(nominal, AT_REST)
     assert nominal.friction == before.friction
     assert nominal.X_GnG.IsExactlyIdentity()
 

@@ -4,13 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.math import RollPitchYaw
 
 from drake_disasm.impact import (
     ImpactConditions,
     ImpactLaw,
     ImpactStep,
     LockShape,
+    Surroundings,
     turning,
 )
 from drake_disasm.scenario import LockConfig
@@ -20,8 +21,12 @@ K, D = np.array([15e3] * 3 + [150.0] * 3), np.array([400.0] * 3 + [3.0] * 3)
 TURNED = ImpactConditions(
     law=ImpactLaw(300.0, 1.4, 2.0, 0.1),
     shape=LockShape(LockConfig()),
-    friction=0.2,
-    X_GnG=RigidTransform(RollPitchYaw(0.0, 0.03, 0.0), [0.0, 0.0, 1e-4]),
+    around=Surroundings(
+        np.array([0.2]),
+        RollPitchYaw(0.0, 0.03, 0.0).ToRotationMatrix().matrix()[None],
+        np.array([[0.0, 0.0, 1e-4]]),
+        np.zeros((1, 3)),
+    ),
     M=M,
     K=K,
     D=D,

@@ -74,7 +74,7 @@ def test_move_turns_about_the_bolt_and_shifts_in_g() -> None:
 def test_pose_target_counts_from_the_last_command() -> None:
     system = PoseTarget(BoltCoordinates(), np.zeros(6), 0.1)
     context = system.CreateDefaultContext()
-    system.get_input_port().FixValue(context, ACTION)
+    system.GetInputPort("action").FixValue(context, ACTION)
     X_GB = RigidTransform()
     for _ in range(3):
         before = BoltCoordinates().solve(X_GB, np.zeros(6))

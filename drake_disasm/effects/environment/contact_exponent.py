@@ -1,0 +1,26 @@
+"""The contact stiffens otherwise as it is pressed."""
+
+import dataclasses
+
+from drake_disasm.effects.base import (
+    BoltMotion,
+    Environment,
+    EnvironmentEffect,
+    parameter,
+)
+
+
+@dataclasses.dataclass
+class ContactExponent(EnvironmentEffect):
+    """The normal force grows with another power of the penetration.
+
+    Equation: F = k p^(e + change) of IMPACT (thesis 4.3), p in mm; at least zero.
+    Where it acts: IMPACT's law; hydroelastic contact has no exponent and ignores it.
+    """
+
+    change: float = parameter("1", -1.0, 3.0, "of the exponent e")
+
+    def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
+        """Changes the exponent."""
+        exponent = max(0.0, environment.impact_exponent + self.change)
+        return dataclasses.replace(environment, impact_exponent=exponent)

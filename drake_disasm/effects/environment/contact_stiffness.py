@@ -1,0 +1,34 @@
+"""The contact is stiffer or softer."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import (
+    BoltMotion,
+    Environment,
+    EnvironmentEffect,
+    parameter,
+)
+
+
+@dataclasses.dataclass
+class ContactStiffness(EnvironmentEffect):
+    """Bolt and groove yield less, or more, than their nominal materials.
+
+    Equation: k = k_nominal exp(log_factor) for the hydroelastic moduli and for
+    IMPACT's stiffness alike.
+    Where it acts: the contact material of the bolt, or IMPACT's law.
+    """
+
+    log_factor: float = parameter("1", -5.0, 5.0, "natural logarithm of the factor")
+
+    def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
+        """Scales the stiffness."""
+        factor = float(np.exp(self.log_factor))
+        return dataclasses.replace(
+            environment,
+            modulus=environment.modulus * factor,
+            head_modulus=environment.head_modulus * factor,
+            impact_stiffness=environment.impact_stiffness * factor,
+        )

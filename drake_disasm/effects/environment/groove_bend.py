@@ -1,0 +1,38 @@
+"""The groove is bent."""
+
+import dataclasses
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from drake_disasm.effects.base import (
+    BoltMotion,
+    Environment,
+    EnvironmentEffect,
+    parameter,
+)
+from drake_disasm.spatial import rotation_from_vector
+
+
+@dataclasses.dataclass
+class GrooveBend(EnvironmentEffect):
+    """The groove's axis is an arc instead of a line.
+
+    Equation: at travel x the axis is displaced by c(x) = [0, ky x^2 / 2, kz x^2 / 2]
+    and turned by its slope; the bolt meets the groove as a straight one that is
+    tangent to the arc there.
+    Where it acts: the pose of the lock in the plant, anew in each step of the MDP.
+    """
+
+    ky: float = parameter("1/m", -2.0, 2.0, "curvature out of the plate")
+    kz: float = parameter("1/m", -2.0, 2.0, "curvature across the groove")
+
+    is_local = True
+
+    def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
+        """Composes the tangent groove at the bolt onto the pose so far."""
+        x = float((environment.X_GnG.inverse() @ bolt.p)[0])
+        R = rotation_from_vector(np.array([0.0, -self.kz * x, self.ky * x]))
+        c = np.array([x, self.ky * x**2 / 2.0, self.kz * x**2 / 2.0])
+        tangent = RigidTransform(R, c - R @ np.array([x, 0.0, 0.0]))
+        return dataclasses.replace(environment, X_GnG=environment.X_GnG @ tangent)

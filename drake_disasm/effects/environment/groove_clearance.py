@@ -1,0 +1,31 @@
+"""The bolt has more, or less, play in the slot."""
+
+import dataclasses
+
+from drake_disasm.effects.base import (
+    BoltMotion,
+    Environment,
+    EnvironmentEffect,
+    parameter,
+)
+
+_LEAST = 2e-5  # m: a bolt that is no wider than its slot
+
+
+@dataclasses.dataclass
+class GrooveClearance(EnvironmentEffect):
+    """The slot is wider or narrower than the model says: wear, dirt, tolerance.
+
+    Equation: clearance = max(0.02 mm, nominal + change), the slot's width minus the
+    neck's diameter.
+    Where it acts: the lips of the groove in the scene graph.
+    """
+
+    change: float = parameter("m", -5e-4, 1e-3, "of the clearance")
+
+    def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
+        """Changes the clearance."""
+        clearance = max(
+            min(_LEAST, environment.clearance), environment.clearance + self.change
+        )
+        return dataclasses.replace(environment, clearance=clearance)

@@ -1,0 +1,45 @@
+"""The groove rubs more at one place."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import (
+    BoltMotion,
+    Environment,
+    EnvironmentEffect,
+    parameter,
+    shape,
+)
+
+
+@dataclasses.dataclass
+class RustyPatch(EnvironmentEffect):
+    """A patch of rust or dirt: friction that depends on the position.
+
+    Equation: mu += a exp(-((x - x_0) / w)^2), x the travel of the bolt; mu stays at or
+    above zero.
+    Where it acts: the contact material of the groove and of the bolt.
+    """
+
+    coefficient: float = parameter(
+        "1", -1.0, 2.0, "a, added in the middle of the patch"
+    )
+    position: float = shape(
+        0.03,
+        "m",
+        -0.02,
+        0.1,
+        "x_0, its middle",
+        (0.005, 0.015, 0.025, 0.035, 0.045, 0.055),
+    )
+    width: float = shape(0.008, "m", 0.001, 0.1, "w, its half width", (0.008,))
+
+    is_local = True
+
+    def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
+        """Adds what there is at this place."""
+        away = (bolt.p[0] - self.position) / self.width
+        added = self.coefficient * np.exp(-(away**2))
+        friction = max(0.0, float(environment.friction + added))
+        return dataclasses.replace(environment, friction=friction)

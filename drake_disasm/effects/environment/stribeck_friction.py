@@ -1,0 +1,37 @@
+"""The groove rubs more at low speed."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import (
+    BoltMotion,
+    Environment,
+    EnvironmentEffect,
+    parameter,
+    shape,
+)
+
+
+@dataclasses.dataclass
+class GrooveStribeckFriction(EnvironmentEffect):
+    """Friction that is higher at low speed (Stribeck 1902).
+
+    Equation: mu += a exp(-(|v| / v_s)^2), v the velocity at which the bolt is to move
+    in this step; mu stays at or above zero.
+    Where it acts: the contact material of the groove and of the bolt.
+    """
+
+    coefficient: float = parameter("1", -1.0, 1.0, "a, added at rest")
+    velocity: float = shape(
+        0.01, "m/s", 1e-4, 1.0, "v_s, at which it has mostly gone", (0.005, 0.015)
+    )
+
+    is_local = True
+
+    def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
+        """Adds what is left at this speed."""
+        speed = float(np.linalg.norm(bolt.v))
+        added = self.coefficient * np.exp(-((speed / self.velocity) ** 2))
+        friction = max(0.0, float(environment.friction + added))
+        return dataclasses.replace(environment, friction=friction)

@@ -1,0 +1,32 @@
+"""Grease between bolt and groove."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import (
+    BoltMotion,
+    Environment,
+    EnvironmentEffect,
+    parameter,
+)
+
+
+@dataclasses.dataclass
+class GrooveViscousFriction(EnvironmentEffect):
+    """A drag that grows with the speed, whatever presses: grease.
+
+    Equation: f = -c v, v the velocity at which the bolt is to move in this step.
+    Where it acts: a force on the bolt at Bo.
+    """
+
+    coefficient: float = parameter("N s/m", 0.0, 1000.0, "c")
+
+    is_local = True
+
+    def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
+        """Adds the drag."""
+        fx, fy, fz = np.array(environment.force_Gn) - self.coefficient * bolt.v
+        return dataclasses.replace(
+            environment, force_Gn=(float(fx), float(fy), float(fz))
+        )

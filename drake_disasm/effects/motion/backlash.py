@@ -1,0 +1,36 @@
+"""Lost motion: a gear has play."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import Memory, MotionEffect, parameter
+
+
+@dataclasses.dataclass
+class Backlash(MotionEffect):
+    """Play between command and motion: nothing moves until it is taken up.
+
+    Equation: the play operator, d_k = min(max(d_(k-1), c_k - b/2), c_k + b/2) with c
+    the command and b = [x, y, z, u, v, w] the play, which begins centred.
+    Where it acts: on the commanded pose, before inverse kinematics; the measured pose
+    shows it.
+    """
+
+    x: float = parameter("m", 0.0, 0.005, "play along x_G")
+    y: float = parameter("m", 0.0, 0.005, "play along y_G")
+    z: float = parameter("m", 0.0, 0.005, "play along z_G")
+    u: float = parameter("rad", 0.0, 0.05, "play about x_G")
+    v: float = parameter("rad", 0.0, 0.05, "play about y_G")
+    w: float = parameter("rad", 0.0, 0.05, "play about z_G")
+
+    stage = 2
+
+    def execute(
+        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
+    ) -> tuple[np.ndarray, Memory]:
+        """See MotionEffect; the memory is the pose before."""
+        play = np.array([self.x, self.y, self.z, self.u, self.v, self.w])
+        near, far = commanded - play / 2.0, commanded + play / 2.0
+        executed = np.minimum(np.maximum(memory, near), far)
+        return executed, executed

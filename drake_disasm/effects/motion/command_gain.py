@@ -1,0 +1,31 @@
+"""The arm goes further, or less far, than it is told."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import Memory, MotionEffect, parameter
+
+
+@dataclasses.dataclass
+class CommandGain(MotionEffect):
+    """A scale error of the commanded motion: wrong link lengths or gear ratios.
+
+    Equation: d_executed = (1 + diag(k)) d_commanded, d the displacement from the start
+    (position and rotation vector of B in G), k = [x, y, z, u, v, w].
+    Where it acts: on the commanded pose, before inverse kinematics.
+    """
+
+    x: float = parameter("1", -0.5, 0.5, "more displacement along x_G")
+    y: float = parameter("1", -0.5, 0.5, "more displacement along y_G")
+    z: float = parameter("1", -0.5, 0.5, "more displacement along z_G")
+    u: float = parameter("1", -0.5, 0.5, "more rotation about x_G")
+    v: float = parameter("1", -0.5, 0.5, "more rotation about y_G")
+    w: float = parameter("1", -0.5, 0.5, "more rotation about z_G")
+
+    def execute(
+        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
+    ) -> tuple[np.ndarray, Memory]:
+        """See MotionEffect."""
+        gain = np.array([self.x, self.y, self.z, self.u, self.v, self.w])
+        return commanded + gain * commanded, memory

@@ -1,0 +1,35 @@
+"""Arm, gripper or sensor yield more than the model's springs."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import Memory, MotionEffect, parameter
+
+
+@dataclasses.dataclass
+class Compliance(MotionEffect):
+    """Arm, gripper and sensor give way to a force, and come back.
+
+    Equation: d_executed = d_commanded + C F with C = diag(x, y, z, u, v, w) and F the
+    measured wrench on the bolt at Bo in G at the beginning of the step: slow motion,
+    in which the yielding part is in balance. It comes on top of the springs of the
+    station, in series with them.
+    Where it acts: on the commanded pose, before inverse kinematics.
+    """
+
+    x: float = parameter("m/N", 0.0, 4e-5, "along x_G")
+    y: float = parameter("m/N", 0.0, 4e-5, "along y_G")
+    z: float = parameter("m/N", 0.0, 4e-5, "along z_G")
+    u: float = parameter("rad/(N m)", 0.0, 1.5e-3, "about x_G")
+    v: float = parameter("rad/(N m)", 0.0, 1.5e-3, "about y_G")
+    w: float = parameter("rad/(N m)", 0.0, 4e-4, "about z_G")
+
+    stage = 3
+
+    def execute(
+        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
+    ) -> tuple[np.ndarray, Memory]:
+        """See MotionEffect."""
+        yields = np.array([self.x, self.y, self.z, self.u, self.v, self.w])
+        return commanded + yields * wrench, memory

@@ -1,0 +1,29 @@
+"""The arm follows its command late."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import Memory, MotionEffect, parameter
+
+
+@dataclasses.dataclass
+class MotionLag(MotionEffect):
+    """A dead time between command and motion.
+
+    Equation: d_executed(t) = d_commanded(t - delay), the command moving evenly within
+    a step; delays beyond one step of the MDP count as one step. For slow motion a
+    first-order lag of that time constant looks the same.
+    Where it acts: on the commanded pose, before inverse kinematics.
+    """
+
+    delay: float = parameter("s", 0.0, 0.1, "of the motion behind its command")
+
+    stage = 1
+
+    def execute(
+        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
+    ) -> tuple[np.ndarray, Memory]:
+        """See MotionEffect; the memory is the command before."""
+        share = min(self.delay / period, 1.0)
+        return commanded + share * (memory - commanded), commanded

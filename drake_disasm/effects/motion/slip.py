@@ -1,0 +1,32 @@
+"""The bolt slips in the gripper."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import Memory, MotionEffect, parameter
+
+
+@dataclasses.dataclass
+class BoltSlip(MotionEffect):
+    """The bolt creeps in the gripper under a force, and does not come back.
+
+    Equation: d_executed = d_commanded + s, ds/dt = C F with C = diag(x, y, z) and F the
+    measured force on the bolt in G: a viscous grip. Positions are the bolt's, as an
+    outside frame or a re-grasp would show them.
+    Where it acts: between gripper and bolt.
+    """
+
+    x: float = parameter("m/(N s)", 0.0, 1e-3, "creep along x_G")
+    y: float = parameter("m/(N s)", 0.0, 1e-3, "creep along y_G")
+    z: float = parameter("m/(N s)", 0.0, 1e-3, "creep along z_G")
+
+    stage = 3
+
+    def execute(
+        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
+    ) -> tuple[np.ndarray, Memory]:
+        """See MotionEffect; the memory is the slip so far."""
+        creep = np.array([self.x, self.y, self.z, 0.0, 0.0, 0.0])
+        slip = memory + creep * wrench * period
+        return commanded + slip, slip

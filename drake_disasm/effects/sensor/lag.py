@@ -1,0 +1,38 @@
+"""The sensor's filter is slow."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import SensorMemoryEffect, parameter, shape
+
+
+@dataclasses.dataclass
+class SensorLag(SensorMemoryEffect):
+    """A first-order low-pass between load and reading.
+
+    Equation: F_read = F + a (f - F), df/dt = (F - f) / T; a = 1 is the filter alone,
+    less is a reading that the filter has a share in. Between samples the load
+    is taken to hold.
+    Where it acts: the filter of the sensor's electronics.
+    """
+
+    share: float = parameter("1", 0.0, 1.0, "a, that goes through the filter")
+    time_constant: float = shape(0.1, "s", 0.005, 5.0, "T", (0.05, 0.15, 0.5))
+
+    stage = 3
+
+    def begin(self, wrench_S: np.ndarray) -> np.ndarray:
+        """Returns the settled filter."""
+        return wrench_S
+
+    def remember(
+        self, memory: np.ndarray, wrench_S: np.ndarray, interval: float
+    ) -> np.ndarray:
+        """Returns the filter's output."""
+        stays = np.exp(-interval / self.time_constant)
+        return wrench_S + stays * (memory - wrench_S)
+
+    def read(self, wrench_S: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """Returns the reading."""
+        return wrench_S + self.share * (memory - wrench_S)

@@ -1,0 +1,51 @@
+"""The commands of measured episodes, and where effects on the motion take them."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from drake_disasm.effects import MotionEffect
+from drake_disasm.systems.pose_target import through_motion
+from sysid.logs import Episode
+from sysid.models.base import Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Commands:
+    """What an arm was told in an episode of n steps.
+
+    Attributes:
+        path: (n + 1, 6) commanded position and rotation vector of B in G [m, rad].
+        wrench: (n + 1, 6) [f; tau] measured on the bolt at Bo in G.
+        period: of the MDP [s].
+    """
+
+    path: Array
+    wrench: Array
+    period: float
+
+    @classmethod
+    def of(cls, episode: Episode, period: float) -> Self:
+        """Returns those of an episode of transitions."""
+        pose = episode["X_GB_commanded"]
+        turn = Rotation.from_quat(pose[:, [4, 5, 6, 3]]).as_rotvec()
+        return cls(np.hstack([pose[:, :3], turn]), episode["wrench"], period)
+
+    def executed(self, effects: Sequence[MotionEffect]) -> Array:
+        """Returns where effects, in the chain's order, take the path (n + 1, 6)."""
+        path, memories = [self.path[0]], np.zeros((len(effects), 6))
+        for commanded, wrench in zip(self.path[1:], self.wrench, strict=False):
+            executed, memories = through_motion(
+                effects, commanded, wrench, memories, self.period
+            )
+            path.append(executed)
+        return np.array(path)
+
+
+def twin_coordinates(path: Array) -> Array:
+    """Returns the twin's coordinates (n, 6) of positions and rotation vectors."""
+    angles = Rotation.from_rotvec(path[:, 3:]).as_euler("ZYX")
+    return np.hstack([path[:, :3], angles])

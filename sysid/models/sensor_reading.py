@@ -1,0 +1,127 @@
+"""The wrench at the sensor: where its channels' noise is independent, and errs."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import UniformGravityFieldElement
+from scipy.spatial.transform import Rotation
+
+from drake_disasm.devices.ft_sensor import Payload
+from drake_disasm.effects import SensorEffect, SensorMemoryEffect
+from drake_disasm.lock import bolt_inertia
+from drake_disasm.scenario import Scenario
+from drake_disasm.stations.simulated import nominal_groove_pose
+from drake_disasm.tool import Tool
+from sysid.models.base import Array
+
+_SAMPLES = 10  # of the sensor between two states
+
+
+def at_sensor(states: Array, X_SB: RigidTransform) -> Array:
+    """Returns states with the wrench at So in S in place of that at Bo in G.
+
+    The inverse of the last step of observation processing.
+
+    Args:
+        states: (n, 12), position, rotation vector and wrench [f; tau] at Bo, in G.
+        X_SB: the bolt in the sensor's frame.
+    """
+    X_BS = X_SB.inverse()
+    R_GB = Rotation.from_rotvec(states[:, 3:6]).as_matrix()
+    p_BoSo_G = R_GB @ X_BS.translation()
+    f_G, t_Bo_G = states[:, 6:9], states[:, 9:12]
+    t_So_G = t_Bo_G - np.cross(p_BoSo_G, f_G)
+    R_GS = R_GB @ X_BS.rotation().matrix()
+    in_S = [np.einsum("nij,ni->nj", R_GS, vector) for vector in (f_G, t_So_G)]
+    return np.hstack([states[:, :6], *in_S])
+
+
+class SensorReading:
+    """How the sensor's effects change processed wrenches, many at once.
+
+    Processing takes the reading at zeroing off, and the change of the known weight
+    since then (`contact_wrench`); so what effects add to readings, and to the
+    one at zeroing, is added to what is processed.
+    """
+
+    def __init__(self, scenario: Scenario, tool: Tool) -> None:
+        bolt = bolt_inertia(scenario.lock)
+        X_SB = tool.X_SB
+        g_W = UniformGravityFieldElement().gravity_vector()
+        # What hangs on the twin's sensor: the bolt alone.
+        self._payload = Payload(bolt.get_mass(), X_SB @ bolt.get_com(), g_W)
+        self._R_WG = nominal_groove_pose(scenario.placement).rotation().matrix()
+        self._R_BS = X_SB.inverse().rotation().matrix()
+
+    def raw(self, states: Array, zero: Array) -> Array:
+        """Returns the raw readings (n, 6) in S of states (n, 12), wrench at So in S.
+
+        Args:
+            states: of the task.
+            zero: (6,) the reading at zeroing.
+        """
+        weight = self._weight(self._R_WS(states))
+        at_rest = self._weight(self._R_WG[None] @ self._R_BS)[0]
+        return states[:, 6:] + zero - at_rest + weight
+
+    def read(
+        self,
+        effects: Sequence[SensorEffect],
+        states: Array,
+        zero: Array,
+        times: Array,
+    ) -> Array:
+        """Returns states (n, 12) whose wrench is read through effects.
+
+        Args:
+            effects: in the order of the chain.
+            states: without them, the wrench at So in S.
+            zero: (6,) the reading at zeroing, without them.
+            times: (n,) since the episode began [s]; they start anew in each episode.
+        """
+        raw = self.raw(states, zero)
+        sensing = self._payload.sensing(times, self._R_WS(states))
+        rest = self._payload.sensing(np.array(0.0), self._R_WG @ self._R_BS)
+        load, at_rest, seen = raw, zero, zero
+        for effect in effects:
+            sensing, rest = (effect.circumstances(each) for each in (sensing, rest))
+            if isinstance(effect, SensorMemoryEffect):
+                load = _along(effect, load, at_rest, times)
+                continue
+            load = effect.apply(load, sensing)
+            at_rest = effect.apply(at_rest, rest)
+            if effect.present_at_zeroing:
+                seen = effect.apply(seen, rest)
+        change = (load - raw) - (seen - zero)
+        return np.hstack([states[:, :6], states[:, 6:] + change])
+
+    def _R_WS(self, states: Array) -> Array:
+        R_GB = Rotation.from_rotvec(states[:, 3:6]).as_matrix()
+        return np.asarray(self._R_WG @ R_GB @ self._R_BS)
+
+    def _weight(self, R_WS: Array) -> Array:
+        """Returns what the payload loads the sensor with, (n, 6), at orientations."""
+        f = self._payload.mass * (self._payload.g_W @ R_WS)
+        return np.hstack([f, np.cross(self._payload.p_SoScm_S, f)])
+
+
+def _along(
+    effect: SensorMemoryEffect, loads: Array, at_rest: Array, times: Array
+) -> Array:
+    """Returns what an effect with a memory reads of loads (n, 6), each in its turn.
+
+    Between two of them the load goes evenly. An episode begins at rest.
+    """
+    found, previous, before = np.empty_like(loads), at_rest, 0.0
+    memory = effect.begin(at_rest)
+    for i, (load, time) in enumerate(zip(loads, times, strict=True)):
+        if time <= before:
+            memory, previous, before = effect.begin(at_rest), at_rest, 0.0
+        interval = (time - before) / _SAMPLES
+        for part in np.arange(1, _SAMPLES + 1) / _SAMPLES:
+            now = previous + part * (load - previous)
+            memory = effect.remember(memory, now, interval)
+        found[i] = effect.read(load, memory)
+        previous, before = load, time
+    return found
