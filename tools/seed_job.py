@@ -8,6 +8,7 @@ from typing import Any
 import cli
 from tqdm import tqdm
 
+from drake_disasm.learning.checkpoint import load_memory
 from drake_disasm.learning.dataset import remember
 from drake_disasm.learning.experiment import Experiment
 from drake_disasm.learning.replay import Replay
@@ -107,7 +108,7 @@ def train_seed(job: SeedJob, report: Callable[[News | None], None]) -> dict[str,
         "preset": experiment.preset,
         "data": experiment.logs | experiment.demonstrations,
     }
-    demonstrations = _memory(experiment, experiment.demonstrations)
+    demonstrations = _demonstrations(job)
     dataset = _memory(experiment, experiment.logs)
     training = Training(experiment.spec(job.seed), demonstrations, dataset)
     if experiment.start:
@@ -120,6 +121,15 @@ def train_seed(job: SeedJob, report: Callable[[News | None], None]) -> dict[str,
         updates = experiment.updates or dataset.size
         return learn_offline(training, job.folder, updates, *end)
     return run_training(training, job.folder, _Log(job), *end)
+
+
+def _demonstrations(job: SeedJob) -> Replay | None:
+    """Returns what to mix into each batch: logs, or else what the start remembers."""
+    experiment = job.experiment
+    shown = _memory(experiment, experiment.demonstrations)
+    if shown or not (experiment.start and experiment.config.demonstrations):
+        return shown
+    return load_memory(start_checkpoint(experiment.start, job.seed))
 
 
 def _memory(experiment: Experiment, folders: Collection[str]) -> Replay | None:

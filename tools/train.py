@@ -42,7 +42,7 @@ _EXAMPLES = """examples:
   python tools/train.py --from-logs out/sliding/seed_*/log --scenario sliding \\
       --preset chapter3 --out out/offline                      without acting
   python tools/train.py --model cell --start-from out/turned --scenario \\
-      removal_turned --out out/in_the_cell                     from the twin to the cell
+      removal_turned --hyper demonstrations=0.5 --out out/in_the_cell    twin to cell
   python tools/train.py ... --out out/sliding --resume         go on after Ctrl-C
 """
 
@@ -126,7 +126,8 @@ def _add_agent_arguments(add: Callable[..., object]) -> None:
         "--start-from",
         type=Path,
         metavar="DIR",
-        help="go on with what the same seeds learned in this training, elsewhere",
+        help="go on with what the same seeds learned in this training, elsewhere; "
+        "with --hyper demonstrations=0.5 half of each batch is what they remember",
     )
 
 

@@ -97,6 +97,14 @@ def _add_agent_arguments(add: Callable[..., object]) -> None:
         metavar="N",
         help="in the stand-in (default: 100, as on the thesis's robot)",
     )
+    add(
+        "--rehearsal",
+        type=float,
+        default=0.5,
+        metavar="SHARE",
+        help="of each batch in the stand-in: what is remembered of the twin "
+        "(default: 0.5)",
+    )
 
 
 def _add_run_arguments(add: Callable[..., object]) -> None:
@@ -149,6 +157,7 @@ def _study(args: argparse.Namespace, arguments: Sequence[str]) -> TransferStudy:
         model=args.model,
         common=common,
         episodes=args.stand_in_episodes,
+        rehearsal=args.rehearsal,
         folder=args.out,
     )
 

@@ -54,6 +54,18 @@ def load_agent(path: Path, agent: Agent) -> None:
     _restore_state(path, agent, arrays)
 
 
+def load_memory(path: Path) -> Replay:
+    """Returns what a training remembers.
+
+    Raises:
+        DisasmError: the file is damaged.
+    """
+    arrays, own = _read(path)
+    replay = Replay(max(1, len(arrays["replay"])))
+    replay.restore(arrays["replay"], own["following"])
+    return replay
+
+
 def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Returns the arrays of a checkpoint and the text among them."""
     try:

@@ -1,8 +1,10 @@
 """Going on elsewhere with what was learned: from twin to cell, from ψ to ψ.
 
 A training that starts from another takes over its agent (networks, targets, Adam's
-memory), seed by seed, and nothing else: its memory is empty, its exploration begins
-anew. So both must mean the same by what the networks read and give.
+moments), seed by seed. Its own memory is empty, its exploration begins anew. What was
+remembered there can be rehearsed: with the hyper-parameter `demonstrations` that share
+of each batch comes from it (half and half: Ball et al., 2023, RLPD). Both must mean
+the same by what the networks read and give.
 """
 
 import hashlib

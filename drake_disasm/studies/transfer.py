@@ -63,6 +63,8 @@ class TransferStudy:
         model: "cell" or "twin", of the stand-in.
         common: everything else of the trainings; its scenario and model are unused.
         episodes: of each training in the stand-in.
+        rehearsal: share of each batch there that comes from what the agent remembers
+            of its twin; without it a new memory is so narrow that the agent unlearns.
         folder: for all of it.
     """
 
@@ -72,6 +74,7 @@ class TransferStudy:
     model: str
     common: Experiment
     episodes: int
+    rehearsal: float
     folder: Path
 
     def experiments(self) -> dict[str, Experiment]:
@@ -84,7 +87,11 @@ class TransferStudy:
         return trained | {b.folder: self._in_stand_in(b) for b in BRANCHES}
 
     def _in_stand_in(self, branch: Branch) -> Experiment:
-        config = dataclasses.replace(self.common.config, episodes=self.episodes)
+        config = dataclasses.replace(
+            self.common.config,
+            episodes=self.episodes,
+            demonstrations=self.rehearsal if branch.start else 0.0,
+        )
         return dataclasses.replace(
             self.common,
             scenario=self.stand_in,
@@ -134,11 +141,11 @@ def results(folder: Path) -> list[dict[str, Any]]:
     """Returns the figures of each branch over the seeds that are finished.
 
     Returns:
-        For each of BRANCHES that has a finished seed: label, thesis, seeds, and with
-        one entry per seed P, first_success (number of the episode, or None), success
-        (share of the training's episodes), greedy (P of the final policy's
-        validation), and deployed and deployed_success (the same before learning
-        went on; empty without transfer).
+        For each of BRANCHES that has a finished seed: folder, label, thesis, seeds,
+        and with one entry per seed P, first_success (number of the episode, or None)
+        and success (share of the episodes) of the training; P and success of greedy
+        episodes after it (greedy, greedy_success) and before it (deployed,
+        deployed_success; empty without transfer).
     """
     found = []
     for branch in BRANCHES:
@@ -170,29 +177,43 @@ def _share(figures: dict[str, Any]) -> float:
     return figures["successes"] / figures["episodes"]
 
 
+_HEADER = (
+    "",
+    "P",
+    "each seed",
+    "success",
+    "first success",
+    "greedy before: P, success",
+    "greedy after: P, success",
+    "thesis: P",
+)
+
+
 def table(rows: Sequence[dict[str, Any]]) -> str:
     """Returns the figures of `results` as a table for a terminal."""
-    width = max(len(branch.label) for branch in BRANCHES)
-    lines = [
-        f"{'':{width}}       P  (each seed)                success  first  "
-        "greedy before: P, success  after: P, success  thesis: P"
-    ]
-    for row in rows:
-        each = ", ".join(f"{P:.1f}" for P in row["P"])
-        first = ", ".join(str(f or "-") for f in row["first_success"])
-        lines.append(
-            f"{row['label']:{width}}  {np.mean(row['P']):6.1f}  ({each})".ljust(
-                width + 38
-            )
-            + f"{_percent(row['success'])}  {first:>5}  "
-            f"{_greedy(row, 'deployed'):>25}  {_greedy(row, 'greedy'):>17}  "
-            f"{row['thesis']}"
-        )
-    return "\n".join(lines)
+    cells = [_HEADER, *map(_cells, rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return "\n".join(
+        "  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True))
+        for line in cells
+    )
+
+
+def _cells(row: dict[str, Any]) -> tuple[str, ...]:
+    return (
+        row["label"],
+        f"{np.mean(row['P']):.1f}",
+        ", ".join(f"{P:.1f}" for P in row["P"]),
+        _percent(row["success"]),
+        ", ".join(str(first or "-") for first in row["first_success"]),
+        _greedy(row, "deployed"),
+        _greedy(row, "greedy"),
+        row["thesis"],
+    )
 
 
 def _percent(shares: Sequence[float]) -> str:
-    return f"{100 * np.mean(shares):5.0f} %"
+    return f"{100 * np.mean(shares):.0f} %"
 
 
 def _greedy(row: dict[str, Any], name: str) -> str:

@@ -215,12 +215,18 @@ def test_demonstrations_are_mixed_in(undisturbed: Path, tmp_path: Path) -> None:
 def test_a_training_goes_on_from_another(undisturbed: Path, tmp_path: Path) -> None:
     """On another model, with the networks that the same seed came to."""
     out, start = tmp_path / "on", f"--start-from={undisturbed}"
-    _finished(out, "--episodes=1", "--first-seed=1", "--psi=0.0003", start)
-    _finished(tmp_path / "new", "--episodes=1", "--first-seed=1", "--psi=0.0003")
+    settings = ["--episodes=1", "--first-seed=1", "--psi=0.0003"]
+    _finished(out, *settings, start)
     policy = load_policy(out / "seed_001/policy.npz")
     assert list(policy.description.provenance["start"]) == [str(undisturbed)]
-    new = _content(tmp_path / "new/seed_001")
-    assert _content(out / "seed_001")["log"] != new["log"]
+    shown = ["--hyper", *SMALL[SMALL.index("--hyper") + 1 :], "demonstrations=0.5"]
+    _finished(tmp_path / "rehearsed", *settings, start, *shown)
+    _finished(tmp_path / "new", *settings)
+    went_on, rehearsed, new = (
+        _content(tmp_path / name / "seed_001") for name in ("on", "rehearsed", "new")
+    )
+    assert went_on["log"] == rehearsed["log"] != new["log"]
+    assert went_on["weights"] != rehearsed["weights"]
 
 
 def test_a_start_that_does_not_fit_is_named(undisturbed: Path, tmp_path: Path) -> None:
