@@ -2,6 +2,7 @@
 
 from drake_disasm.effects.arm.asymmetric_friction import JointAsymmetricFriction
 from drake_disasm.effects.arm.coulomb_friction import JointCoulombFriction
+from drake_disasm.effects.arm.flange_payload import FlangePayload
 from drake_disasm.effects.arm.load_friction import JointLoadFriction
 from drake_disasm.effects.arm.rotor_inertia import RotorInertia
 from drake_disasm.effects.arm.stribeck_friction import JointStribeckFriction
@@ -15,6 +16,7 @@ from drake_disasm.effects.base import (
     Effect,
     Environment,
     EnvironmentEffect,
+    JointEffect,
     JointSamples,
     MotionEffect,
     Sensing,
@@ -89,6 +91,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     TorqueOffset,
     TorqueGain,
     RotorInertia,
+    FlangePayload,
 )
 
 __all__ = [
@@ -107,6 +110,7 @@ __all__ = [
     "Effect",
     "Environment",
     "EnvironmentEffect",
+    "FlangePayload",
     "GrooveBend",
     "GrooveClearance",
     "GrooveFriction",
@@ -115,6 +119,7 @@ __all__ = [
     "GrooveViscousFriction",
     "JointAsymmetricFriction",
     "JointCoulombFriction",
+    "JointEffect",
     "JointLoadFriction",
     "JointSamples",
     "JointStribeckFriction",

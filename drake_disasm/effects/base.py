@@ -239,7 +239,11 @@ class JointSamples:
     load: np.ndarray
 
 
-class ArmEffect(Effect, abc.ABC):
+class ArmEffect(Effect):
+    """Acts on an arm, and so on the torques that its joints' sensors measure."""
+
+
+class JointEffect(ArmEffect, abc.ABC):
     """Acts at one joint of an arm, on the torque that its sensor measures.
 
     Attributes:

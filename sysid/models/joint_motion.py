@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.effects import ArmEffect, JointSamples
+from drake_disasm.effects import FlangePayload, JointEffect, JointSamples
 from drake_disasm.errors import DisasmError
 from drake_disasm.quantity import closest
 from drake_disasm.scenario import Scenario, with_values
@@ -62,7 +62,8 @@ class JointMotionModel(ScenarioModel):
             name: np.concatenate([e[name] for _, e in episodes])
             for name in ("q", "v", "vd")
         }
-        self._Y = np.concatenate(parts)[:, :, base.independent]
+        Y = np.concatenate(parts)
+        self._Y, self._Y_F = Y[:, :, base.independent], Y[:, :, arm.last_link]
         self._beta = base.beta(arm.inertia)
         self._fixed = np.zeros(len(self._beta))
         self._free = np.arange(len(self._beta))
@@ -78,10 +79,14 @@ class JointMotionModel(ScenarioModel):
         beta, count = self._fixed.copy(), len(self._free)
         beta[self._free] = theta[:count]
         load: Array = self._Y[rows] @ beta
+        effects = self.scenario_at(theta).effects
+        for effect in effects:
+            if isinstance(effect, FlangePayload):
+                load = load + self._Y_F[rows] @ effect.inertial
         torque = load.copy()
         joints = [channel.name for channel in self.measurements.channels]
-        for effect in self.scenario_at(theta).effects:
-            if isinstance(effect, ArmEffect):
+        for effect in effects:
+            if isinstance(effect, JointEffect):
                 i = joints.index(effect.joint)
                 motion = {name: all_[rows, i] for name, all_ in self._motion.items()}
                 samples = JointSamples(**motion, load=load[:, i])
@@ -160,6 +165,7 @@ class JointMotionModel(ScenarioModel):
     def _selected(self, mask: NDArray[np.bool_]) -> Self:
         return self._changed(
             _Y=self._Y[mask],
+            _Y_F=self._Y_F[mask],
             _motion={name: values[mask] for name, values in self._motion.items()},
             measurements=self.measurements.select(mask),
         )

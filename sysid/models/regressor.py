@@ -37,6 +37,7 @@ class ArmDynamics:
     Attributes:
         links: names of the links that move, in the order of pi.
         inertia: pi by the URDF.
+        last_link: where in pi the link is that is farthest from the base.
 
     Args:
         urdf: a path, or `package://`.
@@ -56,6 +57,8 @@ class ArmDynamics:
         self.inertia = np.concatenate(
             [_inertial(body.default_spatial_inertia()) for body in self._bodies]
         )
+        last = len(INERTIAL) * _farthest(plant, bodies)
+        self.last_link = slice(last, last + len(INERTIAL))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -181,6 +184,20 @@ def _weld_root(plant: MultibodyPlant, bodies: Sequence[RigidBody]) -> None:
     for body in bodies:
         if int(body.index()) not in held:
             plant.WeldFrames(plant.world_frame(), body.body_frame())
+
+
+def _farthest(plant: MultibodyPlant, bodies: Sequence[RigidBody]) -> int:
+    """Returns which body has the most joints, welds too, between it and the world."""
+    joints = [plant.get_joint(i) for i in plant.GetJointIndices()]
+    parents = {j.child_body().index(): j.parent_body().index() for j in joints}
+
+    depths = []
+    for body in bodies:
+        index, depth = body.index(), 0
+        while index in parents:
+            index, depth = parents[index], depth + 1
+        depths.append(depth)
+    return int(np.argmax(depths))
 
 
 def _velocity_columns(

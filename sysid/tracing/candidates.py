@@ -11,6 +11,7 @@ from drake_disasm.effects import (
     ArmEffect,
     Effect,
     EnvironmentEffect,
+    JointEffect,
     SensorEffect,
     shapes,
     sizes,
@@ -70,8 +71,8 @@ def candidates(
         return [
             Candidate.of(effect)
             for kind in kinds
-            for joint in joints
-            for effect in _in_all_shapes(kind, joint=joint)
+            for place in _places(kind, joints)
+            for effect in _in_all_shapes(kind, **place)
         ]
     acts: tuple[type[Effect], ...] = (SensorEffect, EnvironmentEffect)
     if isinstance(model, StaticWrenchModel):
@@ -127,6 +128,13 @@ def _place(scenario: Scenario, candidate: Candidate) -> int:
             return number
     scenario.effects.append(copy.deepcopy(wanted))
     return len(scenario.effects) - 1
+
+
+def _places(kind: type[ArmEffect], joints: Sequence[str]) -> list[dict[str, str]]:
+    """Returns where an arm's effect may act: at each joint, or on the arm."""
+    if issubclass(kind, JointEffect):
+        return [{"joint": joint} for joint in joints]
+    return [{}]
 
 
 def _in_all_shapes(kind: type[Effect], **fields: Any) -> list[Effect]:

@@ -24,6 +24,7 @@ _SHOWN_BY = {
     "sides",
     "TorqueGain": "the same motion with two known payloads",
     "RotorInertia": "fast reversals of this joint alone, the others at rest",
+    "FlangePayload": "rests in several poses, with and without what hangs there",
     "GroovePose": "pulls in both directions, the bolt turned by a known angle between",
     "GrooveBend": "slow pulls over the whole groove, both ways and along both walls",
     "GrooveClearance": "small steps sideways from wall to wall, at several depths",

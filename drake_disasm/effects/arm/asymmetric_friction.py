@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from drake_disasm.effects.base import (
-    ArmEffect,
+    JointEffect,
     JointSamples,
     joint_name,
     parameter,
@@ -17,7 +17,7 @@ _CREEP = (0.005, 0.02, 0.08)
 
 
 @dataclasses.dataclass
-class JointAsymmetricFriction(ArmEffect):
+class JointAsymmetricFriction(JointEffect):
     """What friction forwards exceeds friction backwards by, half of it.
 
     Equation: tau = c tanh(v / e)^2 + b |v|: even in v, and zero at rest.
@@ -30,6 +30,6 @@ class JointAsymmetricFriction(ArmEffect):
     creep: float = shape(0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP)
 
     def torque(self, samples: JointSamples) -> np.ndarray:
-        """See ArmEffect."""
+        """See JointEffect."""
         dry = self.coulomb * np.tanh(samples.v / self.creep) ** 2
         return dry + self.viscous * np.abs(samples.v)

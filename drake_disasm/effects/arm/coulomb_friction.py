@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from drake_disasm.effects.base import (
-    ArmEffect,
+    JointEffect,
     JointSamples,
     joint_name,
     parameter,
@@ -17,7 +17,7 @@ _CREEP = (0.005, 0.02, 0.08)
 
 
 @dataclasses.dataclass
-class JointCoulombFriction(ArmEffect):
+class JointCoulombFriction(JointEffect):
     """Dry friction of constant size against the motion.
 
     Equation: tau = c tanh(v / e), e the speed below which the joint creeps.
@@ -29,5 +29,5 @@ class JointCoulombFriction(ArmEffect):
     creep: float = shape(0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP)
 
     def torque(self, samples: JointSamples) -> np.ndarray:
-        """See ArmEffect."""
+        """See JointEffect."""
         return self.size * np.tanh(samples.v / self.creep)

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from drake_disasm.effects.base import (
-    ArmEffect,
+    JointEffect,
     JointSamples,
     joint_name,
     parameter,
@@ -17,7 +17,7 @@ _CREEP = (0.005, 0.02, 0.08)
 
 
 @dataclasses.dataclass
-class JointLoadFriction(ArmEffect):
+class JointLoadFriction(JointEffect):
     """Dry friction in proportion to the torque that the gear transmits.
 
     Equation: tau = k |tau_load| tanh(v / e).
@@ -29,6 +29,6 @@ class JointLoadFriction(ArmEffect):
     creep: float = shape(0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP)
 
     def torque(self, samples: JointSamples) -> np.ndarray:
-        """See ArmEffect."""
+        """See JointEffect."""
         direction = np.tanh(samples.v / self.creep)
         return self.coefficient * np.abs(samples.load) * direction

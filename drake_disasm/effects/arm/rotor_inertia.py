@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import ArmEffect, JointSamples, joint_name, parameter
+from drake_disasm.effects.base import JointEffect, JointSamples, joint_name, parameter
 
 
 @dataclasses.dataclass
-class RotorInertia(ArmEffect):
+class RotorInertia(JointEffect):
     """Inertia of rotor and gear, as the joint feels it.
 
     Equation: tau = I_a vd: unlike a link's inertia it couples to no other joint.
@@ -19,5 +19,5 @@ class RotorInertia(ArmEffect):
     inertia: float = parameter("kg m^2", 0.0, 50.0, "reflected to the joint")
 
     def torque(self, samples: JointSamples) -> np.ndarray:
-        """See ArmEffect."""
+        """See JointEffect."""
         return self.inertia * samples.vd

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from drake_disasm.effects.base import (
-    ArmEffect,
+    JointEffect,
     JointSamples,
     joint_name,
     parameter,
@@ -14,7 +14,7 @@ from drake_disasm.effects.base import (
 
 
 @dataclasses.dataclass
-class JointStribeckFriction(ArmEffect):
+class JointStribeckFriction(JointEffect):
     """Friction that falls as a film of grease builds up (Stribeck).
 
     Equation: tau = c tanh(v / e) exp(-(v / v_s)^2), v_s the film's speed
@@ -30,6 +30,6 @@ class JointStribeckFriction(ArmEffect):
     )
 
     def torque(self, samples: JointSamples) -> np.ndarray:
-        """See ArmEffect."""
+        """See JointEffect."""
         film = np.exp(-((samples.v / self.speed) ** 2))
         return self.size * np.tanh(samples.v / self.creep) * film

@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import ArmEffect, JointSamples, joint_name, parameter
+from drake_disasm.effects.base import JointEffect, JointSamples, joint_name, parameter
 
 
 @dataclasses.dataclass
-class TorqueGain(ArmEffect):
+class TorqueGain(JointEffect):
     """A share of the torque, too much.
 
     Equation: tau = g tau_load.
@@ -19,5 +19,5 @@ class TorqueGain(ArmEffect):
     share: float = parameter("1", -0.9, 0.9, "too much")
 
     def torque(self, samples: JointSamples) -> np.ndarray:
-        """See ArmEffect."""
+        """See JointEffect."""
         return self.share * samples.load

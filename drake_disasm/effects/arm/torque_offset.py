@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import ArmEffect, JointSamples, joint_name, parameter
+from drake_disasm.effects.base import JointEffect, JointSamples, joint_name, parameter
 
 
 @dataclasses.dataclass
-class TorqueOffset(ArmEffect):
+class TorqueOffset(JointEffect):
     """A constant in the reading of a joint's torque sensor.
 
     Equation: tau = c.
@@ -19,5 +19,5 @@ class TorqueOffset(ArmEffect):
     size: float = parameter("N m", -200.0, 200.0, "offset")
 
     def torque(self, samples: JointSamples) -> np.ndarray:
-        """See ArmEffect."""
+        """See JointEffect."""
         return np.full_like(samples.v, self.size)

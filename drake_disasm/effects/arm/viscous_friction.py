@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import ArmEffect, JointSamples, joint_name, parameter
+from drake_disasm.effects.base import JointEffect, JointSamples, joint_name, parameter
 
 
 @dataclasses.dataclass
-class JointViscousFriction(ArmEffect):
+class JointViscousFriction(JointEffect):
     """Friction that grows with the joint's speed.
 
     Equation: tau = b v.
@@ -19,5 +19,5 @@ class JointViscousFriction(ArmEffect):
     coefficient: float = parameter("N m s/rad", 0.0, 500.0, "viscous coefficient")
 
     def torque(self, samples: JointSamples) -> np.ndarray:
-        """See ArmEffect."""
+        """See JointEffect."""
         return self.coefficient * samples.v

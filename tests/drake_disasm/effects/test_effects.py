@@ -15,10 +15,12 @@ from drake_disasm.effects import (
     Effect,
     Environment,
     EnvironmentEffect,
+    FlangePayload,
     GrooveFriction,
     GroovePose,
     JointAsymmetricFriction,
     JointCoulombFriction,
+    JointEffect,
     JointLoadFriction,
     JointSamples,
     JointStribeckFriction,
@@ -93,8 +95,10 @@ def test_vanishes_at_null_as_a_function(effect: type[Effect]) -> None:
         wrench = np.array([1.1, -2.2, 3.3, 0.1, -0.2, 0.3])
         read = null.apply(wrench, _sensing((0.3, -0.8, 2.0)))
         assert np.array_equal(read, wrench)
-    if isinstance(null, ArmEffect):
+    if isinstance(null, JointEffect):
         assert not null.torque(SAMPLES).any()
+    if isinstance(null, FlangePayload):
+        assert not null.inertial.any()
 
 
 def _trajectory(
@@ -205,7 +209,7 @@ def test_the_chain_goes_from_the_load_to_the_electronics() -> None:
         (RotorInertia(inertia=2.0), [2.0, -2.0, 6.0]),
     ],
 )  # fmt: skip
-def test_arm_effects_are_their_equations(effect: ArmEffect, expected: list) -> None:
+def test_arm_effects_are_their_equations(effect: JointEffect, expected: list) -> None:
     np.testing.assert_allclose(effect.torque(SAMPLES), expected, atol=1e-12)
 
 

@@ -1,0 +1,47 @@
+"""Something hangs on the flange that nobody told the controller of."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects.base import ArmEffect, parameter
+
+_LIGHTEST = 0.1  # kg, that has an inertia of its own
+
+
+@dataclasses.dataclass
+class FlangePayload(ArmEffect):
+    """A load on the arm's last link that the model of the arm does not know.
+
+    Equation: tau = Y_F(q, v, vd) pi, with Y_F the arm's regressor of a body in the
+    frame F of its last link (the flange), and pi = [m, c, I] mass, first moment
+    c = m p_FoPcm_F and inertia about Fo of a point mass, I = (c.c 1 - c c^T) / m
+    (Khalil and Dombre 2002). With the moment as parameter, rather than the centre
+    of mass, all but I is linear; I is bounded below 0.1 kg, where it means nothing.
+    Where it acts: every joint of the arm, on the torques that their sensors
+    measure. It can't be told from a wrong mass of the last link. In the cell it
+    weighs on the flange, before the force/torque sensor, and the gravity
+    compensation does not carry it: the joints yield by tau / k.
+    """
+
+    mass: float = parameter("kg", 0.0, 50.0, "of the payload")
+    cx: float = parameter("kg m", -10.0, 10.0, "its first moment along x_F")
+    cy: float = parameter("kg m", -10.0, 10.0, "its first moment along y_F")
+    cz: float = parameter("kg m", -10.0, 10.0, "its first moment along z_F")
+
+    @property
+    def first_moment(self) -> np.ndarray:
+        """(3,) mass times centre of mass, in F [kg m]."""
+        return np.array([self.cx, self.cy, self.cz])
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """(3, 3) about Fo, in F [kg m^2]."""
+        c = self.first_moment
+        return (c @ c * np.eye(3) - np.outer(c, c)) / max(self.mass, _LIGHTEST)
+
+    @property
+    def inertial(self) -> np.ndarray:
+        """(10,) [m, cx, cy, cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz] about Fo, in F."""
+        upper = self.inertia[np.triu_indices(3)]
+        return np.concatenate([[self.mass], self.first_moment, upper])

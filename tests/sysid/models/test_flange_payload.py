@@ -1,0 +1,102 @@
+"""A payload that the model of the arm does not know, against Drake's dynamics."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drake_disasm.effects import FlangePayload, JointCoulombFriction
+from drake_disasm.scenario import Scenario
+from sysid.logs import Log, LogHeader, LogWriter, flat_columns, read_log
+from sysid.models.from_logs import ModelChoice, model_of
+from sysid.models.joint_motion import JointMotionModel
+from sysid.scenario_parameters import Request
+from sysid.tracing.candidates import candidates, extended
+from sysid.tracing.pipeline import close_loop
+from sysid.workers import Workers
+from tests.sysid.models.test_joint_motion import (
+    JOINT,
+    JOINTS,
+    LINK,
+    drakes_torques,
+    states,
+)
+
+MASS, COM = 1.5, np.array([0.05, -0.03, 0.12])
+NOISE = 0.05  # N m
+LOAD = f"""<link name="load"><inertial><origin xyz="{COM[0]} {COM[1]} {COM[2]}"/>
+<mass value="{MASS}"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>
+</inertial></link><joint name="held" type="fixed"><parent link="flange"/>
+<child link="load"/></joint>"""
+FLANGE = """<link name="flange"/><joint name="ee" type="fixed"><parent link="lower"/>
+<child link="flange"/><origin xyz="0 0.02 0.3" rpy="0.3 0 1"/></joint>"""
+
+
+def _arm(path: Path, load: str) -> Path:
+    text = '<robot name="two"><link name="base"/>' + FLANGE + load
+    text += LINK.format("upper", "0.1 0.02 0.1", 2.0)
+    text += LINK.format("lower", "0.05 0 0.1", 1.0)
+    text += JOINT.format("shoulder", "base", "upper", "0 0 0.3", "1.2 0 0")
+    text += JOINT.format("elbow", "upper", "lower", "0 0.4 0", "0 1.3 0.2")
+    path.write_text(text + "</robot>")
+    return path
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Log:
+    """Motion of an arm that carries something; the header knows nothing of it."""
+    known, loaded = _arm(tmp_path / "a.urdf", ""), _arm(tmp_path / "b.urdf", LOAD)
+    q, v, vd = states(400)
+    tau = drakes_torques(loaded, q, v, vd)
+    tau += NOISE * np.random.default_rng(1).normal(size=tau.shape)
+    columns = {"time": 0.01 * np.arange(400), "q": q, "v": v, "vd": vd, "tau": tau}
+    header = LogHeader("joint_motion", "excite", {}, joints=JOINTS, urdf=str(known))
+    with LogWriter(tmp_path / "log", header) as writer:
+        writer.write_episode(flat_columns("joint_motion", columns))
+    return read_log(tmp_path / "log")
+
+
+def test_a_payload_is_drakes_point_mass(log: Log) -> None:
+    scenario = Scenario(effects=[FlangePayload(MASS, *(MASS * COM))])
+    model = JointMotionModel([log], scenario=scenario).only([])
+    residual = model.predict(np.zeros(0), slice(0, 400)) - model.measurements.values
+    assert np.std(residual) == pytest.approx(NOISE, rel=0.1)
+
+
+def test_it_is_a_candidate_of_the_arm_and_not_of_a_joint(log: Log) -> None:
+    library = [FlangePayload, JointCoulombFriction]
+    found = candidates(JointMotionModel([log]), library)
+    assert [c.name for c in found].count("FlangePayload") == 1
+    assert len(found) == 1 + 2 * 3
+
+
+def test_it_is_inseparable_from_the_last_link(log: Log) -> None:
+    """All that it does, base parameters do: no new column."""
+    base = JointMotionModel([log])
+    model, (new,) = extended(base, candidates(base, [FlangePayload]))
+    theta = np.array([p.nominal for p in model.parameters])
+    rows, count = slice(0, 400), len(base.parameters)
+    at_null = model.predict(theta, rows)
+    shifts = 0.1 * np.eye(len(theta))
+    A = np.array([model.predict(theta + s, rows) - at_null for s in shifts])
+    A = A.reshape(len(theta), -1).T
+    left = A[:, new] - A[:, :count] @ np.linalg.lstsq(A[:, :count], A[:, new])[0]
+    assert np.linalg.norm(left) < 1e-8 * np.linalg.norm(A[:, new])
+
+
+def test_closing_the_loop_finds_it_beside_the_arm_of_the_urdf(log: Log) -> None:
+    """With the base parameters frozen; among all else that an arm may have."""
+    model = model_of([log], ModelChoice(requests=(Request("upper.Izz"),)))
+    assert isinstance(model, JointMotionModel)
+    found = close_loop(model, [0], [], np.inf, Workers(), lambda _: None)
+    assert found.verdict.names == ("FlangePayload",)
+    (effect,) = found.last.model.scenario_at(found.last.theta).effects
+    assert effect.mass == pytest.approx(MASS, abs=0.03)
+    np.testing.assert_allclose(effect.first_moment, MASS * COM, atol=0.01)
+
+
+def test_closing_the_loop_says_none_if_the_last_link_is_free(log: Log) -> None:
+    model = model_of([log], ModelChoice())
+    assert isinstance(model, JointMotionModel)
+    found = close_loop(model, [0], [], np.inf, Workers(), lambda _: None)
+    assert found.verdict.ending == "none"
