@@ -1,5 +1,7 @@
 """The cell: arm, sensor, gripper, bench and lock in one MultibodyPlant."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
@@ -20,11 +22,13 @@ from pydrake.systems.primitives import (
 )
 
 from drake_disasm.coordinates import ArmCoordinates
+from drake_disasm.effects import ArmEffect
 from drake_disasm.errors import DisasmError
 from drake_disasm.lock import add_lock, bolt_inertia, plate_bottom
 from drake_disasm.models import add_arm, add_model
 from drake_disasm.ports import CELL_PORTS
 from drake_disasm.scenario import Scenario
+from drake_disasm.stations.arm_effects import ArmMechanics
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.tool import FINGERS, Tool, add_tool, grasp_pose
 
@@ -99,13 +103,14 @@ class CellStation(SimulatedStation):
             config.arm, self.X_WG, self.tool.X_FB, config.task.period
         )
         self.start = self.coordinates.start(RigidTransform())
-        self.iiwa, flange = add_arm(plant, config.arm.model)
-        self.tool_models = add_tool(plant, flange, config)
+        self.iiwa, frame_F = add_arm(plant, config.arm.model)
+        self.tool_models = add_tool(plant, frame_F, config)
         self.lock = add_lock(plant, frame_Gn, config.lock, config.contact)
         self._add_bench(frame_Gn)
         self._hold_bolt()
         plant.Finalize()
         self._set_gains()
+        self._mechanics = ArmMechanics(plant, self.iiwa, frame_F)
         self._wire_arm(builder)
         self._wire_gripper(builder)
         self._add_sensor(
@@ -160,6 +165,7 @@ class CellStation(SimulatedStation):
         state = builder.AddNamedSystem("iiwa_state", Demultiplexer([7, 7]))
         connect(plant.get_state_output_port(self.iiwa), state.get_input_port())
         torque = plant.get_net_actuation_output_port(self.iiwa)
+        self._mechanics.wire(builder, state.get_output_port(1), torque)
         outputs = {
             "position_commanded": command.get_output_port(),
             "position_measured": state.get_output_port(0),
@@ -233,6 +239,13 @@ class CellStation(SimulatedStation):
         builder.Connect(plant.get_state_output_port(gripper), opening.get_input_port())
         builder.ExportOutput(opening.get_output_port(), "gripper.state_measured")
         self._add_ready_device(builder, "gripper")
+
+    def _set_arm_effects(self, context: Context, effects: Sequence[ArmEffect]) -> None:
+        self._mechanics.set_effects(
+            self.part_context(self.plant, context),
+            self.part_context(self._mechanics.friction, context),
+            effects,
+        )
 
     def _fix_commands(self, context: Context) -> None:
         super()._fix_commands(context)

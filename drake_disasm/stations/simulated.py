@@ -219,11 +219,15 @@ class SimulatedStation(Station):
             self._set_environment(context, environment)
 
     def _set_arm_effects(self, context: Context, effects: Sequence[ArmEffect]) -> None:
-        """Puts effects on the arm's joints into this station's Context."""
-        for effect in effects:
+        """Puts an arm's effects, and no others, into this station's Context.
+
+        Raises:
+            DisasmError: the station has no arm.
+        """
+        if effects:
             raise DisasmError(
-                f"{type(effect).__name__}: acts on logs of joint torques; no "
-                "simulated station carries it yet, take it out of effects"
+                f"{type(effects[0]).__name__}: acts on the arm, and this station has "
+                "none; take it out of effects, or use --model cell"
             )
 
     def _set_environment(self, context: Context, environment: Environment) -> None:

@@ -1,0 +1,209 @@
+"""Effects on the arm in the cell, against their own equations and statics."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from pydrake.multibody.tree import JacobianWrtVariable
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from drake_disasm.effects import (
+    Effect,
+    FlangePayload,
+    JointAsymmetricFriction,
+    JointCoulombFriction,
+    JointEffect,
+    JointLoadFriction,
+    JointSamples,
+    JointStribeckFriction,
+    JointViscousFriction,
+    RotorInertia,
+    TorqueGain,
+    TorqueOffset,
+)
+from drake_disasm.errors import DisasmError
+from drake_disasm.scenario import load_scenario
+from drake_disasm.stations import CellStation, TwinStation
+from tests.drake_disasm.conftest import QUIET
+
+LIFT = np.array([0, -0.3, 0, 0, 0, 0, 0])  # rad, of the arm out of the lock
+JOINT = 3  # carries much of the weight
+NAME = "iiwa_joint_4"
+SPEED = 0.1  # rad/s
+
+
+@pytest.fixture(scope="module")
+def station() -> CellStation:
+    """The cell with its bolt welded in, commanded as often as the plant steps."""
+    period = "arm.control_period=0.0025"  # else the command is a staircase to it
+    return CellStation(load_scenario("removal", [QUIET, "gripper.hold=weld", period]))
+
+
+def _lifted(station: CellStation, effects: Sequence[Effect]) -> Simulator:
+    """Returns the station with the arm raised, so that nothing touches the bolt."""
+    simulator = station.at_start(effects)
+    context = simulator.get_mutable_context()
+    plant_context = station.part_context(station.plant, context)
+    q = station.start + LIFT
+    station.plant.SetPositions(plant_context, station.iiwa, q)
+    station.GetInputPort("iiwa.position").FixValue(context, q)
+    simulator.Initialize()
+    return simulator
+
+
+def _drive(station: CellStation, simulator: Simulator, q: np.ndarray) -> np.ndarray:
+    """Commands one joint (steps,) beside its place; returns its torques (steps,)."""
+    context, torques = simulator.get_mutable_context(), []
+    for k, place in enumerate(q):
+        command = station.start + LIFT
+        command[JOINT] += place
+        station.GetInputPort("iiwa.position").FixValue(context, command)
+        simulator.AdvanceTo((k + 1) * station.control_period)
+        torque = station.GetOutputPort("iiwa.torque_measured").Eval(context)
+        torques.append(torque[JOINT])
+    return np.array(torques)
+
+
+def _forth_and_back(station: CellStation, effects: Sequence[Effect]) -> np.ndarray:
+    """Returns a joint's torque after 0.4 s at steady speed, forwards and backwards."""
+    t = station.control_period * np.arange(1, 161)
+    torques = [
+        _drive(station, _lifted(station, effects), v * t)[-1] for v in (SPEED, -SPEED)
+    ]
+    return np.array(torques)
+
+
+@pytest.fixture(scope="module")
+def without(station: CellStation) -> np.ndarray:
+    """Torques forth and back of the nominal arm."""
+    return _forth_and_back(station, [])
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        JointViscousFriction(NAME, 80.0),
+        JointCoulombFriction(NAME, 9.0, creep=0.02),
+        JointCoulombFriction(NAME, 9.0, creep=1e-4),
+        JointStribeckFriction(NAME, 12.0, speed=0.15),
+        JointAsymmetricFriction(NAME, 4.0, viscous=30.0),
+        JointLoadFriction(NAME, 0.2),
+    ],
+)
+def test_a_joint_at_steady_speed_takes_the_effects_torque(
+    effect: JointEffect, station: CellStation, without: np.ndarray
+) -> None:
+    v = np.array([SPEED, -SPEED])
+    expected = effect.torque(JointSamples(0 * v, v, 0 * v, without))
+    measured = _forth_and_back(station, [effect])
+    np.testing.assert_allclose(measured - without, expected, atol=0.03)
+
+
+def test_friction_does_not_chatter_at_rest(station: CellStation) -> None:
+    """However sharp it is, the joint is as quiet as without it."""
+    simulator = _lifted(station, [JointCoulombFriction(NAME, 30.0, creep=1e-4)])
+    torques = _drive(station, simulator, np.zeros(200))
+    assert np.ptp(torques[-20:]) < 1e-3
+
+
+def test_a_rotor_takes_torque_while_it_speeds_up(station: CellStation) -> None:
+    """2 kg m^2 at 0.5 rad/s^2 are 1 N m; at the first instants, near one place."""
+    t = station.control_period * np.arange(1, 121)
+    q = 0.25 * t**2
+    slow, fast = (
+        _drive(station, _lifted(station, effects), q)[-20:].mean()
+        for effects in ([], [RotorInertia(NAME, 2.0)])
+    )
+    assert fast - slow == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_payload_bends_the_joints(station: CellStation) -> None:
+    """At rest: k (q_commanded - q) = J^T m g, which nothing compensates."""
+    mass, p_FoPcm_F = 2.0, np.array([0.02, -0.05, 0.1])
+    simulator = _lifted(station, [FlangePayload(mass, *(mass * p_FoPcm_F))])
+    simulator.AdvanceTo(0.6)
+    plant = station.plant
+    context = station.part_context(plant, simulator.get_mutable_context())
+    J_W = plant.CalcJacobianTranslationalVelocity(
+        context, JacobianWrtVariable.kV, plant.GetFrameByName("iiwa_link_ee"),
+        p_FoPcm_F, plant.world_frame(), plant.world_frame(),
+    )  # fmt: skip
+    yielded = station.start + LIFT - plant.GetPositions(context, station.iiwa)
+    weight = J_W.T @ [0.0, 0.0, 9.81 * mass]
+    k = np.array(station.scenario.arm.stiffness)
+    np.testing.assert_allclose(k * yielded, weight[:7], atol=0.01)
+    assert np.abs(yielded).max() > 1e-3
+
+
+def _parameters(station: CellStation, context: Context) -> np.ndarray:
+    """Returns all numbers that effects on the arm may change."""
+    parts = (station.plant, station.GetSubsystemByName("arm_friction"))
+    contexts = [station.part_context(part, context) for part in parts]
+    return np.concatenate(
+        [
+            each.get_numeric_parameter(i).CopyToVector()
+            for each in contexts
+            for i in range(each.num_numeric_parameter_groups())
+        ]
+    )
+
+
+EVERY = (
+    JointViscousFriction(NAME, 80.0),
+    JointCoulombFriction(NAME, 9.0),
+    JointStribeckFriction(NAME, 12.0),
+    JointAsymmetricFriction(NAME, 4.0, viscous=30.0),
+    JointLoadFriction(NAME, 0.2),
+    RotorInertia(NAME, 2.0),
+    FlangePayload(2.0, 0.1),
+)
+NULL = (
+    *(type(e)(NAME) for e in EVERY if isinstance(e, JointEffect)),
+    FlangePayload(),
+)
+
+
+@pytest.mark.parametrize("after", [(), NULL])
+def test_nothing_stays_of_effects_that_are_gone(
+    after: Sequence[Effect], station: CellStation
+) -> None:
+    context = station.CreateDefaultContext()
+    station.set_effects(context, [])
+    nominal = _parameters(station, context)
+    station.set_effects(context, EVERY)
+    assert np.sum(_parameters(station, context) != nominal) >= len(EVERY)
+    station.set_effects(context, after)
+    np.testing.assert_array_equal(_parameters(station, context), nominal)
+
+
+@pytest.mark.parametrize("effect", EVERY)
+def test_each_effect_changes_the_arm(effect: Effect, station: CellStation) -> None:
+    context = station.CreateDefaultContext()
+    station.set_effects(context, [])
+    nominal = _parameters(station, context)
+    station.set_effects(context, [effect])
+    assert not np.array_equal(_parameters(station, context), nominal)
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        ([TorqueOffset(NAME, 1.0)], "torque sensors.* take it out of effects"),
+        ([TorqueGain(NAME, 0.1)], "torque sensors.* take it out of effects"),
+        ([RotorInertia("iiwa_join_4", 1.0)], "did you mean 'iiwa_joint_4'"),
+        ([JointLoadFriction(NAME, 0.1)] * 2, "acts twice on iiwa_joint_4.* merge"),
+        ([FlangePayload(cx=0.1)], "no mass; give it a mass"),
+    ],
+)
+def test_refuses_what_the_cell_cannot_carry(
+    effects: list[Effect], message: str, station: CellStation
+) -> None:
+    with pytest.raises(DisasmError, match=message):
+        station.set_effects(station.CreateDefaultContext(), effects)
+
+
+@pytest.mark.parametrize("effect", EVERY)
+def test_the_twin_has_no_arm(effect: Effect, twin: TwinStation) -> None:
+    with pytest.raises(DisasmError, match=r"acts on the arm.* use --model cell"):
+        twin.set_effects(twin.CreateDefaultContext(), [effect])
