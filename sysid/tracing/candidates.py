@@ -9,10 +9,13 @@ from typing import Any, Self
 from drake_disasm.effects import (
     EFFECTS,
     ArmEffect,
+    ContactExponent,
     Effect,
     EnvironmentEffect,
     JointEffect,
+    MotionEffect,
     SensorEffect,
+    SensorMemoryEffect,
     shapes,
     sizes,
 )
@@ -74,13 +77,16 @@ def candidates(
             for place in _places(kind, joints)
             for effect in _in_all_shapes(kind, **place)
         ]
-    acts: tuple[type[Effect], ...] = (SensorEffect, EnvironmentEffect)
+    acts: tuple[type[Effect], ...] = (EnvironmentEffect, MotionEffect, SensorEffect)
+    silent: tuple[type[Effect], ...] = (ContactExponent,)
     if isinstance(model, StaticWrenchModel):
-        acts = (SensorEffect,)
+        acts, silent = (SensorEffect,), (SensorMemoryEffect,)
+    elif model.scenario.contact.model == "impact":
+        silent = ()
     return [
         Candidate.of(effect)
         for kind in library
-        if issubclass(kind, acts)
+        if issubclass(kind, acts) and not issubclass(kind, silent)
         for effect in _in_all_shapes(kind)
     ]
 

@@ -1,20 +1,16 @@
 """Whether a log is long enough to decide anything."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drake_disasm.errors import DisasmError
-from sysid.identification.uncertainty import block_length
 from sysid.models.base import ScenarioModel
-from sysid.tracing.empirical import curves
-from sysid.tracing.evidence import LEAST_GAIN
-from sysid.tracing.selection import Fit, Survey
+from sysid.tracing.selection import Fit
+from sysid.tracing.study import Study, blocks_of
 
-Array = NDArray[np.float64]
-
-LEAST_BLOCKS = 6  # one in 64 by chance that an effect betters them all
 _LEAST_ROWS = 10
 _ROWS_EACH = 2  # for each parameter, so that some can be held out
+_MOST_EXCESS = 1.0  # of the loss of a block that is not fitted
+_AT_MOST = 20  # times the log: beyond that, the estimate means nothing
 
 
 def refuse_few_rows(model: ScenarioModel) -> None:
@@ -33,46 +29,31 @@ def refuse_few_rows(model: ScenarioModel) -> None:
         )
 
 
-def refuse_short_logs(last: Fit, end: Survey) -> None:
-    """Refuses to guess where there are too few independent pieces of data.
+def refuse_short_logs(last: Fit) -> None:
+    """Refuses to guess where a part of the log does not carry over to the rest.
 
-    They are counted in what nothing explains: while an effect is missing, residuals
-    stay correlated for as long as it lasts, which says nothing of the log. Curves
-    that may be more than chance are taken out, too, and the median over channels is
-    taken, since one channel's wandering does not make the others' readings fewer.
+    Half of the blocks cost several times as much when they are predicted by a fit to
+    all others as in the fit to all: each shows something else, and whatever is added
+    to the model follows that. The excess is in proportion to the parameters over the
+    independent data (Akaike's final prediction error), so it says how much is lacking.
 
     Args:
         last: the fit with all effects that were found.
-        end: the survey beside it.
 
     Raises:
         DisasmError: there are too few; it says how much more is needed.
     """
     episode = last.model.measurements.episode
-    rows = len(episode)
-    left = _unexplained(last, end)
-    lengths = [block_length(r[:, None], episode, most=0.5) for r in left.T]
-    length = int(np.median(lengths))
-    blocks = rows // length
-    if blocks >= LEAST_BLOCKS:
+    empty = np.zeros((*last.here.residual.shape, 0))
+    study = Study.of(last.here, empty, blocks_of(last.here, episode))
+    alone = study.losses(np.arange(len(last.theta)))
+    excess = float(np.median(alone / np.maximum(study.energy, 1e-300))) - 1.0
+    if excess <= _MOST_EXCESS:
         return
-    needed = LEAST_BLOCKS * length
+    rows = len(episode)
+    more = min(int(np.ceil(rows * (excess / _MOST_EXCESS - 1.0))), _AT_MOST * rows)
     raise DisasmError(
-        f"the log is too short to decide: what is left of it stays correlated over "
-        f"{length} of its {rows} rows, so it has {blocks} independent pieces, and "
-        f"{LEAST_BLOCKS} are needed; record at least {needed - rows} rows more, at the "
-        "same rate"
+        f"the log is too short to decide: a fit to all but a part of its {rows} rows "
+        f"misses that part by {np.sqrt(1.0 + excess):.1f} times as much as a fit to "
+        f"all; record at least {max(more, 1)} rows more, of other motion or poses"
     )
-
-
-def _unexplained(last: Fit, end: Survey) -> Array:
-    """Returns the residual (rows, channels) beside all curves that may be in it."""
-    residual = last.here.residual
-    columns, found = curves(last.model)
-    likely = [e.what for e in end.dependences if e.gain >= LEAST_GAIN]
-    kept = [i for d in found if d in likely for i in d.columns]
-    if not kept:
-        return residual
-    A = columns[..., kept].reshape(-1, len(kept))
-    fit = A @ np.linalg.lstsq(A, residual.reshape(-1), rcond=None)[0]
-    return np.asarray(residual - fit.reshape(residual.shape))

@@ -4,28 +4,31 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.tracing.evidence import ALPHA, Bench
 from sysid.tracing.selection import Fit
-from sysid.tracing.study import family_p
+from sysid.tracing.study import Columns, Study, family_p
 
-_LEAST_BLOCKS = 5  # of an episode, and of all others
-_LEAST_GAIN = 0.2  # of an episode's loss: far beyond what a common model leaves
-_LEAST_SHARE = 0.8  # of its blocks
+_MOST_EPISODES = 12  # with more, one alone hardly shows, and imprecision is the word
+_LEAST_GAIN = 0.2  # of the loss: far beyond what a common model leaves
+_LEAST_SHARE = 0.8  # of the blocks
+_SIMPLER = 0.1  # of the gain, that fewer parameters may cost
+_OWN = "the model's own parameters"
 
 
 @dataclass(frozen=True)
 class Contradiction:
-    """An episode that an effect explains, with other sizes than it has elsewhere.
+    """Episodes that an effect explains only with other sizes in each.
 
     Attributes:
-        episode: its name.
-        effect: that would explain it; the one that explains most.
-        gain: share of the episode's loss that its own sizes take away, judged on
-            blocks that they were not fitted to.
+        episodes: names; one that differs from all others, or the only two.
+        effect: that differs; the simplest of those that explain most.
+        gain: share of the loss that this takes away, judged on blocks that were not
+            fitted.
     """
 
-    episode: str
+    episodes: tuple[str, ...]
     effect: str
     gain: float
 
@@ -33,44 +36,74 @@ class Contradiction:
 def contradictions(fit: Fit, bench: Bench, own: int) -> tuple[Contradiction, ...]:
     """Returns the episodes that contradict the others, the worst first.
 
+    A candidate whose sizes may differ in one episode is held against the same with
+    common sizes, on blocks that were not fitted.
+
     Args:
         fit: with all effects that all episodes have in common.
         bench: beside it.
         own: number of the parameters that the model has anyway.
     """
-    sets = _sets(fit, bench, own)
     names = fit.model.measurements.names
+    if not 1 < len(names) <= _MOST_EPISODES:
+        return ()
+    numbers = range(len(names)) if len(names) > 2 else [1]
     found = []
-    for number in np.unique(bench.episodes):
-        mine = bench.episodes == number
-        if min(mine.sum(), (~mine).sum()) < _LEAST_BLOCKS:
-            continue
-        gains = np.column_stack(
-            [study.disagreement(columns, mine) for _, study, columns in sets]
-        )
-        p = family_p(gains) * len(names)
-        share = np.mean(gains > 0.0, axis=0)
-        gain = gains.sum(axis=0) / bench.raw.energy[mine].sum()
-        passed = (p < ALPHA) & (share >= _LEAST_SHARE) & (gain >= _LEAST_GAIN)
-        if passed.any():
-            best = int(np.argmax(np.where(passed, gain, -np.inf)))
-            found.append(Contradiction(names[number], sets[best][0], float(gain[best])))
+    for number in numbers:
+        best = _differs(fit, bench, own, number, len(numbers))
+        if best:
+            which = (names[number],) if len(names) > 2 else names
+            found.append(Contradiction(which, *best))
     return tuple(sorted(found, key=lambda each: -each.gain))
 
 
-def _sets(fit: Fit, bench: Bench, own: int) -> list[tuple]:
-    """Returns what may differ: its name, a study, and the columns there."""
-    base = np.arange(own)
-    beside = bench.raw.beside(base)
-    sets: list[tuple] = [("the model's own parameters", bench.raw, base)]
-    sets += [(e.text, beside, fit.columns_of(e)) for e in fit.effects]
-    sets += [(text, beside, columns) for text, columns in bench.groups.items()]
-    return [each for each in sets if len(each[2])]
+def _differs(
+    fit: Fit, bench: Bench, own: int, number: int, tests: int
+) -> tuple[str, float] | None:
+    """Returns what differs in an episode and by how much that explains; else None."""
+    count, size = len(fit.theta), len(bench.fields)
+    study = _apart(bench.raw, bench.episodes == number, size).beside(np.arange(count))
+    begin = len(bench.raw.scale)
+    sets = [(text, columns) for text, columns in bench.groups.items() if len(columns)]
+    sets += [(e.text, fit.columns_of(e)) for e in fit.effects]
+    sets.append((_OWN, np.arange(own)))
+    gains = np.column_stack([_gains(study, columns, begin) for _, columns in sets])
+    p, share = family_p(gains) * tests, np.mean(gains > 0.0, axis=0)
+    gain = gains.sum(axis=0) / study.energy.sum()
+    passed = (p < ALPHA) & (share >= _LEAST_SHARE) & (gain >= _LEAST_GAIN)
+    if not passed.any():
+        return None
+    enough = (1.0 - _SIMPLER) * gain[passed].max()
+    good = np.flatnonzero(passed & (gain >= enough))
+    best = min(good, key=lambda i: len(sets[i][1]))
+    return sets[best][0], float(gain[best])
+
+
+def _gains(study: Study, columns: Columns, begin: int) -> NDArray[np.float64]:
+    """Returns what blocks gain, (B,), if columns may differ in the episode."""
+    both = np.concatenate([columns, begin + columns])
+    return study.losses(columns) - study.losses(both)
+
+
+def _apart(raw: Study, mine: NDArray[np.bool_], size: int) -> Study:
+    """Returns a study with parameters once more, acting in one episode alone.
+
+    Args:
+        raw: of all episodes.
+        mine: (B,) the episode's blocks.
+        size: number of parameters.
+    """
+    mask = mine.astype(float)
+    cross = raw.H[:, :, :size] * mask[:, None, None]
+    H = np.block([[raw.H, cross], [cross.swapaxes(1, 2), cross[:, :size]]])
+    g = np.concatenate([raw.g, raw.g[:, :size] * mask[:, None]], axis=1)
+    scale = np.concatenate([raw.scale, raw.scale[:size]])
+    return Study(H, g, raw.energy, scale, np.zeros(len(scale)))
 
 
 def in_words(found: Sequence[Contradiction]) -> str:
     """Returns which episodes contradict each other, in words; empty if none does."""
     if not found:
         return ""
-    each = "; ".join(f"{c.episode} ({c.effect} differs)" for c in found)
+    each = "; ".join(f"{' against '.join(c.episodes)} ({c.effect})" for c in found)
     return f"episodes that no common effect explains: {each}"

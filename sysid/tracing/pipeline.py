@@ -67,7 +67,7 @@ def close_loop(
     first = tracer.fit(())
     begin = tracer.survey(first)
     last, end = tracer.forward(first, begin)
-    refuse_short_logs(last, end)
+    refuse_short_logs(last)
     kept = whole.of_episodes(test) if test else None
     errors = held_out(tracer, first, last, kept)
     found = verdict(tracer, first, last, end, errors)

@@ -117,20 +117,6 @@ class Study:
         gradient = np.linalg.pinv(H, hermitian=True) @ (self.g / size).T
         return np.asarray(np.linalg.norm(gradient, axis=1) / size / self.scale)
 
-    def disagreement(self, columns: Columns, own: NDArray[np.bool_]) -> Array:
-        """Returns what blocks gain, (b,), if columns are fitted to their like only.
-
-        Args:
-            columns: to fit.
-            own: (B,) which blocks are alike; they are predicted by a fit to the others
-                of them, and by a fit to all that are not.
-        """
-        H, g = self._parts(columns)
-        mine, rest = (H[own].sum(axis=0), g[own].sum(axis=0)), (H[~own], g[~own])
-        alone = _change(H[own], g[own], mine[0] - H[own], mine[1] - g[own])
-        theirs = (part.sum(axis=0)[None] for part in rest)
-        return np.asarray(_change(H[own], g[own], *theirs) - alone)
-
     def _parts(self, columns: Columns) -> tuple[Array, Array]:
         """Returns the normal equations of some columns only."""
         return self.H[:, columns[:, None], columns], self.g[:, columns]

@@ -114,15 +114,11 @@ def verdict(
     ties = tuple(_tied(name, tracer.rounds) for name in names)
     values = values_of(tracer, last)
     dependence = left[0].name if left else ""
-    ending = _ending(names, dependence, explained)
     assert end.bench is not None
     against = contradictions(last, end.bench, len(tracer.base.parameters))
+    ending = _ending(names, dependence or in_words(against), explained)
     lines = [
-        "; ".join(
-            part
-            for part in (_missing(ending, names, ties, dependence), in_words(against))
-            if part
-        ),
+        _missing(ending, names, ties, dependence, in_words(against)),
         _value_line(names, values),
         f"error on held-out data: {improvement(errors)}",
     ]
@@ -139,8 +135,8 @@ def verdict(
     )
 
 
-def _ending(names: tuple[str, ...], dependence: str, explained: float) -> str:
-    if not names and not dependence:
+def _ending(names: tuple[str, ...], left: str, explained: float) -> str:
+    if not names and not left:
         return "none"
     return "explained" if names and explained >= _BELIEVED else "unexplained"
 
@@ -186,8 +182,13 @@ def _other(tie: Evidence, joint: str) -> str:
 
 
 def _missing(
-    ending: str, names: tuple[str, ...], ties: tuple[tuple[Tie, ...], ...], left: str
+    ending: str,
+    names: tuple[str, ...],
+    ties: tuple[tuple[Tie, ...], ...],
+    dependence: str,
+    against: str,
 ) -> str:
+    left = "; ".join(part for part in (dependence, against) if part)
     if ending == "none":
         return "missing: none; the residual shows nothing beyond chance"
     effects = ", then ".join(
@@ -196,7 +197,7 @@ def _missing(
     )
     tests = list(dict.fromkeys(tie.experiment for each in ties for tie in each))
     if tests:
-        effects += f"; these data can't tell, this would: {_or_else(tests)}"
+        effects += f"; these data can't tell, this would: {' / '.join(tests[:_SHOWN])}"
     if ending == "unexplained":
         near = f"; the nearest is {effects}" if effects else ""
         return f"missing: unexplained, no effect in the library does it: {left}{near}"
