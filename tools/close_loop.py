@@ -1,10 +1,11 @@
 """Finds which physical effect a model lacks to explain a measured log, and adds it.
 
-The log says what is modelled: readings of a force/torque sensor at rest, or joint
-torques of an arm. The model is fitted; what is left is tested against every effect of
-the library on data that were not fitted; those that pass are added one by one. Prints
-what was missing, its parameters, and the error before and after. Writes the scenario
-with the effects in it, `result.json`, and a report that opens offline.
+The log says what is modelled: transitions of the cell or the twin, readings of a
+force/torque sensor at rest, or joint torques of an arm. The model is fitted; what is
+left is tested against every effect of the library on data that were not fitted; those
+that pass are added one by one. Prints what was missing, its parameters, and the error
+before and after. Writes the scenario with the effects in it, `result.json`, and a
+report that opens offline.
 """
 
 import argparse
@@ -20,16 +21,19 @@ from drake_disasm.errors import DisasmError
 from drake_disasm.scenario import dump_scenario, load_scenario
 from drake_disasm.writing import write_atomically
 from sysid.identification.split import split_episodes
-from sysid.logs import read_logs
+from sysid.logs import Log, read_logs
 from sysid.models import ScenarioModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.report import closing_page
+from sysid.scenario_parameters import read_requests
 from sysid.tracing.pipeline import Closed, close_loop
 from sysid.tracing.plain import to_mapping
 from sysid.workers import Workers
 
-_KINDS = ("static_wrench", "joint_motion")
+_HELD_OUT = 0.25  # of a log of transitions
+_HUBER = 3.0  # for the twin: a stop that is hit a moment later is an outlier
 _EXAMPLES = """examples:
+  python tools/close_loop.py --log out/log --scenario removal --out out/closed
   python tools/close_loop.py --log readings --out out/sensor     a static_wrench log
   python tools/close_loop.py --log run_1 run_2 --held-out run_2 --out out/arm
 """
@@ -56,8 +60,24 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         nargs="+",
         default=[],
         metavar="NAME",
-        help="logs or episodes that are not fitted but judged (default: contiguous "
-        "blocks in turn)",
+        help="logs or episodes that are not fitted but judged (default: a quarter of "
+        "the episodes of transitions; else contiguous blocks in turn)",
+    )
+    add(
+        "--parameters",
+        nargs="+",
+        default=[],
+        metavar="NAME|FILE",
+        help="numbers of the scenario that are fitted again along with the effects, as "
+        "tools/identify.py names them (default: none for transitions, else the "
+        "model's own)",
+    )
+    add(
+        "--huber",
+        type=float,
+        metavar="K",
+        help="residuals beyond K standard deviations count linearly; inf for plain "
+        "squares (default: 3 for transitions, else inf)",
     )
     add(
         "--workers",
@@ -74,24 +94,34 @@ def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
     logs = read_logs(args.log)
-    if logs[0].header.kind not in _KINDS:
-        raise DisasmError(
-            f"{logs[0].folder}: a log of kind '{logs[0].header.kind}'; effects are "
-            f"traced in logs of {' and '.join(_KINDS)} only, so far; fit it by "
-            "tools/identify.py"
-        )
-    scenario = load_scenario(args.scenario) if args.scenario else None
-    model = model_of(logs, ModelChoice(scenario=scenario, urdf=args.urdf))
-    assert isinstance(model, ScenarioModel)
+    model = _model(args, logs)
     names = model.measurements.names
-    train, test = split_episodes(names, args.held_out or 0.0)
+    is_twin = logs[0].header.kind == "transitions"
+    share = _HELD_OUT if is_twin else 0.0
+    train, test = split_episodes(names, args.held_out or share)
+    huber = args.huber or (_HUBER if is_twin else np.inf)
+    if not huber > 0.0:
+        raise DisasmError("--huber: give a number above zero, or inf")
     origin = cli.provenance("close_loop", arguments, 0)
     with Workers(args.workers) as workers:
-        closed = close_loop(model, train, test, np.inf, workers, _tell)
+        closed = close_loop(model, train, test, huber, workers, _tell)
     _write(args.out, closed, origin)
     print(closed.verdict.text)
     print(f"report: {args.out / 'report.html'}")
     return 0
+
+
+def _model(args: argparse.Namespace, logs: Sequence[Log]) -> ScenarioModel:
+    """Returns the model of the logs that the command line asks for."""
+    choice = ModelChoice(
+        scenario=load_scenario(args.scenario) if args.scenario else None,
+        requests=tuple(read_requests(args.parameters)) if args.parameters else (),
+        urdf=args.urdf,
+        fixed=True,
+    )
+    model = model_of(logs, choice)
+    assert isinstance(model, ScenarioModel)
+    return model
 
 
 def _tell(line: str) -> None:

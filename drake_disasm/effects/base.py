@@ -130,6 +130,11 @@ class Sensing:
 class Effect:
     """Base of all effects; see the module's docstring."""
 
+    @property
+    def is_null(self) -> bool:
+        """Whether all its sizes are zero: it does nothing."""
+        return not any(getattr(self, name) for name in sizes(type(self)))
+
 
 class EnvironmentEffect(Effect, abc.ABC):
     """Acts on the world around the bolt."""
@@ -259,8 +264,20 @@ class JointEffect(ArmEffect, abc.ABC):
 
 def motion_chain(effects: Sequence[Effect]) -> tuple[MotionEffect, ...]:
     """Returns the effects on the motion in the order in which they act."""
-    chosen = [effect for effect in effects if isinstance(effect, MotionEffect)]
+    chosen = [
+        effect
+        for effect in effects
+        if isinstance(effect, MotionEffect) and not effect.is_null
+    ]
     return tuple(sorted(chosen, key=lambda effect: effect.stage))
+
+
+def is_local(effects: Sequence[Effect]) -> bool:
+    """Returns whether the environment depends on where the bolt is, or how fast."""
+    return any(
+        isinstance(effect, EnvironmentEffect) and effect.is_local and not effect.is_null
+        for effect in effects
+    )
 
 
 def environment_at(
@@ -268,7 +285,7 @@ def environment_at(
 ) -> Environment:
     """Returns the environment with the effects in it, in the scenario's order."""
     for effect in effects:
-        if isinstance(effect, EnvironmentEffect):
+        if isinstance(effect, EnvironmentEffect) and not effect.is_null:
             nominal = effect.apply(nominal, bolt)
     return nominal
 
@@ -280,5 +297,9 @@ def joint_name() -> Any:
 
 def sensor_chain(effects: Sequence[Effect]) -> tuple[SensorEffect, ...]:
     """Returns the sensor's effects in the order in which they act."""
-    chosen = [effect for effect in effects if isinstance(effect, SensorEffect)]
+    chosen = [
+        effect
+        for effect in effects
+        if isinstance(effect, SensorEffect) and not effect.is_null
+    ]
     return tuple(sorted(chosen, key=lambda effect: effect.stage))

@@ -32,8 +32,8 @@ from drake_disasm.effects import (
     BoltMotion,
     Effect,
     Environment,
-    EnvironmentEffect,
     environment_at,
+    is_local,
     sensor_chain,
 )
 from drake_disasm.errors import DisasmError
@@ -214,7 +214,7 @@ class SimulatedStation(Station):
             effects: the same.
             bolt: its motion in the step to come.
         """
-        if any(isinstance(e, EnvironmentEffect) and e.is_local for e in effects):
+        if is_local(effects):
             environment = environment_at(self.lock.nominal, effects, bolt)
             self._set_environment(context, environment)
 

@@ -10,7 +10,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects import EnvironmentEffect, environment_at
+from drake_disasm.effects import environment_at, is_local
 from drake_disasm.impact import (
     ImpactConditions,
     ImpactStep,
@@ -86,7 +86,7 @@ class ImpactReplay:
     def _conditions(self, steps: Steps) -> ImpactConditions:
         """Returns what the contact depends on, step by step if an effect asks so."""
         conditions, effects = self._diagram.impact_conditions(), self._scenario.effects
-        if not any(isinstance(e, EnvironmentEffect) and e.is_local for e in effects):
+        if not is_local(effects):
             return conditions
         nominal = self._diagram.station.lock.nominal
         around = Surroundings.of(

@@ -34,7 +34,7 @@ from pydrake.systems.primitives import (
 from drake_disasm.effects import (
     BoltMotion,
     Effect,
-    EnvironmentEffect,
+    is_local,
     motion_chain,
 )
 from drake_disasm.lock import lift_needed
@@ -193,7 +193,7 @@ class TaskSimulation:
 
     def _follow(self) -> None:
         """Brings effects that depend on the bolt's motion up to date for a step."""
-        if not any(isinstance(e, EnvironmentEffect) and e.is_local for e in self._set):
+        if not is_local(self._set):
             return
         # The policy has acted then, and the motion not yet begun.
         period = self.scenario.task.period

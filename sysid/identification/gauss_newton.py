@@ -43,7 +43,7 @@ def gauss_newton(
         central: whether differences are central, or one-sided at half the price.
     """
     here = linearise(objective, u, central=central) if start is None else start
-    for _ in range(iterations):
+    for _ in range(iterations if len(u) else 0):
         value = objective.value(here.residual)
         if callback:
             callback(value)

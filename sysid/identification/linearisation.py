@@ -41,7 +41,8 @@ class Linearisation:
     @property
     def flat_jacobian(self) -> Array:
         """The jacobian as (rows * channels, p)."""
-        return self.jacobian.reshape(-1, self.jacobian.shape[-1])
+        rows, channels, size = self.jacobian.shape
+        return self.jacobian.reshape(rows * channels, size)
 
     @property
     def effect(self) -> Array:

@@ -33,6 +33,7 @@ class ModelChoice:
         urdf: of the arm, in place of what the log states.
         coarse: whether transitions may begin in coarse time steps.
         noise: standard deviations of channels, by name, in place of the model's.
+        fixed: whether a twin may have no parameter to vary.
     """
 
     objective: str | None = None
@@ -41,6 +42,7 @@ class ModelChoice:
     urdf: str | None = None
     coarse: bool = True
     noise: tuple[tuple[str, float], ...] = ()
+    fixed: bool = False
 
 
 def model_of(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
@@ -75,7 +77,7 @@ def _twin(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
             f"{logs[0].folder}: states no scenario; name the one that the twin "
             "begins with by --scenario"
         )
-    if not choice.requests:
+    if not (choice.requests or choice.fixed):
         raise DisasmError(
             "name what the twin is to learn by --parameters, for example "
             "contact.friction lock.clearance GroovePose.ry"

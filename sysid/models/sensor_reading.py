@@ -37,8 +37,23 @@ def at_sensor(states: Array, X_SB: RigidTransform) -> Array:
     return np.hstack([states[:, :6], *in_S])
 
 
+def at_bolt(states: Array, X_SB: RigidTransform) -> Array:
+    """Returns states (n, 12) with the wrench at Bo in G again: undoes `at_sensor`."""
+    X_BS = X_SB.inverse()
+    R_GB = Rotation.from_rotvec(states[:, 3:6]).as_matrix()
+    R_GS = R_GB @ X_BS.rotation().matrix()
+    f_G, t_So_G = (
+        np.einsum("nij,nj->ni", R_GS, part) for part in (states[:, 6:9], states[:, 9:])
+    )
+    t_Bo_G = t_So_G + np.cross(R_GB @ X_BS.translation(), f_G)
+    return np.hstack([states[:, :6], f_G, t_Bo_G])
+
+
 class SensorReading:
     """How the sensor's effects change processed wrenches, many at once.
+
+    Attributes:
+        X_SB: the bolt in the sensor's frame.
 
     Processing takes the reading at zeroing off, and the change of the known weight
     since then (`contact_wrench`); so what effects add to readings, and to the
@@ -47,7 +62,7 @@ class SensorReading:
 
     def __init__(self, scenario: Scenario, tool: Tool) -> None:
         bolt = bolt_inertia(scenario.lock)
-        X_SB = tool.X_SB
+        self.X_SB = X_SB = tool.X_SB
         g_W = UniformGravityFieldElement().gravity_vector()
         # What hangs on the twin's sensor: the bolt alone.
         self._payload = Payload(bolt.get_mass(), X_SB @ bolt.get_com(), g_W)

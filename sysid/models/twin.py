@@ -145,22 +145,19 @@ class TwinModel(ScenarioModel):
         )
 
     def covariates(self, channel: int) -> dict[str, Array]:
-        """See LogModel: time, travel, its rate, force, and the action."""
+        """See LogModel: time, place, action and force at the beginning of a step."""
         steps, rows = self.steps, self._rows
         before = np.concatenate([r[:-1] for r in self._readings])[rows]
-        turn = np.concatenate([c.path[:-1, 3:] for c in self._commands])[rows]
         found = {
             "time": steps.index * self.scenario.task.period,
             "order of steps": rows.astype(float),
             "travel x": steps.q[:, 0],
-            "position y": steps.q[:, 1],
             "position z": steps.q[:, 2],
             "commanded rate along x": steps.qd_rate[:, 0],
-            "commanded rate along y": steps.qd_rate[:, 1],
             "commanded rate along z": steps.qd_rate[:, 2],
         }
-        found |= {f"force along {a}_S": before[:, 6 + i] for i, a in enumerate("xyz")}
-        return found | {f"rotation about {a}": turn[:, i] for i, a in enumerate("xyz")}
+        forces = {f"force along {a}_S": before[:, 6 + i] for i, a in enumerate("xyz")}
+        return found | forces
 
     def _steps_of(self, effects: Sequence[MotionEffect]) -> Steps:
         """Returns the steps as effects on the motion would have them executed."""

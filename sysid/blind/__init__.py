@@ -1,0 +1,1 @@
+"""Logs with effects that nobody declares, and how often they are found."""
