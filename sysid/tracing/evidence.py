@@ -1,6 +1,8 @@
 """What speaks for each candidate beside a fit: all of it from one linearisation."""
 
+import dataclasses
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -22,6 +24,7 @@ _LEAST_FIELD = 0.005  # of the loss, that a size must be worth
 _SIMPLER = 0.05  # of the gain, that fewer parameters may cost
 _RIVAL = 0.5  # of the gain, below which nothing is a tie
 _PAIRS_OF = 8
+_IDLE = 0.1  # of the mean gain or loss of a block, below which it has no say
 #: Effects that are listed by their names; more are alike, one for each joint.
 FEW = 2
 
@@ -34,7 +37,7 @@ class Evidence:
         what: the effects, or the dependence.
         gain: share of the loss of blocks that were not fitted, that it takes away.
         p: family-wise, that it explains nothing.
-        share: of the blocks that get better.
+        share: of the blocks that get better, of those that change noticeably.
         cost: number of its parameters.
         gains: (B,) of each block.
     """
@@ -97,19 +100,24 @@ class Bench:
     dependences: Sequence[tuple[Dependence, Columns]]
     episodes: NDArray[np.int64]
 
-    def of_effects(self, sets: Sequence[tuple[Candidate, ...]]) -> list[Evidence]:
-        """Returns the evidence for sets of candidates, the best first."""
-        columns = [np.concatenate([self.groups[c.text] for c in s]) for s in sets]
-        return evidence(
-            self.study, [(s, c) for s, c in zip(sets, columns, strict=True) if len(c)]
+    def everything(
+        self, sets: Sequence[tuple[Candidate, ...]]
+    ) -> tuple[list[Evidence], list[Evidence]]:
+        """Returns the evidence for sets of candidates, and for curves, the best first.
+
+        They are one family: a log without an effect raises neither alarm.
+        """
+        found = evidence(self.study, [*self._columns(sets), *self.dependences])
+        return (
+            [e for e in found if not isinstance(e.what, Dependence)],
+            [e for e in found if isinstance(e.what, Dependence)],
         )
 
-    def of_dependences(self) -> list[Evidence]:
-        """Returns the evidence for curves, the best first."""
-        return evidence(self.study, self.dependences)
-
     def pairs(self, singles: Sequence[Evidence]) -> list[Evidence]:
-        """Returns pairs of the best that pass: some effects show only together."""
+        """Returns pairs of the best that pass: some effects show only together.
+
+        The p-values count all pairs, since the best are chosen by the same data.
+        """
         promising: dict[str, Candidate] = {}
         for one in singles:
             assert isinstance(one.what, tuple)
@@ -118,7 +126,20 @@ class Bench:
             promising.setdefault(one.what[0].name, one.what[0])
         best = list(promising.values())[:_PAIRS_OF]
         pairs = list(itertools.combinations(best, 2))
-        return [e for e in self.of_effects(pairs) if e.accepted]
+        tests = math.comb(len(promising), 2) / max(1, len(pairs))
+        found = evidence(self.study, self._columns(pairs))
+        return [
+            counted
+            for e in found
+            if (counted := dataclasses.replace(e, p=min(1.0, e.p * tests))).accepted
+        ]
+
+    def _columns(
+        self, sets: Sequence[tuple[Candidate, ...]]
+    ) -> list[tuple[What, Columns]]:
+        """Returns sets of candidates with their columns, those that have any."""
+        columns = [np.concatenate([self.groups[c.text] for c in s]) for s in sets]
+        return [(s, c) for s, c in zip(sets, columns, strict=True) if len(c)]
 
     def pruned(self, added: Sequence[Candidate]) -> list[Candidate]:
         """Returns effects with only those sizes free that blocks get better by."""
@@ -153,13 +174,23 @@ def evidence(study: Study, columns: Sequence[tuple[What, Columns]]) -> list[Evid
             what,
             float(gains[:, i].sum() / total),
             float(p[i]),
-            float(np.mean(gains[:, i] > 0.0)),
+            _share(gains[:, i]),
             len(group) + _shape_count(what),
             gains[:, i],
         )
         for i, (what, group) in enumerate(columns)
     ]
     return sorted(found, key=lambda each: -each.gain)
+
+
+def _share(gains: Array) -> float:
+    """Returns which share of blocks gets better, of those that change noticeably.
+
+    A contact effect says nothing of blocks in which the bolt touches nothing.
+    """
+    size = np.abs(gains)
+    concerned = gains[size > _IDLE * size.mean()]
+    return float(np.mean(concerned > 0.0)) if len(concerned) else 0.0
 
 
 def simplest(accepted: Sequence[Evidence]) -> Evidence:

@@ -247,12 +247,8 @@ class Tracer:
         names = {candidate.name for candidate in fit.effects}
         rest = [c for c in self.library if c.name not in names]
         bench = self._bench(fit, rest)
-        return Survey(
-            bench.of_effects([(c,) for c in rest] + together(rest)),
-            bench.of_dependences(),
-            len(bench.study.energy),
-            bench,
-        )
+        effects, dependences = bench.everything([(c,) for c in rest] + together(rest))
+        return Survey(effects, dependences, len(bench.study.energy), bench)
 
     def _bench(self, fit: Fit, library: Sequence[Candidate]) -> Bench:
         """Returns the linearisation beside a fit, and its normal equations."""

@@ -68,7 +68,7 @@ class Study:
     def _block(
         here: Linearisation, A: Array, mask: NDArray[np.bool_]
     ) -> tuple[Array, Array, float]:
-        a = A[mask].reshape(-1, A.shape[2])
+        a = A[mask].reshape(int(mask.sum()) * A.shape[1], A.shape[2])
         r, w = here.residual[mask].reshape(-1), here.weights[mask].reshape(-1)
         wa = w[:, None] * a
         return a.T @ wa, wa.T @ r, float(w @ r**2)
@@ -123,10 +123,11 @@ class Study:
 
     def _possible(self, columns: Columns) -> Columns:
         """Returns the columns without those that a bound keeps from helping."""
-        H, g = self.H.sum(axis=0), self.g.sum(axis=0)
+        if not self.side[columns].any():
+            return columns
         while len(columns):
-            inner = H[np.ix_(columns, columns)][None]
-            phi = -_solve(inner, g[columns][None])[0]
+            H, g = self._parts(columns)
+            phi = -_solve(H.sum(axis=0)[None], g.sum(axis=0)[None])[0]
             barred = phi * self.side[columns] < 0.0
             if not barred.any():
                 break
