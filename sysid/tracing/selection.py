@@ -147,9 +147,10 @@ class Tracer:
             if not accepted:
                 break
             best = simplest(accepted)
+            is_single = any(best is e for e in survey.effects)
             found = self.backward(self._with(fit, survey, best))
             if found.loss <= (1.0 - LEAST_GAIN) * fit.loss and _all_show(found, best):
-                ties = tuple(e for e in accepted if e.ties_with(best))
+                ties = _ties(best, survey.effects if is_single else accepted)
                 record = dataclasses.replace(survey, bench=None)
                 self.rounds.append(Round(best, ties, record, found.value))
                 self.tell(f"{best.name}: objective {found.value:.4g}")
@@ -275,6 +276,12 @@ class Tracer:
             [(d, begin + np.array(d.columns, dtype=np.int64)) for d in dependences],
             episode[np.unique(blocks, return_index=True)[1]],
         )
+
+
+def _ties(best: Evidence, others: Sequence[Evidence]) -> tuple[Evidence, ...]:
+    """Returns what passes, or gains no less, and can't be told from the best."""
+    likely = [e for e in others if e.accepted or e.gain >= best.gain]
+    return tuple(e for e in likely if e.ties_with(best))
 
 
 def _physical(fit: Fit, added: Sequence[Candidate]) -> list[Candidate]:
