@@ -58,9 +58,8 @@ def close_loop(
     Raises:
         DisasmError: the log is too short to decide anything.
     """
-    whole = with_estimated_noise(model, workers, huber)
-    assert isinstance(whole, ScenarioModel)
-    base = whole.of_episodes(train)
+    base = with_estimated_noise(model.of_episodes(train), workers, huber)
+    assert isinstance(base, ScenarioModel)
     tracer = Tracer(base, candidates(base, library), workers, huber, tell)
     tell("the model as it is")
     refuse_few_rows(base)
@@ -68,7 +67,14 @@ def close_loop(
     begin = tracer.survey(first)
     last, end = tracer.forward(first, begin)
     refuse_short_logs(last)
-    kept = whole.of_episodes(test) if test else None
+    kept = _like(base, model.of_episodes(test)) if test else None
     errors = held_out(tracer, first, last, kept)
     found = verdict(tracer, first, last, end, errors)
     return Closed(found, first, last, tuple(tracer.rounds), begin, end, errors)
+
+
+def _like(base: ScenarioModel, test: ScenarioModel) -> ScenarioModel:
+    """Returns the rows that were kept, with the noise that the fitted ones tell."""
+    noise = base.measurements.noise
+    origin = base.measurements.channels[0].origin
+    return test.with_measurements(test.measurements.with_noise(noise, origin))
