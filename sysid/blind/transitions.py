@@ -94,7 +94,7 @@ def commands(random: np.random.Generator, episodes: int, steps: int) -> Array:
             mean = _FORWARD if random.random() < 0.7 else _BACK
             stroke[e, k : k + length] = mean * random.uniform(0.2, 1.8)
             k += length
-    path = np.zeros((episodes, steps + 1, 6))
+    path: Array = np.zeros((episodes, steps + 1, 6))
     travel = np.cumsum(stroke, axis=1)
     path[:, 1:, 0] = np.clip(travel, 0.0, 0.05)
     spread = np.array([_ACROSS] * 2 + [_TURN] * 3) * np.sqrt(1.0 - _FORGETS**2)
@@ -117,7 +117,7 @@ def sensor_noise(
     for k in range(1, steps + 1):
         fresh = np.sqrt(1.0 - correlation**2) * white[:, k]
         noise[:, k] = correlation * noise[:, k - 1] + fresh
-    return noise * np.array(scenario.ft_sensor.noise)
+    return np.asarray(noise * np.array(scenario.ft_sensor.noise))
 
 
 def rollout(

@@ -1,0 +1,61 @@
+"""Draws effects of a wanted size, whatever their fields mean."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from drake_disasm.effects import Effect, shapes, sizes
+
+_FIRST = 1e-3  # of the range of a field, where the search for its size begins
+_MOST_FIELDS = 2
+_ROUNDS = 6
+_CLOSE = 0.05  # of the wanted size
+
+
+def drawn(
+    kind: type[Effect],
+    random: np.random.Generator,
+    level: float,
+    residual: Callable[[Effect], float],
+) -> Effect:
+    """Returns an effect that leaves a residual of about a wanted size.
+
+    One or two of its fields, of random signs where both are allowed, in a random
+    shape within the grid's range.
+
+    Args:
+        kind: of effect.
+        random: draws.
+        level: rms of the residual, in units of the noise.
+        residual: of a model without the effect on a log with it, without noise.
+    """
+    fields = {f.name: f.metadata for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    names = sizes(kind)
+    count = int(random.integers(1, min(_MOST_FIELDS, len(names)) + 1))
+    unit = {}
+    for name in random.choice(names, count, replace=False):
+        reach = float(fields[name]["high"])
+        sign = -1.0 if fields[name]["low"] < 0.0 and random.random() < 0.5 else 1.0
+        unit[str(name)] = sign * reach * random.uniform(0.5, 1.0)
+    look = {
+        name: float(np.exp(random.uniform(*np.log([min(grid), max(grid)]))))
+        for name, grid in shapes(kind).items()
+    }
+    scale = _FIRST
+    for _ in range(_ROUNDS):
+        effect = kind(**look, **_within(fields, unit, scale))
+        found = residual(effect)
+        if abs(found / level - 1.0) < _CLOSE:
+            break
+        # Contact answers late and then steeply, hence no more than threefold at once.
+        scale *= float(np.clip(level / max(found, 1e-9), 0.3, 3.0 if found else 10.0))
+    return kind(**look, **_within(fields, unit, scale))
+
+
+def _within(fields: dict, unit: dict[str, float], scale: float) -> dict[str, float]:
+    """Returns sizes that a scenario may have."""
+    return {
+        name: float(np.clip(scale * value, fields[name]["low"], fields[name]["high"]))
+        for name, value in unit.items()
+    }
