@@ -30,7 +30,7 @@ from sysid.tracing.pipeline import close_loop
 from sysid.workers import Workers
 
 HUBER = 3.0
-_SMALL = (3, 15)  # episodes and steps of the log by which a size is found
+_SMALL = (3, 25)  # episodes and steps of the log by which a size is found
 _HELD_OUT = 0.25
 
 
@@ -177,15 +177,17 @@ def answers(
         for future in as_completed(futures):
             found = future.result()
             known[found.case.key] = found
-            text = json.dumps([asdict(a) for a in known.values()], indent=1)
-            write_atomically(
-                path, lambda stream, text=text: stream.write(text.encode())
-            )
+            _write(path, list(known.values()))
             tell()
     finally:
         for future in futures:
             future.cancel()
     return [known[case.key] for case in cases]
+
+
+def _write(path: Path, found: Sequence[Answer]) -> None:
+    data = json.dumps([asdict(each) for each in found], indent=1).encode()
+    write_atomically(path, lambda stream: stream.write(data))
 
 
 def read_answers(path: Path) -> list[Answer]:

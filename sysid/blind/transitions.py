@@ -30,7 +30,7 @@ from sysid.models.base import Array
 from sysid.models.commands import twin_coordinates
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 
-_FORWARD, _BACK = 1.6e-3, -1.2e-3  # m per step, on average
+_FORWARD, _BACK = 2.2e-3, -1.2e-3  # m per step, on average
 _ACROSS, _TURN = 1.6e-4, 6e-3  # m, rad: how far commands stray
 _FORGETS = 0.6  # of where a command strayed to, per step
 
@@ -91,7 +91,7 @@ def commands(random: np.random.Generator, episodes: int, steps: int) -> Array:
         k = 0
         while k < steps:
             length = int(random.integers(3, 8))
-            mean = _FORWARD if random.random() < 0.7 else _BACK
+            mean = _FORWARD if random.random() < 0.75 else _BACK
             stroke[e, k : k + length] = mean * random.uniform(0.2, 1.8)
             k += length
     path: Array = np.zeros((episodes, steps + 1, 6))
@@ -113,11 +113,12 @@ def sensor_noise(
 ) -> Array:
     """Returns noise of the sensor's channels (E, n + 1, 6), correlated over steps."""
     white = random.standard_normal((episodes, steps + 1, 6))
-    noise = white.copy()
+    noise: Array = np.array(white)
     for k in range(1, steps + 1):
         fresh = np.sqrt(1.0 - correlation**2) * white[:, k]
         noise[:, k] = correlation * noise[:, k - 1] + fresh
-    return np.asarray(noise * np.array(scenario.ft_sensor.noise))
+    noise *= np.array(scenario.ft_sensor.noise)
+    return noise
 
 
 def rollout(
@@ -142,7 +143,7 @@ def rollout(
     states[:, 0, 6:] = noise[:, 0]
     executed = np.array(commanded)
     memories = np.zeros((count, len(motion), 6))
-    times = np.arange(1, size) * scenario.task.period
+    times: Array = np.arange(1, size) * scenario.task.period
     zero = replay.reading_at_zeroing
     for k in range(size - 1):
         in_G = at_bolt(states[:, k], reading.X_SB)

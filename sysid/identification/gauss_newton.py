@@ -40,7 +40,8 @@ def gauss_newton(
         iterations: at most.
         callback: called with the value after each.
         start: the linearisation at u, if it is known.
-        central: whether differences are central, or one-sided at half the price.
+        central: whether differences are central, or one-sided at half the price; then
+            damping is tried only where the full step does not help.
     """
     here = linearise(objective, u, central=central) if start is None else start
     for _ in range(iterations if len(u) else 0):
@@ -48,14 +49,26 @@ def gauss_newton(
         if callback:
             callback(value)
         points = np.clip(here.u + _steps(here), 0.0, 1.0)
-        values = objective(objective.scaling.from_unit(points))
-        best = int(np.argmin(values))
-        if values[best] >= value:
+        point, reached = _best(objective, points, value, all_at_once=central)
+        if reached >= value:
             break
-        here = linearise(objective, points[best], fitting_steps(here), central)
-        if values[best] > (1.0 - _GAIN) * value:
+        here = linearise(objective, point, fitting_steps(here), central)
+        if reached > (1.0 - _GAIN) * value:
             break
     return here
+
+
+def _best(
+    objective: Objective, points: Array, value: float, all_at_once: bool
+) -> tuple[Array, float]:
+    """Returns the best of points (d, p), or the first that is better than a value."""
+    batches = [points] if all_at_once else [points[:1], points[1:]]
+    for batch in batches:
+        values = objective(objective.scaling.from_unit(batch))
+        best = int(np.argmin(values))
+        if values[best] < value:
+            break
+    return batch[best], float(values[best])
 
 
 def _steps(here: Linearisation) -> Array:

@@ -123,6 +123,11 @@ class LogModel(abc.ABC):
     affine: bool = False
 
     @property
+    def costly(self) -> bool:
+        """Whether an evaluation takes seconds: a search is to ask for few rows."""
+        return False
+
+    @property
     def noise_groups(self) -> tuple[str, ...]:
         """For each channel a label; channels of one label have one unknown noise."""
         return tuple(channel.name for channel in self.measurements.channels)

@@ -144,6 +144,11 @@ class TwinModel(ScenarioModel):
             dtype=bool,
         )
 
+    @property
+    def costly(self) -> bool:
+        """See LogModel."""
+        return not self._has_impact
+
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: time, place, action and force at the beginning of a step."""
         steps, rows = self.steps, self._rows

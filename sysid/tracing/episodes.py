@@ -62,7 +62,7 @@ def _differs(
 ) -> tuple[str, float] | None:
     """Returns what differs in an episode and by how much that explains; else None."""
     count, size = len(fit.theta), len(bench.fields)
-    study = _apart(bench.raw, bench.episodes == number, size).beside(np.arange(count))
+    study = bench.raw.apart(bench.episodes == number, size).beside(np.arange(count))
     begin = len(bench.raw.scale)
     sets = [(text, columns) for text, columns in bench.groups.items() if len(columns)]
     sets += [(e.text, fit.columns_of(e)) for e in fit.effects]
@@ -83,22 +83,6 @@ def _gains(study: Study, columns: Columns, begin: int) -> NDArray[np.float64]:
     """Returns what blocks gain, (B,), if columns may differ in the episode."""
     both = np.concatenate([columns, begin + columns])
     return study.losses(columns) - study.losses(both)
-
-
-def _apart(raw: Study, mine: NDArray[np.bool_], size: int) -> Study:
-    """Returns a study with parameters once more, acting in one episode alone.
-
-    Args:
-        raw: of all episodes.
-        mine: (B,) the episode's blocks.
-        size: number of parameters.
-    """
-    mask = mine.astype(float)
-    cross = raw.H[:, :, :size] * mask[:, None, None]
-    H = np.block([[raw.H, cross], [cross.swapaxes(1, 2), cross[:, :size]]])
-    g = np.concatenate([raw.g, raw.g[:, :size] * mask[:, None]], axis=1)
-    scale = np.concatenate([raw.scale, raw.scale[:size]])
-    return Study(H, g, raw.energy, scale, np.zeros(len(scale)))
 
 
 def in_words(found: Sequence[Contradiction]) -> str:

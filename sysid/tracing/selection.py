@@ -28,7 +28,10 @@ from sysid.workers import Workers
 
 Array = NDArray[np.float64]
 
+_KEEPS_UP = 0.25  # of the loss that is left
 _ITERATIONS = 8
+_FEW_ITERATIONS = 4  # where an evaluation takes seconds
+_SURVEYED = 300  # rows, of a model whose evaluation takes seconds
 _AT_BOUND = 1e-6  # of a parameter's range
 _Z95 = 1.959963984540054
 _TRIES = 3  # of effects that pass and then do not keep what they promised
@@ -142,33 +145,66 @@ class Tracer:
     def _added(
         self, fit: Fit, survey: Survey, accepted: Sequence[Evidence]
     ) -> Fit | None:
-        """Returns the fit with the best that passes and keeps what it promised."""
-        for _ in range(_TRIES):
-            if not accepted:
+        """Returns the fit with the best that passes and keeps what it promised.
+
+        Where effects are linear the evidence says which; else rivals are fitted, too.
+        """
+        kept: list[tuple[Evidence, Fit]] = []
+        for trial in _to_try(accepted):
+            found = self._without_needless(self._with(fit, survey, trial))
+            if found.loss > (1.0 - LEAST_GAIN) * fit.loss or not _all_show(
+                found, trial
+            ):
+                self.tell(f"{trial.name}: does not keep what it promised")
+                continue
+            kept.append((trial, found))
+            if self.base.affine or found.value < 1.0:
                 break
-            best = simplest(accepted)
-            is_single = any(best is e for e in survey.effects)
-            found = self.backward(self._with(fit, survey, best))
-            if found.loss <= (1.0 - LEAST_GAIN) * fit.loss and _all_show(found, best):
-                ties = _ties(best, survey.effects if is_single else accepted)
-                record = dataclasses.replace(survey, bench=None)
-                self.rounds.append(Round(best, ties, record, found.value))
-                self.tell(f"{best.name}: objective {found.value:.4g}")
-                return found
-            self.tell(f"{best.name}: does not keep what it promised")
-            accepted = [e for e in accepted if e.effects != best.effects]
-        return None
+        if not kept:
+            return None
+        best, found = _lowest(kept)
+        is_single = any(best is e for e in survey.effects)
+        ties = _ties(best, survey.effects if is_single else accepted)
+        if not self.base.affine:
+            ties = tuple(e for e in ties if _keeps_up(e, fit, found))
+        record = dataclasses.replace(survey, bench=None)
+        self.rounds.append(Round(best, ties, record, found.value))
+        self.tell(f"{best.name}: objective {found.value:.4g}")
+        return found
+
+    def _without_needless(self, fit: Fit) -> Fit:
+        """Returns the fit without effects that the newest has made needless.
+
+        Where effects are not linear, by fits without each.
+        """
+        fit = self.backward(fit)
+        if self.base.affine:
+            return fit
+        for effect in fit.effects[:-1]:
+            rest = tuple(c for c in fit.effects if c is not effect)
+            without = self.fit(rest, fit)
+            if without.loss <= (1.0 + LEAST_GAIN) * fit.loss:
+                self.tell(f"without {effect.text}: objective {without.value:.4g}")
+                fit = without
+        return fit
 
     def _with(self, fit: Fit, survey: Survey, chosen: Evidence) -> Fit:
         """Returns the fit with what was chosen; it begins where the survey was."""
         bench = survey.bench
         assert bench is not None and isinstance(chosen.what, tuple)
         added = bench.pruned(chosen.what)
-        known = {
-            f"{candidate.name}.{bench.fields[column]}": bench.here.jacobian[..., column]
-            for candidate in added
-            for column in bench.groups[candidate.text]
-        }
+        thinned = len(bench.here.residual) < len(fit.here.residual)
+        known = (
+            None
+            if thinned
+            else {
+                f"{candidate.name}.{bench.fields[column]}": bench.here.jacobian[
+                    ..., column
+                ]
+                for candidate in added
+                for column in bench.groups[candidate.text]
+            }
+        )
         while True:
             found = self.fit((*fit.effects, *added), fit, known)
             kept = _physical(found, added)
@@ -239,7 +275,8 @@ class Tracer:
                 [start.here.jacobian, np.stack(more, axis=-1)], axis=-1
             )
             here = dataclasses.replace(start.here, u=u, jacobian=jacobian)
-        here = gauss_newton(objective, u, _ITERATIONS, start=here, central=False)
+        iterations = _FEW_ITERATIONS if model.costly else _ITERATIONS
+        here = gauss_newton(objective, u, iterations, start=here, central=False)
         found = objective.scaling.from_unit(here.u)
         return Fit(effects, model, found, here, objective.value(here.residual))
 
@@ -249,10 +286,27 @@ class Tracer:
         rest = [c for c in self.library if c.name not in names]
         bench = self._bench(fit, rest)
         effects, dependences = bench.everything([(c,) for c in rest] + together(rest))
-        return Survey(effects, dependences, len(bench.study.energy), bench)
+        return Survey(effects, dependences, len(bench.study.begins), bench)
+
+    def _thinned(self, fit: Fit) -> Fit:
+        """Returns a fit of so many rows that a survey is affordable."""
+        every = round(fit.model.measurements.rows / _SURVEYED)
+        if not fit.model.costly or every < 2:
+            return fit
+        model = fit.model.thin(every)
+        assert isinstance(model, ScenarioModel)
+        rows = slice(None, None, every)
+        here = dataclasses.replace(
+            fit.here,
+            residual=fit.here.residual[rows],
+            jacobian=fit.here.jacobian[rows],
+            weights=fit.here.weights[rows],
+        )
+        return dataclasses.replace(fit, model=model, here=here)
 
     def _bench(self, fit: Fit, library: Sequence[Candidate]) -> Bench:
         """Returns the linearisation beside a fit, and its normal equations."""
+        fit = self._thinned(fit)
         model, groups = extended(fit.model, library)
         count = len(fit.theta)
         objective = Objective(model, self.workers, self.huber)
@@ -276,6 +330,28 @@ class Tracer:
             [(d, begin + np.array(d.columns, dtype=np.int64)) for d in dependences],
             episode[np.unique(blocks, return_index=True)[1]],
         )
+
+
+def _keeps_up(tie: Evidence, before: Fit, found: Fit) -> bool:
+    """Returns whether a rival could explain what the chosen effect truly did."""
+    return (1.0 - tie.gain) * before.loss <= (1.0 + _KEEPS_UP) * found.loss
+
+
+def _to_try(accepted: Sequence[Evidence]) -> list[Evidence]:
+    """Returns the simplest of the best, then rivals of other effects by their gain."""
+    found: dict[tuple[str, ...], Evidence] = {}
+    if accepted:
+        first = simplest(accepted)
+        found[first.effects] = first
+    for each in accepted:
+        found.setdefault(each.effects, each)
+    return list(found.values())[:_TRIES]
+
+
+def _lowest(kept: Sequence[tuple[Evidence, Fit]]) -> tuple[Evidence, Fit]:
+    """Returns the first of the fits that are as good as the best."""
+    least = min(fit.loss for _, fit in kept)
+    return next(pair for pair in kept if pair[1].loss <= (1.0 + LEAST_GAIN) * least)
 
 
 def _ties(best: Evidence, others: Sequence[Evidence]) -> tuple[Evidence, ...]:

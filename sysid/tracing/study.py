@@ -3,7 +3,7 @@
 Near a fit, residuals are linear in the parameters, those of candidate effects
 included: r(phi) = r + A phi. All that is asked of a candidate (does it show, what does
 it explain of data that it was not fitted to) follows from the normal equations of each
-block of rows, so that hundreds of candidates cost no more simulations than one.
+block of rows, so that hundreds of candidates need no simulation beyond A.
 """
 
 import dataclasses
@@ -31,19 +31,22 @@ _AT_BOUND = 1e-9  # of a parameter's range
 
 @dataclass(frozen=True)
 class Study:
-    """Normal equations of B blocks for P columns.
+    """Residuals and P columns that may explain them, by blocks of rows.
+
+    Only the normal equations of what is asked for are ever made: of hundreds of
+    columns, a candidate has a few.
 
     Attributes:
-        H: (B, P, P) A^T W A of each block.
-        g: (B, P) A^T W r.
-        energy: (B,) r^T W r.
+        A: (n, P) columns, each of rms 1, weighted as the residuals; block by block.
+        r: (n,) weighted residuals.
+        begins: (B,) where each block begins.
         scale: (P,) what columns were divided by.
         side: (P,) 1 or -1 where a parameter can go up or down only, else 0.
     """
 
-    H: Array
-    g: Array
-    energy: Array
+    A: Array
+    r: Array
+    begins: NDArray[np.int64]
     scale: Array
     side: Array
 
@@ -56,29 +59,46 @@ class Study:
             extra: (rows, channels, k) further columns, of empirical dependences.
             blocks: (rows,) number of each row's block.
         """
-        A = np.concatenate([here.jacobian, extra], axis=2)
+        order = np.argsort(blocks, kind="stable")
+        A = np.concatenate([here.jacobian, extra], axis=2)[order]
         scale = np.maximum(np.sqrt(np.mean(A**2, axis=(0, 1))), 1e-300)
-        A /= scale
-        parts = [cls._block(here, A, blocks == b) for b in range(int(blocks.max()) + 1)]
-        H, g, energy = (np.array(part) for part in zip(*parts, strict=True))
+        root = np.sqrt(here.weights[order])
+        A *= root[:, :, None] / scale
+        rows, channels, count = A.shape
+        r = (root * here.residual[order]).reshape(-1)
         side = (here.u < _AT_BOUND).astype(float) - (here.u > 1.0 - _AT_BOUND)
-        return cls(H, g, energy, scale, np.append(side, np.zeros(extra.shape[2])))
+        return cls(
+            A.reshape(rows * channels, count),
+            r,
+            np.unique(blocks[order], return_index=True)[1] * channels,
+            scale,
+            np.append(side, np.zeros(extra.shape[2])),
+        )
 
-    @staticmethod
-    def _block(
-        here: Linearisation, A: Array, mask: NDArray[np.bool_]
-    ) -> tuple[Array, Array, float]:
-        a = A[mask].reshape(int(mask.sum()) * A.shape[1], A.shape[2])
-        r, w = here.residual[mask].reshape(-1), here.weights[mask].reshape(-1)
-        wa = w[:, None] * a
-        return a.T @ wa, wa.T @ r, float(w @ r**2)
+    @property
+    def energy(self) -> Array:
+        """Sum of the weighted squares of each block (B,)."""
+        return np.asarray(np.add.reduceat(self.r**2, self.begins))
 
     def moved(self, change: Array) -> "Study":
         """Returns the study of residuals elsewhere, a change (P,) of u away."""
-        phi = change * self.scale
-        Hphi = self.H @ phi
-        energy = self.energy + 2.0 * self.g @ phi + Hphi @ phi
-        return dataclasses.replace(self, g=self.g + Hphi, energy=energy)
+        return dataclasses.replace(self, r=self.r + self.A @ (change * self.scale))
+
+    def apart(self, mine: NDArray[np.bool_], size: int) -> "Study":
+        """Returns the study with parameters once more, acting in some blocks alone.
+
+        Args:
+            mine: (B,) which blocks.
+            size: number of the parameters, the first ones.
+        """
+        lengths = np.diff(self.begins, append=len(self.r))
+        acts = np.repeat(mine, lengths)[:, None]
+        return dataclasses.replace(
+            self,
+            A=np.hstack([self.A, self.A[:, :size] * acts]),
+            scale=np.concatenate([self.scale, self.scale[:size]]),
+            side=np.zeros(len(self.scale) + size),
+        )
 
     def beside(self, base: Columns) -> "Study":
         """Returns the study of all columns with some projected out, fitted to all rows.
@@ -87,22 +107,16 @@ class Study:
         a base of many parameters that a block fixes alone would drown it. Columns
         that the base can do are zero.
         """
-        H = self.H.sum(axis=0)
-        inner = H[np.ix_(base, base)][None]
-        K = _solve(inner, H[base][None])[0]
-        phi = np.zeros(len(self.scale))
-        phi[base] = -_solve(inner, self.g[:, base].sum(axis=0)[None])[0]
-        there = self.moved(phi / self.scale)
-        cross = K.T @ self.H[:, base]
-        projected = self.H - cross - cross.swapaxes(1, 2)
-        projected += K.T @ self.H[:, base][:, :, base] @ K
-        left, size = (np.diagonal(each.sum(axis=0)) for each in (projected, self.H))
-        new = (left > _NEW**2 * size).astype(float)
-        return dataclasses.replace(
-            there,
-            H=projected * new[:, None] * new,
-            g=(there.g - there.g[:, base] @ K) * new,
-        )
+        if not len(base):
+            return self
+        own = self.A[:, base]
+        H = (own.T @ own)[None]
+        K = _solve(H, (own.T @ self.A)[None])[0]
+        phi = -_solve(H, (own.T @ self.r)[None])[0]
+        projected = self.A - own @ K
+        left, size = (np.einsum("np,np->p", A, A) for A in (projected, self.A))
+        projected *= left > _NEW**2 * size
+        return dataclasses.replace(self, A=projected, r=self.r + own @ phi)
 
     def losses(self, columns: Columns) -> Array:
         """Returns what each block costs, (B,), if columns are fitted to all others."""
@@ -111,23 +125,29 @@ class Study:
 
     def spread(self) -> Array:
         """Returns the standard deviation (P,) of all parameters, fitted together."""
-        size = np.sqrt(np.diagonal(self.H.sum(axis=0)))
+        parts_H, parts_g = self._parts(np.arange(len(self.scale)))
+        H = parts_H.sum(axis=0)
+        size = np.sqrt(np.diagonal(H))
         size = np.where(size > 0.0, size, 1.0)
-        H = self.H.sum(axis=0) / np.outer(size, size)
-        gradient = np.linalg.pinv(H, hermitian=True) @ (self.g / size).T
+        H = H / np.outer(size, size)
+        gradient = np.linalg.pinv(H, hermitian=True) @ (parts_g / size).T
         return np.asarray(np.linalg.norm(gradient, axis=1) / size / self.scale)
 
     def _parts(self, columns: Columns) -> tuple[Array, Array]:
-        """Returns the normal equations of some columns only."""
-        return self.H[:, columns[:, None], columns], self.g[:, columns]
+        """Returns the normal equations of columns, (B, k, k) and (B, k)."""
+        a = self.A[:, columns]
+        ends = [*self.begins[1:], len(self.r)]
+        blocks = [slice(i, j) for i, j in zip(self.begins, ends, strict=True)]
+        H = np.array([a[block].T @ a[block] for block in blocks])
+        return H, np.array([a[block].T @ self.r[block] for block in blocks])
 
     def _possible(self, columns: Columns) -> Columns:
         """Returns the columns without those that a bound keeps from helping."""
         if not self.side[columns].any():
             return columns
         while len(columns):
-            H, g = self._parts(columns)
-            phi = -_solve(H.sum(axis=0)[None], g.sum(axis=0)[None])[0]
+            a = self.A[:, columns]
+            phi = -_solve((a.T @ a)[None], (a.T @ self.r)[None])[0]
             barred = phi * self.side[columns] < 0.0
             if not barred.any():
                 break
