@@ -24,6 +24,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import cli
 import numpy as np
 import psutil
+from effect_matrix import closing_time, run_matrix
 from objective_speed import (
     SIZES,
     THESIS_S,
@@ -48,6 +49,7 @@ from drake_disasm.timing import boundary
 from drake_disasm.writing import make_folder, write_atomically
 
 _REPEATS = 5
+_CLOSING_AIM_S = 300.0
 _SCENARIO = "removal_turned"  # the bolt is in contact nearly all the time
 _POLICY = "admittance"
 _WIDTHS = (12, 128, 128, 128, 6)  # of the policy whose inference is timed
@@ -206,6 +208,12 @@ def measure_objective(contact: str, prefix: str) -> Iterator[Figure]:
     yield Figure(f"{prefix}_883_one_core_s", alone, "s", reference, ratio)
 
 
+def measure_closing(contact: str, key: str) -> Iterator[Figure]:
+    """Yields the time from a log to the verdict."""
+    value = closing_time(SIZES[0], cores(), contact)
+    yield Figure(key, value, "s", "300 s, the aim", value / _CLOSING_AIM_S)
+
+
 def measure_update_speed(name: str) -> Iterator[Figure]:
     """Yields DDPG updates per second of a preset, beside stable-baselines3's."""
     ours, theirs = measure_updates(name)
@@ -308,6 +316,10 @@ MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
             ("impact", "objective_impact"),
         )
     },
+    ("close_loop_883_s",): lambda: measure_closing("hydroelastic", "close_loop_883_s"),
+    ("close_loop_impact_883_s",): lambda: measure_closing(
+        "impact", "close_loop_impact_883_s"
+    ),
     ("peak_mib_simulate", "peak_mib_train", "peak_mib_identify"): measure_memory,
 }
 
@@ -323,6 +335,26 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("--only", nargs="+", metavar="KEY", help="run a part")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write figures")
+    parser.add_argument(
+        "--effects",
+        type=Path,
+        metavar="DIR",
+        help="instead: blind tests of closing the loop, each effect at three sizes, "
+        "null logs, pairs, effects that the library lacks; takes hours, Ctrl-C and the "
+        "same command go on; writes answers.json, effects.md, confusion.png",
+    )
+    for option, usual, words in (
+        ("seeds", 5, "of each effect at each size"),
+        ("nulls", 100, "logs without an effect, of each correlation of the noise"),
+        ("pairs", 40, "logs with two effects"),
+    ):
+        parser.add_argument(
+            f"--{option}",
+            type=int,
+            default=usual,
+            metavar="N",
+            help=f"with --effects: {words} (default: {usual})",
+        )
     args = parser.parse_args(arguments)
     for key in args.only or []:
         if key not in keys:
@@ -333,6 +365,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
+    if args.effects:
+        print(run_matrix(args.effects, args.seeds, args.nulls, args.pairs))
+        return 0
     wanted = set(args.only) if args.only else {k for g in MEASUREMENTS for k in g}
     groups = {g: m for g, m in MEASUREMENTS.items() if wanted & set(g)}
     figures: list[Figure] = []

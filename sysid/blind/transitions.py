@@ -143,7 +143,7 @@ def rollout(
     states[:, 0, 6:] = noise[:, 0]
     executed = np.array(commanded)
     memories = np.zeros((count, len(motion), 6))
-    times: Array = np.arange(1, size) * scenario.task.period
+    times = np.arange(1, size, dtype=np.float64) * scenario.task.period
     zero = replay.reading_at_zeroing
     for k in range(size - 1):
         in_G = at_bolt(states[:, k], reading.X_SB)

@@ -1,5 +1,6 @@
 """The objective's residuals and their derivatives at a point."""
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,12 +26,14 @@ class Linearisation:
         residual: (rows, channels) in units of the noise.
         jacobian: (rows, channels, p) per range of the parameter.
         weights: (rows, channels) Huber's, 1 for all but outliers.
+        huber: where squares end, in units of the noise.
     """
 
     u: Array
     residual: Array
     jacobian: Array
     weights: Array
+    huber: float = np.inf
 
     @property
     def information(self) -> Array:
@@ -77,7 +80,7 @@ def linearise(
     difference = found[1 : size + 1] - found[size + 1 :]
     jacobian = np.moveaxis(difference / way[:, None, None], 0, -1)
     weights = huber_weights(found[0], objective.huber)
-    return Linearisation(u, found[0], jacobian, weights)
+    return Linearisation(u, found[0], jacobian, weights, objective.huber)
 
 
 def extend(
@@ -102,14 +105,15 @@ def extend(
     found = objective.residuals(objective.scaling.from_unit(points))
     columns = [(r - here.residual) / w for r, w in zip(found, way, strict=True)]
     jacobian = np.concatenate([here.jacobian, np.stack(columns, axis=-1)], axis=-1)
-    return Linearisation(u, here.residual, jacobian, here.weights)
+    return dataclasses.replace(here, u=u, jacobian=jacobian)
 
 
 def _at(objective: Objective, u: Array) -> Linearisation:
     """Returns the residuals at a point (p,), with no parameter."""
     residual = objective.residuals(objective.scaling.from_unit(u))[0]
     weights = huber_weights(residual, objective.huber)
-    return Linearisation(u[:0], residual, np.zeros((*residual.shape, 0)), weights)
+    nothing = np.zeros((*residual.shape, 0))
+    return Linearisation(u[:0], residual, nothing, weights, objective.huber)
 
 
 def fitting_steps(linearisation: Linearisation) -> Array:

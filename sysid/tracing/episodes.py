@@ -45,7 +45,7 @@ def contradictions(fit: Fit, bench: Bench, own: int) -> tuple[Contradiction, ...
         own: number of the parameters that the model has anyway.
     """
     names = fit.model.measurements.names
-    if not 1 < len(names) <= _MOST_EPISODES:
+    if not 1 < len(names) <= _MOST_EPISODES or _is_noise(fit):
         return ()
     numbers = range(len(names)) if len(names) > 2 else [1]
     found = []
@@ -55,6 +55,11 @@ def contradictions(fit: Fit, bench: Bench, own: int) -> tuple[Contradiction, ...
             which = (names[number],) if len(names) > 2 else names
             found.append(Contradiction(which, *best))
     return tuple(sorted(found, key=lambda each: -each.gain))
+
+
+def _is_noise(fit: Fit) -> bool:
+    """Returns whether channels whose noise is known leave nothing to explain."""
+    return not fit.model.affine and fit.value < 1.0
 
 
 def _differs(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import wilcoxon
 
 from sysid.identification.linearisation import Linearisation
 from sysid.tracing.candidates import Candidate
@@ -181,6 +182,27 @@ def evidence(study: Study, columns: Sequence[tuple[What, Columns]]) -> list[Evid
         for i, (what, group) in enumerate(columns)
     ]
     return sorted(found, key=lambda each: -each.gain)
+
+
+def measured(trial: Evidence, gains: Array, total: float, tests: int) -> Evidence:
+    """Returns evidence for the same by gains (B,) that were measured.
+
+    Args:
+        trial: what was tried.
+        gains: of each block.
+        total: loss of all blocks before.
+        tests: how many effects it was chosen from.
+    """
+    if not gains.any():
+        return dataclasses.replace(trial, gain=0.0, p=1.0, share=0.0, gains=gains)
+    p = float(wilcoxon(gains, alternative="greater").pvalue)
+    return dataclasses.replace(
+        trial,
+        gain=float(gains.sum() / total),
+        p=min(1.0, tests * p),
+        share=_share(gains),
+        gains=gains,
+    )
 
 
 def _share(gains: Array) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.identification.linearisation import Linearisation, extend
 from sysid.models.base import ScenarioModel
-from sysid.objective import Objective
+from sysid.objective import Objective, tempered
 from sysid.parameters import Scaling, nominal_values
 from sysid.tracing.candidates import Candidate, extended
 from sysid.tracing.empirical import curves
@@ -20,6 +20,7 @@ from sysid.tracing.evidence import (
     Bench,
     Evidence,
     evidence,
+    measured,
     simplest,
     together,
 )
@@ -34,7 +35,7 @@ _FEW_ITERATIONS = 4  # where an evaluation takes seconds
 _SURVEYED = 300  # rows, of a model whose evaluation takes seconds
 _AT_BOUND = 1e-6  # of a parameter's range
 _Z95 = 1.959963984540054
-_TRIES = 3  # of effects that pass and then do not keep what they promised
+_TRIES = 4  # effects that are fitted in a round
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,8 @@ class Fit:
 
     @property
     def loss(self) -> float:
-        """Sum of the weighted squares."""
-        return float(np.sum(self.here.weights * self.here.residual**2))
+        """Sum of the squares, less beyond where they end."""
+        return float(np.sum(tempered(self.here.residual, self.here.huber) ** 2))
 
     def columns_of(self, effect: Candidate) -> NDArray[np.int64]:
         """Returns which of the parameters are an effect's sizes."""
@@ -134,27 +135,29 @@ class Tracer:
         """
         while True:
             assert survey.bench is not None
-            accepted = [e for e in survey.effects if e.accepted]
-            if not accepted and not fit.effects:
-                accepted = survey.bench.pairs(survey.effects)
-            found = self._added(fit, survey, accepted)
+            if self.base.affine:
+                trials = [e for e in survey.effects if e.accepted]
+                if not trials and not fit.effects:
+                    trials = survey.bench.pairs(survey.effects)
+            else:
+                trials = [e for e in survey.effects if e.gain >= LEAST_GAIN]
+            found = self._added(fit, survey, trials)
             if found is None:
                 return fit, survey
             fit, survey = found, self.survey(found)
 
     def _added(
-        self, fit: Fit, survey: Survey, accepted: Sequence[Evidence]
+        self, fit: Fit, survey: Survey, trials: Sequence[Evidence]
     ) -> Fit | None:
         """Returns the fit with the best that passes and keeps what it promised.
 
-        Where effects are linear the evidence says which; else rivals are fitted, too.
+        Where effects are linear, the evidence says which passes. Else it only says
+        which are worth a fit, and fits decide.
         """
         kept: list[tuple[Evidence, Fit]] = []
-        for trial in _to_try(accepted):
+        for trial in _to_try(trials):
             found = self._without_needless(self._with(fit, survey, trial))
-            if found.loss > (1.0 - LEAST_GAIN) * fit.loss or not _all_show(
-                found, trial
-            ):
+            if not self._keeps_promise(fit, found, trial):
                 self.tell(f"{trial.name}: does not keep what it promised")
                 continue
             kept.append((trial, found))
@@ -164,13 +167,20 @@ class Tracer:
             return None
         best, found = _lowest(kept)
         is_single = any(best is e for e in survey.effects)
-        ties = _ties(best, survey.effects if is_single else accepted)
+        ties = _ties(best, survey.effects if is_single else trials)
         if not self.base.affine:
-            ties = tuple(e for e in ties if _keeps_up(e, fit, found))
+            ties = _true_ties(ties, kept, fit, found)
         record = dataclasses.replace(survey, bench=None)
         self.rounds.append(Round(best, ties, record, found.value))
         self.tell(f"{best.name}: objective {found.value:.4g}")
         return found
+
+    def _keeps_promise(self, fit: Fit, found: Fit, trial: Evidence) -> bool:
+        """Returns whether a fit with more effects is truly better."""
+        if found.loss > (1.0 - LEAST_GAIN) * fit.loss or not _all_show(found, trial):
+            return False
+        tests = len({candidate.name for candidate in self.library})
+        return self.base.affine or _confirmed(fit, found, trial, tests).accepted
 
     def _without_needless(self, fit: Fit) -> Fit:
         """Returns the fit without effects that the newest has made needless.
@@ -332,9 +342,40 @@ class Tracer:
         )
 
 
-def _keeps_up(tie: Evidence, before: Fit, found: Fit) -> bool:
-    """Returns whether a rival could explain what the chosen effect truly did."""
-    return (1.0 - tie.gain) * before.loss <= (1.0 + _KEEPS_UP) * found.loss
+def _confirmed(before: Fit, after: Fit, trial: Evidence, tests: int) -> Evidence:
+    """Returns the evidence for what was added, by fits before and after.
+
+    Each block is judged by what the fit after would cost it, were it fitted to all
+    others; the p-value is for as many tests as there are effects (Bonferroni).
+    """
+    blocks = blocks_of(before.here, before.model.measurements.episode)
+    empty = np.zeros((*before.here.residual.shape, 0))
+    energy = Study.of(before.here, empty, blocks).energy
+    study = Study.of(after.here, empty, blocks)
+    gains = energy - study.losses(np.arange(len(after.theta)))
+    return measured(trial, gains, float(energy.sum()), tests)
+
+
+def _true_ties(
+    ties: Sequence[Evidence],
+    kept: Sequence[tuple[Evidence, Fit]],
+    before: Fit,
+    found: Fit,
+) -> tuple[Evidence, ...]:
+    """Returns rivals that could explain what the chosen effect truly did.
+
+    Those that were fitted are judged by that.
+    """
+    limit = (1.0 + _KEEPS_UP) * found.loss
+    fitted = {e.effects: fit.loss for e, fit in kept if fit is not found}
+    known = {e.effects: e for e, fit in kept if fit is not found}
+    for tie in ties:
+        known.setdefault(tie.effects, tie)
+    return tuple(
+        tie
+        for effects, tie in known.items()
+        if fitted.get(effects, (1.0 - tie.gain) * before.loss) <= limit
+    )
 
 
 def _to_try(accepted: Sequence[Evidence]) -> list[Evidence]:

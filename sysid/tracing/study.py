@@ -16,6 +16,7 @@ from scipy.stats import rankdata, wilcoxon
 
 from sysid.identification.linearisation import Linearisation
 from sysid.identification.uncertainty import block_length, block_numbers
+from sysid.objective import huber_weights, tempered
 
 Array = NDArray[np.float64]
 Columns = NDArray[np.int64]
@@ -27,6 +28,9 @@ _NEW = 1e-3  # share of a column that the base can't do
 _MOST_BLOCKS = 40
 _SAME = 1e-6  # of a block's gain, that is no difference
 _AT_BOUND = 1e-9  # of a parameter's range
+_REWEIGHTED = 3  # times, where squares end
+_FAR = 10.0  # times where squares end: a row that is missed by more has no say
+_MOST_ROWS = 0.95  # of the rows, whose leverage none may exceed
 
 
 @dataclass(frozen=True)
@@ -37,11 +41,13 @@ class Study:
     columns, a candidate has a few.
 
     Attributes:
-        A: (n, P) columns, each of rms 1, weighted as the residuals; block by block.
-        r: (n,) weighted residuals.
+        A: (n, P) columns, each of rms 1; block by block.
+        r: (n,) residuals, in units of the noise.
         begins: (B,) where each block begins.
         scale: (P,) what columns were divided by.
         side: (P,) 1 or -1 where a parameter can go up or down only, else 0.
+        channels: of each row.
+        huber: where squares end.
     """
 
     A: Array
@@ -49,6 +55,8 @@ class Study:
     begins: NDArray[np.int64]
     scale: Array
     side: Array
+    channels: int
+    huber: float
 
     @classmethod
     def of(cls, here: Linearisation, extra: Array, blocks: NDArray[np.int64]) -> Self:
@@ -62,23 +70,23 @@ class Study:
         order = np.argsort(blocks, kind="stable")
         A = np.concatenate([here.jacobian, extra], axis=2)[order]
         scale = np.maximum(np.sqrt(np.mean(A**2, axis=(0, 1))), 1e-300)
-        root = np.sqrt(here.weights[order])
-        A *= root[:, :, None] / scale
+        A /= scale
         rows, channels, count = A.shape
-        r = (root * here.residual[order]).reshape(-1)
         side = (here.u < _AT_BOUND).astype(float) - (here.u > 1.0 - _AT_BOUND)
         return cls(
             A.reshape(rows * channels, count),
-            r,
+            here.residual[order].reshape(-1),
             np.unique(blocks[order], return_index=True)[1] * channels,
             scale,
             np.append(side, np.zeros(extra.shape[2])),
+            channels,
+            here.huber,
         )
 
     @property
     def energy(self) -> Array:
-        """Sum of the weighted squares of each block (B,)."""
-        return np.asarray(np.add.reduceat(self.r**2, self.begins))
+        """Loss of each block (B,): squares, and less beyond `huber`."""
+        return self._loss(self.r)
 
     def moved(self, change: Array) -> "Study":
         """Returns the study of residuals elsewhere, a change (P,) of u away."""
@@ -110,22 +118,68 @@ class Study:
         if not len(base):
             return self
         own = self.A[:, base]
-        H = (own.T @ own)[None]
-        K = _solve(H, (own.T @ self.A)[None])[0]
-        phi = -_solve(H, (own.T @ self.r)[None])[0]
+        weighted = self._weights(self.r)[:, None] * own
+        H = (own.T @ weighted)[None]
+        K = _solve(H, (weighted.T @ self.A)[None])[0]
+        phi = -_solve(H, (weighted.T @ self.r)[None])[0]
         projected = self.A - own @ K
         left, size = (np.einsum("np,np->p", A, A) for A in (projected, self.A))
         projected *= left > _NEW**2 * size
         return dataclasses.replace(self, A=projected, r=self.r + own @ phi)
 
     def losses(self, columns: Columns) -> Array:
-        """Returns what each block costs, (B,), if columns are fitted to all others."""
-        H, g = self._parts(self._possible(columns))
-        return self.energy + _change(H, g, H.sum(axis=0) - H, g.sum(axis=0) - g)
+        """Returns what each block costs, (B,), if columns are fitted to all others.
+
+        Contact makes and breaks: at a few rows a derivative is of no use, and huge. So
+        a fit begins with and without the rows of the most extreme columns, rows that it
+        misses by far lose their say, and the better of the two counts.
+        """
+        a = self.A[:, self._possible(columns)]
+        starts = [np.ones(len(self.r))]
+        if np.isfinite(self.huber) and a.shape[1]:
+            starts.append(self._calm(a))
+        found = [self._left_out(a, w) for w in starts]
+        return min(found, key=np.sum)
+
+    def _left_out(self, a: Array, calm: Array) -> Array:
+        """Returns what each block costs, (B,), if columns (n, k) fit all others.
+
+        Args:
+            a: columns.
+            calm: (n,) weights to begin with.
+        """
+        w = calm * self._weights(self.r)
+        for _ in range(_REWEIGHTED if np.isfinite(self.huber) else 0):
+            phi = -_solve((a.T @ (w[:, None] * a))[None], (a.T @ (w * self.r))[None])
+            w = calm * self._weights(self.r + a @ phi[0])
+        H, g = self._parts(a, w)
+        others = -_solve(H.sum(axis=0) - H, g.sum(axis=0) - g)
+        lengths = np.diff(self.begins, append=len(self.r))
+        change = np.einsum("nk,nk->n", a, np.repeat(others, lengths, axis=0))
+        return self._loss(self.r + change)
+
+    def _calm(self, a: Array) -> Array:
+        """Returns weights (n,) that give no row more leverage than most have."""
+        size = np.abs(a).max(axis=1).reshape(-1, self.channels).max(axis=1)
+        most = np.quantile(size, _MOST_ROWS)
+        weight = np.minimum(1.0, most / np.maximum(size, 1e-300)) ** 2
+        return np.repeat(weight, self.channels)
+
+    def _weights(self, r: Array) -> Array:
+        """Returns the weights (n,) of residuals: Huber's, and less far beyond."""
+        if not np.isfinite(self.huber):
+            return np.ones(len(r))
+        far = np.minimum(1.0, _FAR * self.huber / np.maximum(np.abs(r), 1e-300))
+        return huber_weights(r, self.huber) * far**2
+
+    def _loss(self, r: Array) -> Array:
+        """Returns the loss of each block (B,) of residuals (n,)."""
+        squares = tempered(r, self.huber) ** 2
+        return np.asarray(np.add.reduceat(squares, self.begins))
 
     def spread(self) -> Array:
         """Returns the standard deviation (P,) of all parameters, fitted together."""
-        parts_H, parts_g = self._parts(np.arange(len(self.scale)))
+        parts_H, parts_g = self._parts(self.A, self._weights(self.r))
         H = parts_H.sum(axis=0)
         size = np.sqrt(np.diagonal(H))
         size = np.where(size > 0.0, size, 1.0)
@@ -133,34 +187,28 @@ class Study:
         gradient = np.linalg.pinv(H, hermitian=True) @ (parts_g / size).T
         return np.asarray(np.linalg.norm(gradient, axis=1) / size / self.scale)
 
-    def _parts(self, columns: Columns) -> tuple[Array, Array]:
-        """Returns the normal equations of columns, (B, k, k) and (B, k)."""
-        a = self.A[:, columns]
+    def _parts(self, a: Array, w: Array) -> tuple[Array, Array]:
+        """Returns the normal equations of columns (n, k), (B, k, k) and (B, k)."""
+        weighted = w[:, None] * a
         ends = [*self.begins[1:], len(self.r)]
         blocks = [slice(i, j) for i, j in zip(self.begins, ends, strict=True)]
-        H = np.array([a[block].T @ a[block] for block in blocks])
-        return H, np.array([a[block].T @ self.r[block] for block in blocks])
+        H = np.array([a[block].T @ weighted[block] for block in blocks])
+        return H, np.array([weighted[block].T @ self.r[block] for block in blocks])
 
     def _possible(self, columns: Columns) -> Columns:
         """Returns the columns without those that a bound keeps from helping."""
         if not self.side[columns].any():
             return columns
+        w = self._weights(self.r)
         while len(columns):
             a = self.A[:, columns]
-            phi = -_solve((a.T @ a)[None], (a.T @ self.r)[None])[0]
+            weighted = w[:, None] * a
+            phi = -_solve((a.T @ weighted)[None], (weighted.T @ self.r)[None])[0]
             barred = phi * self.side[columns] < 0.0
             if not barred.any():
                 break
             columns = columns[~barred]
         return columns
-
-
-def _change(H: Array, g: Array, fit_H: Array, fit_g: Array) -> Array:
-    """Returns the change of blocks' losses, (b,), by fits to other normal equations."""
-    phi = -_solve(fit_H, fit_g)
-    phi = np.broadcast_to(phi, g.shape)
-    Hphi = np.einsum("bij,bj->bi", H, phi)
-    return np.asarray(np.sum(phi * (Hphi + 2.0 * g), axis=1))
 
 
 def family_p(gains: Array, seed: int = 0) -> Array:

@@ -1,0 +1,114 @@
+"""What the simulator does with an effect, the model of a log says, too."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from drake_disasm.effects import (
+    Backlash,
+    BoltSlip,
+    ChainPull,
+    Compliance,
+    GrooveBend,
+    GrooveClearance,
+    GrooveViscousFriction,
+    MotionLag,
+    RustyPatch,
+    SensorHysteresis,
+    SensorMounting,
+)
+from drake_disasm.policies import Exploring, make_policy
+from drake_disasm.scenario import load_scenario
+from drake_disasm.task.simulation import TaskSimulation
+from sysid.logs.recording import record_transitions
+from sysid.models.twin import TwinModel
+from sysid.objective import Objective
+from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.workers import Workers
+
+_NOTHING = np.zeros(0)
+_STEPS = 30
+
+
+def _scenario(contact):
+    scenario = load_scenario("removal_turned", [f"contact.model={contact}"])
+    scenario.task.steps = _STEPS
+    return scenario
+
+
+def _log(folder, scenario, effect):
+    real = copy.deepcopy(scenario)
+    real.effects.append(effect)
+    policy = Exploring(make_policy("admittance"), 1e-4, 0)
+    simulation = TaskSimulation(real, "twin", policy)
+    return real, record_transitions(folder, simulation, _STEPS)
+
+
+def _error(log, scenario):
+    """The rms residual of a model without parameters, in units of the noise."""
+    model = TwinModel([log], scenario, (), coarse=False)
+    measured = model.measurements
+    error = (model.predictions(_NOTHING) - measured.values) / measured.noise
+    return float(np.sqrt(np.mean(error**2)))
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        GrooveBend(kz=0.8),
+        GrooveClearance(2e-4),
+        GrooveViscousFriction(100.0),
+        RustyPatch(0.3, position=0.01),
+        ChainPull(fx=-3.0, k=100.0),
+        MotionLag(0.03),
+        Backlash(x=4e-4, z=4e-4),
+        Compliance(x=2e-5, z=2e-5),
+        BoltSlip(x=1e-4),
+        SensorMounting(ry=0.1),
+    ],
+    ids=lambda effect: type(effect).__name__,
+)
+def test_the_model_with_the_effect_explains_the_log_of_a_simulation(effect, tmp_path):
+    scenario = _scenario("impact")
+    real, log = _log(tmp_path / "log", scenario, effect)
+    assert _error(log, real) < 0.85
+    assert _error(log, scenario) > 2.0
+
+
+def test_a_sensor_with_memory_is_explained_mostly(tmp_path):
+    """Between two states of a log the load is taken to go evenly."""
+    scenario = _scenario("impact")
+    real, log = _log(tmp_path / "log", scenario, SensorHysteresis(1.0, 1.0))
+    assert _error(log, real) < 0.25 * _error(log, scenario)
+
+
+def test_local_effects_hold_with_hydroelastic_contact(tmp_path):
+    scenario = _scenario("hydroelastic")
+    real, log = _log(tmp_path / "log", scenario, RustyPatch(0.3, position=0.01))
+    assert _error(log, real) < 0.85
+    assert _error(log, scenario) > 2.0
+
+
+def test_sensor_effects_share_one_simulation(tmp_path, monkeypatch):
+    scenario = _scenario("impact")
+    _, log = _log(tmp_path / "log", scenario, SensorMounting(ry=0.1))
+    names = ["SensorBias.fx", "SensorGain.tz", "contact.friction"]
+    scenario, parameters = scenario_parameters(scenario, [Request(n) for n in names])
+    model = TwinModel([log], scenario, parameters)
+    np.testing.assert_array_equal(model.simulated, [False, False, True])
+    asked = []
+    simulate = TwinModel.simulate
+
+    def counted(self, theta, rows):
+        asked.append(theta)
+        return simulate(self, theta, rows)
+
+    monkeypatch.setattr(TwinModel, "simulate", counted)
+    thetas = np.array([[0.0, 0.0, 0.2], [0.5, 0.0, 0.2], [0.0, 0.1, 0.2], [0, 0, 0.3]])
+    found = Objective(model, Workers()).residuals(thetas)
+    assert len(asked) == 2
+    change = (found[1] - found[0]) * model.measurements.noise
+    np.testing.assert_allclose(change[:, 6], 0.5, atol=1e-9)
+    alone = model.predict(thetas[2], slice(0, _STEPS)) - model.measurements.values
+    np.testing.assert_allclose(found[2], alone / model.measurements.noise, atol=1e-9)
