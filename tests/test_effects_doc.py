@@ -1,0 +1,24 @@
+"""docs/effects.md lists the library as it is."""
+
+from pathlib import Path
+
+from drake_disasm.effects import EFFECTS, shapes, sizes
+
+_PAGE = (Path(__file__).parents[1] / "docs" / "effects.md").read_text("utf-8")
+
+
+def test_every_effect_is_listed_with_its_fields():
+    rows = {
+        line.split("`")[1]: line
+        for line in _PAGE.splitlines()
+        if line.startswith("| `")
+    }
+    assert sorted(rows) == sorted(effect.__name__ for effect in EFFECTS)
+    for effect in EFFECTS:
+        row = rows[effect.__name__]
+        fields = [*sizes(effect), *shapes(effect)]
+        assert (
+            all(name in row for name in fields)
+            or f"{len(fields)} such" in row
+            or (len(sizes(effect)) > 6)
+        )
