@@ -45,6 +45,7 @@ GROOVE_FIELDS = ("clearance", "channel_clearance", "keyhole_clearance", "travel"
 
 _BORDER = 0.010  # m, solid rim around the channel
 _FLOOR = 0.003  # m, plate under the channel
+_FRICTION_STEP = 1e-4  # below the scatter of any measurement
 _PAD_FRICTION = 0.8  # steel on rubber, as on the gripper's pads
 _BRASS = np.array([0.80, 0.65, 0.30, 1.0])
 _STEEL = np.array([0.55, 0.58, 0.62, 1.0])
@@ -175,7 +176,7 @@ def set_environment(
 
     A clearance that is not the lock's own stays in the scene graph's Context.
     """
-    lock.frame.SetPoseInParentFrame(plant_context, environment.X_GnG)
+    set_pose(lock, environment, plant_context)
     if environment.clearance != lock.config.clearance:
         config = dataclasses.replace(lock.config, clearance=environment.clearance)
         reshape_groove(lock, config, scene_graph, scene_graph_context)
@@ -188,6 +189,22 @@ def set_environment(
         scene_graph.AssignRole(
             scene_graph_context, source, geometry_id, properties, RoleAssign.kReplace
         )
+
+
+def set_pose(lock: Lock, environment: Environment, plant_context: Context) -> None:
+    """Writes the environment's pose alone into a plant's Context."""
+    lock.frame.SetPoseInParentFrame(plant_context, environment.X_GnG)
+
+
+def is_alike(one: Environment, other: Environment) -> bool:
+    """Returns whether environments differ in pose and pull alone, or not noticeably.
+
+    Other materials are made anew in the scene graph, which takes milliseconds.
+    """
+    same = dataclasses.replace(
+        other, X_GnG=one.X_GnG, force_Gn=one.force_Gn, friction=one.friction
+    )
+    return one == same and abs(one.friction - other.friction) < _FRICTION_STEP
 
 
 def _surface(environment: Environment) -> ProximityProperties:

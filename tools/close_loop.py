@@ -99,7 +99,8 @@ def main(arguments: Sequence[str]) -> int:
     is_twin = logs[0].header.kind == "transitions"
     share = _HELD_OUT if is_twin else 0.0
     train, test = split_episodes(names, args.held_out or share)
-    huber = args.huber or (_HUBER if is_twin else np.inf)
+    usual = _HUBER if is_twin else np.inf
+    huber = usual if args.huber is None else args.huber
     if not huber > 0.0:
         raise DisasmError("--huber: give a number above zero, or inf")
     origin = cli.provenance("close_loop", arguments, 0)

@@ -37,7 +37,7 @@ from drake_disasm.effects import (
     sensor_chain,
 )
 from drake_disasm.errors import DisasmError
-from drake_disasm.lock import Lock, set_environment
+from drake_disasm.lock import Lock, is_alike, set_environment, set_pose
 from drake_disasm.ports import Health, Port, check_ports
 from drake_disasm.scenario import PlacementConfig, Scenario, validate
 from drake_disasm.systems.outside_force import OutsideForce
@@ -216,7 +216,7 @@ class SimulatedStation(Station):
         """
         if is_local(effects):
             environment = environment_at(self.lock.nominal, effects, bolt)
-            self._set_environment(context, environment)
+            self._change_environment(context, environment)
 
     def _set_arm_effects(self, context: Context, effects: Sequence[ArmEffect]) -> None:
         """Puts an arm's effects, and no others, into this station's Context.
@@ -230,6 +230,15 @@ class SimulatedStation(Station):
                 "none; take it out of effects, or use --model cell"
             )
 
+    def _change_environment(self, context: Context, environment: Environment) -> None:
+        """Puts what has changed of the world around the bolt into a Context."""
+        outside = self.part_context(self.outside_force, context)
+        if is_alike(self.outside_force.material(outside), environment):
+            set_pose(self.lock, environment, self.part_context(self.plant, context))
+            self.outside_force.set_force(outside, np.array(environment.force_Gn))
+        else:
+            self._set_environment(context, environment)
+
     def _set_environment(self, context: Context, environment: Environment) -> None:
         """Puts the world around the bolt into this station's Context."""
         if environment.impact_exponent != self.lock.nominal.impact_exponent:
@@ -237,10 +246,9 @@ class SimulatedStation(Station):
                 "ContactExponent: hydroelastic contact has none; set contact.model to "
                 "impact, on the twin"
             )
-        self.outside_force.set_force(
-            self.part_context(self.outside_force, context),
-            np.array(environment.force_Gn),
-        )
+        outside = self.part_context(self.outside_force, context)
+        self.outside_force.set_force(outside, np.array(environment.force_Gn))
+        self.outside_force.set_material(outside, environment)
         set_environment(
             self.lock,
             environment,

@@ -194,6 +194,12 @@ class TwinStation(SimulatedStation):
         declaration = CollisionFilterDeclaration().ExcludeBetween(bolt, groove)
         self.scene_graph.collision_filter_manager().Apply(declaration)
 
+    def _change_environment(self, context: Context, environment: Environment) -> None:
+        if self.impact is None:
+            super()._change_environment(context, environment)
+        else:
+            self._set_environment(context, environment)
+
     def _set_environment(self, context: Context, environment: Environment) -> None:
         if self.impact is None:
             super()._set_environment(context, environment)

@@ -8,6 +8,8 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from drake_disasm.effects import Environment
+
 
 class OutsideForce(LeafSystem):
     """A force on the bolt at Bo, and what comes from outside.
@@ -32,6 +34,7 @@ class OutsideForce(LeafSystem):
         super().__init__()
         self._bolt, self._R_WGn = bolt, R_WGn.matrix()
         self._force = self.DeclareNumericParameter(BasicVector(3))
+        self._material = self.DeclareAbstractParameter(Value[object](None))
         self._outside = self.DeclareAbstractInputPort(
             "applied_spatial_force", Value[list[ExternallyAppliedSpatialForce]]()
         )
@@ -48,6 +51,15 @@ class OutsideForce(LeafSystem):
     def set_force(self, context: Context, f_Gn: np.ndarray) -> None:
         """Puts a force (3,) [N], in Gn, into this system's Context."""
         context.get_mutable_numeric_parameter(self._force).SetFromVector(f_Gn)
+
+    def set_material(self, context: Context, environment: Environment) -> None:
+        """Notes in this system's Context whose material the scene graph has."""
+        parameter = context.get_mutable_abstract_parameter(self._material)
+        parameter.set_value(environment)
+
+    def material(self, context: Context) -> Environment:
+        """Returns what `set_material` noted."""
+        return context.get_abstract_parameter(self._material).get_value()
 
     def _calc(self, context: Context, output: Value) -> None:
         f_Gn = context.get_numeric_parameter(self._force).value()

@@ -1,5 +1,6 @@
 """From a model of a log to the effect that the model lacks."""
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,8 @@ from sysid.tracing.held_out import HeldOut, held_out
 from sysid.tracing.selection import Fit, Round, Survey, Tracer
 from sysid.tracing.verdict import Verdict, verdict
 from sysid.workers import Workers
+
+_SEARCHED = 250  # rows, of a model whose evaluation takes seconds
 
 
 @dataclass(frozen=True)
@@ -60,17 +63,33 @@ def close_loop(
     """
     base = with_estimated_noise(model.of_episodes(train), workers, huber)
     assert isinstance(base, ScenarioModel)
-    tracer = Tracer(base, candidates(base, library), workers, huber, tell)
-    tell("the model as it is")
     refuse_few_rows(base)
+    library_here = candidates(base, library)
+    tracer = Tracer(_affordable(base), library_here, workers, huber, tell)
+    tell("the model as it is")
     first = tracer.fit(())
+    tell(f"objective {first.value:.4g}; asking {len(library_here)} candidates")
     begin = tracer.survey(first)
     last, end = tracer.forward(first, begin)
+    if tracer.base is not base:
+        tell("once more with all rows")
+        tracer = dataclasses.replace(tracer, base=base)
+        first, last = tracer.fit(()), tracer.fit(last.effects, last)
     refuse_short_logs(last)
     kept = _like(base, model.of_episodes(test)) if test else None
     errors = held_out(tracer, first, last, kept)
     found = verdict(tracer, first, last, end, errors)
     return Closed(found, first, last, tuple(tracer.rounds), begin, end, errors)
+
+
+def _affordable(base: ScenarioModel) -> ScenarioModel:
+    """Returns the model of so many rows that hundreds of evaluations are affordable."""
+    every = round(base.measurements.rows / _SEARCHED)
+    if not base.costly or every < 2:
+        return base
+    thinned = base.thin(every)
+    assert isinstance(thinned, ScenarioModel)
+    return thinned
 
 
 def _like(base: ScenarioModel, test: ScenarioModel) -> ScenarioModel:

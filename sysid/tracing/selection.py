@@ -31,8 +31,7 @@ Array = NDArray[np.float64]
 
 _KEEPS_UP = 0.25  # of the loss that is left
 _ITERATIONS = 8
-_FEW_ITERATIONS = 4  # where an evaluation takes seconds
-_SURVEYED = 300  # rows, of a model whose evaluation takes seconds
+_FEW_ITERATIONS = 6  # where an evaluation takes seconds
 _AT_BOUND = 1e-6  # of a parameter's range
 _Z95 = 1.959963984540054
 _TRIES = 4  # effects that are fitted in a round
@@ -161,7 +160,7 @@ class Tracer:
                 self.tell(f"{trial.name}: does not keep what it promised")
                 continue
             kept.append((trial, found))
-            if self.base.affine or found.value < 1.0:
+            if self.base.affine or (self.base.costly and found.value < 1.0):
                 break
         if not kept:
             return None
@@ -203,18 +202,11 @@ class Tracer:
         bench = survey.bench
         assert bench is not None and isinstance(chosen.what, tuple)
         added = bench.pruned(chosen.what)
-        thinned = len(bench.here.residual) < len(fit.here.residual)
-        known = (
-            None
-            if thinned
-            else {
-                f"{candidate.name}.{bench.fields[column]}": bench.here.jacobian[
-                    ..., column
-                ]
-                for candidate in added
-                for column in bench.groups[candidate.text]
-            }
-        )
+        known = {
+            f"{candidate.name}.{bench.fields[column]}": bench.here.jacobian[..., column]
+            for candidate in added
+            for column in bench.groups[candidate.text]
+        }
         while True:
             found = self.fit((*fit.effects, *added), fit, known)
             kept = _physical(found, added)
@@ -298,25 +290,8 @@ class Tracer:
         effects, dependences = bench.everything([(c,) for c in rest] + together(rest))
         return Survey(effects, dependences, len(bench.study.begins), bench)
 
-    def _thinned(self, fit: Fit) -> Fit:
-        """Returns a fit of so many rows that a survey is affordable."""
-        every = round(fit.model.measurements.rows / _SURVEYED)
-        if not fit.model.costly or every < 2:
-            return fit
-        model = fit.model.thin(every)
-        assert isinstance(model, ScenarioModel)
-        rows = slice(None, None, every)
-        here = dataclasses.replace(
-            fit.here,
-            residual=fit.here.residual[rows],
-            jacobian=fit.here.jacobian[rows],
-            weights=fit.here.weights[rows],
-        )
-        return dataclasses.replace(fit, model=model, here=here)
-
     def _bench(self, fit: Fit, library: Sequence[Candidate]) -> Bench:
         """Returns the linearisation beside a fit, and its normal equations."""
-        fit = self._thinned(fit)
         model, groups = extended(fit.model, library)
         count = len(fit.theta)
         objective = Objective(model, self.workers, self.huber)

@@ -4,11 +4,15 @@ import json
 import subprocess
 import sys
 
-from drake_disasm.effects import SensorDrift
+import numpy as np
+import pytest
+
+from drake_disasm.effects import CommandGain, SensorDrift
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
-from sysid.logs.recording import record_transitions
+from sysid.blind.matrix import nominal
+from sysid.blind.transitions import transitions_log
 from tests.sysid.tracing.blind import static_log
 from tests.tools.programs import ROOT
 
@@ -34,10 +38,29 @@ def test_the_tool_writes_a_scenario_and_a_report(tmp_path):
     assert "data:image/png" in page and "http://" not in page
 
 
-def test_refuses_logs_that_it_cannot_trace_yet(tmp_path):
-    scenario = load_scenario("removal", ["task.steps=3"])
+def test_transitions_give_a_scenario_that_simulates(tmp_path):
+    hidden = [CommandGain(x=0.03)]
+    transitions_log(tmp_path / "log", nominal(), hidden, 0, episodes=6, steps=12)
+    out = tmp_path / "out"
+    result = run("--log", tmp_path / "log", "--out", out, "--workers", "1")
+    assert result.returncode == 0, result.stderr
+    assert "missing: CommandGain" in result.stdout
+    scenario = load_scenario(str(out / "scenario.yaml"))
+    assert scenario.effects[0].x == pytest.approx(0.03, rel=0.02)
     simulation = TaskSimulation(scenario, "twin", make_policy("straight"))
-    record_transitions(tmp_path / "log", simulation, 3)
-    result = run("--log", tmp_path / "log", "--out", tmp_path / "out")
-    assert result.returncode == 2 and "static_wrench and joint_motion" in result.stderr
+    simulation.reset(0)
+    assert np.isfinite(simulation.step().observation).all()
+
+
+def test_refuses_what_is_not_there(tmp_path):
+    transitions_log(tmp_path / "log", nominal(), [], 0, episodes=2, steps=12)
+    arguments = ("--log", tmp_path / "log", "--out", tmp_path / "out")
+    for more, text in (
+        (("--held-out", "nothing"), "no such episode"),
+        (("--huber", "-1"), "--huber"),
+        (("--parameters", "contact.frictoin"), "did you mean"),
+    ):
+        result = run(*arguments, *more)
+        assert result.returncode == 2 and text in result.stderr
+        assert result.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()
