@@ -2,14 +2,18 @@
 
 import multiprocessing
 import os
+import tempfile
 import time
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
 from objective_speed import recorded_log
 from tqdm import tqdm
 
-from drake_disasm.scenario import load_scenario
+from drake_disasm.effects import GroovePose
+from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.writing import make_folder, write_atomically
 from sysid.blind.matrix import (
     Answer,
@@ -21,6 +25,7 @@ from sysid.blind.matrix import (
     single_cases,
 )
 from sysid.blind.report import confusion_figure, errors_table, table
+from sysid.blind.transitions import transitions_log
 from sysid.identification.split import split_episodes
 from sysid.logs import read_log
 from sysid.models.twin import TwinModel
@@ -33,6 +38,7 @@ _LEFT_OUT_LEVEL = 5.0
 _PAIR_LEVEL = 3.0
 _HELD_OUT = 0.25
 _HUBER = 3.0
+_STEPS, _TURN = 80, 0.0349066  # of an episode; rad, as in removal_turned
 
 
 def run_matrix(folder: Path, seeds: int, nulls: int, pairs: int) -> str:
@@ -95,13 +101,28 @@ def in_words(found: dict[str, list[Answer]]) -> str:
     return "\n".join(lines)
 
 
+@contextmanager
+def _turned_log(transitions: int, scenario: Scenario) -> Iterator[Path]:
+    """Yields a log of a turned groove, with the contact of a scenario; it goes after."""
+    if scenario.contact.model == "hydroelastic":
+        with recorded_log(transitions) as log:
+            yield log
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        episodes = -(-transitions // _STEPS)
+        turned = [GroovePose(ry=_TURN)]
+        log = Path(folder) / "log"
+        transitions_log(log, scenario, turned, 0, episodes, _STEPS)
+        yield log
+
+
 def closing_time(transitions: int, workers: int, contact: str) -> float:
-    """Returns the time [s] from a log to the verdict.
+    """Returns the time [s] from a log of the twin to the verdict.
 
     The log is of a turned groove, which the stated scenario does not know.
     """
-    with recorded_log(transitions) as log:
-        scenario = load_scenario("removal", [f"contact.model={contact}"])
+    scenario = load_scenario("removal", [f"contact.model={contact}"])
+    with _turned_log(transitions, scenario) as log:
         start = time.perf_counter()
         model = TwinModel([read_log(log)], scenario, ()).first(transitions)
         train, test = split_episodes(model.measurements.names, _HELD_OUT)

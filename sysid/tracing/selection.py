@@ -29,6 +29,7 @@ from sysid.workers import Workers
 
 Array = NDArray[np.float64]
 
+_WORTH_A_FIT = 0.02  # of the loss, by its linear account
 _KEEPS_UP = 0.25  # of the loss that is left
 _ITERATIONS = 8
 _FEW_ITERATIONS = 6  # where an evaluation takes seconds
@@ -139,7 +140,7 @@ class Tracer:
                 if not trials and not fit.effects:
                     trials = survey.bench.pairs(survey.effects)
             else:
-                trials = [e for e in survey.effects if e.gain >= LEAST_GAIN]
+                trials = [e for e in survey.effects if e.gain >= _WORTH_A_FIT]
             found = self._added(fit, survey, trials)
             if found is None:
                 return fit, survey
