@@ -103,7 +103,7 @@ def in_words(found: dict[str, list[Answer]]) -> str:
 
 @contextmanager
 def _turned_log(transitions: int, scenario: Scenario) -> Iterator[Path]:
-    """Yields a log of a turned groove, with the contact of a scenario; it goes after."""
+    """Yields a log of a turned groove with a scenario's contact; it goes after."""
     if scenario.contact.model == "hydroelastic":
         with recorded_log(transitions) as log:
             yield log

@@ -64,7 +64,7 @@ def _error(log, scenario):
         MotionLag(0.03),
         Backlash(x=4e-4, z=4e-4),
         Compliance(x=2e-5, z=2e-5),
-        BoltSlip(x=1e-4),
+        BoltSlip(x=3e-4),
         SensorMounting(ry=0.1),
     ],
     ids=lambda effect: type(effect).__name__,
