@@ -195,7 +195,7 @@ def measured(trial: Evidence, gains: Array, total: float, tests: int) -> Evidenc
     """
     if not gains.any():
         return dataclasses.replace(trial, gain=0.0, p=1.0, share=0.0, gains=gains)
-    p = float(wilcoxon(gains, alternative="greater").pvalue)
+    p = float(wilcoxon(_concerned(gains), alternative="greater").pvalue)
     return dataclasses.replace(
         trial,
         gain=float(gains.sum() / total),
@@ -206,13 +206,18 @@ def measured(trial: Evidence, gains: Array, total: float, tests: int) -> Evidenc
 
 
 def _share(gains: Array) -> float:
-    """Returns which share of blocks gets better, of those that change noticeably.
+    """Returns which share of blocks gets better, of those that change noticeably."""
+    concerned = _concerned(gains)
+    return float(np.mean(concerned > 0.0)) if len(concerned) else 0.0
+
+
+def _concerned(gains: Array) -> Array:
+    """Returns the gains of blocks that change noticeably, for better or for worse.
 
     A contact effect says nothing of blocks in which the bolt touches nothing.
     """
     size = np.abs(gains)
-    concerned = gains[size > _IDLE * size.mean()]
-    return float(np.mean(concerned > 0.0)) if len(concerned) else 0.0
+    return gains[size > _IDLE * size.mean()]
 
 
 def simplest(accepted: Sequence[Evidence]) -> Evidence:

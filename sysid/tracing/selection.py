@@ -1,6 +1,7 @@
 """Adds one effect at a time, as long as data that were not fitted get better by it."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -29,6 +30,7 @@ from sysid.workers import Workers
 
 Array = NDArray[np.float64]
 
+_PAIRS = 3  # that are fitted where nothing passes alone
 _WORTH_A_FIT = 0.02  # of the loss, by its linear account
 _KEEPS_UP = 0.25  # of the loss that is left
 _ITERATIONS = 8
@@ -154,15 +156,9 @@ class Tracer:
         Where effects are linear, the evidence says which passes. Else it only says
         which are worth a fit, and fits decide.
         """
-        kept: list[tuple[Evidence, Fit]] = []
-        for trial in _to_try(trials):
-            found = self._without_needless(self._with(fit, survey, trial))
-            if not self._keeps_promise(fit, found, trial):
-                self.tell(f"{trial.name}: does not keep what it promised")
-                continue
-            kept.append((trial, found))
-            if self.base.affine or (self.base.costly and found.value < 1.0):
-                break
+        kept, tried = self._tried(fit, survey, _to_try(trials))
+        if not kept and not self.base.affine:
+            kept, _ = self._tried(fit, survey, _pairs(tried))
         if not kept:
             return None
         best, found = _lowest(kept)
@@ -174,6 +170,22 @@ class Tracer:
         self.rounds.append(Round(best, ties, record, found.value))
         self.tell(f"{best.name}: objective {found.value:.4g}")
         return found
+
+    def _tried(
+        self, fit: Fit, survey: Survey, trials: Sequence[Evidence]
+    ) -> tuple[list[tuple[Evidence, Fit]], list[tuple[Evidence, Fit]]]:
+        """Returns the fits that keep what their effects promised, and all fits."""
+        kept, tried = [], []
+        for trial in trials:
+            found = self._without_needless(self._with(fit, survey, trial))
+            tried.append((trial, found))
+            if not self._keeps_promise(fit, found, trial):
+                self.tell(f"{trial.name}: does not keep what it promised")
+                continue
+            kept.append((trial, found))
+            if self.base.affine or (self.base.costly and found.value < 1.0):
+                break
+        return kept, tried
 
     def _keeps_promise(self, fit: Fit, found: Fit, trial: Evidence) -> bool:
         """Returns whether a fit with more effects is truly better."""
@@ -363,6 +375,18 @@ def _to_try(accepted: Sequence[Evidence]) -> list[Evidence]:
     for each in accepted:
         found.setdefault(each.effects, each)
     return list(found.values())[:_TRIES]
+
+
+def _pairs(tried: Sequence[tuple[Evidence, Fit]]) -> list[Evidence]:
+    """Returns pairs of what was tried alone, the best first."""
+    order = sorted(tried, key=lambda pair: pair[1].loss)
+    return [
+        dataclasses.replace(
+            first, what=(*first.what, *second.what), cost=first.cost + second.cost
+        )
+        for (first, _), (second, _) in itertools.combinations(order, 2)
+        if isinstance(first.what, tuple) and isinstance(second.what, tuple)
+    ][:_PAIRS]
 
 
 def _lowest(kept: Sequence[tuple[Evidence, Fit]]) -> tuple[Evidence, Fit]:

@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 #: Share of what can be explained that effects must explain to be believed.
 _BELIEVED = 0.75
+#: Objective beyond which there is more than noise, where the noise is known.
+_NOISE = 1.2
 _SHOWN = 3  # of anything, in three lines
 
 
@@ -116,9 +118,12 @@ def verdict(
     dependence = left[0].name if left else ""
     assert end.bench is not None
     against = contradictions(last, end.bench, len(tracer.base.parameters))
-    ending = _ending(names, dependence or in_words(against), explained)
+    beyond = _beyond_noise(last)
+    ending = _ending(names, dependence or in_words(against) or beyond, explained)
+    if beyond and ending == "explained":
+        ending = "unexplained"
     lines = [
-        _missing(ending, names, ties, dependence, in_words(against)),
+        _missing(ending, names, ties, dependence, in_words(against) or beyond),
         _value_line(names, values),
         f"error on held-out data: {improvement(errors)}",
     ]
@@ -133,6 +138,16 @@ def verdict(
         against,
         "\n".join(lines),
     )
+
+
+def _beyond_noise(last: Fit) -> str:
+    """Returns that a residual is too large, in words; empty if it is not.
+
+    Only where channels state their noise: estimated from a fit it says nothing.
+    """
+    if last.model.affine or last.value <= _NOISE:
+        return ""
+    return f"the residual is {last.value:.2g} times the noise"
 
 
 def _ending(names: tuple[str, ...], left: str, explained: float) -> str:
