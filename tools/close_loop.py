@@ -11,7 +11,7 @@ report that opens offline.
 import argparse
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cli
@@ -26,12 +26,10 @@ from sysid.models import ScenarioModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.report import closing_page
 from sysid.scenario_parameters import read_requests
-from sysid.tracing.pipeline import Closed, close_loop
+from sysid.tracing.pipeline import HELD_OUT, HUBER, Closed, close_loop
 from sysid.tracing.plain import to_mapping
 from sysid.workers import Workers
 
-_HELD_OUT = 0.25  # of a log of transitions
-_HUBER = 3.0  # for the twin: a stop that is hit a moment later is an outlier
 _EXAMPLES = """examples:
   python tools/close_loop.py --log out/log --scenario removal --out out/closed
   python tools/close_loop.py --log readings --out out/sensor     a static_wrench log
@@ -49,6 +47,19 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     add = parser.add_argument
     add("--log", nargs="+", required=True, metavar="DIR", help="logs of one kind")
+    _add_model_arguments(add)
+    add(
+        "--workers",
+        type=cli.positive,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="processes (default: one per core)",
+    )
+    add("--out", required=True, type=Path, metavar="DIR", help="a folder")
+    return parser.parse_args(arguments)
+
+
+def _add_model_arguments(add: Callable[..., object]) -> None:
     add(
         "--scenario",
         metavar="NAME|FILE",
@@ -79,15 +90,6 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         help="residuals beyond K standard deviations count linearly; inf for plain "
         "squares (default: 3 for transitions, else inf)",
     )
-    add(
-        "--workers",
-        type=cli.positive,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes (default: one per core)",
-    )
-    add("--out", required=True, type=Path, metavar="DIR", help="a folder")
-    return parser.parse_args(arguments)
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -97,9 +99,9 @@ def main(arguments: Sequence[str]) -> int:
     model = _model(args, logs)
     names = model.measurements.names
     is_twin = logs[0].header.kind == "transitions"
-    share = _HELD_OUT if is_twin else 0.0
+    share = HELD_OUT if is_twin else 0.0
     train, test = split_episodes(names, args.held_out or share)
-    usual = _HUBER if is_twin else np.inf
+    usual = HUBER if is_twin else np.inf
     huber = usual if args.huber is None else args.huber
     if not huber > 0.0:
         raise DisasmError("--huber: give a number above zero, or inf")

@@ -29,15 +29,13 @@ from sysid.blind.transitions import transitions_log
 from sysid.identification.split import split_episodes
 from sysid.logs import read_log
 from sysid.models.twin import TwinModel
-from sysid.tracing.pipeline import close_loop
+from sysid.tracing.pipeline import HELD_OUT, HUBER, close_loop
 from sysid.workers import Workers
 
 LEVELS = (1.0, 2.0, 5.0)
 CORRELATIONS = (0.0, 0.5)
 _LEFT_OUT_LEVEL = 5.0
 _PAIR_LEVEL = 3.0
-_HELD_OUT = 0.25
-_HUBER = 3.0
 _STEPS, _TURN = 80, 0.0349066  # of an episode; rad, as in removal_turned
 
 
@@ -125,7 +123,7 @@ def closing_time(transitions: int, workers: int, contact: str) -> float:
     with _turned_log(transitions, scenario) as log:
         start = time.perf_counter()
         model = TwinModel([read_log(log)], scenario, ()).first(transitions)
-        train, test = split_episodes(model.measurements.names, _HELD_OUT)
+        train, test = split_episodes(model.measurements.names, HELD_OUT)
         with Workers(workers) as pool:
-            close_loop(model, train, test, _HUBER, pool, lambda _: None)
+            close_loop(model, train, test, HUBER, pool, lambda _: None)
         return time.perf_counter() - start

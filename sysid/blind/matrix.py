@@ -27,12 +27,10 @@ from sysid.identification.split import split_episodes
 from sysid.logs import read_log
 from sysid.models.twin import TwinModel
 from sysid.objective import rms, tempered
-from sysid.tracing.pipeline import close_loop
+from sysid.tracing.pipeline import HELD_OUT, HUBER, close_loop
 from sysid.workers import Workers
 
-HUBER = 3.0
 _SMALL = (3, 25)  # episodes and steps of the log by which a size is found
-_HELD_OUT = 0.25
 
 
 @dataclass(frozen=True)
@@ -122,7 +120,7 @@ def answer(case: Case) -> Answer:
             log, nominal(), effects, case.seed, correlation=case.correlation
         )
         model = TwinModel([read_log(log)], nominal(), ())
-        train, test = split_episodes(model.measurements.names, _HELD_OUT)
+        train, test = split_episodes(model.measurements.names, HELD_OUT)
         library = [e for e in EFFECTS if e.__name__ not in case.left_out]
         closed = close_loop(
             model, train, test, HUBER, Workers(), lambda _: None, library

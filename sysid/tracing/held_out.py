@@ -110,7 +110,7 @@ def contiguous_folds(episode: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _predicted(test: ScenarioModel, fit: Fit) -> Array:
     model, _ = extended(test, fit.effects, with_shapes=True)
-    return np.concatenate([model.predict(fit.theta, rows) for rows in model.chunks()])
+    return model.predictions(fit.theta)
 
 
 def _cross_predicted(tracer: Tracer, fit: Fit, folds: NDArray[np.int64]) -> Array:

@@ -14,6 +14,10 @@ from sysid.tracing.selection import Fit, Round, Survey, Tracer
 from sysid.tracing.verdict import Verdict, verdict
 from sysid.workers import Workers
 
+#: Of a log of transitions: the share of episodes that is judged, not fitted.
+HELD_OUT = 0.25
+#: For the twin, where squares end: a stop that is hit a moment later is an outlier.
+HUBER = 3.0
 _SEARCHED = 250  # rows, of a model whose evaluation takes seconds
 
 
