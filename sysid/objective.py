@@ -34,16 +34,32 @@ class Objective:
         scaling: between parameters and the unit box.
         evaluations: parameter sets simulated so far.
         failures: those at which the simulation failed, each with the reason.
+        differences: the objective whose differences serve as derivatives; this one,
+            or one of a model that is alike and faster.
     """
 
     def __init__(
-        self, model: LogModel, workers: Workers, huber: float = np.inf
+        self,
+        model: LogModel,
+        workers: Workers,
+        huber: float = np.inf,
+        alike: LogModel | None = None,
     ) -> None:
+        """Evaluates nothing yet.
+
+        Args:
+            model: predicts.
+            workers: do it.
+            huber: where squares end.
+            alike: a faster model with the same parameters, for derivatives.
+        """
         self.model, self.huber = model, huber
         self.scaling = Scaling(model.parameters)
         self.evaluations = 0
         self.failures: list[tuple[Array, str]] = []
         self._workers = workers
+        is_other = alike is not None and alike is not model
+        self.differences = Objective(alike, workers, huber) if is_other else self
 
     def __call__(self, thetas: Array) -> Array:
         """Returns the values (b,) of parameter sets (b, p)."""

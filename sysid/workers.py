@@ -7,9 +7,9 @@ import pickle
 import signal
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from drake_disasm.errors import DisasmError
 from sysid.models.base import Array, LogModel, PredictionError
 
 _ATTEMPTS = 3
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
 
 #: What a worker has built, by thread: a diagram serves one thread.
 _mine = threading.local()
@@ -63,15 +66,29 @@ class Workers:
             return [_outcome(model, theta, rows) for theta, rows in work]
         payload = pickle.dumps(model)
         key = hashlib.sha256(payload).hexdigest()
-        for _ in range(_ATTEMPTS):
-            try:
-                return self._submit(key, payload, work)
-            except BrokenExecutor:
-                self.notes.append("a worker process died; its work was done again")
-                self.close()
-        raise DisasmError(
-            f"worker processes died {_ATTEMPTS} times over the same work (out of "
-            "memory?); give fewer --workers, then resume"
+        return self._tenaciously(
+            lambda executor: [
+                executor.submit(_simulate, key, payload, theta, rows)
+                for theta, rows in work
+            ]
+        )
+
+    def map(
+        self, function: Callable[[Job], Result], jobs: Sequence[Job]
+    ) -> list[Result]:
+        """Returns what a function makes of each job, in their order.
+
+        Args:
+            function: of a module, so that it can be sent to a process.
+            jobs: each sent to a worker.
+
+        Raises:
+            DisasmError: workers died again and again.
+        """
+        if self._make is None:
+            return [function(job) for job in jobs]
+        return self._tenaciously(
+            lambda executor: [executor.submit(function, job) for job in jobs]
         )
 
     def close(self) -> None:
@@ -80,17 +97,23 @@ class Workers:
             self._executor.shutdown(wait=False, cancel_futures=True)
         self._executor = None
 
-    def _submit(
-        self, key: str, payload: bytes, work: Sequence[tuple[Array, slice]]
-    ) -> list[Array | str]:
-        if self._executor is None:
-            assert self._make is not None
-            self._executor = self._make()
-        futures = [
-            self._executor.submit(_simulate, key, payload, theta, rows)
-            for theta, rows in work
-        ]
-        return [future.result() for future in futures]
+    def _tenaciously(
+        self, submit: Callable[[Executor], list[Future[Result]]]
+    ) -> list[Result]:
+        """Returns the results of what is submitted, once more if workers die over it."""
+        assert self._make is not None
+        for _ in range(_ATTEMPTS):
+            try:
+                if self._executor is None:
+                    self._executor = self._make()
+                return [future.result() for future in submit(self._executor)]
+            except BrokenExecutor:
+                self.notes.append("a worker process died; its work was done again")
+                self.close()
+        raise DisasmError(
+            f"worker processes died {_ATTEMPTS} times over the same work (out of "
+            "memory?); give fewer --workers, then resume"
+        )
 
     def __enter__(self) -> Self:
         """Returns the workers."""

@@ -49,10 +49,11 @@ def gauss_newton(
         if callback:
             callback(value)
         points = np.clip(here.u + _steps(here), 0.0, 1.0)
-        point, reached = _best(objective, points, value, all_at_once=central)
+        point, residual = _best(objective, points, value, all_at_once=central)
+        reached = objective.value(residual)
         if reached >= value:
             break
-        here = linearise(objective, point, fitting_steps(here), central)
+        here = linearise(objective, point, fitting_steps(here), central, residual)
         if reached > (1.0 - _GAIN) * value:
             break
     return here
@@ -60,15 +61,19 @@ def gauss_newton(
 
 def _best(
     objective: Objective, points: Array, value: float, all_at_once: bool
-) -> tuple[Array, float]:
-    """Returns the best of points (d, p), or the first that is better than a value."""
+) -> tuple[Array, Array]:
+    """Returns the best of points (d, p), or the first that is better than a value.
+
+    And the residuals there.
+    """
     batches = [points] if all_at_once else [points[:1], points[1:]]
     for batch in batches:
-        values = objective(objective.scaling.from_unit(batch))
+        residuals = objective.residuals(objective.scaling.from_unit(batch))
+        values = [objective.value(r) for r in residuals]
         best = int(np.argmin(values))
         if values[best] < value:
             break
-    return batch[best], float(values[best])
+    return batch[best], residuals[best]
 
 
 def _steps(here: Linearisation) -> Array:

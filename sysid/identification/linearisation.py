@@ -58,6 +58,7 @@ def linearise(
     u: Array,
     steps: Array | None = None,
     central: bool = True,
+    residual: Array | None = None,
 ) -> Linearisation:
     """Returns the linearisation at a point (p,) of the unit box.
 
@@ -66,12 +67,15 @@ def linearise(
         u: where.
         steps: (p,) of the differences, in the unit box.
         central: central differences, 2 p + 1 evaluations, one-sided at a bound; or
-            all one-sided, p + 1 evaluations.
+            all one-sided, p + 1 evaluations, of what the objective has for
+            differences.
+        residual: (rows, channels) there, if it is known; saves an evaluation of
+            one-sided differences.
     """
     size = len(u)
     steps = np.full(size, FIRST_STEP) if steps is None else steps
     if not central:
-        return extend(_at(objective, u), objective, u, steps)
+        return extend(_at(objective, u, residual), objective, u, steps)
     ahead = np.clip(u + np.diag(steps), 0.0, 1.0)
     behind = np.clip(u - np.diag(steps), 0.0, 1.0)
     points = np.vstack([u[None], ahead, behind])
@@ -102,15 +106,21 @@ def extend(
     way = np.where(u[known:] > 0.5, -steps, steps)
     points = np.tile(u, (len(way), 1))
     points[:, known:] += np.diag(way)
-    found = objective.residuals(objective.scaling.from_unit(points))
-    columns = [(r - here.residual) / w for r, w in zip(found, way, strict=True)]
+    source, origin = objective.differences, here.residual
+    if source is not objective:
+        points = np.vstack([points, u])
+    found = source.residuals(objective.scaling.from_unit(points))
+    if source is not objective:
+        origin = found.pop()
+    columns = [(r - origin) / w for r, w in zip(found, way, strict=True)]
     jacobian = np.concatenate([here.jacobian, np.stack(columns, axis=-1)], axis=-1)
     return dataclasses.replace(here, u=u, jacobian=jacobian)
 
 
-def _at(objective: Objective, u: Array) -> Linearisation:
+def _at(objective: Objective, u: Array, residual: Array | None) -> Linearisation:
     """Returns the residuals at a point (p,), with no parameter."""
-    residual = objective.residuals(objective.scaling.from_unit(u))[0]
+    if residual is None:
+        residual = objective.residuals(objective.scaling.from_unit(u))[0]
     weights = huber_weights(residual, objective.huber)
     nothing = np.zeros((*residual.shape, 0))
     return Linearisation(u[:0], residual, nothing, weights, objective.huber)

@@ -127,6 +127,14 @@ class LogModel(abc.ABC):
         """Whether an evaluation takes seconds: a search is to ask for few rows."""
         return False
 
+    def alike(self) -> Self:
+        """Returns a model that behaves alike and is faster; itself if there is none.
+
+        Its parameters are the same. Differences of its predictions serve where those
+        of this one take too long.
+        """
+        return self
+
     @property
     def noise_groups(self) -> tuple[str, ...]:
         """For each channel a label; channels of one label have one unknown noise."""

@@ -41,6 +41,7 @@ from sysid.parameters import Parameter
 #: repeatability (0.1 mm, against an outside frame), above their resolution.
 POSE_NOISE = (2e-5, 1e-4)
 
+_FRICTION = "contact.friction"  # which both kinds of contact have
 _CHUNK = 32  # transitions: a tenth of a second of work
 _IMPACT_CHUNK = 512  # large enough for arrays, small enough to share
 
@@ -148,6 +149,17 @@ class TwinModel(ScenarioModel):
     def costly(self) -> bool:
         """See LogModel."""
         return not self._has_impact
+
+    def alike(self) -> Self:
+        """See LogModel: IMPACT, where all parameters mean the same to it."""
+        paths = [parameter.path for parameter in self.parameters]
+        own = [p for p in paths if p.startswith("contact.") and p != _FRICTION]
+        if self._has_impact or self.rollout or own:
+            return self
+        contact = dataclasses.replace(self.scenario.contact, model="impact")
+        return self._changed(
+            scenario=dataclasses.replace(self.scenario, contact=contact)
+        )
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: time, place, action and force at the beginning of a step."""

@@ -79,6 +79,8 @@ def close_loop(
         tell("once more with all rows")
         tracer = dataclasses.replace(tracer, base=base)
         first, last = tracer.fit(()), tracer.fit(last.effects, last)
+        tracer = dataclasses.replace(tracer, exact=True)
+        last = tracer.fit(last.effects, last)
     refuse_short_logs(last)
     kept = _like(base, model.of_episodes(test)) if test else None
     errors = held_out(tracer, first, last, kept)

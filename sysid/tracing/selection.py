@@ -20,6 +20,7 @@ from sysid.tracing.evidence import (
     LEAST_GAIN,
     Bench,
     Evidence,
+    What,
     evidence,
     measured,
     simplest,
@@ -30,10 +31,14 @@ from sysid.workers import Workers
 
 Array = NDArray[np.float64]
 
+_FAR = 5.0  # times the noise: beyond that, the linear account is not asked
+_COARSE_ROWS = 120
 _PAIRS = 3  # that are fitted where nothing passes alone
 _WORTH_A_FIT = 0.02  # of the loss, by its linear account
+_CLEARLY = 0.5  # of the loss without an effect: no fit is needed to see its worth
 _KEEPS_UP = 0.25  # of the loss that is left
 _ITERATIONS = 8
+_LAST_ITERATIONS = 1  # with its own derivatives
 _FEW_ITERATIONS = 6  # where an evaluation takes seconds
 _AT_BOUND = 1e-6  # of a parameter's range
 _Z95 = 1.959963984540054
@@ -68,6 +73,10 @@ class Fit:
         names = [f"{effect.name}.{field}" for field in effect.fields]
         own = [i for i, p in enumerate(self.model.parameters) if p.name in names]
         return np.array(own, dtype=np.int64)
+
+
+#: Rough fits with one more effect each, by the effect's name, to begin at.
+Starts = Mapping[tuple[str, ...], Fit]
 
 
 @dataclass(frozen=True)
@@ -117,6 +126,8 @@ class Tracer:
         workers: to evaluate with.
         huber: where squares end, in units of the noise.
         tell: called with a line after each step.
+        rounds: how effects were chosen.
+        exact: whether derivatives are the model's own, else those of one alike.
     """
 
     base: ScenarioModel
@@ -125,6 +136,7 @@ class Tracer:
     huber: float
     tell: Callable[[str], None]
     rounds: list[Round] = field(default_factory=list)
+    exact: bool = False
 
     def forward(self, fit: Fit, survey: Survey) -> tuple[Fit, Survey]:
         """Returns the fit with all effects that pass, and the survey that ended it.
@@ -136,27 +148,56 @@ class Tracer:
             survey: beside it.
         """
         while True:
-            assert survey.bench is not None
-            if self.base.affine:
-                trials = [e for e in survey.effects if e.accepted]
-                if not trials and not fit.effects:
-                    trials = survey.bench.pairs(survey.effects)
-            else:
-                trials = [e for e in survey.effects if e.gain >= _WORTH_A_FIT]
-            found = self._added(fit, survey, trials)
+            found = self._added(fit, survey)
             if found is None:
                 return fit, survey
             fit, survey = found, self.survey(found)
 
-    def _added(
-        self, fit: Fit, survey: Survey, trials: Sequence[Evidence]
-    ) -> Fit | None:
+    def _promising(self, fit: Fit, survey: Survey) -> tuple[list[Evidence], Starts]:
+        """Returns what is worth a fit, the best first, and where fits may begin."""
+        assert survey.bench is not None
+        if self.base.affine:
+            passing = [e for e in survey.effects if e.accepted]
+            if not passing and not fit.effects:
+                passing = survey.bench.pairs(survey.effects)
+            return passing, {}
+        if fit.value > _FAR:
+            return self._coarse(fit, survey)
+        return [e for e in survey.effects if e.gain >= _WORTH_A_FIT], {}
+
+    def _coarse(self, fit: Fit, survey: Survey) -> tuple[list[Evidence], Starts]:
+        """Returns the same by a fit of each effect, to a few rows.
+
+        Far from the data a linear account is worthless: a bolt that the model has
+        inside the wall says how hard the wall is, not where.
+        """
+        base = self.base.alike()
+        base = base.thin(max(1, round(base.measurements.rows / _COARSE_ROWS)))
+        assert isinstance(base, ScenarioModel)
+        small = dataclasses.replace(
+            self, base=base, library=(), workers=Workers(), tell=_silent
+        )
+        before = small.fit(fit.effects, fit)
+        each = list({e.effects: e for e in reversed(survey.effects)}.values())
+        jobs = [_RoughFit(small, before, e.what) for e in each]
+        rough = self.workers.map(_RoughFit.run, jobs)
+        tests = len(each)
+        found = [
+            _confirmed(before, after, e, tests)
+            for e, after in zip(each, rough, strict=True)
+        ]
+        starts = {e.effects: after for e, after in zip(each, rough, strict=True)}
+        found = [e for e in found if e.gain >= _WORTH_A_FIT]
+        return sorted(found, key=lambda e: -e.gain), starts
+
+    def _added(self, fit: Fit, survey: Survey) -> Fit | None:
         """Returns the fit with the best that passes and keeps what it promised.
 
         Where effects are linear, the evidence says which passes. Else it only says
         which are worth a fit, and fits decide.
         """
-        kept, tried = self._tried(fit, survey, _to_try(trials))
+        trials, starts = self._promising(fit, survey)
+        kept, tried = self._tried(fit, survey, _to_try(trials), starts)
         if not kept and not self.base.affine:
             kept, _ = self._tried(fit, survey, _pairs(tried))
         if not kept:
@@ -172,12 +213,18 @@ class Tracer:
         return found
 
     def _tried(
-        self, fit: Fit, survey: Survey, trials: Sequence[Evidence]
+        self,
+        fit: Fit,
+        survey: Survey,
+        trials: Sequence[Evidence],
+        starts: Starts | None = None,
     ) -> tuple[list[tuple[Evidence, Fit]], list[tuple[Evidence, Fit]]]:
         """Returns the fits that keep what their effects promised, and all fits."""
         kept, tried = [], []
         for trial in trials:
-            found = self._without_needless(self._with(fit, survey, trial))
+            start = (starts or {}).get(trial.effects)
+            found = self._further(start) if start else self._with(fit, survey, trial)
+            found = self._without_needless(found)
             tried.append((trial, found))
             if not self._keeps_promise(fit, found, trial):
                 self.tell(f"{trial.name}: does not keep what it promised")
@@ -202,7 +249,10 @@ class Tracer:
         fit = self.backward(fit)
         if self.base.affine:
             return fit
+        worth = self.worth(fit)
         for effect in fit.effects[:-1]:
+            if worth[effect.name] > _CLEARLY:
+                continue
             rest = tuple(c for c in fit.effects if c is not effect)
             without = self.fit(rest, fit)
             if without.loss <= (1.0 + LEAST_GAIN) * fit.loss:
@@ -226,6 +276,20 @@ class Tracer:
             if kept == added or not kept:
                 return found
             added = kept
+
+    def _further(self, rough: Fit) -> Fit:
+        """Returns the fit to all rows that begins at one to few of them.
+
+        The newest effect keeps those sizes that show.
+        """
+        found = self.fit(rough.effects, rough)
+        shows = _shows(found)
+        newest = rough.effects[-1]
+        columns = found.columns_of(newest)
+        fields = [f for f, c in zip(newest.fields, columns, strict=True) if shows[c]]
+        if not fields or len(fields) == len(newest.fields):
+            return found
+        return self.fit((*rough.effects[:-1], newest.only(fields)), found)
 
     def backward(self, fit: Fit) -> Fit:
         """Returns the fit without effects that later ones have made needless."""
@@ -279,7 +343,7 @@ class Tracer:
         model, _ = extended(self.base, effects, with_shapes=True)
         values = _values_of(start) if start else {}
         theta = [values.get(p.name, p.nominal) for p in model.parameters]
-        objective = Objective(model, self.workers, self.huber)
+        objective = self._objective(model)
         u = objective.scaling.to_unit(np.array(theta))
         here = None
         if start and known is not None:
@@ -291,9 +355,14 @@ class Tracer:
             )
             here = dataclasses.replace(start.here, u=u, jacobian=jacobian)
         iterations = _FEW_ITERATIONS if model.costly else _ITERATIONS
+        iterations = _LAST_ITERATIONS if self.exact and model.costly else iterations
         here = gauss_newton(objective, u, iterations, start=here, central=False)
         found = objective.scaling.from_unit(here.u)
         return Fit(effects, model, found, here, objective.value(here.residual))
+
+    def _objective(self, model: ScenarioModel) -> Objective:
+        alike = None if self.exact else model.alike()
+        return Objective(model, self.workers, self.huber, alike)
 
     def survey(self, fit: Fit) -> Survey:
         """Returns what speaks for each candidate that the fit does not have."""
@@ -307,7 +376,7 @@ class Tracer:
         """Returns the linearisation beside a fit, and its normal equations."""
         model, groups = extended(fit.model, library)
         count = len(fit.theta)
-        objective = Objective(model, self.workers, self.huber)
+        objective = self._objective(model)
         rest = nominal_values(model.parameters)[count:]
         u = objective.scaling.to_unit(np.concatenate([fit.theta, rest]))
         here = extend(fit.here, objective, u)
@@ -328,6 +397,24 @@ class Tracer:
             [(d, begin + np.array(d.columns, dtype=np.int64)) for d in dependences],
             episode[np.unique(blocks, return_index=True)[1]],
         )
+
+
+@dataclass(frozen=True)
+class _RoughFit:
+    """A fit with effects more than another has, as work for a process."""
+
+    tracer: Tracer
+    before: Fit
+    what: What
+
+    def run(self) -> Fit:
+        """Returns the fit."""
+        assert isinstance(self.what, tuple)
+        return self.tracer.fit((*self.before.effects, *self.what), self.before)
+
+
+def _silent(line: str) -> None:
+    """Tells nobody."""
 
 
 def _confirmed(before: Fit, after: Fit, trial: Evidence, tests: int) -> Evidence:
