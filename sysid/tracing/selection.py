@@ -36,6 +36,7 @@ _COARSE_ROWS = 120
 _PAIRS = 3  # that are fitted where nothing passes alone
 _WORTH_A_FIT = 0.02  # of the loss, by its linear account
 _CLEARLY = 0.5  # of the loss without an effect: no fit is needed to see its worth
+_HOPELESS = 2.0  # times the least loss of rough fits
 _KEEPS_UP = 0.25  # of the loss that is left
 _ITERATIONS = 8
 _LAST_ITERATIONS = 1  # with its own derivatives
@@ -182,11 +183,17 @@ class Tracer:
         jobs = [_RoughFit(small, before, e.what) for e in each]
         rough = self.workers.map(_RoughFit.run, jobs)
         tests = len(each)
-        found = [
-            _confirmed(before, after, e, tests)
+        enough = _HOPELESS * min(after.loss for after in rough)
+        starts = {
+            e.effects: after
             for e, after in zip(each, rough, strict=True)
+            if after.loss <= enough
+        }
+        found = [
+            _confirmed(before, starts[e.effects], e, tests)
+            for e in each
+            if e.effects in starts
         ]
-        starts = {e.effects: after for e, after in zip(each, rough, strict=True)}
         found = [e for e in found if e.gain >= _WORTH_A_FIT]
         return sorted(found, key=lambda e: -e.gain), starts
 
