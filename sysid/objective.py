@@ -58,8 +58,9 @@ class Objective:
         self.evaluations = 0
         self.failures: list[tuple[Array, str]] = []
         self._workers = workers
-        is_other = alike is not None and alike is not model
-        self.differences = Objective(alike, workers, huber) if is_other else self
+        self.differences = self
+        if alike is not None and alike is not model:
+            self.differences = Objective(alike, workers, huber)
 
     def __call__(self, thetas: Array) -> Array:
         """Returns the values (b,) of parameter sets (b, p)."""

@@ -100,7 +100,7 @@ class Workers:
     def _tenaciously(
         self, submit: Callable[[Executor], list[Future[Result]]]
     ) -> list[Result]:
-        """Returns the results of what is submitted, once more if workers die over it."""
+        """Returns the results of what is submitted, again if workers die over it."""
         assert self._make is not None
         for _ in range(_ATTEMPTS):
             try:

@@ -133,10 +133,9 @@ def _tell(line: str) -> None:
 
 
 def _write(folder: Path, closed: Closed, origin: dict[str, object]) -> None:
-    scenario = closed.last.model.scenario_at(closed.last.theta)
     result = to_mapping(closed) | {"provenance": origin}
     files = {
-        "scenario.yaml": dump_scenario(scenario),
+        "scenario.yaml": dump_scenario(closed.scenario),
         "result.json": json.dumps(result, indent=2) + "\n",
         "report.html": closing_page(closed, origin),
     }

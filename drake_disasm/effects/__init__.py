@@ -42,6 +42,7 @@ from drake_disasm.effects.environment.viscous_friction import GrooveViscousFrict
 from drake_disasm.effects.motion.backlash import Backlash
 from drake_disasm.effects.motion.command_gain import CommandGain
 from drake_disasm.effects.motion.compliance import Compliance
+from drake_disasm.effects.motion.imprecision import Imprecision
 from drake_disasm.effects.motion.lag import MotionLag
 from drake_disasm.effects.motion.slip import BoltSlip
 from drake_disasm.effects.sensor.base_tilt import BaseTilt
@@ -73,6 +74,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     Backlash,
     Compliance,
     BoltSlip,
+    Imprecision,
     SensorBias,
     SensorDrift,
     SensorWarmUp,
@@ -118,6 +120,7 @@ __all__ = [
     "GroovePose",
     "GrooveStribeckFriction",
     "GrooveViscousFriction",
+    "Imprecision",
     "JointAsymmetricFriction",
     "JointCoulombFriction",
     "JointEffect",

@@ -154,8 +154,11 @@ class MotionEffect(Effect, abc.ABC):
     G, at the boundaries of the MDP's steps; between them the arm moves evenly.
     """
 
-    #: Where on the way: 0 scale, 1 time, 2 gears, 3 what yields.
+    #: Where on the way: 0 scale, 1 time, 2 gears, 3 what yields, 4 what scatters.
     stage: int = 0
+
+    #: Whether it acts on the variance alone: models predict the mean.
+    is_random: bool = False
 
     @abc.abstractmethod
     def execute(

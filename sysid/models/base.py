@@ -212,7 +212,7 @@ class LogModel(abc.ABC):
         """Returns the same model compared with other measurements of the same rows."""
         return self._changed(measurements=measurements)
 
-    def thin(self, every: int) -> "LogModel":
+    def thin(self, every: int) -> Self:
         """Returns the same model of every n-th row, where rows stand alone."""
         return self
 

@@ -101,6 +101,7 @@ class TwinModel(ScenarioModel):
         self._replay: TwinReplay | ImpactReplay | None = None
         self._simulated: bytes | None = None
         self._moved: tuple[str, Steps] | None = None
+        self._push: Array | None = None
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
@@ -114,7 +115,9 @@ class TwinModel(ScenarioModel):
         scenario = self.scenario_at(theta)
         try:
             replay = self._replay_at(theta, scenario)
-            steps = self._steps_of(motion_chain(scenario.effects)).select(rows)
+            steps = self._steps_of(_mean_chain(scenario)).select(rows)
+            if self._push is not None:
+                steps = _pushed(steps, self._push[rows] / self.scenario.task.period)
             states = at_sensor(self._states(replay, steps), self._X_SB)
         except (RuntimeError, DisasmError, ValueError) as error:
             self._replay = self._simulated = None
@@ -160,6 +163,14 @@ class TwinModel(ScenarioModel):
         return self._changed(
             scenario=dataclasses.replace(self.scenario, contact=contact)
         )
+
+    def pushed(self, push: Array) -> Self:
+        """Returns the same model where each step leads further than commanded.
+
+        Args:
+            push: (rows, 3) by how much, in G [m].
+        """
+        return self._changed(_push=push)
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: time, place, action and force at the beginning of a step."""
@@ -247,6 +258,17 @@ class TwinModel(ScenarioModel):
     def __getstate__(self) -> dict[str, Any]:
         """Leaves the diagram out: each worker builds its own."""
         return self.__dict__ | {"_replay": None, "_simulated": None, "_moved": None}
+
+
+def _mean_chain(scenario: Scenario) -> tuple[MotionEffect, ...]:
+    """Returns the effects on the motion that a prediction can follow."""
+    return tuple(e for e in motion_chain(scenario.effects) if not e.is_random)
+
+
+def _pushed(steps: Steps, rate: Array) -> Steps:
+    """Returns steps that go faster by rates (n, 3) [m/s]."""
+    more = np.hstack([rate, np.zeros_like(rate)])
+    return dataclasses.replace(steps, qd_rate=steps.qd_rate + more)
 
 
 def _environment_alone(scenario: Scenario) -> Scenario:

@@ -20,7 +20,7 @@ What = tuple[Candidate, ...] | Dependence
 
 ALPHA = 0.05  # family-wise, in each round
 LEAST_GAIN = 0.01  # of the loss
-_LEAST_SHARE = 0.8  # of the blocks
+LEAST_SHARE = 0.8  # of the blocks
 _LEAST_FIELD = 0.005  # of the loss, that a size must be worth
 _SIMPLER = 0.05  # of the gain, that fewer parameters may cost
 _RIVAL = 0.5  # of the gain, below which nothing is a tie
@@ -54,7 +54,7 @@ class Evidence:
     def accepted(self) -> bool:
         """Whether it is more than chance."""
         significant = self.p < ALPHA and self.gain >= LEAST_GAIN
-        return significant and self.share >= _LEAST_SHARE
+        return significant and self.share >= LEAST_SHARE
 
     @property
     def name(self) -> str:

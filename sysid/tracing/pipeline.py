@@ -4,12 +4,14 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from drake_disasm.effects import EFFECTS, Effect
+from drake_disasm.effects import EFFECTS, Effect, Imprecision
+from drake_disasm.scenario import Scenario
 from sysid.identification.noise import with_estimated_noise
 from sysid.models.base import ScenarioModel
 from sysid.tracing.candidates import candidates
 from sysid.tracing.enough import refuse_few_rows, refuse_short_logs
 from sysid.tracing.held_out import HeldOut, held_out
+from sysid.tracing.scatter import Scatter, scatter
 from sysid.tracing.selection import Fit, Round, Survey, Tracer
 from sysid.tracing.verdict import Verdict, verdict
 from sysid.workers import Workers
@@ -31,6 +33,7 @@ class Closed:
         rounds: how the effects were chosen.
         begin, end: what spoke for each candidate before the first and after the last.
         errors: before and after, on rows that were not fitted.
+        scatter: about the commands, if the arm has that.
     """
 
     verdict: Verdict
@@ -40,6 +43,16 @@ class Closed:
     begin: Survey
     end: Survey
     errors: HeldOut
+    scatter: Scatter | None
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was identified, with the effects that were found."""
+        scenario = self.last.model.scenario_at(self.last.theta)
+        if self.scatter is None:
+            return scenario
+        more = Imprecision(*self.scatter.std.tolist())
+        return dataclasses.replace(scenario, effects=[*scenario.effects, more])
 
 
 def close_loop(
@@ -84,8 +97,10 @@ def close_loop(
     refuse_short_logs(last)
     kept = _like(base, model.of_episodes(test)) if test else None
     errors = held_out(tracer, first, last, kept)
-    found = verdict(tracer, first, last, end, errors)
-    return Closed(found, first, last, tuple(tracer.rounds), begin, end, errors)
+    loose = scatter(last, workers, huber) if Imprecision in library else None
+    found = verdict(tracer, first, last, end, errors, loose)
+    rounds = tuple(tracer.rounds)
+    return Closed(found, first, last, rounds, begin, end, errors, loose)
 
 
 def _affordable(base: ScenarioModel) -> ScenarioModel:
@@ -93,9 +108,7 @@ def _affordable(base: ScenarioModel) -> ScenarioModel:
     every = round(base.measurements.rows / _SEARCHED)
     if not base.costly or every < 2:
         return base
-    thinned = base.thin(every)
-    assert isinstance(thinned, ScenarioModel)
-    return thinned
+    return base.thin(every)
 
 
 def _like(base: ScenarioModel, test: ScenarioModel) -> ScenarioModel:

@@ -31,8 +31,9 @@ from sysid.workers import Workers
 
 Array = NDArray[np.float64]
 
-_FAR = 5.0  # times the noise: beyond that, the linear account is not asked
+_FAR = 10.0  # times the noise: beyond that, the linear account is not asked
 _COARSE_ROWS = 120
+_SCANNED = 0.5 / 2.5 ** np.arange(5)  # of the range on either side of null
 _PAIRS = 3  # that are fitted where nothing passes alone
 _WORTH_A_FIT = 0.02  # of the loss, by its linear account
 _CLEARLY = 0.5  # of the loss without an effect: no fit is needed to see its worth
@@ -174,7 +175,6 @@ class Tracer:
         """
         base = self.base.alike()
         base = base.thin(max(1, round(base.measurements.rows / _COARSE_ROWS)))
-        assert isinstance(base, ScenarioModel)
         small = dataclasses.replace(
             self, base=base, library=(), workers=Workers(), tell=_silent
         )
@@ -210,6 +210,11 @@ class Tracer:
         if not kept:
             return None
         best, found = _lowest(kept)
+        if not self.base.affine:
+            again = self.fit(fit.effects, found)
+            if again.loss <= (1.0 + LEAST_GAIN) * found.loss:
+                self.tell(f"a better fit without more: objective {again.value:.4g}")
+                return again
         is_single = any(best is e for e in survey.effects)
         ties = _ties(best, survey.effects if is_single else trials)
         if not self.base.affine:
@@ -338,6 +343,7 @@ class Tracer:
         effects: tuple[Candidate, ...],
         start: Fit | None = None,
         known: Mapping[str, Array] | None = None,
+        values: Mapping[str, float] | None = None,
     ) -> Fit:
         """Returns a model with effects, fitted.
 
@@ -346,10 +352,11 @@ class Tracer:
             start: where to begin; what it does not have begins at null.
             known: derivatives (rows, channels) by what is new beside the start, if
                 everything of the start is kept; shapes have none at null.
+            values: where else to begin, by name.
         """
         model, _ = extended(self.base, effects, with_shapes=True)
-        values = _values_of(start) if start else {}
-        theta = [values.get(p.name, p.nominal) for p in model.parameters]
+        begin = (_values_of(start) if start else {}) | dict(values or {})
+        theta = [begin.get(p.name, p.nominal) for p in model.parameters]
         objective = self._objective(model)
         u = objective.scaling.to_unit(np.array(theta))
         here = None
@@ -415,9 +422,37 @@ class _RoughFit:
     what: What
 
     def run(self) -> Fit:
-        """Returns the fit."""
+        """Returns the fit; it begins at the size that helps most by itself."""
         assert isinstance(self.what, tuple)
-        return self.tracer.fit((*self.before.effects, *self.what), self.before)
+        effects = (*self.before.effects, *self.what)
+        model, _ = extended(self.tracer.base, effects, with_shapes=True)
+        return self.tracer.fit(effects, self.before, values=self._scanned(model))
+
+    def _scanned(self, model: ScenarioModel) -> dict[str, float]:
+        """Returns the value of the one new size that helps most, if any does.
+
+        Each is tried alone over its range: downhill from null ends where contact does.
+        What a sensor does to readings needs no such care.
+        """
+        known = _values_of(self.before)
+        theta = [known.get(p.name, p.nominal) for p in model.parameters]
+        tries = [
+            (i, p.name, float(end * share))
+            for i, p in enumerate(model.parameters)
+            if p.name not in known and model.simulated[i] and not p.is_shape
+            for end in (p.low, p.high)
+            if end
+            for share in _SCANNED
+        ]
+        if not tries:
+            return {}
+        thetas = np.tile(theta, (len(tries), 1))
+        for row, (i, _, value) in zip(thetas, tries, strict=True):
+            row[i] = value
+        found = Objective(model, self.tracer.workers, self.tracer.huber)(thetas)
+        best = int(np.argmin(found))
+        _, name, value = tries[best]
+        return {name: value} if found[best] < self.before.value else {}
 
 
 def _silent(line: str) -> None:

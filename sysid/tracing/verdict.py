@@ -6,12 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.effects import Imprecision
 from sysid.identification.uncertainty import uncertainty
 from sysid.objective import Objective
 from sysid.tracing.episodes import Contradiction, contradictions, in_words
 from sysid.tracing.evidence import FEW, Evidence
 from sysid.tracing.experiments import separating
 from sysid.tracing.held_out import HeldOut, improvement
+from sysid.tracing.scatter import Scatter
 from sysid.tracing.selection import Fit, Round, Survey, Tracer
 
 Array = NDArray[np.float64]
@@ -20,6 +22,7 @@ Array = NDArray[np.float64]
 _BELIEVED = 0.75
 #: Objective beyond which there is more than noise, where the noise is known.
 _NOISE = 1.2
+_SCATTERS = Imprecision.__name__
 _SHOWN = 3  # of anything, in three lines
 
 
@@ -97,7 +100,12 @@ class Verdict:
 
 
 def verdict(
-    tracer: Tracer, first: Fit, last: Fit, end: Survey, errors: HeldOut
+    tracer: Tracer,
+    first: Fit,
+    last: Fit,
+    end: Survey,
+    errors: HeldOut,
+    loose: Scatter | None = None,
 ) -> Verdict:
     """Returns the verdict of a search.
 
@@ -106,19 +114,23 @@ def verdict(
         first, last: the fits without and with the effects.
         end: the survey at which it ended.
         errors: on rows that were not fitted.
+        loose: how the arm scatters about its commands, if it does.
     """
     left = [d for d in end.dependences if d.accepted]
     gained = max(first.loss - last.loss, 0.0)
     missing = left[0].gain * last.loss if left else 0.0
     explained = gained / (gained + missing) if gained + missing > 0.0 else 1.0
     worth = tracer.worth(last)
+    values = values_of(tracer, last)
+    if loose:
+        worth[_SCATTERS] = loose.gain
+        values = (*values, *_scatter_values(loose))
     names = tuple(sorted(worth, key=lambda name: -worth[name]))
     ties = tuple(_tied(name, tracer.rounds) for name in names)
-    values = values_of(tracer, last)
     dependence = left[0].name if left else ""
     assert end.bench is not None
     against = contradictions(last, end.bench, len(tracer.base.parameters))
-    beyond = _beyond_noise(last)
+    beyond = _beyond_noise(last, loose)
     ending = _ending(names, dependence or in_words(against) or beyond, explained)
     if beyond and ending == "explained":
         ending = "unexplained"
@@ -140,14 +152,23 @@ def verdict(
     )
 
 
-def _beyond_noise(last: Fit) -> str:
+def _scatter_values(loose: Scatter) -> tuple[Value, ...]:
+    """Returns how an arm scatters, axis by axis."""
+    return tuple(
+        Value(f"{_SCATTERS}.{axis}", float(std), "m", (float(low), float(high)), 0.0)
+        for axis, std, (low, high) in zip("xyz", loose.std, loose.interval, strict=True)
+    )
+
+
+def _beyond_noise(last: Fit, loose: Scatter | None) -> str:
     """Returns that a residual is too large, in words; empty if it is not.
 
     Only where channels state their noise: estimated from a fit it says nothing.
     """
-    if last.model.affine or last.value <= _NOISE:
+    value = loose.value if loose else last.value
+    if last.model.affine or value <= _NOISE:
         return ""
-    return f"the residual is {last.value:.2g} times the noise"
+    return f"the residual is {value:.2g} times the noise"
 
 
 def _ending(names: tuple[str, ...], left: str, explained: float) -> str:

@@ -10,6 +10,7 @@ import psutil
 import pytest
 
 from drake_disasm.errors import DisasmError
+from sysid.identification.linearisation import linearise
 from sysid.objective import FAILED_RESIDUAL, Objective, huber_weights, rms, tempered
 from sysid.workers import Workers
 from tests.sysid.toys import NOISE, Decay
@@ -130,3 +131,23 @@ def test_workers_leave_with_a_parent_that_is_killed(tmp_path):
     while any(psutil.pid_exists(child) for child in children):
         assert time.monotonic() < deadline
         time.sleep(0.05)
+
+
+def test_derivatives_may_be_those_of_a_model_alike():
+    class Alike(Decay):
+        def predict(self, theta, rows):
+            return 2.0 * super().predict(theta, rows)
+
+    own, alike = (
+        linearise(
+            Objective(Decay(), Workers(), alike=a), np.full(3, 0.4), central=False
+        )
+        for a in (None, Alike())
+    )
+    assert np.array_equal(alike.residual, own.residual)
+    np.testing.assert_allclose(alike.jacobian, 2.0 * own.jacobian, atol=1e-6)
+
+
+def test_jobs_go_to_the_workers_and_come_back_in_order():
+    with Workers(2, lambda: ThreadPoolExecutor(2)) as threads:
+        assert threads.map(abs, [-1, 2, -3]) == Workers().map(abs, [-1, 2, -3])

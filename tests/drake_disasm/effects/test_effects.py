@@ -18,6 +18,7 @@ from drake_disasm.effects import (
     FlangePayload,
     GrooveFriction,
     GroovePose,
+    Imprecision,
     JointAsymmetricFriction,
     JointCoulombFriction,
     JointEffect,
@@ -244,3 +245,18 @@ def test_groove_pose_moves_body_and_geometry(
     X_WG = station.X_WG
     expected = X_WG @ X_GnG @ X_WG.inverse() @ before
     assert after.IsNearlyEqualTo(expected, 1e-12)
+
+
+def test_imprecision_scatters_about_the_command_and_repeats_itself():
+    effect = Imprecision(x=1e-3, z=5e-4)
+    command, memory, away = np.zeros(6), np.zeros(6), []
+    for _ in range(2000):
+        executed, memory = effect.execute(command, np.zeros(6), memory, 0.1)
+        away.append(executed - command)
+    assert np.array_equal(
+        effect.execute(command, np.zeros(6), np.zeros(6), 0.1)[0], away[0]
+    )
+    np.testing.assert_allclose(
+        np.std(away, axis=0), [1e-3, 0, 5e-4, 0, 0, 0], rtol=0.05
+    )
+    np.testing.assert_allclose(np.mean(away, axis=0), 0.0, atol=8e-5)

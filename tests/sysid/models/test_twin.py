@@ -159,3 +159,13 @@ def test_the_wrench_at_the_sensor_is_the_inverse_of_the_shift_to_the_bolt():
     found = at_sensor(state[None], X_SB)[0]
     np.testing.assert_allclose(found[6:], load, atol=1e-12)
     np.testing.assert_array_equal(found[:6], state[:6])
+
+
+def test_what_is_alike_has_impact_unless_a_parameter_means_nothing_to_it(log, turned):
+    model = make(log, turned)
+    alike = model.alike()
+    assert alike.scenario.contact.model == "impact" and not alike.costly
+    assert model.scenario.contact.model == "hydroelastic" and model.costly
+    assert alike.alike() is alike
+    own = make(log, turned, ["contact.modulus"])
+    assert own.alike() is own
