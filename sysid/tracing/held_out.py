@@ -134,9 +134,11 @@ def _linearly_predicted(fit: Fit, folds: NDArray[np.int64]) -> Array:
     residual = here.residual.copy()
     root = np.sqrt(here.weights)
     J, r = root[..., None] * here.jacobian, root * here.residual
+    channels = r.shape[1]
     for fold in range(int(folds.max()) + 1):
         own = folds == fold
-        A, b = J[~own].reshape(-1, len(here.u)), r[~own].reshape(-1)
+        A = J[~own].reshape((~own).sum() * channels, len(here.u))
+        b = r[~own].reshape(-1)
         step = -np.linalg.lstsq(A, b, rcond=_RCOND)[0]
         step = np.clip(here.u + step, 0.0, 1.0) - here.u
         residual[own] += here.jacobian[own] @ step

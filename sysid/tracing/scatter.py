@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 
 _PUSH = 2e-5  # m, of the derivatives
 _ROUNDS = 4
+_MISSED = 0.02  # of the rows, beyond an edge that a derivative doesn't see
 _FOLDS = 8
 _UNIT = 1e-4  # m, near the optimum
 _LEAST = 1e-3  # of the unit: none
@@ -45,7 +46,8 @@ class Scatter:
         std: (3,) along the axes of G [m].
         interval: (3, 2) 95 %, by the likelihood's curvature.
         gain: share of the loss that it accounts for.
-        value: of the objective when it is accounted for.
+        value: of the objective when it is accounted for, without the few rows in which
+            contact came or went.
     """
 
     std: Array
@@ -84,6 +86,7 @@ class _Likelihood:
         """Returns the standard deviations (3,) that are likeliest."""
 
         def loss(log: Array) -> float:
+            """Returns what is minimised, by the logarithm."""
             return float(self.rows(np.exp(log))[0].sum())
 
         found = minimize(
@@ -141,32 +144,33 @@ def scatter(fit: Fit, workers: Workers, huber: float) -> Scatter | None:
     blocks = blocks_of(fit.here, fit.model.measurements.episode)
     if not _carries_over(seen, blocks) or _depends(fit.model, led, std > 0.0):
         return None
-    squares = [seen.rows(s)[1].sum() for s in (np.zeros(3), std)]
+    before, after = (seen.rows(s)[1] for s in (np.zeros(3), std))
+    usual = after[after <= np.quantile(after, 1.0 - _MISSED)]
     away = _Z95 * seen.spread(std)
     ends = np.stack([np.maximum(std - away, 0.0), std + away], axis=-1)
     return Scatter(
         std * _UNIT,
         ends * _UNIT,
-        float(1.0 - squares[1] / squares[0]),
-        float(np.sqrt(squares[1] / seen.r.size)),
+        float(1.0 - after.sum() / before.sum()),
+        float(np.sqrt(usual.mean() / seen.r.shape[1])),
     )
 
 
 def _seen(fit: Fit, workers: Workers, huber: float, led: Array) -> _Likelihood:
     """Returns residuals and derivatives where steps led (n, 3), as from no scatter."""
-    model = fit.model
-    assert isinstance(model, TwinModel)
+    assert isinstance(fit.model, TwinModel)
 
-    def residual(push: Array) -> Array:
+    def residual(model: TwinModel, push: Array) -> Array:
         """Returns the residuals where steps lead by a push (n, 3) further."""
         there = model.pushed(led * _UNIT + push)
         return Objective(there, workers, huber).residuals(fit.theta)[0]
 
     ways = _PUSH * np.eye(3)[:, None] * np.ones((len(led), 1))
-    columns = [residual(w) - residual(-w) for w in ways]
+    alike = fit.model.alike()
+    columns = [residual(alike, w) - residual(alike, -w) for w in ways]
     J = np.stack(columns, axis=-1) * (_UNIT / (2.0 * _PUSH))
-    r = residual(np.zeros_like(led)) - np.einsum("nci,ni->nc", J, led)
-    return _Likelihood(r, J, huber)
+    here = residual(fit.model, np.zeros_like(led))
+    return _Likelihood(here - np.einsum("nci,ni->nc", J, led), J, huber)
 
 
 def _carries_over(seen: _Likelihood, blocks: NDArray[np.int64]) -> bool:
