@@ -38,14 +38,19 @@ class Workers:
     """
 
     def __init__(
-        self, count: int = 1, make: Callable[[], Executor] | None = None
+        self,
+        count: int = 1,
+        make: Callable[[], Executor] | None = None,
+        beat: Callable[[], object] = lambda: None,
     ) -> None:
         """Starts nothing yet.
 
         Args:
             count: processes; 1 works in this one.
             make: makes the executor, instead of a spawned pool of `count` processes.
+            beat: called in this process after each piece of work; may raise to stop.
         """
+        self._beat = beat
         self._make = make or (None if count == 1 else lambda: _spawned(count))
         self._executor: Executor | None = None
         self.notes: list[str] = []
@@ -63,7 +68,7 @@ class Workers:
             DisasmError: workers died again and again.
         """
         if self._make is None or model.affine:  # a product of matrices: not worth it
-            return [_outcome(model, theta, rows) for theta, rows in work]
+            return [self._done(_outcome(model, theta, rows)) for theta, rows in work]
         payload = pickle.dumps(model)
         key = hashlib.sha256(payload).hexdigest()
         return self._tenaciously(
@@ -86,7 +91,7 @@ class Workers:
             DisasmError: workers died again and again.
         """
         if self._make is None:
-            return [function(job) for job in jobs]
+            return [self._done(function(job)) for job in jobs]
         return self._tenaciously(
             lambda executor: [executor.submit(function, job) for job in jobs]
         )
@@ -97,6 +102,10 @@ class Workers:
             self._executor.shutdown(wait=False, cancel_futures=True)
         self._executor = None
 
+    def _done(self, result: Result) -> Result:
+        self._beat()
+        return result
+
     def _tenaciously(
         self, submit: Callable[[Executor], list[Future[Result]]]
     ) -> list[Result]:
@@ -106,7 +115,8 @@ class Workers:
             try:
                 if self._executor is None:
                     self._executor = self._make()
-                return [future.result() for future in submit(self._executor)]
+                futures = submit(self._executor)
+                return [self._done(future.result()) for future in futures]
             except BrokenExecutor:
                 self.notes.append("a worker process died; its work was done again")
                 self.close()

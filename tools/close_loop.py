@@ -5,17 +5,19 @@ force/torque sensor at rest, or joint torques of an arm. The model is fitted; wh
 left is tested against every effect of the library on data that were not fitted; those
 that pass are added one by one. Prints what was missing, its parameters, and the error
 before and after. Writes the scenario with the effects in it, `result.json`, and a
-report that opens offline.
+report that opens offline. After Ctrl-C the same command goes on where it was.
 """
 
 import argparse
 import json
 import os
+import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cli
 import numpy as np
+from tqdm import tqdm
 
 from drake_disasm.errors import DisasmError
 from drake_disasm.scenario import dump_scenario, load_scenario
@@ -106,9 +108,14 @@ def main(arguments: Sequence[str]) -> int:
     if not huber > 0.0:
         raise DisasmError("--huber: give a number above zero, or inf")
     origin = cli.provenance("close_loop", arguments, 0)
-    with Workers(args.workers) as workers:
-        closed = close_loop(model, train, test, huber, workers, _tell)
+    fits = args.out / "fits"
+    with (
+        tqdm(unit=" runs", desc="simulating", leave=False) as bar,
+        Workers(args.workers, beat=lambda: _beat(bar)) as workers,
+    ):
+        closed = close_loop(model, train, test, huber, workers, tqdm.write, folder=fits)
     _write(args.out, closed, origin)
+    shutil.rmtree(fits, ignore_errors=True)
     print(closed.verdict.text)
     print(f"report: {args.out / 'report.html'}")
     return 0
@@ -127,9 +134,10 @@ def _model(args: argparse.Namespace, logs: Sequence[Log]) -> ScenarioModel:
     return model
 
 
-def _tell(line: str) -> None:
+def _beat(bar: tqdm) -> None:
+    """Shows that work goes on; stops it where Ctrl-C was pressed."""
     cli.stop_if_interrupted()
-    print(line, flush=True)
+    bar.update()
 
 
 def _write(folder: Path, closed: Closed, origin: dict[str, object]) -> None:

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from drake_disasm.effects import EFFECTS, Effect, Imprecision
 from drake_disasm.scenario import Scenario
@@ -63,6 +64,7 @@ def close_loop(
     workers: Workers,
     tell: Callable[[str], None],
     library: Sequence[type[Effect]] = EFFECTS,
+    folder: Path | None = None,
 ) -> Closed:
     """Finds what a model lacks to explain its log.
 
@@ -74,6 +76,8 @@ def close_loop(
         workers: to evaluate with.
         tell: called with a line after each step.
         library: effects that may be named.
+        folder: where fits are kept: the same search, stopped and begun again, takes
+            them from there.
 
     Raises:
         DisasmError: the log is too short to decide anything.
@@ -82,7 +86,9 @@ def close_loop(
     assert isinstance(base, ScenarioModel)
     refuse_few_rows(base)
     library_here = candidates(base, library)
-    tracer = Tracer(_affordable(base), library_here, workers, huber, tell)
+    tracer = Tracer(
+        _affordable(base), library_here, workers, huber, tell, folder=folder
+    )
     tell("the model as it is")
     first = tracer.fit(())
     tell(f"objective {first.value:.4g}; asking {len(library_here)} candidates")

@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from sysid.tracing.evidence import (
     simplest,
     together,
 )
+from sysid.tracing.kept import remembered
 from sysid.tracing.study import Study, blocks_of
 from sysid.workers import Workers
 
@@ -130,6 +132,7 @@ class Tracer:
         tell: called with a line after each step.
         rounds: how effects were chosen.
         exact: whether derivatives are the model's own, else those of one alike.
+        folder: where fits are kept, for a search that is stopped; None keeps none.
     """
 
     base: ScenarioModel
@@ -139,6 +142,7 @@ class Tracer:
     tell: Callable[[str], None]
     rounds: list[Round] = field(default_factory=list)
     exact: bool = False
+    folder: Path | None = None
 
     def forward(self, fit: Fit, survey: Survey) -> tuple[Fit, Survey]:
         """Returns the fit with all effects that pass, and the survey that ended it.
@@ -204,12 +208,12 @@ class Tracer:
         which are worth a fit, and fits decide.
         """
         trials, starts = self._promising(fit, survey)
-        kept, tried = self._tried(fit, survey, _to_try(trials), starts)
-        if not kept and not self.base.affine:
-            kept, _ = self._tried(fit, survey, _pairs(tried))
-        if not kept:
+        passing, tried = self._tried(fit, survey, _to_try(trials), starts)
+        if not passing and not self.base.affine:
+            passing, _ = self._tried(fit, survey, _pairs(tried))
+        if not passing:
             return None
-        best, found = _lowest(kept)
+        best, found = _lowest(passing)
         if not self.base.affine:
             again = self.fit(fit.effects, found)
             if again.loss <= (1.0 + LEAST_GAIN) * found.loss:
@@ -218,7 +222,7 @@ class Tracer:
         is_single = any(best is e for e in survey.effects)
         ties = _ties(best, survey.effects if is_single else trials)
         if not self.base.affine:
-            ties = _true_ties(ties, kept, fit, found)
+            ties = _true_ties(ties, passing, fit, found)
         record = dataclasses.replace(survey, bench=None)
         self.rounds.append(Round(best, ties, record, found.value))
         self.tell(f"{best.name}: objective {found.value:.4g}")
@@ -232,7 +236,7 @@ class Tracer:
         starts: Starts | None = None,
     ) -> tuple[list[tuple[Evidence, Fit]], list[tuple[Evidence, Fit]]]:
         """Returns the fits that keep what their effects promised, and all fits."""
-        kept, tried = [], []
+        passing, tried = [], []
         for trial in trials:
             start = (starts or {}).get(trial.effects)
             found = self._further(start) if start else self._with(fit, survey, trial)
@@ -241,10 +245,10 @@ class Tracer:
             if not self._keeps_promise(fit, found, trial):
                 self.tell(f"{trial.name}: does not keep what it promised")
                 continue
-            kept.append((trial, found))
+            passing.append((trial, found))
             if self.base.affine or (self.base.costly and found.value < 1.0):
                 break
-        return kept, tried
+        return passing, tried
 
     def _keeps_promise(self, fit: Fit, found: Fit, trial: Evidence) -> bool:
         """Returns whether a fit with more effects is truly better."""
@@ -370,7 +374,11 @@ class Tracer:
             here = dataclasses.replace(start.here, u=u, jacobian=jacobian)
         iterations = _FEW_ITERATIONS if model.costly else _ITERATIONS
         iterations = _LAST_ITERATIONS if self.exact and model.costly else iterations
-        here = gauss_newton(objective, u, iterations, start=here, central=False)
+        here = remembered(
+            None if model.affine else self.folder,
+            (model, self.huber, self.exact, u, here),
+            lambda: gauss_newton(objective, u, iterations, start=here, central=False),
+        )
         found = objective.scaling.from_unit(here.u)
         return Fit(effects, model, found, here, objective.value(here.residual))
 
