@@ -15,13 +15,13 @@ from sysid.models.base import ScenarioModel
 from sysid.objective import Objective, tempered
 from sysid.parameters import Scaling, nominal_values
 from sysid.tracing.candidates import Candidate, extended
+from sysid.tracing.coarse import rough_fits
 from sysid.tracing.empirical import curves
 from sysid.tracing.evidence import (
     FEW,
     LEAST_GAIN,
     Bench,
     Evidence,
-    What,
     evidence,
     measured,
     simplest,
@@ -34,10 +34,9 @@ from sysid.workers import Workers
 Array = NDArray[np.float64]
 
 _FAR = 10.0  # times the noise: beyond that, the linear account is not asked
-_COARSE_ROWS = 120
-_SCANNED = 0.5 / 2.5 ** np.arange(5)  # of the range on either side of null
 _PAIRS = 3  # that are fitted where nothing passes alone
 _WORTH_A_FIT = 0.02  # of the loss, by its linear account
+_CREEPS = 0.005  # of the loss: a fit that gets better by less is where it was
 _CLEARLY = 0.5  # of the loss without an effect: no fit is needed to see its worth
 _HOPELESS = 2.0  # times the least loss of rough fits
 _KEEPS_UP = 0.25  # of the loss that is left
@@ -71,6 +70,12 @@ class Fit:
     def loss(self) -> float:
         """Sum of the squares, less beyond where they end."""
         return float(np.sum(tempered(self.here.residual, self.here.huber) ** 2))
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The parameters' values, by name."""
+        names = [p.name for p in self.model.parameters]
+        return dict(zip(names, self.theta.tolist(), strict=True))
 
     def columns_of(self, effect: Candidate) -> NDArray[np.int64]:
         """Returns which of the parameters are an effect's sizes."""
@@ -177,15 +182,8 @@ class Tracer:
         Far from the data a linear account is worthless: a bolt that the model has
         inside the wall says how hard the wall is, not where.
         """
-        base = self.base.alike()
-        base = base.thin(max(1, round(base.measurements.rows / _COARSE_ROWS)))
-        small = dataclasses.replace(
-            self, base=base, library=(), workers=Workers(), tell=_silent
-        )
-        before = small.fit(fit.effects, fit)
         each = list({e.effects: e for e in reversed(survey.effects)}.values())
-        jobs = [_RoughFit(small, before, e.what) for e in each]
-        rough = self.workers.map(_RoughFit.run, jobs)
+        before, rough = rough_fits(self, fit, [e.what for e in each])
         tests = len(each)
         enough = _HOPELESS * min(after.loss for after in rough)
         starts = {
@@ -218,7 +216,7 @@ class Tracer:
             again = self.fit(fit.effects, found)
             if again.loss <= (1.0 + LEAST_GAIN) * found.loss:
                 self.tell(f"a better fit without more: objective {again.value:.4g}")
-                return again
+                return again if again.loss < (1.0 - _CREEPS) * fit.loss else None
         is_single = any(best is e for e in survey.effects)
         ties = _ties(best, survey.effects if is_single else trials)
         if not self.base.affine:
@@ -359,7 +357,7 @@ class Tracer:
             values: where else to begin, by name.
         """
         model, _ = extended(self.base, effects, with_shapes=True)
-        begin = (_values_of(start) if start else {}) | dict(values or {})
+        begin = (start.values if start else {}) | dict(values or {})
         theta = [begin.get(p.name, p.nominal) for p in model.parameters]
         objective = self._objective(model)
         u = objective.scaling.to_unit(np.array(theta))
@@ -419,52 +417,6 @@ class Tracer:
             [(d, begin + np.array(d.columns, dtype=np.int64)) for d in dependences],
             episode[np.unique(blocks, return_index=True)[1]],
         )
-
-
-@dataclass(frozen=True)
-class _RoughFit:
-    """A fit with effects more than another has, as work for a process."""
-
-    tracer: Tracer
-    before: Fit
-    what: What
-
-    def run(self) -> Fit:
-        """Returns the fit; it begins at the size that helps most by itself."""
-        assert isinstance(self.what, tuple)
-        effects = (*self.before.effects, *self.what)
-        model, _ = extended(self.tracer.base, effects, with_shapes=True)
-        return self.tracer.fit(effects, self.before, values=self._scanned(model))
-
-    def _scanned(self, model: ScenarioModel) -> dict[str, float]:
-        """Returns the value of the one new size that helps most, if any does.
-
-        Each is tried alone over its range: downhill from null ends where contact does.
-        What a sensor does to readings needs no such care.
-        """
-        known = _values_of(self.before)
-        theta = [known.get(p.name, p.nominal) for p in model.parameters]
-        tries = [
-            (i, p.name, float(end * share))
-            for i, p in enumerate(model.parameters)
-            if p.name not in known and model.simulated[i] and not p.is_shape
-            for end in (p.low, p.high)
-            if end
-            for share in _SCANNED
-        ]
-        if not tries:
-            return {}
-        thetas = np.tile(theta, (len(tries), 1))
-        for row, (i, _, value) in zip(thetas, tries, strict=True):
-            row[i] = value
-        found = Objective(model, self.tracer.workers, self.tracer.huber)(thetas)
-        best = int(np.argmin(found))
-        _, name, value = tries[best]
-        return {name: value} if found[best] < self.before.value else {}
-
-
-def _silent(line: str) -> None:
-    """Tells nobody."""
 
 
 def _confirmed(before: Fit, after: Fit, trial: Evidence, tests: int) -> Evidence:
@@ -574,8 +526,3 @@ def _shows(fit: Fit) -> NDArray[np.bool_]:
     scaling = Scaling(fit.model.parameters)
     away = fit.here.u - scaling.to_unit(nominal_values(fit.model.parameters))
     return np.asarray(np.abs(away) > _Z95 * study.spread())
-
-
-def _values_of(fit: Fit) -> dict[str, float]:
-    names = [p.name for p in fit.model.parameters]
-    return dict(zip(names, fit.theta.tolist(), strict=True))
