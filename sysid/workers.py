@@ -41,7 +41,7 @@ class Workers:
         self,
         count: int = 1,
         make: Callable[[], Executor] | None = None,
-        beat: Callable[[], object] = lambda: None,
+        beat: Callable[[], object] | None = None,
     ) -> None:
         """Starts nothing yet.
 
@@ -103,7 +103,8 @@ class Workers:
         self._executor = None
 
     def _done(self, result: Result) -> Result:
-        self._beat()
+        if self._beat:
+            self._beat()
         return result
 
     def _tenaciously(

@@ -16,7 +16,8 @@ def test_a_groove_turned_by_three_degrees_is_named_and_measured(tmp_path):
     transitions_log(tmp_path / "log", nominal(), hidden, 0, episodes=6, steps=20)
     model = TwinModel([read_log(tmp_path / "log")], nominal(), ())
     train, test = range(5), [5]
-    closed = close_loop(model, train, test, HUBER, Workers(), lambda _: None, _LIBRARY)
+    with Workers(2) as pool:
+        closed = close_loop(model, train, test, HUBER, pool, lambda _: None, _LIBRARY)
     assert closed.first.value > 10.0
     assert closed.verdict.ending == "explained"
     assert closed.verdict.names == ("GroovePose",)
