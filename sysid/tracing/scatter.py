@@ -28,6 +28,8 @@ from sysid.workers import Workers
 
 Array = NDArray[np.float64]
 
+#: Objective beyond which there is more than noise, where the noise is known.
+BEYOND_NOISE = 1.2
 _PUSH = 2e-5  # m, of the derivatives
 _ROUNDS = 4
 _MISSED = 0.02  # of the rows, beyond an edge that a derivative doesn't see
@@ -132,7 +134,7 @@ def scatter(fit: Fit, workers: Workers, huber: float) -> Scatter | None:
         workers: to evaluate with.
         huber: where squares end.
     """
-    if not isinstance(fit.model, TwinModel) or fit.value <= 1.0:
+    if not isinstance(fit.model, TwinModel) or fit.value <= BEYOND_NOISE:
         return None
     led = np.zeros((len(fit.here.residual), 3))
     for _ in range(_ROUNDS):

@@ -13,15 +13,13 @@ from sysid.tracing.episodes import Contradiction, contradictions, in_words
 from sysid.tracing.evidence import FEW, Evidence
 from sysid.tracing.experiments import separating
 from sysid.tracing.held_out import HeldOut, improvement
-from sysid.tracing.scatter import Scatter
+from sysid.tracing.scatter import BEYOND_NOISE, Scatter
 from sysid.tracing.selection import Fit, Round, Survey, Tracer
 
 Array = NDArray[np.float64]
 
 #: Share of what can be explained that effects must explain to be believed.
 _BELIEVED = 0.75
-#: Objective beyond which there is more than noise, where the noise is known.
-_NOISE = 1.2
 _SCATTERS = Imprecision.__name__
 _SHOWN = 3  # of anything, in three lines
 
@@ -166,7 +164,7 @@ def _beyond_noise(last: Fit, loose: Scatter | None) -> str:
     Only where channels state their noise: estimated from a fit it says nothing.
     """
     value = loose.value if loose else last.value
-    if last.model.affine or value <= _NOISE:
+    if last.model.affine or value <= BEYOND_NOISE:
         return ""
     return f"the residual is {value:.2g} times the noise"
 
