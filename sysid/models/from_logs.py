@@ -95,7 +95,8 @@ def _static_wrench(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
 
 
 def _joint_motion(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
-    model = JointMotionModel(logs, choice.urdf)
+    known = choice.scenario or stated_scenario(logs)
+    model = JointMotionModel(logs, choice.urdf, known)
     names = [request.name for request in choice.requests]
     return model.only(names) if names else model
 

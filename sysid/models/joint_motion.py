@@ -43,8 +43,8 @@ class JointMotionModel(ScenarioModel):
             scenario: whose arm effects act.
 
         Raises:
-            DisasmError: a log is of another kind or arm, lacks a quantity, or there
-                is no URDF.
+            DisasmError: a log is of another kind or arm, lacks a quantity, there is
+                no URDF, or an effect acts at a joint that the log does not have.
         """
         episodes = [(log, e) for log in logs for e in log.episodes]
         _refuse_other_logs(logs, episodes)
@@ -58,6 +58,7 @@ class JointMotionModel(ScenarioModel):
         base = base_set(arm.random_regressor())
         parts = [arm.regressor(e["q"], e["v"], e["vd"]) for _, e in episodes]
         self.scenario = scenario or Scenario()
+        _refuse_other_joints(self.scenario, header.joints)
         self._motion = {
             name: np.concatenate([e[name] for _, e in episodes])
             for name in ("q", "v", "vd")
@@ -169,6 +170,15 @@ class JointMotionModel(ScenarioModel):
             _motion={name: values[mask] for name, values in self._motion.items()},
             measurements=self.measurements.select(mask),
         )
+
+
+def _refuse_other_joints(scenario: Scenario, joints: Sequence[str]) -> None:
+    for number, effect in enumerate(scenario.effects):
+        if isinstance(effect, JointEffect) and effect.joint not in joints:
+            raise DisasmError(
+                f"effects.{number}.joint: the log has no joint '{effect.joint}'; "
+                f"{closest(effect.joint, list(joints))}"
+            )
 
 
 def _refuse_other_logs(

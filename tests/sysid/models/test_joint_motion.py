@@ -4,11 +4,14 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
+from drake_disasm.effects import JointViscousFriction
 from drake_disasm.errors import DisasmError
+from drake_disasm.scenario import Scenario
 from sysid.identification.journal import Journal
 from sysid.identification.pipeline import Settings, identify
 from sysid.identification.search import Effort
 from sysid.logs import LogHeader, LogWriter, flat_columns, read_log
+from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.regressor import ArmDynamics, base_set, body_regressor
 from sysid.workers import Workers
@@ -157,3 +160,26 @@ def test_a_real_arm_has_43_base_parameters(tmp_path):
     for rows, expected in ((slice(0, half), 0.0658), (slice(half, None), 0.0626)):
         error = np.linalg.norm(Y[rows] @ beta - tau[rows]) / np.linalg.norm(tau[rows])
         assert error == pytest.approx(expected, abs=2e-4)
+
+
+def test_a_scenarios_own_effects_at_joints_act(urdf, tmp_path):
+    motion_log(tmp_path / "log", urdf)
+    logs = [read_log(tmp_path / "log")]
+    bare, rubbing = (
+        model_of(logs, ModelChoice(urdf=str(urdf), scenario=Scenario(effects=effects)))
+        for effects in ([], [JointViscousFriction("elbow", 0.7)])
+    )
+    theta = np.array([p.nominal for p in bare.parameters])
+    more = rubbing.predictions(theta) - bare.predictions(theta)
+    v = states(300)[1]
+    np.testing.assert_allclose(more, np.column_stack([0 * v[:, 0], 0.7 * v[:, 1]]))
+
+
+def test_refuses_an_effect_at_a_joint_that_the_log_does_not_have(urdf, tmp_path):
+    motion_log(tmp_path / "log", urdf)
+    scenario = Scenario(effects=[JointViscousFriction("elbwo", 0.7)])
+    with pytest.raises(DisasmError, match="did you mean 'elbow'"):
+        model_of(
+            [read_log(tmp_path / "log")],
+            ModelChoice(urdf=str(urdf), scenario=scenario),
+        )
