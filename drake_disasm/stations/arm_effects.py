@@ -29,6 +29,8 @@ from drake_disasm.effects import (
     JointStribeckFriction,
     JointViscousFriction,
     RotorInertia,
+    TorqueGain,
+    TorqueOffset,
     shapes,
     sizes,
 )
@@ -48,17 +50,11 @@ _RUBBING: tuple[type[_Rubbing], ...] = (
     JointAsymmetricFriction,
     JointLoadFriction,
 )
-_CARRIED: tuple[type[ArmEffect], ...] = (
-    *_RUBBING,
-    JointViscousFriction,
-    RotorInertia,
-    FlangePayload,
-)
 _TINY = 1e-9  # N m, against 0 / 0
 
 
 class ArmMechanics:
-    """The arm's friction, rotors and payload, as its Contexts have them.
+    """The arm's friction, rotors, payload and sensors, as its Contexts have them.
 
     Viscous friction is a joint's damping, which the solver takes implicitly; a
     rotor's inertia and the payload are Drake's own as well. Drake's joints have no
@@ -71,9 +67,13 @@ class ArmMechanics:
     a step can follow: 9 N m at joint 4 to 0.007 rad/s. Faster than that nothing
     changes; slower, and at rest, the joint gives way at that speed.
 
+    What a torque sensor reads wrongly shows in `torque_measured` alone; the cell's
+    drives do not go by it, and `torque_external` is what truly pushes.
+
     Attributes:
         friction: the system that adds it; inputs are the joints' velocities and the
             torques of their drives in the step before, output is for the plant.
+        sensor: the system that reads the drives' torques.
     """
 
     def __init__(
@@ -86,11 +86,16 @@ class ArmMechanics:
         self._actuators = {a.joint().name(): a for a in actuators}
         self._joints = [_RubbingJoint(a.joint()) for a in actuators]
         self.friction = self._friction()
+        self.sensor = _torque_sensor(list(self._actuators))
 
     def wire(
         self, builder: DiagramBuilder, velocity: OutputPort, torque: OutputPort
-    ) -> None:
-        """Adds the friction to the diagram, behind ports of all joints."""
+    ) -> OutputPort:
+        """Adds friction and sensor to the diagram, behind ports of all joints.
+
+        Returns:
+            The port of the torques as they are measured.
+        """
         count = len(self._joints)
         state = builder.AddNamedSystem("arm_friction_state", Multiplexer([count] * 2))
         builder.AddNamedSystem("arm_friction", self.friction)
@@ -101,11 +106,15 @@ class ArmMechanics:
             self.friction.get_output_port(),
             self._plant.get_applied_generalized_force_input_port(),
         )
+        builder.AddNamedSystem("arm_torque_sensor", self.sensor)
+        builder.Connect(torque, self.sensor.get_input_port())
+        return self.sensor.get_output_port()
 
     def set_effects(
         self,
         plant_context: Context,
         friction_context: Context,
+        sensor_context: Context,
         effects: Sequence[ArmEffect],
     ) -> None:
         """Puts effects, and no others, onto the arm of a Context.
@@ -115,6 +124,9 @@ class ArmMechanics:
                 arm's.
         """
         own = self._by_joint(effects)
+        sensor_context.get_mutable_numeric_parameter(0).SetFromVector(
+            np.concatenate([_misreadings(own[name]) for name in self._actuators])
+        )
         values: list[float] = []
         for joint, (name, actuator) in zip(
             self._joints, self._actuators.items(), strict=True
@@ -134,20 +146,14 @@ class ArmMechanics:
     def _by_joint(self, effects: Sequence[ArmEffect]) -> dict[str, list[JointEffect]]:
         own: dict[str, list[JointEffect]] = {name: [] for name in self._actuators}
         for effect in effects:
-            kind = type(effect).__name__
-            if not isinstance(effect, _CARRIED):
+            if not isinstance(effect, JointEffect):
+                continue
+            if effect.joint not in own:
                 raise DisasmError(
-                    f"{kind}: is in the readings of torque sensors (logs of kind "
-                    "joint_motion), which nothing in the cell goes by; take it out of "
-                    "effects"
+                    f"{type(effect).__name__}.joint: the arm has no joint "
+                    f"'{effect.joint}'; {closest(effect.joint, list(own))}"
                 )
-            if isinstance(effect, JointEffect):
-                if effect.joint not in own:
-                    raise DisasmError(
-                        f"{kind}.joint: the arm has no joint '{effect.joint}'; "
-                        f"{closest(effect.joint, list(own))}"
-                    )
-                own[effect.joint].append(effect)
+            own[effect.joint].append(effect)
         return own
 
     def _friction(self) -> SymbolicVectorSystem:
@@ -221,6 +227,24 @@ class _RubbingJoint:
             wide = dataclasses.replace(found[0], creep=wider * found[0].creep)
             values += [getattr(wide, name) for name in _numbers(kind)]
         return values
+
+
+def _torque_sensor(joints: Sequence[str]) -> SymbolicVectorSystem:
+    """Returns the system that reads joints' torques, each with a gain and an offset."""
+    u = [Variable(f"{name}.torque") for name in joints]
+    wrong = [(Variable(f"{n}.share"), Variable(f"{n}.offset")) for n in joints]
+    reading = [t + share * t + c for t, (share, c) in zip(u, wrong, strict=True)]
+    parameters = [symbol for pair in wrong for symbol in pair]
+    return SymbolicVectorSystem(
+        input=np.array(u), parameter=np.array(parameters), output=np.array(reading)
+    )
+
+
+def _misreadings(effects: Sequence[JointEffect]) -> np.ndarray:
+    """Returns share and offset (2,) by which a joint's sensor is wrong."""
+    share = sum(e.share for e in effects if isinstance(e, TorqueGain))
+    offset = sum(e.size for e in effects if isinstance(e, TorqueOffset))
+    return np.array([share, offset], dtype=float)
 
 
 def _numbers(kind: type[JointEffect]) -> list[str]:

@@ -165,13 +165,13 @@ class CellStation(SimulatedStation):
         state = builder.AddNamedSystem("iiwa_state", Demultiplexer([7, 7]))
         connect(plant.get_state_output_port(self.iiwa), state.get_input_port())
         torque = plant.get_net_actuation_output_port(self.iiwa)
-        self._mechanics.wire(builder, state.get_output_port(1), torque)
+        measured = self._mechanics.wire(builder, state.get_output_port(1), torque)
         outputs = {
             "position_commanded": command.get_output_port(),
             "position_measured": state.get_output_port(0),
             "velocity_estimated": state.get_output_port(1),
             "torque_commanded": torque,
-            "torque_measured": torque,
+            "torque_measured": measured,
             "torque_external": self._external_torque(builder),
         }
         for quantity, port in outputs.items():
@@ -244,6 +244,7 @@ class CellStation(SimulatedStation):
         self._mechanics.set_effects(
             self.part_context(self.plant, context),
             self.part_context(self._mechanics.friction, context),
+            self.part_context(self._mechanics.sensor, context),
             effects,
         )
 

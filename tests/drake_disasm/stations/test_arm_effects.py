@@ -141,8 +141,8 @@ def test_a_payload_bends_the_joints(station: CellStation) -> None:
 
 def _parameters(station: CellStation, context: Context) -> np.ndarray:
     """Returns all numbers that effects on the arm may change."""
-    parts = (station.plant, station.GetSubsystemByName("arm_friction"))
-    contexts = [station.part_context(part, context) for part in parts]
+    named = map(station.GetSubsystemByName, ("arm_friction", "arm_torque_sensor"))
+    contexts = [station.part_context(part, context) for part in (station.plant, *named)]
     return np.concatenate(
         [
             each.get_numeric_parameter(i).CopyToVector()
@@ -159,6 +159,8 @@ EVERY = (
     JointAsymmetricFriction(NAME, 4.0, viscous=30.0),
     JointLoadFriction(NAME, 0.2),
     RotorInertia(NAME, 2.0),
+    TorqueOffset(NAME, -2.0),
+    TorqueGain(NAME, 0.1),
     FlangePayload(2.0, 0.1),
 )
 NULL = (
@@ -192,8 +194,7 @@ def test_each_effect_changes_the_arm(effect: Effect, station: CellStation) -> No
 @pytest.mark.parametrize(
     ("effects", "message"),
     [
-        ([TorqueOffset(NAME, 1.0)], "torque sensors.* take it out of effects"),
-        ([TorqueGain(NAME, 0.1)], "torque sensors.* take it out of effects"),
+        ([TorqueOffset("iiwa_join_4", 1.0)], "did you mean 'iiwa_joint_4'"),
         ([RotorInertia("iiwa_join_4", 1.0)], "did you mean 'iiwa_joint_4'"),
         ([JointLoadFriction(NAME, 0.1)] * 2, "acts twice on iiwa_joint_4.* merge"),
         ([FlangePayload(cx=0.1)], "no mass; give it a mass"),
@@ -210,3 +211,19 @@ def test_refuses_what_the_cell_cannot_carry(
 def test_the_twin_has_no_arm(effect: Effect, twin: TwinStation) -> None:
     with pytest.raises(DisasmError, match=r"acts on the arm.* use --model cell"):
         twin.set_effects(twin.CreateDefaultContext(), [effect])
+
+
+def test_a_torque_sensor_reads_what_its_effects_say(station: CellStation) -> None:
+    """Only the reading is wrong: the arm holds still as before."""
+    effects = [TorqueOffset(NAME, -2.0), TorqueGain(NAME, 0.1)]
+    context = _lifted(station, effects).get_mutable_context()
+    true, read = (
+        station.GetOutputPort(f"iiwa.torque_{end}").Eval(context)
+        for end in ("commanded", "measured")
+    )
+    expected = true.copy()
+    expected[JOINT] = 1.1 * true[JOINT] - 2.0
+    np.testing.assert_allclose(read, expected)
+    station.set_effects(context, [])
+    read = station.GetOutputPort("iiwa.torque_measured").Eval(context)
+    np.testing.assert_array_equal(read, true)
