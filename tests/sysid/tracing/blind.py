@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from drake_disasm.effects import Effect, SensorBias, SensorEffect, sizes
@@ -24,6 +26,7 @@ from sysid.workers import Workers
 
 FORCE_NOISE, TORQUE_NOISE = 0.05, 0.002  # N, N m
 READINGS = 100
+_FORGETS = 500  # readings, after which a sieve knows nothing of its beginning
 _PAYLOAD = PayloadError(mass=1.2, cx=0.01, cy=-0.02, cz=0.06)
 _BIAS = SensorBias(fx=1.0, fy=-2.0, fz=3.0, tx=0.1, ty=-0.2, tz=0.05)
 
@@ -142,3 +145,17 @@ def _unexplained(change: np.ndarray, R_WS: np.ndarray) -> float:
         left = flat - A @ np.linalg.lstsq(A, flat, rcond=None)[0]
         parts.append(left / noise)
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+
+
+def sieve(residual: np.ndarray, order: int, random: np.random.Generator) -> np.ndarray:
+    """Returns noise (n,) as correlated as a residual (n,): an autoregressive sieve.
+
+    Innovations of the autoregression that Yule and Walker fit, drawn anew.
+    """
+    n = len(residual)
+    centred = residual - residual.mean()
+    power = np.array([centred[k:] @ centred[: n - k] for k in range(order + 1)])
+    whitener = np.append(1.0, -solve_toeplitz(power[:-1], power[1:]))
+    innovations = lfilter(whitener, [1.0], centred)[order:]
+    drawn = random.choice(innovations - innovations.mean(), n + _FORGETS)
+    return np.asarray(lfilter([1.0], whitener, drawn)[_FORGETS:])

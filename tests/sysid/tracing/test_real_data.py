@@ -1,5 +1,7 @@
 """What real measurements lack, from the models that their authors used."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,9 @@ from sysid.models.from_logs import ModelChoice, model_of
 from sysid.tracing.pipeline import Closed, close_loop
 from sysid.workers import Workers
 from tests.sysid.real_data import write_arm, write_motion, write_static
+from tests.sysid.tracing.blind import sieve
+
+_NULLS = 40
 
 
 def _closed(folders, train, test) -> Closed:
@@ -47,3 +52,30 @@ def test_too_little_of_a_real_arms_motion_is_refused(tmp_path):
     short = model.of_rows(np.arange(model.measurements.rows) < 500)
     with pytest.raises(DisasmError, match="too short to decide"):
         close_loop(short, [0], [], np.inf, Workers(), lambda _: None)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("residual_of", ["first", "last"])
+def test_noise_as_correlated_as_a_real_arms_residual_raises_no_alarm(
+    residual_of, tmp_path
+):
+    """Of the model without effects, and of the one with all that were found."""
+    arm = write_arm(tmp_path / "arm.urdf")
+    log = read_logs([write_motion(1, tmp_path / "run", arm)])
+    model = model_of(log, ModelChoice())
+    model = model.of_rows(np.arange(model.measurements.rows) % 5 == 0)
+
+    def closed(model):
+        return close_loop(model, [0], [], np.inf, Workers(), lambda _: None)
+
+    found = closed(model)
+    fit = getattr(found, residual_of)
+    residual = fit.here.residual * fit.model.measurements.noise
+    clean = found.first.model.predictions(found.first.theta)
+    alarms = []
+    for seed in range(_NULLS):
+        random = np.random.default_rng(seed)
+        noise = np.column_stack([sieve(r, 30, random) for r in residual.T])
+        null = dataclasses.replace(model.measurements, values=clean + noise)
+        alarms.append(closed(model.with_measurements(null)).verdict.ending != "none")
+    assert sum(alarms) <= 0.05 * _NULLS
