@@ -288,8 +288,16 @@ class Tracer:
             found = self.fit((*fit.effects, *added), fit, known)
             kept = _physical(found, added)
             if kept == added or not kept:
-                return found
+                break
             added = kept
+        moves = any(found.model.simulated[found.columns_of(c)].any() for c in added)
+        if self.base.affine or found.value <= 1.0 or not moves:
+            return found
+        # Contact hides sizes from the linear account that matter once it is away.
+        full = self.fit((*fit.effects, *chosen.what), found)
+        if full.loss > (1.0 - LEAST_GAIN) * found.loss:
+            return found
+        return self._with_what_shows(full, len(fit.effects))
 
     def _further(self, rough: Fit) -> Fit:
         """Returns the fit to all rows that begins at one to few of them.
@@ -297,13 +305,19 @@ class Tracer:
         The newest effect keeps those sizes that show.
         """
         found = self.fit(rough.effects, rough)
-        shows = _shows(found)
-        newest = rough.effects[-1]
-        columns = found.columns_of(newest)
-        fields = [f for f, c in zip(newest.fields, columns, strict=True) if shows[c]]
-        if not fields or len(fields) == len(newest.fields):
-            return found
-        return self.fit((*rough.effects[:-1], newest.only(fields)), found)
+        return self._with_what_shows(found, len(rough.effects) - 1)
+
+    def _with_what_shows(self, fit: Fit, known: int) -> Fit:
+        """Returns the fit whose effects after the known ones have sizes that show."""
+        shows = _shows(fit)
+        new = []
+        for effect in fit.effects[known:]:
+            columns = fit.columns_of(effect)
+            pairs = zip(effect.fields, columns, strict=True)
+            if fields := [field for field, c in pairs if shows[c]]:
+                new.append(effect.only(fields))
+        effects = (*fit.effects[:known], *new)
+        return fit if not new or effects == fit.effects else self.fit(effects, fit)
 
     def backward(self, fit: Fit) -> Fit:
         """Returns the fit without effects that later ones have made needless."""
