@@ -164,40 +164,30 @@ class Tracer:
                 return fit, survey
             fit, survey = found, self.survey(found)
 
-    def _promising(self, fit: Fit, survey: Survey) -> tuple[list[Evidence], Starts]:
-        """Returns what is worth a fit, the best first, and where fits may begin."""
+    def _promising(self, fit: Fit, survey: Survey) -> list[Evidence]:
+        """Returns what is worth a fit, by a linear account, the best first."""
         assert survey.bench is not None
-        if self.base.affine:
-            passing = [e for e in survey.effects if e.accepted]
-            if not passing and not fit.effects:
-                passing = survey.bench.pairs(survey.effects)
-            return passing, {}
-        if fit.value > _FAR:
-            return self._coarse(fit, survey)
-        return [e for e in survey.effects if e.gain >= _WORTH_A_FIT], {}
+        if not self.base.affine:
+            return [e for e in survey.effects if e.gain >= _WORTH_A_FIT]
+        passing = [e for e in survey.effects if e.accepted]
+        if not passing and not fit.effects:
+            passing = survey.bench.pairs(survey.effects)
+        return passing
 
-    def _coarse(self, fit: Fit, survey: Survey) -> tuple[list[Evidence], Starts]:
-        """Returns the same by a fit of each effect, to a few rows.
+    def _coarse(self, fit: Fit, survey: Survey) -> tuple[Survey, Starts]:
+        """Returns a survey by rough fits of each effect, and where to begin others.
 
-        Far from the data a linear account is worthless: a bolt that the model has
-        inside the wall says how hard the wall is, not where.
+        Begins are those alone that are not hopeless.
         """
         each = list({e.effects: e for e in reversed(survey.effects)}.values())
         before, rough = rough_fits(self, fit, [e.what for e in each])
         tests = len(each)
         enough = _HOPELESS * min(after.loss for after in rough)
-        starts = {
-            e.effects: after
-            for e, after in zip(each, rough, strict=True)
-            if after.loss <= enough
-        }
-        found = [
-            _confirmed(before, starts[e.effects], e, tests)
-            for e in each
-            if e.effects in starts
-        ]
-        found = [e for e in found if e.gain >= _WORTH_A_FIT]
-        return sorted(found, key=lambda e: -e.gain), starts
+        pairs = list(zip(each, rough, strict=True))
+        found = [_confirmed(before, after, e, tests) for e, after in pairs]
+        ranking = sorted(found, key=lambda e: -e.gain)
+        starts = {e.effects: after for e, after in pairs if after.loss <= enough}
+        return dataclasses.replace(survey, effects=ranking), starts
 
     def _added(self, fit: Fit, survey: Survey) -> Fit | None:
         """Returns the fit with the best that passes and keeps what it promised.
@@ -205,7 +195,12 @@ class Tracer:
         Where effects are linear, the evidence says which passes. Else it only says
         which are worth a fit, and fits decide.
         """
-        trials, starts = self._promising(fit, survey)
+        starts: Starts = {}
+        if fit.value > _FAR and not self.base.affine:
+            survey, starts = self._coarse(fit, survey)
+        trials = self._promising(fit, survey)
+        if starts:
+            trials = [e for e in trials if e.effects in starts]
         passing, tried = self._tried(fit, survey, _to_try(trials), starts)
         if not passing and not self.base.affine:
             passing, _ = self._tried(fit, survey, _pairs(tried))
