@@ -286,7 +286,8 @@ class Tracer:
                 break
             added = kept
         moves = any(found.model.simulated[found.columns_of(c)].any() for c in added)
-        if self.base.affine or found.value <= 1.0 or not moves:
+        done = self.base.affine or self.base.costly or not moves
+        if done or found.value <= 1.0:
             return found
         # Contact hides sizes from the linear account that matter once it is away.
         full = self.fit((*fit.effects, *chosen.what), found)
