@@ -3,6 +3,7 @@
 import argparse
 import importlib
 import importlib.metadata
+import os
 import signal
 import subprocess
 import sys
@@ -82,6 +83,17 @@ def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
         dest="overrides",
         help="override one field, e.g. lock.clearance=0.0003, effects.0.ry=0.02 or "
         "'effects=[!SensorBias {fx: 0.5}]'; repeatable",
+    )
+
+
+def add_workers_argument(parser: argparse.ArgumentParser, more: str = "") -> None:
+    """Adds --workers, with more to say about it."""
+    parser.add_argument(
+        "--workers",
+        type=positive,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help=f"processes (default: one per core){more}",
     )
 
 

@@ -10,7 +10,6 @@ report that opens offline. After Ctrl-C the same command goes on where it was.
 
 import argparse
 import json
-import os
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -50,13 +49,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add = parser.add_argument
     add("--log", nargs="+", required=True, metavar="DIR", help="logs of one kind")
     _add_model_arguments(add)
-    add(
-        "--workers",
-        type=cli.positive,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes (default: one per core)",
-    )
+    cli.add_workers_argument(parser)
     add("--out", required=True, type=Path, metavar="DIR", help="a folder")
     return parser.parse_args(arguments)
 

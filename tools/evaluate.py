@@ -98,7 +98,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         default=0,
         help="of the first episode; the next ones count on (default: 0)",
     )
-    add("--workers", type=cli.positive, metavar="N", help="(default: one per core)")
+    cli.add_workers_argument(parser)
     add("--json", type=Path, metavar="FILE", help="also write the figures")
     return parser.parse_args(arguments)
 
@@ -113,9 +113,7 @@ def main(arguments: Sequence[str]) -> int:
     total = len(rows) * args.episodes
     try:
         with tqdm(total=total, unit="episode", leave=False) as bar:
-            found.update(
-                run_jobs(_run, rows, args.workers or os.cpu_count() or 1, _shown(bar))
-            )
+            found.update(run_jobs(_run, rows, args.workers, _shown(bar)))
     finally:
         ordered = {row: found[row] for row in rows if row in found}
         if ordered:

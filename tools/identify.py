@@ -8,7 +8,6 @@ Writes the identified scenario, `result.json`, and a report that opens offline.
 
 import argparse
 import json
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -61,6 +60,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     _add_input_arguments(parser.add_argument)
     _add_search_arguments(parser.add_argument)
+    cli.add_workers_argument(parser, "; any number gives the same bits")
     _add_judgement_arguments(parser.add_argument)
     args = parser.parse_args(arguments)
     if args.preset == "thesis" and args.cycles is None and args.budget is None:
@@ -137,13 +137,6 @@ def _add_search_arguments(add: Callable[..., object]) -> None:
         help="a Gaussian process proposes points in place of scouts",
     )
     add("--seed", type=int, default=0, help="of the searches (default: 0)")
-    add(
-        "--workers",
-        type=cli.positive,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes (default: one per core); any number gives the same bits",
-    )
     add(
         "--fine",
         action="store_true",

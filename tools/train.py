@@ -59,6 +59,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     _add_task_arguments(parser.add_argument)
     _add_agent_arguments(parser.add_argument)
     _add_run_arguments(parser.add_argument)
+    cli.add_workers_argument(parser, "; seeds at a time")
     return parser.parse_args(arguments)
 
 
@@ -149,12 +150,6 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
         help="greedy episodes after each training (default: 10)",
     )
     add(
-        "--workers",
-        type=cli.positive,
-        metavar="N",
-        help="seeds at a time (default: one per core)",
-    )
-    add(
         "--threads",
         type=cli.positive,
         default=1,
@@ -176,7 +171,7 @@ def main(arguments: Sequence[str]) -> int:
     experiment = open_experiment(experiment, args.out, args.resume)
     jobs = seed_jobs(experiment, seeds, args.out)
     try:
-        train_seeds(jobs, args.workers or os.cpu_count() or 1)
+        train_seeds(jobs, args.workers)
     finally:
         print(write_summary(args.out))
     print(f"all of it: {args.out}")

@@ -55,6 +55,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     _add_scenario_arguments(parser.add_argument)
     _add_agent_arguments(parser.add_argument)
     _add_run_arguments(parser.add_argument)
+    cli.add_workers_argument(parser)
     return parser.parse_args(arguments)
 
 
@@ -118,7 +119,6 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
         metavar="N",
         help="greedy episodes before and after learning in the stand-in (default: 10)",
     )
-    add("--workers", type=cli.positive, metavar="N", help="(default: one per core)")
     add("--eager", action="store_true", help="don't compile the updates")
     add("--resume", action="store_true", help="go on with what is in --out")
 
@@ -128,7 +128,7 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     study = _study(args, arguments)
     seeds = range(args.first_seed, args.first_seed + args.seeds)
-    workers = args.workers or os.cpu_count() or 1
+    workers = args.workers
     try:
         for name, experiment in study.experiments().items():
             _train(name, experiment, seeds, study.folder / name, args.resume, workers)

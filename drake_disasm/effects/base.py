@@ -130,6 +130,9 @@ class Sensing:
 class Effect:
     """Base of all effects; see the module's docstring."""
 
+    #: Whether it acts on the variance alone: models predict the mean.
+    is_random: bool = False
+
     @property
     def is_null(self) -> bool:
         """Whether all its sizes are zero: it does nothing."""
@@ -156,9 +159,6 @@ class MotionEffect(Effect, abc.ABC):
 
     #: Where on the way: 0 scale, 1 time, 2 gears, 3 what yields, 4 what scatters.
     stage: int = 0
-
-    #: Whether it acts on the variance alone: models predict the mean.
-    is_random: bool = False
 
     @abc.abstractmethod
     def execute(

@@ -87,7 +87,7 @@ def candidates(
         Candidate.of(effect)
         for kind in library
         if issubclass(kind, acts) and not issubclass(kind, silent)
-        if not getattr(kind, "is_random", False)  # see scatter.py
+        if not kind.is_random  # see scatter.py
         for effect in _in_all_shapes(kind)
     ]
 

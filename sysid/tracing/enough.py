@@ -5,7 +5,6 @@ import numpy as np
 from drake_disasm.errors import DisasmError
 from sysid.models.base import ScenarioModel
 from sysid.tracing.selection import Fit
-from sysid.tracing.study import Study, blocks_of
 
 _LEAST_ROWS = 10
 _ROWS_EACH = 2  # for each parameter, so that some can be held out
@@ -43,14 +42,12 @@ def refuse_short_logs(last: Fit) -> None:
     Raises:
         DisasmError: there are too few; it says how much more is needed.
     """
-    episode = last.model.measurements.episode
-    empty = np.zeros((*last.here.residual.shape, 0))
-    study = Study.of(last.here, empty, blocks_of(last.here, episode))
+    study = last.study()
     alone = study.losses(np.arange(len(last.theta)))
     excess = float(np.median(alone / np.maximum(study.energy, 1e-300))) - 1.0
     if excess <= _MOST_EXCESS:
         return
-    rows = len(episode)
+    rows = last.model.measurements.rows
     more = min(int(np.ceil(rows * (excess / _MOST_EXCESS - 1.0))), _AT_MOST * rows)
     raise DisasmError(
         f"the log is too short to decide: a fit to all but a part of its {rows} rows "

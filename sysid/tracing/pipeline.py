@@ -96,10 +96,7 @@ def close_loop(
     last, end = tracer.forward(first, begin)
     if tracer.base is not base:
         tell("once more with all rows")
-        tracer = dataclasses.replace(tracer, base=base)
-        first, last = tracer.fit(()), tracer.fit(last.effects, last)
-        tracer = dataclasses.replace(tracer, exact=True)
-        last = tracer.fit(last.effects, last)
+        tracer, first, last = _with_all_rows(tracer, base, last)
     refuse_short_logs(last)
     kept = _like(base, model.of_episodes(test)) if test else None
     errors = held_out(tracer, first, last, kept)
@@ -115,6 +112,19 @@ def _affordable(base: ScenarioModel) -> ScenarioModel:
     if not base.costly or every < 2:
         return base
     return base.thin(every)
+
+
+def _with_all_rows(
+    tracer: Tracer, base: ScenarioModel, last: Fit
+) -> tuple[Tracer, Fit, Fit]:
+    """Returns the fits without and with the effects to what was thinned for the search.
+
+    The last has the model's own derivatives; and the tracer that fits so.
+    """
+    tracer = dataclasses.replace(tracer, base=base)
+    first, last = tracer.fit(()), tracer.fit(last.effects, last)
+    tracer = dataclasses.replace(tracer, exact=True)
+    return tracer, first, tracer.fit(last.effects, last)
 
 
 def _like(base: ScenarioModel, test: ScenarioModel) -> ScenarioModel:

@@ -74,10 +74,8 @@ class _Likelihood:
 
         Squares end at `huber`, row by row.
         """
-        JD = self.J * std
-        M = np.eye(3) + np.einsum("nci,ncj->nij", JD, JD)
-        b = np.einsum("nci,nc->ni", JD, self.r)
-        taken = np.einsum("ni,ni->n", b, np.linalg.solve(M, b[..., None])[..., 0])
+        M, b, led = self._posterior(std)
+        taken = np.einsum("ni,ni->n", b, led)
         squares = np.einsum("nc,nc->n", self.r, self.r) - taken
         channels = self.r.shape[1]
         level = np.sqrt(np.maximum(squares, 0.0) / channels)
@@ -102,10 +100,17 @@ class _Likelihood:
 
     def led(self, std: Array) -> Array:
         """Returns where steps likely led (n, 3), beside the command."""
+        return -std * self._posterior(std)[2]
+
+    def _posterior(self, std: Array) -> tuple[Array, Array, Array]:
+        """Returns M (n, 3, 3), b (n, 3) and M^-1 b, in units of `std`.
+
+        The precision of where steps led, what residuals say of it, and its mean.
+        """
         JD = self.J * std
         M = np.eye(3) + np.einsum("nci,ncj->nij", JD, JD)
         b = np.einsum("nci,nc->ni", JD, self.r)
-        return -std * np.linalg.solve(M, b[..., None])[..., 0]
+        return M, b, np.linalg.solve(M, b[..., None])[..., 0]
 
     def spread(self, std: Array) -> Array:
         """Returns the standard deviation (3,) of the estimate, axis by axis."""

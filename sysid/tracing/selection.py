@@ -71,6 +71,12 @@ class Fit:
         """Sum of the squares, less beyond where they end."""
         return float(np.sum(tempered(self.here.residual, self.here.huber) ** 2))
 
+    def study(self, blocks: NDArray[np.int64] | None = None) -> Study:
+        """Returns its normal equations, by blocks (rows,) of its own or of another."""
+        if blocks is None:
+            blocks = blocks_of(self.here, self.model.measurements.episode)
+        return Study.of(self.here, blocks)
+
     @property
     def values(self) -> dict[str, float]:
         """The parameters' values, by name."""
@@ -336,18 +342,15 @@ class Tracer:
             return {}
         scaling = Scaling(fit.model.parameters)
         null = scaling.to_unit(nominal_values(fit.model.parameters))
-        blocks = blocks_of(fit.here, fit.model.measurements.episode)
-        empty = np.zeros((*fit.here.residual.shape, 0))
-        study = Study.of(fit.here, empty, blocks)
+        study = fit.study()
         found = {}
         for effect in fit.effects:
             own = np.isin(np.arange(len(null)), fit.columns_of(effect))
             without = study.moved(np.where(own, null - fit.here.u, 0.0))
             without = dataclasses.replace(without, side=np.zeros(len(null)))
             beside = without.beside(np.flatnonzero(~own))
-            found[effect.name] = evidence(beside, [((effect,), np.flatnonzero(own))])[
-                0
-            ].gain
+            (says,) = evidence(beside, [((effect,), np.flatnonzero(own))])
+            found[effect.name] = says.gain
         return found
 
     def fit(
@@ -380,15 +383,19 @@ class Tracer:
                 [start.here.jacobian, np.stack(more, axis=-1)], axis=-1
             )
             here = dataclasses.replace(start.here, u=u, jacobian=jacobian)
-        iterations = _FEW_ITERATIONS if model.costly else _ITERATIONS
-        iterations = _LAST_ITERATIONS if self.exact and model.costly else iterations
+        most = self._most_iterations(model)
         here = remembered(
             None if model.affine else self.folder,
             (model, self.huber, self.exact, u, here),
-            lambda: gauss_newton(objective, u, iterations, start=here, central=False),
+            lambda: gauss_newton(objective, u, most, start=here, central=False),
         )
         found = objective.scaling.from_unit(here.u)
         return Fit(effects, model, found, here, objective.value(here.residual))
+
+    def _most_iterations(self, model: ScenarioModel) -> int:
+        if not model.costly:
+            return _ITERATIONS
+        return _LAST_ITERATIONS if self.exact else _FEW_ITERATIONS
 
     def _objective(self, model: ScenarioModel) -> Objective:
         alike = None if self.exact else model.alike()
@@ -413,7 +420,7 @@ class Tracer:
         episode = model.measurements.episode
         extra, dependences = curves(model)
         blocks = blocks_of(here, episode)
-        raw = Study.of(here, extra, blocks)
+        raw = Study.of(here, blocks, extra)
         begin = len(model.parameters)
         return Bench(
             here,
@@ -436,10 +443,8 @@ def _confirmed(before: Fit, after: Fit, trial: Evidence, tests: int) -> Evidence
     others; the p-value is for as many tests as there are effects (Bonferroni).
     """
     blocks = blocks_of(before.here, before.model.measurements.episode)
-    empty = np.zeros((*before.here.residual.shape, 0))
-    energy = Study.of(before.here, empty, blocks).energy
-    study = Study.of(after.here, empty, blocks)
-    gains = energy - study.losses(np.arange(len(after.theta)))
+    energy = before.study(blocks).energy
+    gains = energy - after.study(blocks).losses(np.arange(len(after.theta)))
     return measured(trial, gains, float(energy.sum()), tests)
 
 
@@ -530,9 +535,6 @@ def _shows(fit: Fit) -> NDArray[np.bool_]:
     95 %, by the sums of the gradient over blocks (a sandwich): right whatever the
     correlation within a block.
     """
-    blocks = blocks_of(fit.here, fit.model.measurements.episode)
-    empty = np.zeros((*fit.here.residual.shape, 0))
-    study = Study.of(fit.here, empty, blocks)
     scaling = Scaling(fit.model.parameters)
     away = fit.here.u - scaling.to_unit(nominal_values(fit.model.parameters))
-    return np.asarray(np.abs(away) > _Z95 * study.spread())
+    return np.asarray(np.abs(away) > _Z95 * fit.study().spread())

@@ -59,14 +59,21 @@ class Study:
     huber: float
 
     @classmethod
-    def of(cls, here: Linearisation, extra: Array, blocks: NDArray[np.int64]) -> Self:
+    def of(
+        cls,
+        here: Linearisation,
+        blocks: NDArray[np.int64],
+        extra: Array | None = None,
+    ) -> Self:
         """Returns the study of a linearisation.
 
         Args:
             here: at the fit, with the candidates at null.
-            extra: (rows, channels, k) further columns, of empirical dependences.
             blocks: (rows,) number of each row's block.
+            extra: (rows, channels, k) further columns, of empirical dependences.
         """
+        if extra is None:
+            extra = np.zeros((*here.residual.shape, 0))
         order = np.argsort(blocks, kind="stable")
         A = np.concatenate([here.jacobian, extra], axis=2)[order]
         scale = np.maximum(np.sqrt(np.mean(A**2, axis=(0, 1))), 1e-300)

@@ -115,9 +115,8 @@ def verdict(
         loose: how the arm scatters about its commands, if it does.
     """
     left = [d for d in end.dependences if d.accepted]
-    gained = max(first.loss - last.loss, 0.0)
-    missing = left[0].gain * last.loss if left else 0.0
-    explained = gained / (gained + missing) if gained + missing > 0.0 else 1.0
+    dependence = left[0].name if left else ""
+    explained = _explained(first, last, left[0].gain if left else 0.0)
     worth = tracer.worth(last)
     values = values_of(tracer, last)
     if loose:
@@ -125,15 +124,14 @@ def verdict(
         values = (*values, *_scatter_values(loose))
     names = tuple(sorted(worth, key=lambda name: -worth[name]))
     ties = tuple(_tied(name, tracer.rounds) for name in names)
-    dependence = left[0].name if left else ""
     assert end.bench is not None
     against = contradictions(last, end.bench, len(tracer.base.parameters))
     beyond = _beyond_noise(last, loose)
-    ending = _ending(names, dependence or in_words(against) or beyond, explained)
-    if beyond and ending == "explained":
-        ending = "unexplained"
+    other = in_words(against) or beyond
+    believed = bool(names) and explained >= _BELIEVED and not beyond
+    ending = _ending(bool(names or dependence or other), believed)
     lines = [
-        _missing(ending, names, ties, dependence, in_words(against) or beyond),
+        _missing(ending, names, ties, dependence, other),
         _value_line(names, values),
         f"error on held-out data: {improvement(errors)}",
     ]
@@ -169,10 +167,22 @@ def _beyond_noise(last: Fit, loose: Scatter | None) -> str:
     return f"the residual is {value:.2g} times the noise"
 
 
-def _ending(names: tuple[str, ...], left: str, explained: float) -> str:
-    if not names and not left:
+def _explained(first: Fit, last: Fit, left: float) -> float:
+    """Returns the share that effects explain of what could be.
+
+    Args:
+        first, last: the fits without and with them.
+        left: share of the last's loss that a dependence would take away.
+    """
+    gained = max(first.loss - last.loss, 0.0)
+    missing = left * last.loss
+    return gained / (gained + missing) if gained + missing > 0.0 else 1.0
+
+
+def _ending(is_something: bool, is_believed: bool) -> str:
+    if not is_something:
         return "none"
-    return "explained" if names and explained >= _BELIEVED else "unexplained"
+    return "explained" if is_believed else "unexplained"
 
 
 def values_of(tracer: Tracer, fit: Fit) -> tuple[Value, ...]:

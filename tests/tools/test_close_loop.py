@@ -1,11 +1,7 @@
 """tools/close_loop.py, as a user runs it."""
 
 import json
-import os
-import signal
 import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
@@ -19,19 +15,12 @@ from sysid.blind.transitions import transitions_log
 from sysid.objective import tempered
 from sysid.tracing.pipeline import HUBER
 from tests.sysid.tracing.blind import static_log
-from tests.tools.programs import ROOT
-
-
-def program(*arguments: object) -> list[str]:
-    """Returns the command."""
-    return [sys.executable, str(ROOT / "tools" / "close_loop.py"), *map(str, arguments)]
+from tests.tools.programs import interrupt, run_program
 
 
 def run(*arguments: object) -> subprocess.CompletedProcess[str]:
     """Runs the program to its end."""
-    return subprocess.run(
-        program(*arguments), capture_output=True, text=True, timeout=280
-    )
+    return run_program("close_loop", *arguments)
 
 
 def test_the_tool_writes_a_scenario_and_a_report(tmp_path):
@@ -80,16 +69,7 @@ def test_ctrl_c_leaves_fits_with_which_the_same_command_goes_on(tmp_path):
     transitions_log(tmp_path / "log", nominal(), hidden, 0, episodes=6, steps=12)
     out = tmp_path / "out"
     arguments = ("--log", tmp_path / "log", "--out", out, "--workers", "1")
-    process = subprocess.Popen(
-        program(*arguments), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    deadline = time.monotonic() + 200
-    while len(list(out.glob("fits/*.npz"))) < 2:
-        assert time.monotonic() < deadline and process.poll() is None
-        time.sleep(0.02)
-    os.kill(process.pid, signal.SIGINT)
-    _, errors = process.communicate(timeout=100)
-    assert process.returncode == 130 and "what was finished is kept" in errors
+    interrupt(lambda: len(list(out.glob("fits/*.npz"))) >= 2, "close_loop", *arguments)
     assert not (out / "result.json").exists()
     # A fit that is looked up is not written: what was kept shows in what it says.
     first = min(out.glob("fits/*.npz"), key=lambda path: path.stat().st_mtime_ns)

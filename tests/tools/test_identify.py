@@ -1,11 +1,7 @@
 """tools/identify.py: what it writes, and how it refuses bad input."""
 
 import json
-import os
-import signal
 import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -14,19 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from drake_disasm.scenario import load_scenario
 from sysid.logs import read_log, write_static_wrench
-from tests.tools.programs import ROOT
+from tests.tools.programs import interrupt, run_program
 
 QUICK = ("--budget", "60", "--workers", "1")
 
 
-def program(*arguments: object, name: str = "identify") -> list[str]:
-    return [sys.executable, str(ROOT / f"tools/{name}.py"), *map(str, arguments)]
-
-
 def run(*arguments: object, name: str = "identify") -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        program(*arguments, name=name), capture_output=True, text=True, timeout=280
-    )
+    return run_program(name, *arguments)
 
 
 @pytest.fixture(scope="module")
@@ -123,16 +113,11 @@ def test_ctrl_c_leaves_a_state_that_resumes_to_the_same_result(
     assert whole.returncode == 0, whole.stderr
     out = tmp_path / "fit"
     journal = out / "evaluations.jsonl"
-    process = subprocess.Popen(
-        program(*arguments, "--out", out), stderr=subprocess.PIPE, text=True
-    )
-    deadline = time.monotonic() + 200
-    while not (journal.exists() and len(journal.read_text().splitlines()) > 5):
-        assert time.monotonic() < deadline and process.poll() is None
-        time.sleep(0.05)
-    os.kill(process.pid, signal.SIGINT)
-    _, errors = process.communicate(timeout=100)
-    assert process.returncode == 130 and "what was finished is kept" in errors
+
+    def is_searching() -> bool:
+        return journal.exists() and len(journal.read_text().splitlines()) > 5
+
+    interrupt(is_searching, "identify", *arguments, "--out", out)
     assert not (out / "result.json").exists()
     refused = run(*arguments, "--out", out)
     assert refused.returncode == 2 and "--resume" in refused.stderr
