@@ -2,8 +2,11 @@
 
 import contextlib
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FrameType
 from typing import IO, Any
 
 from drake_disasm.errors import DisasmError
@@ -27,7 +30,7 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
     """Writes a file whole or not at all.
 
     The content goes to a hidden temporary file in the same folder, reaches the disk,
-    and takes the file's name in one step.
+    and takes the file's name in one step. Ctrl-C waits until it is there.
 
     Args:
         path: the file.
@@ -38,7 +41,7 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
     """
     temporary = path.with_name(f".{path.name}.tmp")
     try:
-        with _removed_on_failure(temporary):
+        with _uninterrupted(), _removed_on_failure(temporary):
             with temporary.open("wb") as stream:
                 write(stream)
                 stream.flush()
@@ -50,6 +53,23 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
             f"{path}: cannot be written ({error.strerror}); check the disk's space "
             "and the folder's permissions"
         ) from error
+
+
+@contextlib.contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Puts Ctrl-C off to the end: libraries make other errors of it halfway."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before is None:
+        yield  # there it does not come
+        return
+    pressed: list[tuple[int, FrameType | None]] = []
+    signal.signal(signal.SIGINT, lambda *caught: pressed.append(caught))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if pressed and callable(before):
+        before(*pressed[0])
 
 
 @contextlib.contextmanager
