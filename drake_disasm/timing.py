@@ -15,6 +15,10 @@ POLICY_DELAY = 1e-6
 #: The pose target takes up the policy's action this long after it [s].
 MOTION_DELAY = 2e-6
 
+#: A command leaves for the arm this long after it was decided on [s]. At the same
+#: time it would leave before, being published at the end of the step that led there.
+COMMAND_DELAY = 1e-5
+
 
 def boundary(steps: int, period: float) -> float:
     """Returns the time [s] at which the policy acts after `steps` periods.

@@ -15,7 +15,7 @@ FLOORS = (
     {"scenario", "ports"},
     {"mdp", "lock", "impact", "devices", "models"},
     {"tool"},
-    {"coordinates"},
+    {"coordinates", "safety"},
     {"systems"},
     {"stations", "policies"},
     {"task"},

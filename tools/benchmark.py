@@ -44,7 +44,8 @@ from drake_disasm.policies import ActionMap, LearnedPolicy, Network, make_policy
 from drake_disasm.quantity import closest
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import TwinStation
-from drake_disasm.task.simulation import TaskSimulation, add_motion, copy_state
+from drake_disasm.stations.simulated import copy_state
+from drake_disasm.task.simulation import TaskSimulation, add_motion
 from drake_disasm.timing import boundary
 from drake_disasm.writing import make_folder, write_atomically
 

@@ -1,8 +1,9 @@
-"""Runs the task in simulation and shows it in Meshcat.
+"""Runs the task, in simulation or on the robot, and shows it in Meshcat.
 
 One scenario file gives one Drake diagram: an iiwa slides a bolt along a door-chain
 groove under hydroelastic contact. Watch it in the browser page whose address is
-printed, record it as a log, or save a page that plays offline.
+printed, record it as a log, or save a page that plays offline. The same diagram runs
+on the devices of a real cell, without a page; read docs/hardware.md first.
 """
 
 import argparse
@@ -11,6 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cli
+import hardware
 from tqdm import tqdm
 
 from drake_disasm.errors import DisasmError
@@ -40,6 +42,7 @@ _EXAMPLES = """examples:
   python tools/simulate.py --no-meshcat --episodes 11 --record out/log \
       --policy admittance --explore 0.15 --hidden removal_turned
                                   a log that states removal and measured another
+  python tools/simulate.py --station hardware --hardware-config cell.yaml --dry-run
 """
 
 
@@ -53,6 +56,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     cli.add_scenario_arguments(parser)
     _add_run_arguments(parser.add_argument)
+    _add_hardware_arguments(parser.add_argument)
     _add_log_arguments(parser.add_argument)
     _add_view_arguments(parser.add_argument)
     return parser.parse_args(arguments)
@@ -85,6 +89,27 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
         type=int,
         default=0,
         help="of the first episode; the next ones count on (default: 0)",
+    )
+
+
+def _add_hardware_arguments(add: Callable[..., object]) -> None:
+    add(
+        "--station",
+        default="simulated",
+        choices=["simulated", "hardware"],
+        help="what obeys: the simulated plant, or the devices of --hardware-config "
+        "(default: simulated)",
+    )
+    add(
+        "--hardware-config",
+        type=Path,
+        metavar="FILE",
+        help="where the devices are, and limits; see models/hardware/cell.yaml",
+    )
+    add(
+        "--dry-run",
+        action="store_true",
+        help="with --station hardware: read and display, command nothing",
     )
 
 
@@ -137,11 +162,10 @@ def _add_view_arguments(add: Callable[..., object]) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
-    if args.explore < 0.0:
-        raise DisasmError(f"--explore {args.explore:g}: give millimetres, 0 or more")
-    if args.resume and not args.record:
-        raise DisasmError("--resume: say which log by --record DIR")
+    _refuse_contradictions(args)
     scenario = load_scenario(args.scenario, args.overrides)
+    if args.station == "hardware":
+        return _on_hardware(args, arguments, scenario)
     real = load_scenario(args.hidden, args.overrides) if args.hidden else scenario
     policy = cli.named_policy(args.policy, scenario)
     writer = _open_log(args, arguments, scenario) if args.record else None
@@ -162,6 +186,53 @@ def main(arguments: Sequence[str]) -> int:
             print(summary_table(summaries))
     _finish(args, view)
     return 0
+
+
+def _on_hardware(
+    args: argparse.Namespace, arguments: Sequence[str], scenario: Scenario
+) -> int:
+    """Runs one episode on the devices, or only watches them."""
+    with hardware.open_station(scenario, args.hardware_config, args.dry_run) as station:
+        if args.dry_run:
+            hardware.watch(station)
+        policy = cli.named_policy(args.policy, scenario)
+        writer = _open_log(args, arguments, scenario) if args.record else None
+        if args.explore:
+            policy = Exploring(policy, args.explore * _MM, args.seed)
+        simulation = TaskSimulation(scenario, "cell", policy, make=lambda _: station)
+        simulation.set_target_realtime_rate(1.0)
+        print("waiting for the devices", flush=True)
+        try:
+            print(summary_table([_run_one(simulation, args.seed, writer, None)]))
+        finally:
+            print(hardware.health_table(station))
+    if args.record:
+        print(f"log: {args.record}")
+    return 0
+
+
+def _refuse_contradictions(args: argparse.Namespace) -> None:
+    """Refuses options that do not go together.
+
+    Raises:
+        DisasmError: names the first.
+    """
+    if args.explore < 0.0:
+        raise DisasmError(f"--explore {args.explore:g}: give millimetres, 0 or more")
+    if args.resume and not args.record:
+        raise DisasmError("--resume: say which log by --record DIR")
+    if args.station == "simulated":
+        for name in ("hardware_config", "dry_run"):
+            if getattr(args, name):
+                option = name.replace("_", "-")
+                raise DisasmError(f"--{option}: is for --station hardware")
+        return
+    one = {"model": "cell", "episodes": 1, "realtime_rate": None}
+    none = {"hidden": None, "html": None, "resume": False}
+    for name, only in (one | none).items():
+        if getattr(args, name) != only:
+            option = name.replace("_", "-")
+            raise DisasmError(f"--{option}: hardware can't do that; leave it out")
 
 
 def _run_one(

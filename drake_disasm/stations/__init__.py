@@ -1,8 +1,9 @@
 """Stations: the one part of the diagram that is swapped (cell, twin, hardware)."""
 
 from drake_disasm.scenario import Scenario
+from drake_disasm.stations.base import Beginning, Station
 from drake_disasm.stations.cell import CellStation
-from drake_disasm.stations.simulated import SimulatedStation, Station
+from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.stations.twin import TwinStation
 
 #: What `--model` may name.
@@ -16,6 +17,7 @@ def make_station(model: str, scenario: Scenario) -> SimulatedStation:
 
 __all__ = [
     "MODELS",
+    "Beginning",
     "CellStation",
     "SimulatedStation",
     "Station",

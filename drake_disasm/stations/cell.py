@@ -21,7 +21,6 @@ from pydrake.systems.primitives import (
     StateInterpolatorWithDiscreteDerivative,
 )
 
-from drake_disasm.coordinates import ArmCoordinates
 from drake_disasm.effects import ArmEffect
 from drake_disasm.errors import DisasmError
 from drake_disasm.lock import add_lock, bolt_inertia, plate_bottom
@@ -30,7 +29,7 @@ from drake_disasm.ports import CELL_PORTS
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.arm_effects import ArmMechanics
 from drake_disasm.stations.simulated import SimulatedStation
-from drake_disasm.tool import FINGERS, Tool, add_tool, grasp_pose
+from drake_disasm.tool import FINGERS, add_tool, grasp_pose
 
 _BENCH = "package://disasm_models/bench/bench.urdf"
 _ARM_INERTIA = 4.0  # kg m^2, of a joint with its rotor, for the damping ratio
@@ -87,11 +86,8 @@ class CellStation(SimulatedStation):
                 f"contact.model: '{scenario.contact.model}' is of the twin alone; "
                 "use hydroelastic for the cell, or --model twin"
             )
-        self.control_period = scenario.arm.control_period
         self.grip_command = _grip_command(scenario)
-        self.tool = Tool.from_models(scenario)
-        self.X_SB = self.tool.X_SB
-        self.payload_mass, self.p_SoScm_S = self.tool.mass, self.tool.p_SoScm_S
+        self.tool = self._set_cell_geometry()
         builder = DiagramBuilder()
         self._build(builder)
 
@@ -99,10 +95,6 @@ class CellStation(SimulatedStation):
         config = self.scenario
         frame_Gn = self._add_plant(builder, config.simulation.cell_time_step)
         plant = self.plant
-        self.coordinates = ArmCoordinates(
-            config.arm, self.X_WG, self.tool.X_FB, config.task.period
-        )
-        self.start = self.coordinates.start(RigidTransform())
         self.iiwa, frame_F = add_arm(plant, config.arm.model)
         self.tool_models = add_tool(plant, frame_F, config)
         self.lock = add_lock(plant, frame_Gn, config.lock, config.contact)

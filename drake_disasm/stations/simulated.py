@@ -1,4 +1,4 @@
-"""What every station has, and what the simulated ones share."""
+"""What the simulated stations share."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
 from pydrake.geometry import SceneGraph
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import (
     AddMultibodyPlant,
     MultibodyPlant,
@@ -17,7 +17,6 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import (
     BasicVector,
     Context,
-    Diagram,
     DiagramBuilder,
     LeafSystem,
     OutputPort,
@@ -25,8 +24,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
-from drake_disasm.coordinates import Coordinates
-from drake_disasm.devices.ft_sensor import ForceTorqueSensor, Payload
+from drake_disasm.devices.ft_sensor import ForceTorqueSensor
 from drake_disasm.effects import (
     ArmEffect,
     BoltMotion,
@@ -38,41 +36,11 @@ from drake_disasm.effects import (
 )
 from drake_disasm.errors import DisasmError
 from drake_disasm.lock import Lock, is_alike, set_environment, set_pose
-from drake_disasm.ports import Health, Port, check_ports
-from drake_disasm.scenario import PlacementConfig, Scenario, validate
+from drake_disasm.ports import Health, check_ports
+from drake_disasm.scenario import Scenario, validate
+from drake_disasm.stations.base import Beginning, Station, nominal_groove_pose
 from drake_disasm.systems.outside_force import OutsideForce
 from drake_disasm.timing import newest_step
-
-
-class Station(Diagram):
-    """A diagram with station ports, and what the task layer must know of it.
-
-    Attributes:
-        scenario: what it was built from.
-        table: its port table.
-        arm: the device whose position is commanded ("iiwa", or "bolt").
-        has_velocity_input: whether `<arm>.velocity` is an input as well.
-        control_period: at which `<arm>.position` is read [s].
-        grip_command: what to send to `gripper.position` [m]; None has no gripper.
-        coordinates: maps the arm's coordinates to X_GB and back.
-        start: the coordinates (n,) at which an episode starts, X_GB = identity.
-        X_SB: the bolt in the sensor frame, as grasped.
-        payload_mass, p_SoScm_S: what the sensor carries [kg], (3,) [m].
-        X_WG: the groove's nominal frame in the world.
-    """
-
-    scenario: Scenario
-    table: tuple[Port, ...]
-    arm: str
-    has_velocity_input: bool
-    control_period: float
-    grip_command: float | None = None
-    coordinates: Coordinates
-    start: np.ndarray
-    X_SB: RigidTransform
-    payload_mass: float
-    p_SoScm_S: np.ndarray
-    X_WG: RigidTransform
 
 
 class SimulatedStation(Station):
@@ -110,6 +78,7 @@ class SimulatedStation(Station):
             contact_model="hydroelastic_with_fallback",
         )
         self.plant, self.scene_graph = AddMultibodyPlant(config, builder)
+        self.g_W = self.plant.gravity_field().gravity_vector()
         self.X_WG = nominal_groove_pose(self.scenario.placement)
         world = self.plant.world_frame()
         return self.plant.AddFrame(FixedOffsetFrame("groove_nominal", world, self.X_WG))
@@ -146,12 +115,6 @@ class SimulatedStation(Station):
             builder.ExportOutput(
                 self.sensor.GetOutputPort(quantity), f"ft_sensor.{quantity}"
             )
-
-    @property
-    def payload(self) -> Payload:
-        """What is known to hang on the sensor."""
-        g_W = self.plant.gravity_field().gravity_vector()
-        return Payload(self.payload_mass, self.p_SoScm_S, g_W)
 
     def _add_ready_device(self, builder: DiagramBuilder, name: str) -> None:
         """Exports health and sample time of a device that never fails."""
@@ -276,6 +239,24 @@ class SimulatedStation(Station):
         simulator.AdvanceTo(self.settling_time)
         return simulator.get_mutable_context()
 
+    @property
+    def random_sources(self) -> tuple[RandomSource, ...]:
+        """See Station."""
+        return (self.sensor_noise,)
+
+    def begin(self, context: Context, effects: Sequence[Effect]) -> Beginning:
+        """See Station: the bolt is gripped at A, at rest, and the sensor is zeroed."""
+        settled = self.settled(effects)
+        self.set_effects(context, effects)
+        copy_state(settled, context)
+        return Beginning(self.start, self.reading_at_zeroing(settled))
+
+    def bolt_is_out(self, context: Context, lift_needed: float) -> bool:
+        """See Station."""
+        X_GnB: RigidTransform = self.GetOutputPort("bolt_pose").Eval(context)
+        X_GB = self.true_groove_pose(context).inverse() @ X_GnB
+        return bool(X_GB.translation()[1] >= lift_needed)
+
     def reading_at_zeroing(self, context: Context) -> np.ndarray:
         """Returns what the sensor reads, noise averaged away, (6,) [f; tau] in S."""
         return self.sensor.reading_at_zeroing(self.part_context(self.sensor, context))
@@ -350,7 +331,13 @@ class _BodyPose(LeafSystem):
         output.set_value(self._X_GW @ X_WB)
 
 
-def nominal_groove_pose(placement: PlacementConfig) -> RigidTransform:
-    """Returns X_WGn: x along the groove at `yaw`, y up, z across."""
-    R = RollPitchYaw(np.pi / 2, 0.0, placement.yaw).ToRotationMatrix()
-    return RigidTransform(R, placement.p_WG)
+def copy_state(source: Context, target: Context) -> None:
+    """Copies discrete and abstract state between Contexts of one system.
+
+    Drake's own copy (SetTimeStateAndParametersFrom) takes root Contexts only, and
+    a station's is a part of the diagram's.
+    """
+    target.get_mutable_discrete_state().SetFrom(source.get_discrete_state())
+    values = target.get_mutable_abstract_state()
+    for i in range(source.num_abstract_states()):
+        values.get_mutable_value(i).SetFrom(source.get_abstract_state().get_value(i))

@@ -92,6 +92,13 @@ class PoseTarget(LeafSystem):
         state.set_value(self._executed, action)
         return EventStatus.Succeeded()
 
+    def set_start(self, context: Context, start: np.ndarray) -> None:
+        """Puts the coordinates (n,) at which an episode starts into a Context."""
+        pose = pose_to_vector(self._coordinates.pose(start))
+        context.SetDiscreteState(self._from, start)
+        context.SetDiscreteState(self._to, start)
+        context.SetDiscreteState(self._pose, pose)
+
     def set_effects(self, context: Context, effects: Sequence[MotionEffect]) -> None:
         """Puts effects, in the order of the chain, into this system's Context.
 

@@ -9,7 +9,8 @@ policy -> imprecision -> pose target -> motion -> station -> observation
 
 import copy
 import dataclasses
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -40,13 +41,15 @@ from drake_disasm.effects import (
 from drake_disasm.lock import lift_needed
 from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
 from drake_disasm.scenario import Scenario, draw, with_values
-from drake_disasm.stations import SimulatedStation, Station, make_station
+from drake_disasm.stations import Station, make_station
 from drake_disasm.systems.imprecision import ImprecisionNoise, clamped
 from drake_disasm.systems.observation import Mounting, ObservationProcessor
 from drake_disasm.systems.policy import Policy, PolicySystem
 from drake_disasm.systems.pose_target import PoseTarget
 from drake_disasm.systems.task_monitor import TaskMonitor
 from drake_disasm.timing import MOTION_DELAY, POLICY_DELAY, boundary
+
+_RANDOM = 2  # sources of randomness: a simulated sensor's noise, and the imprecision
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,6 +89,7 @@ class TaskSimulation:
         policy: observation (12,) to action (6,), or None.
         observers: what watches it (a view); each one's `connect(builder, self)` is
             called before the diagram is built.
+        make: makes another station than the simulated one of that model: hardware.
     """
 
     def __init__(
@@ -94,8 +98,10 @@ class TaskSimulation:
         model: str,
         policy: Policy | None = None,
         observers: Sequence["Observer"] = (),
+        make: Callable[[Scenario], Station] | None = None,
     ) -> None:
         self.scenario, self.model = scenario, model
+        self._make = make or functools.partial(make_station, model)
         self.drawn: dict[str, float] = {}
         self._policy, self._observers = policy, tuple(observers)
         self.steps = 0
@@ -107,9 +113,7 @@ class TaskSimulation:
         self._built = scenario
         self.bounds = action_bounds(scenario.task)
         builder = DiagramBuilder()
-        self.station = builder.AddNamedSystem(
-            "station", make_station(self.model, scenario)
-        )
+        self.station = builder.AddNamedSystem("station", self._make(scenario))
         self._add_systems(builder, scenario)
         for observer in self._observers:
             observer.connect(builder, self)
@@ -143,11 +147,13 @@ class TaskSimulation:
         wanted = copy.deepcopy(
             list(self._built.effects if effects is None else effects)
         )
-        if self._start is None or wanted != self._set:
+        if self._start is None or wanted != self._set or not self.station.repeats:
             self._start, self._set = self._starting_context(wanted), wanted
         self.context.SetTimeStateAndParametersFrom(self._start)
-        seeds = np.random.SeedSequence(seed).generate_state(len(self._random_sources))
-        for source, number in zip(self._random_sources, seeds, strict=True):
+        sources = self._random_sources
+        # From the end, so that the imprecision's is the same where sensors are real.
+        seeds = np.random.SeedSequence(seed).generate_state(_RANDOM)[-len(sources) :]
+        for source, number in zip(sources, seeds, strict=True):
             source.SetRandomContext(
                 source.GetMyMutableContextFromRoot(self.context),
                 RandomGenerator(int(number)),
@@ -179,6 +185,7 @@ class TaskSimulation:
         self._follow()
         self.steps += 1
         self.simulator.AdvanceTo(boundary(self.steps, self.scenario.task.period))
+        self.station.check()
         terms = self.evaluate(self.monitor, "reward_terms")
         code = self.evaluate(self.monitor, "outcome")
         named = dict(zip(REWARD_TERMS, terms.tolist(), strict=True))
@@ -236,10 +243,8 @@ class TaskSimulation:
 
     def bolt_is_out(self) -> bool:
         """Returns whether the bolt truly is out, which only a simulation knows."""
-        X_GnB = self.evaluate(self.station, "bolt_pose")
-        station_context = self.station.GetMyMutableContextFromRoot(self.context)
-        X_GB = self.station.true_groove_pose(station_context).inverse() @ X_GnB
-        return bool(X_GB.translation()[1] >= self._lift_needed)
+        mine = self.station.GetMyMutableContextFromRoot(self.context)
+        return self.station.bolt_is_out(mine, self._lift_needed)
 
     def _add_systems(self, builder: DiagramBuilder, scenario: Scenario) -> None:
         station, task = self.station, scenario.task
@@ -259,7 +264,7 @@ class TaskSimulation:
             "pose_target",
             PoseTarget(station.coordinates, station.start, task.period),
         )
-        self._random_sources = [station.sensor_noise, noise]
+        self._random_sources = [*station.random_sources, noise]
         connect = builder.Connect
         connect(
             station.GetOutputPort(f"{station.arm}.position_measured"),
@@ -306,32 +311,31 @@ class TaskSimulation:
 
     def _starting_context(self, effects: Sequence[Effect]) -> Context:
         """Returns the diagram's Context at t = 0: settled at A and zeroed."""
-        settled = self.station.settled(effects)
         root = self.diagram.CreateDefaultContext()
-        mine = self.station.GetMyMutableContextFromRoot(root)
-        self.station.set_effects(mine, effects)
-        copy_state(settled, mine)
-        self.pose_target.set_effects(
-            self.pose_target.GetMyMutableContextFromRoot(root), motion_chain(effects)
+        begun = self.station.begin(
+            self.station.GetMyMutableContextFromRoot(root), effects
         )
+        target = self.pose_target.GetMyMutableContextFromRoot(root)
+        self.pose_target.set_effects(target, motion_chain(effects))
+        self.pose_target.set_start(target, begun.position)
         self._integrator.GetMyMutableContextFromRoot(root).SetDiscreteState(
-            self.station.start
+            begun.position
         )
         self.processor.zero(
             self.processor.GetMyMutableContextFromRoot(root),
-            self.station.reading_at_zeroing(settled),
+            begun.reading,
         )
         return root
 
 
-def make_processor(station: SimulatedStation, variant: str) -> ObservationProcessor:
+def make_processor(station: Station, variant: str) -> ObservationProcessor:
     """Returns the observation processing that fits a station, not yet zeroed."""
     mounting = Mounting(
         station.X_SB,
         station.X_WG.rotation(),
         station.payload_mass,
         station.p_SoScm_S,
-        station.plant.gravity_field().gravity_vector(),
+        station.g_W,
     )
     return ObservationProcessor(station.coordinates, mounting, variant)
 
@@ -366,18 +370,6 @@ def add_motion(
     if station.has_velocity_input:
         connect(velocity, station.GetInputPort(f"{station.arm}.velocity"))
     return motion
-
-
-def copy_state(source: Context, target: Context) -> None:
-    """Copies discrete and abstract state between Contexts of one system.
-
-    Drake's own copy (SetTimeStateAndParametersFrom) takes root Contexts only, and
-    a station's is a part of the diagram's.
-    """
-    target.get_mutable_discrete_state().SetFrom(source.get_discrete_state())
-    values = target.get_mutable_abstract_state()
-    for i in range(source.num_abstract_states()):
-        values.get_mutable_value(i).SetFrom(source.get_abstract_state().get_value(i))
 
 
 class Observer(Protocol):

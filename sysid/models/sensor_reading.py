@@ -11,7 +11,7 @@ from drake_disasm.devices.ft_sensor import Payload
 from drake_disasm.effects import SensorEffect, SensorMemoryEffect
 from drake_disasm.lock import bolt_inertia
 from drake_disasm.scenario import Scenario
-from drake_disasm.stations.simulated import nominal_groove_pose
+from drake_disasm.stations.base import nominal_groove_pose
 from drake_disasm.tool import Tool
 from sysid.models.base import Array
 

@@ -1,0 +1,7 @@
+"""The one exception of the codecs."""
+
+from drake_disasm.errors import DisasmError
+
+
+class CodecError(DisasmError):
+    """Something is no packet of the protocol, or can't be said in it."""

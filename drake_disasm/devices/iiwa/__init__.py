@@ -1,0 +1,5 @@
+"""KUKA LBR iiwa behind drake-iiwa-driver, by LCM."""
+
+from drake_disasm.devices.iiwa.status import IiwaStatusMonitor
+
+__all__ = ["IiwaStatusMonitor"]

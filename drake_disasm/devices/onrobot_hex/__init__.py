@@ -1,0 +1,23 @@
+"""The OnRobot HEX force/torque sensor, over its Compute Box's UDP protocol."""
+
+from drake_disasm.devices.onrobot_hex.client import HexClient
+from drake_disasm.devices.onrobot_hex.codec import (
+    Command,
+    Request,
+    Sample,
+    decode_request,
+    decode_sample,
+    encode_request,
+    encode_sample,
+)
+
+__all__ = [
+    "Command",
+    "HexClient",
+    "Request",
+    "Sample",
+    "decode_request",
+    "decode_sample",
+    "encode_request",
+    "encode_sample",
+]

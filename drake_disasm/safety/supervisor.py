@@ -1,0 +1,111 @@
+"""Decides what is sent to the arm: what is wanted, or the place where it was held."""
+
+import enum
+from collections.abc import Sequence
+
+import numpy as np
+
+from drake_disasm.safety.guards import Guard, Situation
+
+_LEAP = 0.05  # rad between two looks, 10 rad/s at the usual period: no iiwa does that
+
+
+class Mode(enum.Enum):
+    """What the supervisor lets through."""
+
+    WAITING = "waiting"  # nothing moves until all is ready and command = measurement
+    ACTIVE = "active"
+    HOLD = "hold"  # latched: only `resume` ends it
+
+
+class Supervisor:
+    """Lets commands through while no guard objects; else latches a hold.
+
+    The hold is at the measured position. It lives here and not in a Context, since
+    the robot does not go back in time when a diagram is reset.
+
+    Attributes:
+        mode: see Mode.
+        reason: why it holds or waits; empty while active.
+        held_since: when it tripped, by the devices' clock [s]; NaN without a hold.
+        clamped: how many commands were shortened to the velocity limit.
+
+    Args:
+        guards: asked in their order; the first that objects is the reason.
+        max_step: (7,) from one command to the next [rad].
+        start_tolerance: between command and measurement when motion begins [rad].
+    """
+
+    def __init__(
+        self, guards: Sequence[Guard], max_step: np.ndarray, start_tolerance: float
+    ) -> None:
+        self.mode, self.reason, self.clamped = Mode.WAITING, "not begun", 0
+        self.held_since = np.nan
+        self._guards, self._max_step = tuple(guards), max_step
+        self._tolerance = start_tolerance
+        self._held: np.ndarray | None = None
+        self._sent: np.ndarray | None = None
+
+    def command(self, situation: Situation) -> np.ndarray:
+        """Returns what to send (7,) [rad]; NaN while nothing was ever measured."""
+        if self.mode is Mode.WAITING:
+            self._wait(situation)
+        elif self.mode is Mode.ACTIVE:
+            self._watch(situation)
+        wanted = situation.q_wanted if self.mode is Mode.ACTIVE else self._held
+        if wanted is None:
+            return np.full_like(situation.q_measured, np.nan)
+        self._sent = self._within_step(wanted)
+        return self._sent
+
+    def resume(self) -> None:
+        """Ends a hold: motion begins again once all is ready and nothing leaps."""
+        if self.mode is Mode.HOLD:
+            self.mode, self.reason, self._held = Mode.WAITING, "resuming", None
+            self.held_since = np.nan
+
+    def trip(self, reason: str, q_held: np.ndarray, now: float) -> None:
+        """Latches a hold (7,) [rad] at a time [s]; the first reason stays."""
+        if self.mode is not Mode.HOLD:
+            self.mode, self.reason, self._held = Mode.HOLD, reason, q_held
+            self.held_since = now
+
+    def _wait(self, situation: Situation) -> None:
+        if self._held is None and np.isfinite(situation.q_measured).all():
+            self._held = self._sent = situation.q_measured
+        self.reason = self._objection(situation) or self._apart(situation)
+        if not self.reason:
+            self.mode = Mode.ACTIVE
+
+    def _watch(self, situation: Situation) -> None:
+        if reason := self._objection(situation):
+            self.trip(reason, _believed(situation), situation.now)
+
+    def _objection(self, situation: Situation) -> str:
+        return next((r for guard in self._guards if (r := guard(situation))), "")
+
+    def _apart(self, situation: Situation) -> str:
+        apart = float(np.abs(situation.q_wanted - situation.q_measured).max())
+        if apart <= self._tolerance:
+            return ""
+        return f"the command is {apart:.4f} rad from where the arm is"
+
+    def _within_step(self, wanted: np.ndarray) -> np.ndarray:
+        """Returns the way there, no further than one step may lead."""
+        assert self._sent is not None
+        step = wanted - self._sent
+        short = np.clip(step, -self._max_step, self._max_step)
+        self.clamped += int(not np.array_equal(step, short))
+        return self._sent + short
+
+
+def _believed(situation: Situation) -> np.ndarray:
+    """Returns where the arm is (7,), as last believed.
+
+    A measurement that is NaN, or that leaped, is no place to go to.
+    """
+    now, before = situation.q_measured, situation.q_before
+    if not np.isfinite(now).all():
+        return before
+    leaped = np.isfinite(before).all() and np.abs(now - before).max() > _LEAP
+    return before if leaped else now

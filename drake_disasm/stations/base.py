@@ -1,0 +1,114 @@
+"""What every station has, simulated or real."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.systems.framework import Context, Diagram
+from pydrake.systems.primitives import RandomSource
+
+from drake_disasm.coordinates import ArmCoordinates, Coordinates
+from drake_disasm.devices.ft_sensor import Payload
+from drake_disasm.effects import BoltMotion, Effect
+from drake_disasm.ports import Port
+from drake_disasm.scenario import PlacementConfig, Scenario
+from drake_disasm.tool import Tool
+
+
+@dataclasses.dataclass(frozen=True)
+class Beginning:
+    """Where an episode begins.
+
+    Attributes:
+        position: (n,) coordinates from which motion is commanded.
+        reading: (6,) of the sensor there, noise averaged away.
+    """
+
+    position: np.ndarray
+    reading: np.ndarray
+
+
+class Station(Diagram):
+    """A diagram with station ports, and what the task layer must know of it.
+
+    Attributes:
+        scenario: what it was built from.
+        table: its port table.
+        arm: the device whose position is commanded ("iiwa", or "bolt").
+        has_velocity_input: whether `<arm>.velocity` is an input as well.
+        control_period: at which `<arm>.position` is read [s].
+        grip_command: what to send to `gripper.position` [m]; None has no gripper.
+        repeats: whether what began once begins the same again, by its Context alone.
+        coordinates: maps the arm's coordinates to X_GB and back.
+        start: the coordinates (n,) at which an episode starts, X_GB = identity.
+        X_SB: the bolt in the sensor frame, as grasped.
+        payload_mass, p_SoScm_S: what the sensor carries [kg], (3,) [m].
+        X_WG: the groove's nominal frame in the world.
+        g_W: gravity (3,) [m/s^2].
+    """
+
+    scenario: Scenario
+    table: tuple[Port, ...]
+    arm: str
+    has_velocity_input: bool
+    control_period: float
+    grip_command: float | None = None
+    repeats: bool = True
+    coordinates: Coordinates
+    start: np.ndarray
+    X_SB: RigidTransform
+    payload_mass: float
+    p_SoScm_S: np.ndarray
+    X_WG: RigidTransform
+    g_W: np.ndarray
+
+    @property
+    def payload(self) -> Payload:
+        """What is known to hang on the sensor."""
+        return Payload(self.payload_mass, self.p_SoScm_S, self.g_W)
+
+    @property
+    def random_sources(self) -> tuple[RandomSource, ...]:
+        """What is random in it: seeded anew in each episode."""
+        return ()
+
+    def begin(self, context: Context, effects: Sequence[Effect]) -> Beginning:
+        """Brings the station to where an episode begins.
+
+        Args:
+            context: its own, in a diagram whose time is zero.
+            effects: that act in it.
+        """
+        raise NotImplementedError  # Drake's metaclass leaves no room for ABC's
+
+    def follow(
+        self, context: Context, effects: Sequence[Effect], bolt: BoltMotion
+    ) -> None:
+        """Brings what depends on the bolt's motion up to date; see the simulated."""
+
+    def bolt_is_out(self, context: Context, lift_needed: float) -> bool:
+        """Returns whether the bolt truly has risen so far [m]; False: nobody knows."""
+        return False
+
+    def check(self) -> None:
+        """Raises DisasmError if the station does not obey any more."""
+
+    def _set_cell_geometry(self) -> Tool:
+        """Takes from the scenario where arm, tool and lock are; returns the tool."""
+        scenario, tool = self.scenario, Tool.from_models(self.scenario)
+        self.control_period = scenario.arm.control_period
+        self.X_WG = nominal_groove_pose(scenario.placement)
+        self.X_SB = tool.X_SB
+        self.payload_mass, self.p_SoScm_S = tool.mass, tool.p_SoScm_S
+        self.coordinates = ArmCoordinates(
+            scenario.arm, self.X_WG, tool.X_FB, scenario.task.period
+        )
+        self.start = self.coordinates.start(RigidTransform())
+        return tool
+
+
+def nominal_groove_pose(placement: PlacementConfig) -> RigidTransform:
+    """Returns X_WGn: x along the groove at `yaw`, y up, z across."""
+    R = RollPitchYaw(np.pi / 2, 0.0, placement.yaw).ToRotationMatrix()
+    return RigidTransform(R, placement.p_WG)

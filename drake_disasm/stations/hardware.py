@@ -1,0 +1,425 @@
+"""The real cell: the simulated one's ports, with devices behind them."""
+
+import functools
+import time
+from collections.abc import Callable, Sequence
+from typing import Self
+
+import numpy as np
+from drake import lcmt_iiwa_command, lcmt_iiwa_status
+from pydrake.lcm import DrakeLcm
+from pydrake.manipulation import (
+    IiwaCommandSender,
+    IiwaControlMode,
+    IiwaStatusReceiver,
+)
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.lcm import (
+    LcmInterfaceSystem,
+    LcmPublisherSystem,
+    LcmSubscriberSystem,
+)
+from pydrake.systems.primitives import Gain, PassThrough
+
+from drake_disasm.devices.iiwa import IiwaStatusMonitor
+from drake_disasm.devices.onrobot_hex import HexClient
+from drake_disasm.devices.reading import Clock, Reading
+from drake_disasm.devices.robotiq import RobotiqClient, RobotiqSettings
+from drake_disasm.effects import Effect
+from drake_disasm.errors import DisasmError
+from drake_disasm.models import add_arm
+from drake_disasm.ports import CELL_PORTS, Health, check_ports
+from drake_disasm.safety import Mode, Supervisor, guards
+from drake_disasm.scenario import ArmConfig, Scenario, validate
+from drake_disasm.stations.base import Beginning, Station
+from drake_disasm.stations.hardware_config import HardwareConfig
+from drake_disasm.systems.device_reader import DeviceReader, Readable
+from drake_disasm.systems.gripper_writer import GripperWriter
+from drake_disasm.systems.observation import Mounting
+from drake_disasm.systems.safety_filter import SafetyFilter
+from drake_disasm.timing import COMMAND_DELAY
+
+#: drake-iiwa-driver refuses commands within 0.25 s of its first status.
+_LISTENS_FIRST = 0.3
+_POLL = 0.001  # s: LCM keeps one message of a channel, the newest
+_GRIPPER_PERIOD = 0.05  # s
+_SIZES = {"iiwa": 7, "gripper": 2, "ft_sensor": 6}
+_VALUES = {
+    "iiwa": "position_measured",
+    "gripper": "state_measured",
+    "ft_sensor": "wrench",
+}
+
+
+class HoldError(DisasmError):
+    """The robot is held where it is; only `resume` ends that."""
+
+
+class HardwareStation(Station):
+    """KUKA iiwa, OnRobot HEX and Robotiq 2F-140 behind their own protocols.
+
+    Commands reach the arm through a SafetyFilter. Devices are connected by `begin`,
+    and left alone by `close`. A dry run reads them and sends nothing.
+
+    @system
+    name: HardwareStation
+    input_ports:
+    - iiwa.position
+    - gripper.position
+    output_ports:
+    - iiwa.position_commanded
+    - iiwa.position_measured
+    - iiwa.velocity_estimated
+    - iiwa.torque_commanded
+    - iiwa.torque_measured
+    - iiwa.torque_external
+    - iiwa.health
+    - iiwa.time_measured
+    - gripper.state_measured
+    - gripper.health
+    - gripper.time_measured
+    - ft_sensor.wrench
+    - ft_sensor.health
+    - ft_sensor.time_measured
+    @endsystem
+
+    Attributes:
+        supervisor: lets commands through, or holds.
+        devices: clients by name.
+
+    Args:
+        scenario: of the task; it may have no effects: reality has its own.
+        config: where the devices are, and limits.
+        dry_run: whether nothing is sent to any device that moves.
+        clock: tells when samples come [s].
+        wait: lets a time [s] pass while devices answer.
+        lcm: to reach the arm by, instead of the configured one.
+    """
+
+    table = CELL_PORTS
+    arm = "iiwa"
+    has_velocity_input = False
+    repeats = False
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        config: HardwareConfig,
+        dry_run: bool = False,
+        clock: Clock = time.monotonic,
+        wait: Callable[[float], None] = time.sleep,
+        lcm: DrakeLcm | None = None,
+    ) -> None:
+        super().__init__()
+        validate(scenario)
+        refuse_what_is_simulated(scenario)
+        self.scenario, self.config, self.dry_run = scenario, config, dry_run
+        self._clock, self._wait = clock, wait
+        self._lcm = lcm or DrakeLcm(config.iiwa.lcm_url)
+        self._checked = DrakeLcm("memq://")  # what the monitor has found good
+        self._set_cell_geometry()
+        self.g_W = MultibodyPlant(0.0).gravity_field().gravity_vector()
+        self.grip_command = 0.0  # closes until the fingers stall on the bolt
+        self._connect_devices()
+        self.supervisor = _supervisor(scenario.arm, config)
+        builder = DiagramBuilder()
+        self._wire_arm(builder)
+        self._wire_gripper(builder)
+        for name in self.devices:
+            self._export_reader(builder, name)
+        builder.BuildInto(self)
+        check_ports(self, self.table)
+
+    def begin(self, context: Context, effects: Sequence[Effect]) -> Beginning:
+        """See Station: waits for every device, and zeroes the sensor where the arm is.
+
+        Raises:
+            DisasmError: effects are set; a device does not answer; the arm is not at
+                the start; the robot is held.
+        """
+        refuse_effects(effects)
+        self.check()
+        self.connect()
+        self._await_ready()
+        position = self.devices["iiwa"].read().values
+        self._refuse_far_start(position)
+        reading = self._tare()
+        self.safety_filter.zero(reading)
+        self.safety_filter.begin()
+        return Beginning(position, reading)
+
+    def check(self) -> None:
+        """Raises HoldError, with the reason, while the robot is held."""
+        if self.supervisor.mode is Mode.HOLD:
+            raise HoldError(
+                f"the robot is held: {self.supervisor.reason}; mend that, then resume"
+            )
+
+    def resume(self) -> None:
+        """Ends a hold; nothing moves until all is ready and nothing would leap."""
+        self.supervisor.resume()
+
+    def healths(self) -> dict[str, Health]:
+        """Returns how each device is now."""
+        now, limits = self._clock(), self.config.safety
+        return {
+            name: device.read().health(now, limits.stale_after(name))
+            for name, device in self.devices.items()
+        }
+
+    def readings(self) -> dict[str, Reading]:
+        """Returns the newest reading of each device."""
+        return {name: device.read() for name, device in self.devices.items()}
+
+    def connect(self) -> None:
+        """Begins to listen to the devices; harmless twice."""
+        self._hex.start()
+        self._gripper.start()
+
+    def close(self) -> None:
+        """Leaves the devices alone: no thread and no socket stays."""
+        self._hex.stop()
+        self._gripper.stop()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def pump(self) -> None:
+        """Takes what the arm has sent, where no simulator does."""
+        for lcm in (self._lcm, self._checked):
+            while lcm.HandleSubscriptions(0):
+                pass
+
+    def _connect_devices(self) -> None:
+        config, sensor = self.config, self.config.ft_sensor
+        self._hex = HexClient(
+            sensor.address, sensor.port, sensor.period, sensor.filter_hz, self._clock
+        )
+        grip = config.gripper
+        settings = RobotiqSettings(
+            transport=grip.transport,
+            address=grip.address,
+            port=grip.port,
+            device_id=grip.device_id,
+            speed=grip.speed,
+            force=grip.force,
+            activate=grip.activate and not self.dry_run,
+        )
+        self._gripper = RobotiqClient(settings, self._clock)
+        iiwa = config.iiwa
+        self._monitor = IiwaStatusMonitor(
+            self._lcm,
+            iiwa.status_channel,
+            iiwa.status_period,
+            self._clock,
+            self._checked,
+        )
+        self.devices: dict[str, Readable] = {
+            "iiwa": self._monitor,
+            "gripper": self._gripper,
+            "ft_sensor": self._hex,
+        }
+
+    @functools.cached_property
+    def _mounting(self) -> Mounting:
+        return Mounting(
+            self.X_SB,
+            self.X_WG.rotation(),
+            self.payload_mass,
+            self.p_SoScm_S,
+            self.g_W,
+        )
+
+    def _wire_arm(self, builder: DiagramBuilder) -> None:
+        add, connect, iiwa = builder.AddNamedSystem, builder.Connect, self.config.iiwa
+        add("lcm", LcmInterfaceSystem(self._lcm))
+        add("lcm_checked", LcmInterfaceSystem(self._checked))
+        status = add(
+            "iiwa_status",
+            LcmSubscriberSystem.Make(
+                iiwa.status_channel,
+                lcmt_iiwa_status,
+                self._checked,
+                use_cpp_serializer=True,
+            ),
+        )
+        receiver = add("iiwa_receiver", IiwaStatusReceiver())
+        connect(status.get_output_port(), receiver.get_input_port())
+        for quantity in (
+            "position_commanded",
+            "velocity_estimated",
+            "torque_external",
+        ):
+            builder.ExportOutput(receiver.GetOutputPort(quantity), f"iiwa.{quantity}")
+        for quantity in ("torque_commanded", "torque_measured"):
+            # The driver sends these two with KUKA's sign (drake/manipulation/README).
+            drakes = add(f"iiwa_{quantity}", Gain(-1.0, 7))
+            connect(receiver.GetOutputPort(quantity), drakes.get_input_port())
+            builder.ExportOutput(drakes.get_output_port(), f"iiwa.{quantity}")
+        self._wire_command(builder)
+
+    def _wire_command(self, builder: DiagramBuilder) -> None:
+        """Wires the way of a command: through the safety filter, then to the arm."""
+        add, connect = builder.AddNamedSystem, builder.Connect
+        period = self.control_period
+        self.safety_filter = add(
+            "safety_filter",
+            SafetyFilter(
+                self.supervisor,
+                self.devices,
+                self.coordinates,
+                self._mounting,
+                period,
+                self._clock,
+            ),
+        )
+        builder.ExportInput(
+            self.safety_filter.GetInputPort("position"), "iiwa.position"
+        )
+        if self.dry_run:
+            return
+        sender = add("iiwa_sender", IiwaCommandSender(7, IiwaControlMode.kPositionOnly))
+        publisher = add(
+            "iiwa_command",
+            LcmPublisherSystem.Make(
+                self.config.iiwa.command_channel,
+                lcmt_iiwa_command,
+                self._lcm,
+                publish_period=period,
+                publish_offset=COMMAND_DELAY,
+                use_cpp_serializer=True,
+            ),
+        )
+        connect(self.safety_filter.get_output_port(), sender.get_input_port(0))
+        connect(sender.get_output_port(), publisher.get_input_port())
+
+    def _wire_gripper(self, builder: DiagramBuilder) -> None:
+        if self.dry_run:
+            unheard = builder.AddNamedSystem("gripper_unheard", PassThrough(1))
+            builder.ExportInput(unheard.get_input_port(), "gripper.position")
+            return
+        writer = builder.AddNamedSystem(
+            "gripper_writer",
+            GripperWriter(self._gripper.command, self.supervisor, _GRIPPER_PERIOD),
+        )
+        builder.ExportInput(writer.get_input_port(), "gripper.position")
+
+    def _export_reader(self, builder: DiagramBuilder, name: str) -> None:
+        """Exports a device's health and time, and what its client has checked.
+
+        The arm's measured position is of these: nothing that is not finite gets on.
+        """
+        reader = builder.AddNamedSystem(
+            f"{name}_reader",
+            DeviceReader(
+                self.devices[name],
+                _SIZES[name],
+                self.control_period,
+                self.config.safety.stale_after(name),
+                self._clock,
+            ),
+        )
+        port = reader.GetOutputPort("values")
+        builder.ExportOutput(port, f"{name}.{_VALUES[name]}")
+        for quantity in ("health", "time_measured"):
+            builder.ExportOutput(reader.GetOutputPort(quantity), f"{name}.{quantity}")
+
+    def _await_ready(self) -> None:
+        """Waits until all have sent, the arm for so long that its driver listens."""
+        begun = self._clock()
+        while True:
+            self.pump()
+            health = self.healths()
+            waited = self._clock() - begun
+            not_ready = [n for n, h in health.items() if h is not Health.READY]
+            if not not_ready and waited >= _LISTENS_FIRST:
+                return
+            if waited > self.config.ready_timeout:
+                raise DisasmError(self._silence(not_ready))
+            self._wait(_POLL)
+
+    def _silence(self, names: Sequence[str]) -> str:
+        """Returns what devices that are not ready say of themselves."""
+        readings, health = self.readings(), self.healths()
+        each = [
+            f"{name} is {health[name].name}"
+            + (f" ({readings[name].error})" if readings[name].error else "")
+            for name in names
+        ]
+        return (
+            f"not ready after {self.config.ready_timeout:g} s: {'; '.join(each)}; "
+            "see docs/hardware.md, what to check first"
+        )
+
+    def _refuse_far_start(self, position: np.ndarray) -> None:
+        away = np.abs(position - self.start)
+        joint = int(np.argmax(away))
+        if away[joint] > self.config.start_distance:
+            start = ", ".join(f"{np.rad2deg(q):.2f}" for q in self.start)
+            raise DisasmError(
+                f"joint {joint + 1} is {np.rad2deg(away[joint]):.2f} degrees from "
+                f"where an episode starts; jog the arm to {start} degrees"
+            )
+
+    def _tare(self) -> np.ndarray:
+        """Returns the mean (6,) of readings, each of another time."""
+        taken: dict[float, np.ndarray] = {}
+        deadline = self._clock() + self.config.ready_timeout
+        while len(taken) < self.config.tare_samples:
+            if self._clock() > deadline:
+                raise DisasmError(self._silence(["ft_sensor"]))
+            self._wait(_POLL)
+            self.pump()
+            reading = self.devices["ft_sensor"].read()
+            taken[reading.time] = reading.values
+        return np.asarray(np.mean(list(taken.values()), axis=0))
+
+
+def refuse_what_is_simulated(scenario: Scenario) -> None:
+    """Refuses what a scenario asks of a simulation alone.
+
+    Raises:
+        DisasmError: names the first such line.
+    """
+    refuse_effects(scenario.effects)
+    if scenario.randomisation:
+        parameter = scenario.randomisation[0].parameter
+        raise DisasmError(
+            f"randomisation.0 ({parameter}): hardware can't be drawn anew; take it out"
+        )
+    if scenario.contact.model != "hydroelastic":
+        raise DisasmError(
+            f"contact.model: '{scenario.contact.model}' is of the twin alone; take it "
+            "out for hardware"
+        )
+
+
+def refuse_effects(effects: Sequence[Effect]) -> None:
+    """Refuses effects: they act on a simulated plant, and reality has its own.
+
+    Raises:
+        DisasmError: names the first.
+    """
+    if effects:
+        raise DisasmError(
+            f"effects.0 (!{type(effects[0]).__name__}): acts on a simulated plant, and "
+            "hardware has its own effects; take it out for --station hardware"
+        )
+
+
+def _supervisor(arm: ArmConfig, config: HardwareConfig) -> Supervisor:
+    """Returns the supervisor of an arm, by its model's limits and the file's."""
+    plant = MultibodyPlant(0.0)
+    add_arm(plant, arm.model)
+    plant.Finalize()
+    limits = config.safety
+    fastest = plant.GetVelocityUpperLimits() * limits.velocity_share
+    return Supervisor(
+        guards(limits, plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits()),
+        fastest * arm.control_period,
+        limits.start_tolerance,
+    )

@@ -1,0 +1,91 @@
+"""Where the devices are and what they may do: the file of --hardware-config."""
+
+import dataclasses
+from pathlib import Path
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.quantity import check, quantity
+from drake_disasm.safety import SafetyConfig
+from drake_disasm.scenario.strict_yaml import parse
+
+
+@dataclasses.dataclass
+class IiwaConnection:
+    """The arm, behind drake-iiwa-driver."""
+
+    lcm_url: str = quantity("", "", "of LCM; empty is LCM's own default")
+    command_channel: str = quantity("IIWA_COMMAND", "", "LCM channel")
+    status_channel: str = quantity("IIWA_STATUS", "", "LCM channel")
+    status_period: float = quantity(
+        0.005, "s", "between the driver's messages", low=0.001, high=0.1
+    )
+
+
+@dataclasses.dataclass
+class SensorConnection:
+    """The OnRobot HEX behind its Compute Box."""
+
+    address: str = quantity("192.168.1.1", "", "of the Compute Box")
+    port: int = quantity(49152, "1", "UDP", low=1, high=65535)
+    period: float = quantity(0.01, "s", "between samples", low=0.002, high=0.5)
+    filter_hz: float = quantity(
+        15.0, "Hz", "of the box's low-pass: 0 (none), 500, 150, 50, 15, 5 or 1.5",
+        low=0.0, high=500.0,
+    )  # fmt: skip
+
+
+@dataclasses.dataclass
+class GripperConnection:
+    """The Robotiq 2F-140 by Modbus."""
+
+    transport: str = quantity(
+        "rtu_over_tcp", "", "how its registers are reached",
+        choices=("rtu_over_tcp", "tcp", "serial"),
+    )  # fmt: skip
+    address: str = quantity("192.168.1.11", "", "host, or the serial port's path")
+    port: int = quantity(502, "1", "TCP", low=1, high=65535)
+    device_id: int = quantity(9, "1", "Modbus", low=0, high=247)
+    speed: float = quantity(0.05, "m/s", "of the fingers", low=0.03, high=0.25)
+    force: float = quantity(60.0, "N", "of the fingers", low=10.0, high=125.0)
+    activate: bool = quantity(
+        False, "", "activate it at the start: opens and closes it fully, once"
+    )
+
+
+@dataclasses.dataclass
+class HardwareConfig:
+    """All of it; what a file does not say has these defaults."""
+
+    iiwa: IiwaConnection = dataclasses.field(default_factory=IiwaConnection)
+    ft_sensor: SensorConnection = dataclasses.field(default_factory=SensorConnection)
+    gripper: GripperConnection = dataclasses.field(default_factory=GripperConnection)
+    safety: SafetyConfig = dataclasses.field(default_factory=SafetyConfig)
+    ready_timeout: float = quantity(
+        10.0, "s", "until every device must have answered", low=0.1, high=600.0
+    )
+    start_distance: float = quantity(
+        0.05, "rad", "of a joint from where an episode starts", low=0.001, high=0.5
+    )
+    tare_samples: int = quantity(
+        50, "1", "readings that are averaged at the start", low=1, high=10000
+    )
+
+
+def load_hardware_config(path: Path) -> HardwareConfig:
+    """Returns the configuration of a YAML file.
+
+    Raises:
+        DisasmError: missing file, unknown key, bad value; says which and where.
+    """
+    try:
+        text = path.read_text()
+    except OSError as error:
+        raise DisasmError(
+            f"{path}: {error.strerror}; copy models/hardware/cell.yaml and fill it in"
+        ) from None
+    config: HardwareConfig = parse(text, HardwareConfig(), str(path))
+    try:
+        check(config)
+    except DisasmError as error:
+        raise DisasmError(f"{path}: {error}") from None
+    return config

@@ -1,0 +1,116 @@
+"""The supervisor as a system between what is wanted and what is sent."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiscreteValues,
+    EventStatus,
+    LeafSystem,
+)
+
+from drake_disasm.coordinates import Coordinates
+from drake_disasm.devices.reading import Clock
+from drake_disasm.errors import DisasmError
+from drake_disasm.safety import Situation, Supervisor
+from drake_disasm.systems.device_reader import Readable
+from drake_disasm.systems.observation import Mounting, contact_wrench
+
+
+class SafetyFilter(LeafSystem):
+    """Sends to the arm what its supervisor lets through, once a control period.
+
+    @system
+    name: SafetyFilter
+    input_ports:
+    - position
+    output_ports:
+    - position_sent
+    @endsystem
+
+    Args:
+        supervisor: decides; it outlives the Context, as the robot does.
+        devices: by name; "iiwa" tells where the arm is, "ft_sensor" the load.
+        coordinates: maps joint angles to X_GB.
+        mounting: geometry and payload of the sensor.
+        period: of the position interface [s].
+        clock: the devices'.
+    """
+
+    def __init__(
+        self,
+        supervisor: Supervisor,
+        devices: Mapping[str, Readable],
+        coordinates: Coordinates,
+        mounting: Mounting,
+        period: float,
+        clock: Clock,
+    ) -> None:
+        super().__init__()
+        self._supervisor, self._devices = supervisor, devices
+        self._coordinates, self._mounting, self._clock = coordinates, mounting, clock
+        self._offset: np.ndarray | None = None
+        self._before, self._then = np.full(coordinates.size, np.nan), np.nan
+        self._wanted = self.DeclareVectorInputPort("position", coordinates.size)
+        self._sent = self.DeclareDiscreteState(np.full(coordinates.size, np.nan))
+        self.DeclareInitializationDiscreteUpdateEvent(self._update)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+        self.DeclareVectorOutputPort(
+            "position_sent",
+            coordinates.size,
+            self._calc,
+            prerequisites_of_calc={self.xd_ticket()},
+        )
+
+    def zero(self, reading: np.ndarray) -> None:
+        """Zeroes the load: `reading` (6,) was taken at the start of an episode."""
+        weight = self._mounting.weight(self._mounting.X_BS.rotation())
+        self._offset = reading - weight
+
+    def begin(self) -> None:
+        """Forgets when the last command was: between episodes there are none."""
+        self._before, self._then = np.full_like(self._before, np.nan), np.nan
+
+    def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
+        situation = self._situation(context)
+        state.set_value(self._sent, self._supervisor.command(situation))
+        self._before, self._then = situation.q_measured, situation.now
+        return EventStatus.Succeeded()
+
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        sent = context.get_discrete_state(self._sent).value()
+        if not np.isfinite(sent).all():
+            raise DisasmError(
+                "nothing was measured yet, so nothing can be sent; call the station's "
+                "begin before the simulator's Initialize"
+            )
+        output.SetFromVector(sent)
+
+    def _situation(self, context: Context) -> Situation:
+        now = self._clock()
+        readings = {name: device.read() for name, device in self._devices.items()}
+        q = readings["iiwa"].values
+        X_GB = self._coordinates.pose(q)
+        return Situation(
+            now,
+            0.0 if np.isnan(self._then) else now - self._then,
+            self._wanted.Eval(context),
+            q,
+            self._before,
+            X_GB,
+            self._load(readings["ft_sensor"].values, X_GB),
+            readings,
+        )
+
+    def _load(self, reading: np.ndarray, X_GB: RigidTransform) -> np.ndarray | None:
+        """Returns the load (6,) on the bolt at Bo in S's axes, or None: not zeroed."""
+        if self._offset is None:
+            return None
+        wrench_G = contact_wrench(
+            reading, self._offset, X_GB.rotation(), self._mounting
+        )
+        R_SG = self._mounting.X_SB.rotation() @ X_GB.rotation().inverse()
+        return np.concatenate([R_SG @ wrench_G[:3], R_SG @ wrench_G[3:]])

@@ -1,0 +1,219 @@
+"""The HEX's client against a box on the loopback that can misbehave."""
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import psutil
+import pytest
+
+from drake_disasm.devices.onrobot_hex import Command, HexClient, Request
+from drake_disasm.devices.reading import Counters
+from drake_disasm.errors import DisasmError
+from drake_disasm.ports import Health
+from tests.fakes.hex_box import JUMP, FakeHexBox
+
+WRENCH = (1.0, -2.0, 3.0, 0.1, -0.2, 0.3)
+STREAM = [
+    Request(Command.FILTER, 4),
+    Request(Command.PERIOD, 2),
+    Request(Command.START, 0),
+]
+PATIENT = 60.0  # [s], silence that a busy machine doesn't reach
+
+
+class _Clock:
+    """Stands until a test moves it."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def _until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 10.0
+    while not condition():
+        assert time.monotonic() < deadline, "it never came true"
+        time.sleep(0.001)
+
+
+@pytest.fixture
+def clock() -> _Clock:
+    return _Clock()
+
+
+@pytest.fixture
+def box(clock: _Clock) -> Iterator[FakeHexBox]:
+    with FakeHexBox(clock=clock) as box:
+        yield box
+
+
+@pytest.fixture
+def client(box: FakeHexBox, clock: _Clock) -> Iterator[HexClient]:
+    with HexClient("127.0.0.1", box.port, clock=clock, silence=PATIENT) as client:
+        assert box.wait_started()
+        yield client
+
+
+def _send(box: FakeHexBox, *faults: str) -> None:
+    """Sends a sample for each fault; its fx is the sample's place in the row."""
+    for number, fault in enumerate(faults, start=1):
+        box.fault = fault
+        box.send((float(number), *WRENCH[1:]))
+
+
+def _counted(client: HexClient, **expected: int) -> None:
+    """Waits until the counters are as expected."""
+    _until(lambda: client.read().counters == Counters(**expected))
+
+
+def test_settings_come_before_the_start(box: FakeHexBox, client: HexClient) -> None:
+    assert box.requests == STREAM
+    client.stop()
+    _until(lambda: not box.started)
+    assert box.requests == [*STREAM, Request(Command.STOP)]
+
+
+def test_a_sample_is_read(box: FakeHexBox, client: HexClient, clock: _Clock) -> None:
+    assert client.read().health(0.0, stale_after=0.1) == Health.NO_DATA
+    clock.now = 2.0
+    box.send(WRENCH)
+    _counted(client, received=1)
+    np.testing.assert_array_equal(client.read().values, WRENCH)
+    assert client.read().time == 2.0
+    assert client.read().health(2.05, stale_after=0.1) == Health.READY
+
+
+@pytest.mark.parametrize(
+    ("faults", "newest", "counters"),
+    [
+        (("", "loss", "loss", ""), 4.0, Counters(received=2, lost=2)),
+        # Of each pair the older one was missed first, and dropped when it came.
+        (("", "reorder", "reorder"), 3.0, Counters(received=2, lost=1, reordered=1)),
+        # Whether the unreadable ones were the missing numbers can't be known.
+        (("", "short", "header"), 1.0, Counters(received=1, invalid=2)),
+        (("", "short", ""), 3.0, Counters(received=2, invalid=1, lost=1)),
+        (("", "jump"), 2.0 + JUMP, Counters(received=2)),
+        (("", "frozen", "frozen"), 1.0, Counters(received=1, reordered=2)),
+    ],
+    ids=lambda value: "-".join(value) if isinstance(value, tuple) else None,
+)
+def test_faults_are_counted(
+    box: FakeHexBox,
+    client: HexClient,
+    faults: tuple[str, ...],
+    newest: float,
+    counters: Counters,
+) -> None:
+    _send(box, *faults)
+    _until(lambda: client.read().counters == counters)
+    assert client.read().values[0] == newest
+    assert not client.read().error
+
+
+def test_what_is_held_back_comes_late(
+    box: FakeHexBox, client: HexClient, clock: _Clock
+) -> None:
+    _send(box, "delay")
+    clock.now = box.delay_s
+    _send(box, "loss")
+    _counted(client, received=1)
+
+
+def test_a_frozen_counter_grows_stale(
+    box: FakeHexBox, client: HexClient, clock: _Clock
+) -> None:
+    box.send(WRENCH)
+    _counted(client, received=1)
+    clock.now = 1.0
+    _send(box, "frozen")
+    _counted(client, received=1, reordered=1)
+    assert client.read().health(clock.now, stale_after=0.1) == Health.STALE
+
+
+def test_a_bad_status_is_an_error_until_a_good_one(
+    box: FakeHexBox, client: HexClient
+) -> None:
+    _send(box, "", "status")
+    _until(lambda: bool(client.read().error))
+    assert "HEX status 0x2: " in client.read().error
+    assert client.read().values[0] == 1.0
+    assert client.read().health(0.0, stale_after=0.1) == Health.ERROR
+    box.fault = ""
+    box.send(WRENCH)
+    _counted(client, received=2)
+    assert not client.read().error
+
+
+def test_numbers_wrap_and_begin_anew(box: FakeHexBox, client: HexClient) -> None:
+    box.sequence = 2**32 - 2
+    _send(box, "", "", "")
+    _counted(client, received=3)
+    box.sequence = 5000
+    _send(box, "")
+    _counted(client, received=4, lost=4999)
+    box.sequence = 0
+    _send(box, "")
+    _counted(client, received=5, lost=4999)
+
+
+def test_a_box_that_was_restarted_streams_again() -> None:
+    with FakeHexBox() as old, HexClient("127.0.0.1", old.port, silence=0.02) as client:
+        assert old.wait_started()
+        old.stop()
+        _until(lambda: client.read().counters.reconnects >= 2)
+        with FakeHexBox(old.port) as box:
+
+            def sends_until_read() -> bool:
+                box.send(WRENCH)
+                return client.read().counters.received > 0
+
+            assert box.wait_started()
+            _until(sends_until_read)
+    np.testing.assert_array_equal(client.read().values, WRENCH)
+
+
+def test_a_silent_box_is_asked_again() -> None:
+    with FakeHexBox() as box, HexClient("127.0.0.1", box.port, silence=0.02) as client:
+        _until(lambda: client.read().counters.reconnects >= 2)
+        _until(lambda: len(box.requests) >= 6)
+        assert box.requests[:6] == [*STREAM, *STREAM]
+
+
+def test_nothing_is_left_behind() -> None:
+    def udp() -> list[object]:
+        found = psutil.net_connections("udp")
+        return [c.laddr for c in found if c.pid == os.getpid()]
+
+    threads, sockets = threading.enumerate(), udp()
+    with FakeHexBox() as box:
+        client = HexClient("127.0.0.1", box.port, silence=PATIENT)
+        client.stop()
+        client.start()
+        assert len(udp()) == len(sockets) + 2
+        client.stop()
+        client.stop()
+        assert client.read().counters == Counters()
+    assert threading.enumerate() == threads
+    assert udp() == sockets
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"filter_hz": 30.0}, "choose one of"),
+        ({"period": 0.001}, "whole milliseconds"),
+        ({"silence": 0.002}, "must be longer than period"),
+    ],
+)
+def test_wrong_settings_are_refused(options: dict[str, float], words: str) -> None:
+    with pytest.raises(DisasmError, match=words):
+        HexClient("127.0.0.1", **options)
+
+
+def test_no_way_to_the_box_is_said() -> None:
+    with pytest.raises(DisasmError, match="check the address"):
+        HexClient("127.0.0.1", port=70_000).start()

@@ -1,0 +1,94 @@
+"""The arm's status: golden bytes, what is refused, and what is counted."""
+
+import numpy as np
+import pytest
+from drake import lcmt_iiwa_status
+from pydrake.lcm import DrakeLcm
+
+from drake_disasm.devices.codec_error import CodecError
+from drake_disasm.devices.iiwa import IiwaStatusMonitor
+from drake_disasm.devices.iiwa.status import decode_status
+
+QUANTITIES = (
+    "joint_position_measured",
+    "joint_velocity_estimated",
+    "joint_position_commanded",
+    "joint_position_ipo",
+    "joint_torque_measured",
+    "joint_torque_commanded",
+    "joint_torque_external",
+)
+
+
+def status(utime: int = 5000, first: float = 0.25) -> lcmt_iiwa_status:
+    """Returns a message; joint i's measured position is first + i."""
+    message = lcmt_iiwa_status()
+    message.utime, message.num_joints = utime, 7
+    for name in QUANTITIES:
+        setattr(message, name, [first + i for i in range(7)])
+    return message
+
+
+def test_bytes_are_big_endian_behind_the_fingerprint() -> None:
+    data = status().encode()
+    assert len(data) == 8 + 8 + 4 + 7 * 7 * 8
+    assert data[8:16] == bytes.fromhex("0000000000001388")  # utime 5000
+    assert data[16:20] == bytes.fromhex("00000007")
+    assert data[20:28] == bytes.fromhex("3fd0000000000000")  # 0.25
+    assert decode_status(data).joint_position_measured[2] == 2.25
+
+
+def test_other_arms_and_nan_are_refused() -> None:
+    other = status()
+    other.num_joints = 6
+    for name in QUANTITIES:
+        setattr(other, name, [0.0] * 6)
+    with pytest.raises(CodecError, match="6 joints"):
+        decode_status(other.encode())
+    with pytest.raises(CodecError, match="not finite"):
+        decode_status(status(first=np.nan).encode())
+    with pytest.raises(CodecError, match="not an lcmt_iiwa_status"):
+        decode_status(b"")
+
+
+def test_random_and_mutated_messages_raise_nothing_else() -> None:
+    random = np.random.default_rng(0)
+    good = np.frombuffer(status().encode(), dtype=np.uint8)
+    refused = 0
+    for number in range(100_000):
+        if number % 4:
+            data = good.copy()
+            where = random.integers(len(data), size=3)
+            data[where] = random.integers(256, size=3)
+            data = data[: random.integers(len(data) + 1)] if number % 4 == 1 else data
+        else:
+            data = random.integers(256, size=random.integers(500), dtype=np.uint8)
+        try:
+            decode_status(data.tobytes())
+        except CodecError:
+            refused += 1
+    assert 25_000 < refused < 100_000
+
+
+def test_what_is_lost_late_or_broken_is_counted_and_only_good_ones_get_on() -> None:
+    lcm, checked, passed = DrakeLcm("memq://"), DrakeLcm("memq://"), []
+    checked.Subscribe("S", passed.append)
+    time = 0.0
+    monitor = IiwaStatusMonitor(lcm, "S", 0.005, lambda: time, checked)
+    broken = status(40_000, first=np.nan).encode()
+    for data in (
+        status(5_000).encode(),
+        status(20_000).encode(),  # two are lost
+        status(15_000).encode(),
+        status(20_000).encode(),
+        broken,
+        broken[:50],
+    ):
+        lcm.Publish("S", data)
+        lcm.HandleSubscriptions(0)
+        checked.HandleSubscriptions(0)
+    counters = monitor.read().counters
+    assert (counters.received, counters.lost) == (2, 2)
+    assert (counters.reordered, counters.invalid) == (2, 2)
+    assert "check that the driver" in monitor.read().error
+    assert monitor.read().values[6] == 6.25 and len(passed) == 2

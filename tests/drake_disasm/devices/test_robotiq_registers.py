@@ -1,0 +1,213 @@
+"""The gripper's registers: golden frames, bit by bit, and garbage."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from pymodbus.framer import FramerRTU
+from pymodbus.pdu import DecodePDU
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersResponse,
+    WriteMultipleRegistersRequest,
+)
+
+from drake_disasm.devices.codec_error import CodecError
+from drake_disasm.devices.robotiq.registers import (
+    COMMAND_ADDRESS,
+    FAULTS,
+    Activation,
+    Command,
+    Motion,
+    Status,
+    Stroke,
+    decode_command,
+    decode_status,
+    encode_command,
+    encode_status,
+    fault_words,
+)
+
+OPEN = Command(activate=True, go=True, speed=255, force=255)
+
+#: Writes, of the manual's examples.
+GOLDEN_COMMANDS = {
+    "09 10 03 E8 00 03 06 09 00 00 00 FF FF 72 19": OPEN,
+    "09 10 03 E8 00 03 06 09 00 00 FF FF FF 42 29": dataclasses.replace(
+        OPEN, position=255
+    ),
+    "09 10 03 E8 00 03 06 00 00 00 00 00 00 73 30": Command(),
+    "09 10 03 E8 00 03 06 01 00 00 00 00 00 72 E1": Command(activate=True),
+}
+
+CLOSING = Status(
+    activated=True,
+    going=True,
+    state=Activation.DONE,
+    object_detected=Motion.MOVING,
+    position_request=0xFF,
+    position=0x0E,
+    current=0x0A,
+)
+
+#: Replies to reads, of the manual's examples: closing, and closed on an object.
+GOLDEN_STATUSES = {
+    "09 03 06 39 00 00 FF 0E 0A F7 8B": CLOSING,
+    "09 03 06 B9 00 00 FF BD 00 1D 7C": dataclasses.replace(
+        CLOSING, object_detected=Motion.STOPPED_CLOSING, position=0xBD, current=0
+    ),
+}
+
+#: By register: the bits that mean something.
+COMMAND_BITS = (0x3900, 0x00FF, 0xFFFF)
+STATUS_BITS = (0xF900, 0xFFFF, 0xFFFF)
+
+
+@pytest.mark.parametrize("golden", GOLDEN_COMMANDS)
+def test_golden_command(golden: str) -> None:
+    registers = list(encode_command(GOLDEN_COMMANDS[golden]))
+    request = WriteMultipleRegistersRequest(
+        address=COMMAND_ADDRESS, registers=registers, dev_id=9
+    )
+    framer = FramerRTU(DecodePDU(False))
+    assert framer.buildFrame(request) == bytes.fromhex(golden)
+
+
+@pytest.mark.parametrize("golden", GOLDEN_STATUSES)
+def test_golden_status(golden: str) -> None:
+    _, reply = FramerRTU(DecodePDU(False)).handleFrame(bytes.fromhex(golden), 9, 0)
+    assert isinstance(reply, ReadHoldingRegistersResponse)
+    assert decode_status(reply.registers) == GOLDEN_STATUSES[golden]
+    assert encode_status(GOLDEN_STATUSES[golden]) == tuple(reply.registers)
+
+
+@pytest.mark.parametrize(
+    ("change", "registers"),
+    [
+        ({"activate": True}, (0x0100, 0, 0)),
+        ({"go": True}, (0x0800, 0, 0)),
+        ({"automatic_release": True}, (0x1000, 0, 0)),
+        ({"release_opens": True}, (0x2000, 0, 0)),
+        ({"position": 0x81}, (0, 0x0081, 0)),
+        ({"speed": 0x81}, (0, 0, 0x8100)),
+        ({"force": 0x81}, (0, 0, 0x0081)),
+    ],
+)
+def test_command_bit_by_bit(change: dict[str, int], registers: tuple[int, ...]) -> None:
+    command = Command(**change)
+    assert encode_command(command) == registers
+    assert decode_command(registers) == command
+
+
+@pytest.mark.parametrize(
+    ("change", "registers"),
+    [
+        ({"activated": True}, (0x0100, 0, 0)),
+        ({"going": True}, (0x0800, 0, 0)),
+        ({"state": Activation.ACTIVATING}, (0x1000, 0, 0)),
+        ({"state": Activation.DONE}, (0x3000, 0, 0)),
+        ({"object_detected": Motion.STOPPED_OPENING}, (0x4000, 0, 0)),
+        ({"object_detected": Motion.STOPPED_CLOSING}, (0x8000, 0, 0)),
+        ({"object_detected": Motion.AT_REQUEST}, (0xC000, 0, 0)),
+        ({"fault": 0x8E}, (0, 0x8E00, 0)),
+        ({"position_request": 0x81}, (0, 0x0081, 0)),
+        ({"position": 0x81}, (0, 0, 0x8100)),
+        ({"current": 0x81}, (0, 0, 0x0081)),
+    ],
+)
+def test_status_bit_by_bit(change: dict[str, int], registers: tuple[int, ...]) -> None:
+    status = Status(**change)
+    assert encode_status(status) == registers
+    assert decode_status(registers) == status
+
+
+def test_reserved_bits_are_ignored() -> None:
+    assert decode_command((0xC6FF, 0xFF00, 0)) == Command()
+    assert decode_status((0x06FF, 0, 0)) == Status()
+
+
+def test_undefined_state_is_refused() -> None:
+    with pytest.raises(CodecError, match="gSTA is 2"):
+        decode_status((0x2000, 0, 0))
+
+
+@pytest.mark.parametrize("decode", [decode_command, decode_status])
+@pytest.mark.parametrize(
+    "registers", [(), (0, 0), (0,) * 4, (-1, 0, 0), (0, 65536, 0), (0, 0, 0.0)]
+)
+def test_decoding_refuses(decode: Callable, registers: tuple) -> None:
+    with pytest.raises(CodecError, match="gripper"):
+        decode(registers)
+
+
+@pytest.mark.parametrize("value", [-1, 256, 0.5, None, math.nan])
+def test_encoding_refuses(value: int) -> None:
+    for name in ("position", "speed", "force"):
+        with pytest.raises(CodecError, match="no whole number"):
+            encode_command(Command(**{name: value}))
+    for name in ("fault", "position_request", "position", "current"):
+        with pytest.raises(CodecError, match="no whole number"):
+            encode_status(Status(**{name: value}))
+
+
+def _random_registers() -> Iterator[tuple[int, ...]]:
+    """Whole-range triples, and valid ones with one value or the length mutated."""
+    rng = np.random.default_rng(0)
+    yield from map(tuple, rng.integers(0, 65536, (60_000, 3)).tolist())
+    valid = [encode_status(CLOSING), encode_command(OPEN)]
+    mutations = rng.integers([0, -70_000], [4, 70_000], (40_000, 2)).tolist()
+    for i, (place, value) in enumerate(mutations):
+        registers = list(valid[i % 2])
+        registers[place : place + 1] = [value] * (1 + i % 7 // 6)
+        yield tuple(registers)
+
+
+@pytest.mark.parametrize(
+    ("decode", "encode", "bits"),
+    [
+        (decode_command, encode_command, COMMAND_BITS),
+        (decode_status, encode_status, STATUS_BITS),
+    ],
+)
+def test_garbage(decode: Callable, encode: Callable, bits: tuple[int, ...]) -> None:
+    decoded = 0
+    for registers in _random_registers():
+        try:
+            value = decode(registers)
+        except CodecError:
+            continue
+        decoded += 1
+        assert encode(value) == tuple(
+            r & b for r, b in zip(registers, bits, strict=True)
+        )
+    assert decoded > 40_000
+
+
+def test_openings() -> None:
+    stroke = Stroke()
+    assert stroke.opening(3) == pytest.approx(0.140)
+    assert stroke.opening(230) == pytest.approx(0.0)
+    assert stroke.opening(0) > 0.140  # wrong echoes show
+
+
+def test_requests_are_clamped_and_reach_the_ends() -> None:
+    openings = [math.inf, 0.2, 0.140, 0.0, -0.1, -math.inf]
+    assert [Stroke().request(o) for o in openings] == [0, 0, 0, 255, 255, 255]
+
+
+@pytest.mark.parametrize("echo", [4, 50, 229])
+def test_requests_undo_openings(echo: int) -> None:
+    assert Stroke().request(Stroke().opening(echo)) == echo
+
+
+def test_nan_is_refused() -> None:
+    with pytest.raises(CodecError, match="NaN"):
+        Stroke().request(math.nan)
+
+
+def test_faults_have_words_and_a_remedy() -> None:
+    assert fault_words(0) == ""
+    assert "overcurrent" in fault_words(0x0E)
+    assert "0x21: not in the manual" in fault_words(0x21)
+    assert all(": " in words for words in FAULTS.values())

@@ -1,0 +1,91 @@
+"""Each guard lets the usual pass and objects to what it is there for."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from drake_disasm.devices.reading import Mailbox, Reading
+from drake_disasm.ports import Health
+from drake_disasm.safety import SafetyConfig, Situation, guards
+
+Q = np.array([0.1, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0])
+NAMES = ("iiwa", "gripper", "ft_sensor")
+FRESH = Reading(np.zeros(6), time=1.0)
+USUAL = Situation(
+    now=1.01,
+    elapsed=0.005,
+    q_wanted=Q + 0.001,
+    q_measured=Q,
+    q_before=Q - 0.001,
+    X_GB=RigidTransform([0.02, 0.0, 0.0]),
+    load=np.array([3.0, 2.0, 1.0, 0.1, 0.1, 0.1]),
+    readings=dict.fromkeys(NAMES, FRESH),
+)
+LIMITS = SafetyConfig()
+
+
+def objection(**changes: object) -> str:
+    """Returns what the guards say of the usual situation with changes."""
+    situation = dataclasses.replace(USUAL, **changes)
+    all_guards = guards(LIMITS, np.full(7, -2.0), np.full(7, 2.0))
+    return next((r for guard in all_guards if (r := guard(situation))), "")
+
+
+def of(device: str, **changes: object) -> dict[str, Reading]:
+    return dict(USUAL.readings) | {device: dataclasses.replace(FRESH, **changes)}
+
+
+def joint(q: np.ndarray, number: int, by: float) -> np.ndarray:
+    return q + by * (np.arange(1, 8) == number)
+
+
+def test_the_usual_passes():
+    assert objection() == ""
+    assert objection(load=None) == ""
+    assert objection(q_before=np.full(7, np.nan)) == ""
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"readings": of("iiwa", time=np.nan)}, "iiwa has sent nothing yet"),
+        ({"readings": of("iiwa", time=0.95)}, "iiwa has stopped sending for 0.060 s"),
+        ({"readings": of("ft_sensor", time=0.9)}, "ft_sensor has stopped sending"),
+        ({"readings": of("gripper", time=0.4)}, "gripper has stopped sending"),
+        ({"readings": of("gripper", error="fault 0x0E")}, "gripper: fault 0x0E"),
+        ({"q_wanted": joint(Q, 2, np.nan)}, "iiwa.position is not finite"),
+        ({"load": np.full(6, np.nan)}, "ft_sensor.wrench is not finite"),
+        ({"q_before": joint(Q, 3, -0.06)}, "joint 3 jumped by 0.060 rad"),
+        ({"elapsed": 0.3}, "0.300 s after the last one; a policy is late"),
+        ({"q_wanted": joint(Q, 4, -0.68)}, "joint 4 is sent 0.015 rad into"),
+        ({"q_wanted": joint(Q, 5, 0.03)}, "joint 5 is sent 0.030 rad from where"),
+        ({"X_GB": RigidTransform([0.0, 0.029, 0.0])}, "workspace at y = 29.0 mm"),
+        ({"load": np.array([0, 20.1, 0, 0, 0, 0])}, "force 20.1 N"),
+        ({"load": np.array([0, 0, 0, 3.0, 3.0, 0])}, "torque 4.2 N m"),
+        ({"load": np.array([0, 0, 0, 0, 0, -2.5])}, "torque about z 2.5 N m"),
+    ],
+)
+def test_what_must_stop_the_robot(changes, words):
+    assert words in objection(**changes)
+
+
+def test_limits_stay_below_what_the_gripper_takes():
+    assert LIMITS.max_force < 25.0
+    assert LIMITS.max_torque_xy < 5.0 and LIMITS.max_torque_z < 3.0
+
+
+def test_no_data_yet_is_a_health_and_not_zeros():
+    time = 0.0
+    mailbox = Mailbox(3, clock=lambda: time)
+    assert np.isnan(mailbox.read().values).all()
+    assert mailbox.read().health(0.0, 1.0) is Health.NO_DATA
+    mailbox.put(np.ones(3))
+    assert mailbox.read().health(0.5, 1.0) is Health.READY
+    assert mailbox.read().health(1.5, 1.0) is Health.STALE
+    mailbox.complain("broken")
+    assert mailbox.read().health(0.5, 1.0) is Health.ERROR
+    mailbox.put(np.ones(3))
+    assert mailbox.read().health(0.5, 1.0) is Health.READY
+    assert mailbox.read().counters.received == 2

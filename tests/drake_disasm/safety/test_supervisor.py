@@ -1,0 +1,82 @@
+"""The supervisor: waits, lets through, latches, and is resumed."""
+
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.safety import Mode, Situation, Supervisor
+from tests.drake_disasm.safety.test_guards import USUAL, Q
+
+STEP = np.full(7, 0.004)
+
+
+def supervisor(stop: list[str]) -> Supervisor:
+    """Returns one with a guard that says what is in a list."""
+    return Supervisor([lambda _: stop[0] if stop else ""], STEP, 0.002)
+
+
+def at(
+    q: np.ndarray, wanted: np.ndarray, before: np.ndarray | None = None
+) -> Situation:
+    before = q if before is None else before
+    return dataclasses.replace(USUAL, q_measured=q, q_wanted=wanted, q_before=before)
+
+
+def test_nothing_is_sent_before_anything_is_measured():
+    nowhere = np.full(7, np.nan)
+    stop = ["no data"]
+    waiting = supervisor(stop)
+    assert np.isnan(waiting.command(at(nowhere, Q))).all()
+    assert waiting.mode is Mode.WAITING and waiting.reason == "no data"
+
+
+def test_waits_where_the_arm_is_until_the_command_is_there_too():
+    waiting = supervisor([])
+    assert np.array_equal(waiting.command(at(Q, Q + 0.01)), Q)
+    assert waiting.mode is Mode.WAITING and "0.0100 rad" in waiting.reason
+    waiting.command(at(Q, Q + 0.001))
+    assert waiting.mode is Mode.ACTIVE and waiting.reason == ""
+
+
+def test_steps_are_clamped_and_counted():
+    active = supervisor([])
+    active.command(at(Q, Q))
+    assert np.allclose(active.command(at(Q, Q + 0.01)), Q + STEP)
+    assert active.clamped == 1 and active.mode is Mode.ACTIVE
+
+
+def test_a_trip_holds_at_the_measured_position_and_says_why():
+    stop: list[str] = []
+    active = supervisor(stop)
+    active.command(at(Q, Q))
+    stop.append("first")
+    there = Q + 0.001
+    assert np.array_equal(active.command(at(there, Q + 0.003)), there)
+    stop[:] = []
+    for _ in range(3):  # latched, though all is well again and the arm is pushed
+        assert np.array_equal(active.command(at(Q + 0.002, Q)), there)
+    assert active.mode is Mode.HOLD and active.reason == "first"
+    active.trip("second", Q, 9.0)
+    assert active.reason == "first" and active.held_since == USUAL.now
+
+
+def test_a_measurement_that_leaped_is_no_place_to_hold_at():
+    for wrong in (Q + 0.3, np.full(7, np.nan)):
+        stop: list[str] = []
+        active = supervisor(stop)
+        active.command(at(Q, Q))
+        stop.append("jump")
+        assert np.array_equal(active.command(at(wrong, Q, before=Q)), Q)
+
+
+def test_only_resume_ends_a_hold_and_then_it_waits_again():
+    held = supervisor([])
+    held.command(at(Q, Q))
+    held.trip("stop", Q, 1.0)
+    held.resume()
+    assert held.mode is Mode.WAITING and np.isnan(held.held_since)
+    away = Q + 0.05  # somebody pushed it
+    assert np.array_equal(held.command(at(away, Q)), away)
+    assert held.mode is Mode.WAITING
+    held.command(at(away, away))
+    assert held.mode is Mode.ACTIVE

@@ -1,0 +1,39 @@
+"""The file of --hardware-config: the shipped one is read, mistakes are named."""
+
+from pathlib import Path
+
+import pytest
+
+from drake_disasm.errors import DisasmError
+from drake_disasm.resources import models_dir
+from drake_disasm.stations.hardware_config import load_hardware_config
+
+
+def test_the_shipped_file_is_read() -> None:
+    config = load_hardware_config(models_dir() / "hardware" / "cell.yaml")
+    assert config.gripper.device_id == 9 and config.ft_sensor.port == 49152
+    assert config.safety.stale_after("gripper") == 0.5
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("safety: {max_forc: 10}", "did you mean 'max_force'"),
+        ("safety: {max_force: 30}", "safety.max_force"),
+        ("safety: {max_force: .nan}", "safety.max_force"),
+        ("gripper: {transport: usb}", "gripper.transport"),
+        ("ft_sensor: {port: abc}", "line 1"),
+        ("", "is empty"),
+    ],
+)
+def test_a_mistake_is_one_line(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "cell.yaml"
+    path.write_text(text)
+    with pytest.raises(DisasmError) as caught:
+        load_hardware_config(path)
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_missing_file_says_what_to_copy(tmp_path: Path) -> None:
+    with pytest.raises(DisasmError, match=r"copy models/hardware/cell\.yaml"):
+        load_hardware_config(tmp_path / "none.yaml")

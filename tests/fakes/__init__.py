@@ -1,0 +1,1 @@
+"""Devices that tests talk to over loopback sockets, and that fail on demand."""

@@ -1,0 +1,118 @@
+"""Plays the devices of a cell on this machine, to try the hardware station on.
+
+The simulated cell stands behind an iiwa driver's LCM channels, an OnRobot HEX and a
+Robotiq gripper on the loopback: a simulated stand-in, in real time. It writes the
+configuration by which it is found, then runs until Ctrl-C. A key and Enter orders a
+fault, an empty line ends it:
+
+  ft_sensor: delay, loss, reorder, short, header, status, frozen, jump
+  gripper:   crc, drop, silent, status, short, header
+  iiwa:      loss, frozen, reorder, nan, jump, short, header
+"""
+
+import argparse
+import select
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import cli
+from pydrake.common.yaml import yaml_dump_typed
+from pydrake.lcm import DrakeLcm
+
+from drake_disasm.scenario import load_scenario
+from drake_disasm.stations.hardware_config import HardwareConfig
+from drake_disasm.writing import write_atomically
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests.fakes import hex_box, robotiq_gripper
+from tests.fakes.cell import IIWA_FAULTS, FakeCell
+
+_LCM = "udpm://239.255.76.67:7667?ttl=0"
+_EXAMPLES = """examples:
+  python tools/fake_cell.py --config out/fake.yaml             in one terminal
+  python tools/simulate.py --station hardware --hardware-config out/fake.yaml
+  python tools/fake_cell.py --scenario removal_turned          with a hidden effect
+  ft_sensor loss                                               while it runs
+"""
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    parser = argparse.ArgumentParser(
+        prog="fake_cell.py",
+        description=__doc__,
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    cli.add_scenario_arguments(parser)
+    add = parser.add_argument
+    add(
+        "--config",
+        type=Path,
+        default=Path("fake_cell.yaml"),
+        metavar="FILE",
+        help="written: for simulate.py --hardware-config (default: fake_cell.yaml)",
+    )
+    add("--lcm-url", default=_LCM, metavar="URL", help=f"(default: {_LCM})")
+    add("--seed", type=int, default=0, help="of the sensor's noise (default: 0)")
+    return parser.parse_args(arguments)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the program; returns its exit status."""
+    args = parse(arguments)
+    scenario = load_scenario(args.scenario, args.overrides)
+    lcm = DrakeLcm(args.lcm_url)
+    with FakeCell(scenario, lcm, args.seed) as cell:
+        config = cell.config()
+        config.iiwa.lcm_url = args.lcm_url
+        text = yaml_dump_typed(config, schema=HardwareConfig)
+        write_atomically(args.config, lambda stream: stream.write(text.encode()))
+        print(f"playing a cell; --hardware-config {args.config}", flush=True)
+        _play(cell)
+    return 0
+
+
+def _play(cell: FakeCell) -> None:
+    """Advances the cell in real time; obeys what is typed."""
+    period, begun, steps = cell.station.control_period, time.monotonic(), 0
+    while True:
+        cli.stop_if_interrupted()
+        cell.advance()
+        steps += 1
+        ahead = begun + steps * period - time.monotonic()
+        if ahead > 0.0:
+            time.sleep(ahead)
+        if steps % 20 == 0 and sys.stdin and select.select([sys.stdin], [], [], 0)[0]:
+            line = sys.stdin.readline()
+            if line:
+                _order(cell, line.split())
+
+
+def _order(cell: FakeCell, words: Sequence[str]) -> None:
+    """Orders a fault of a device; none ends all."""
+    devices: dict[str, tuple[object, Sequence[str]]] = {
+        "iiwa": (cell, IIWA_FAULTS),
+        "ft_sensor": (cell.hex, hex_box.FAULTS),
+        "gripper": (cell.gripper, robotiq_gripper.FAULTS),
+    }
+    if not words:
+        for device, _ in devices.values():
+            device.fault = ""  # type: ignore[attr-defined]
+        return
+    try:
+        name, fault = words
+        device, faults = devices[name]
+        if fault not in faults:
+            raise ValueError
+    except (ValueError, KeyError):
+        print(f"{' '.join(words)}: write a device and a fault; see --help")
+        return
+    device.fault = fault  # type: ignore[attr-defined]
+    print(f"{name}: {fault}", flush=True)
+
+
+if __name__ == "__main__":
+    cli.run(main)

@@ -1,0 +1,60 @@
+"""What simulate.py does with --station hardware."""
+
+import time
+from pathlib import Path
+
+import cli
+
+from drake_disasm.devices.reading import Reading
+from drake_disasm.errors import DisasmError
+from drake_disasm.ports import Health
+from drake_disasm.scenario import Scenario
+from drake_disasm.stations.hardware import HardwareStation
+from drake_disasm.stations.hardware_config import load_hardware_config
+
+_EVERY = 0.5  # s, between two looks of a dry run
+_POLL = 0.001  # s: LCM keeps one message of a channel, the newest
+
+
+def open_station(
+    scenario: Scenario, config: Path | None, dry_run: bool
+) -> HardwareStation:
+    """Returns the station of a configuration's file.
+
+    Raises:
+        DisasmError: no file, or one that is wrong.
+    """
+    if config is None:
+        raise DisasmError(
+            "--station hardware: say where the devices are by --hardware-config FILE; "
+            "copy models/hardware/cell.yaml"
+        )
+    return HardwareStation(scenario, load_hardware_config(config), dry_run)
+
+
+def watch(station: HardwareStation) -> None:
+    """Prints how the devices are until Ctrl-C; commands nothing."""
+    print("dry run: nothing is commanded; Ctrl-C ends it")
+    station.connect()
+    while True:
+        end = time.monotonic() + _EVERY
+        while time.monotonic() < end:
+            cli.stop_if_interrupted()
+            station.pump()
+            time.sleep(_POLL)
+        print(health_table(station), flush=True)
+
+
+def health_table(station: HardwareStation) -> str:
+    """Returns a line for each device: health, values, age, packets."""
+    readings, healths, now = station.readings(), station.healths(), time.monotonic()
+    return "\n".join(
+        _line(name, reading, healths[name], now) for name, reading in readings.items()
+    )
+
+
+def _line(name: str, reading: Reading, health: Health, now: float) -> str:
+    values = " ".join(f"{value:8.3f}" for value in reading.values)
+    age = f"{1e3 * reading.age(now):6.0f} ms old"
+    more = reading.error or reading.counters.text
+    return f"{name:10} {health.name:8} {values}  {age}  {more}"
