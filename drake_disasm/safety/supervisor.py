@@ -7,8 +7,6 @@ import numpy as np
 
 from drake_disasm.safety.guards import Guard, Situation
 
-_LEAP = 0.05  # rad between two looks, 10 rad/s at the usual period: no iiwa does that
-
 
 class Mode(enum.Enum):
     """What the supervisor lets through."""
@@ -34,15 +32,21 @@ class Supervisor:
         guards: asked in their order; the first that objects is the reason.
         max_step: (7,) from one command to the next [rad].
         start_tolerance: between command and measurement when motion begins [rad].
+        max_jump: of a measured joint between two looks, beyond which it is no place
+            to hold at [rad].
     """
 
     def __init__(
-        self, guards: Sequence[Guard], max_step: np.ndarray, start_tolerance: float
+        self,
+        guards: Sequence[Guard],
+        max_step: np.ndarray,
+        start_tolerance: float,
+        max_jump: float,
     ) -> None:
         self.mode, self.reason, self.clamped = Mode.WAITING, "not begun", 0
         self.held_since = np.nan
         self._guards, self._max_step = tuple(guards), max_step
-        self._tolerance = start_tolerance
+        self._tolerance, self._max_jump = start_tolerance, max_jump
         self._held: np.ndarray | None = None
         self._sent: np.ndarray | None = None
 
@@ -58,11 +62,16 @@ class Supervisor:
         self._sent = self._within_step(wanted)
         return self._sent
 
+    def begin(self) -> None:
+        """Waits anew, wherever the arm was taken meanwhile; a hold stays one."""
+        if self.mode is not Mode.HOLD:
+            self.mode, self.reason, self._held = Mode.WAITING, "begins", None
+
     def resume(self) -> None:
         """Ends a hold: motion begins again once all is ready and nothing leaps."""
         if self.mode is Mode.HOLD:
-            self.mode, self.reason, self._held = Mode.WAITING, "resuming", None
-            self.held_since = np.nan
+            self.mode, self.held_since = Mode.WAITING, np.nan
+            self.begin()
 
     def trip(self, reason: str, q_held: np.ndarray, now: float) -> None:
         """Latches a hold (7,) [rad] at a time [s]; the first reason stays."""
@@ -79,7 +88,7 @@ class Supervisor:
 
     def _watch(self, situation: Situation) -> None:
         if reason := self._objection(situation):
-            self.trip(reason, _believed(situation), situation.now)
+            self.trip(reason, self._believed(situation), situation.now)
 
     def _objection(self, situation: Situation) -> str:
         return next((r for guard in self._guards if (r := guard(situation))), "")
@@ -98,14 +107,13 @@ class Supervisor:
         self.clamped += int(not np.array_equal(step, short))
         return self._sent + short
 
+    def _believed(self, situation: Situation) -> np.ndarray:
+        """Returns where the arm is (7,), as last believed.
 
-def _believed(situation: Situation) -> np.ndarray:
-    """Returns where the arm is (7,), as last believed.
-
-    A measurement that is NaN, or that leaped, is no place to go to.
-    """
-    now, before = situation.q_measured, situation.q_before
-    if not np.isfinite(now).all():
-        return before
-    leaped = np.isfinite(before).all() and np.abs(now - before).max() > _LEAP
-    return before if leaped else now
+        A measurement that is NaN, or that leaped, is no place to go to.
+        """
+        now, before = situation.q_measured, situation.q_before
+        if not np.isfinite(now).all():
+            return before
+        leaped = np.abs(now - before).max() > self._max_jump  # not where before is NaN
+        return before if leaped else now

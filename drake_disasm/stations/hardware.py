@@ -147,6 +147,7 @@ class HardwareStation(Station):
         reading = self._tare()
         self.safety_filter.zero(reading)
         self.safety_filter.begin()
+        self.supervisor.begin()
         return Beginning(position, reading)
 
     def check(self) -> None:
@@ -422,4 +423,5 @@ def _supervisor(arm: ArmConfig, config: HardwareConfig) -> Supervisor:
         guards(limits, plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits()),
         fastest * arm.control_period,
         limits.start_tolerance,
+        limits.max_jump,
     )

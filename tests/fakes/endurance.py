@@ -8,7 +8,6 @@ import argparse
 import gc
 import signal
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -23,23 +22,26 @@ from drake_disasm.scenario import load_scenario
 from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.stations.hardware_config import load_hardware_config
 from drake_disasm.task.simulation import TaskSimulation
+from tests.tools.programs import command
 
-ROOT = Path(__file__).parents[2]
-_REACH, _STEP = 0.02, 0.001  # m
+_LCM = "udpm://239.255.76.67:7672?ttl=0"  # not where another cell may be
+_NEAR, _FAR, _STEP = 0.005, 0.02, 0.001  # m
+_YIELDS = 5e-5  # m/N, in a step: the grip creeps, and a stiff way would press ever more
 
 
 class Shuttle:
-    """A policy that goes to and fro along the groove."""
+    """A policy that goes to and fro along the groove, and yields across it."""
 
     def __init__(self) -> None:
         self._step = _STEP
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
         """Returns the action (6,) for a state (12,)."""
-        if not 0.0 <= s[0] + self._step <= _REACH:
-            self._step = -self._step
+        if s[0] > _FAR or (s[0] < _NEAR and self._step < 0.0):
+            self._step = -_STEP if s[0] > _FAR else _STEP
         action = np.zeros(6)
         action[0] = self._step
+        action[1:3] = _YIELDS * s[7:9]
         return action
 
 
@@ -125,7 +127,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder) / "fake.yaml"
         fake = subprocess.Popen(
-            [sys.executable, str(ROOT / "tools/fake_cell.py"), "--config", str(config)],
+            command("fake_cell", "--config", config, "--lcm-url", _LCM),
             stdin=subprocess.DEVNULL,
         )
         try:

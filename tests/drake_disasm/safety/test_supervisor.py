@@ -12,7 +12,7 @@ STEP = np.full(7, 0.004)
 
 def supervisor(stop: list[str]) -> Supervisor:
     """Returns one with a guard that says what is in a list."""
-    return Supervisor([lambda _: stop[0] if stop else ""], STEP, 0.002)
+    return Supervisor([lambda _: stop[0] if stop else ""], STEP, 0.002, 0.05)
 
 
 def at(
@@ -80,3 +80,20 @@ def test_only_resume_ends_a_hold_and_then_it_waits_again():
     assert held.mode is Mode.WAITING
     held.command(at(away, away))
     assert held.mode is Mode.ACTIVE
+
+
+def test_an_arm_that_was_jogged_between_episodes_is_not_sent_back():
+    active = supervisor([])
+    active.command(at(Q, Q))
+    jogged = Q + 0.04
+    active.begin()
+    assert np.array_equal(active.command(at(jogged, jogged)), jogged)
+    assert active.mode is Mode.ACTIVE
+
+
+def test_a_new_episode_does_not_end_a_hold():
+    active = supervisor([])
+    active.command(at(Q, Q))
+    active.trip("stop", Q, 1.0)
+    active.begin()
+    assert active.mode is Mode.HOLD and active.reason == "stop"

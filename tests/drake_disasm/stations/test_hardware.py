@@ -154,6 +154,25 @@ def test_a_hold_stays_until_resumed_and_commands_go_nowhere() -> None:
         assert station.supervisor.mode is Mode.ACTIVE, station.supervisor.reason
 
 
+def test_a_policy_that_is_late_ends_in_a_hold() -> None:
+    cells: list[FakeCell] = []
+
+    def thinks(s: np.ndarray) -> np.ndarray:
+        """Takes 0.3 s of the devices' time over a far state."""
+        if s[0] > 0.003:
+            cells[0].time += 0.3
+        return np.array([1e-3, 0, 0, 0, 0, 0])
+
+    with in_lockstep(load_scenario("removal"), thinks) as (simulation, station, cell):
+        cells.append(cell)
+        simulation.reset(0)
+        with pytest.raises(HoldError) as caught:
+            for _ in range(10):
+                simulation.step()
+        assert station.supervisor.mode is Mode.HOLD
+        assert "a policy is late" in str(caught.value)
+
+
 def test_no_thread_and_no_socket_is_left() -> None:
     threads = set(threading.enumerate())
     sockets = len(psutil.Process().net_connections())
