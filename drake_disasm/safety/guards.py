@@ -26,7 +26,7 @@ class Situation:
         q_measured: (7,) [rad].
         q_before: (7,) what was measured at the last command; NaN before the first.
         X_GB: the bolt, as measured.
-        load: (6,) [f; tau] on the bolt at Bo in the sensor's axes, untared; None
+        load: (6,) [f; tau] on the bolt at Bo in the sensor's axes, zeroed; None
             while the sensor has not been zeroed.
         readings: of each device.
     """

@@ -1,6 +1,7 @@
 """What every station has, simulated or real."""
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,8 +12,10 @@ from pydrake.systems.primitives import RandomSource
 from drake_disasm.coordinates import ArmCoordinates, Coordinates
 from drake_disasm.devices.ft_sensor import Payload
 from drake_disasm.effects import BoltMotion, Effect
+from drake_disasm.errors import DisasmError
 from drake_disasm.ports import Port
 from drake_disasm.scenario import PlacementConfig, Scenario
+from drake_disasm.systems.observation import Mounting
 from drake_disasm.tool import Tool
 
 
@@ -68,6 +71,17 @@ class Station(Diagram):
         """What is known to hang on the sensor."""
         return Payload(self.payload_mass, self.p_SoScm_S, self.g_W)
 
+    @functools.cached_property
+    def mounting(self) -> Mounting:
+        """How the sensor sits between bolt and robot, and what it carries."""
+        return Mounting(
+            self.X_SB,
+            self.X_WG.rotation(),
+            self.payload_mass,
+            self.p_SoScm_S,
+            self.g_W,
+        )
+
     @property
     def random_sources(self) -> tuple[RandomSource, ...]:
         """What is random in it: seeded anew in each episode."""
@@ -106,6 +120,19 @@ class Station(Diagram):
         )
         self.start = self.coordinates.start(RigidTransform())
         return tool
+
+
+def refuse_twins_contact(scenario: Scenario) -> None:
+    """Refuses a contact model that only the twin has.
+
+    Raises:
+        DisasmError: says what to use instead.
+    """
+    if scenario.contact.model != "hydroelastic":
+        raise DisasmError(
+            f"contact.model: '{scenario.contact.model}' is of the twin alone; "
+            "use hydroelastic for the cell, or --model twin"
+        )
 
 
 def nominal_groove_pose(placement: PlacementConfig) -> RigidTransform:

@@ -22,12 +22,12 @@ from pydrake.systems.primitives import (
 )
 
 from drake_disasm.effects import ArmEffect
-from drake_disasm.errors import DisasmError
 from drake_disasm.lock import add_lock, bolt_inertia, plate_bottom
 from drake_disasm.models import add_arm, add_model
 from drake_disasm.ports import CELL_PORTS
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.arm_effects import ArmMechanics
+from drake_disasm.stations.base import refuse_twins_contact
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.tool import FINGERS, add_tool, grasp_pose
 
@@ -81,11 +81,7 @@ class CellStation(SimulatedStation):
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__(scenario)
-        if scenario.contact.model != "hydroelastic":
-            raise DisasmError(
-                f"contact.model: '{scenario.contact.model}' is of the twin alone; "
-                "use hydroelastic for the cell, or --model twin"
-            )
+        refuse_twins_contact(scenario)
         self.grip_command = _grip_command(scenario)
         self.tool = self._set_cell_geometry()
         builder = DiagramBuilder()

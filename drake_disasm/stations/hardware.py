@@ -1,6 +1,6 @@
 """The real cell: the simulated one's ports, with devices behind them."""
 
-import functools
+import dataclasses
 import time
 from collections.abc import Callable, Sequence
 from typing import Self
@@ -32,11 +32,10 @@ from drake_disasm.models import add_arm
 from drake_disasm.ports import CELL_PORTS, Health, check_ports
 from drake_disasm.safety import Mode, Supervisor, guards
 from drake_disasm.scenario import ArmConfig, Scenario, validate
-from drake_disasm.stations.base import Beginning, Station
+from drake_disasm.stations.base import Beginning, Station, refuse_twins_contact
 from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.systems.device_reader import DeviceReader, Readable
 from drake_disasm.systems.gripper_writer import GripperWriter
-from drake_disasm.systems.observation import Mounting
 from drake_disasm.systems.safety_filter import SafetyFilter
 from drake_disasm.timing import COMMAND_DELAY
 
@@ -174,7 +173,7 @@ class HardwareStation(Station):
         return {name: device.read() for name, device in self.devices.items()}
 
     def connect(self) -> None:
-        """Begins to listen to the devices; harmless twice."""
+        """Begins to listen to the devices; once more, the sensor streams anew."""
         self._hex.start()
         self._gripper.start()
 
@@ -200,16 +199,10 @@ class HardwareStation(Station):
         self._hex = HexClient(
             sensor.address, sensor.port, sensor.period, sensor.filter_hz, self._clock
         )
-        grip = config.gripper
-        settings = RobotiqSettings(
-            transport=grip.transport,
-            address=grip.address,
-            port=grip.port,
-            device_id=grip.device_id,
-            speed=grip.speed,
-            force=grip.force,
-            activate=grip.activate and not self.dry_run,
+        grip = dataclasses.replace(
+            config.gripper, activate=config.gripper.activate and not self.dry_run
         )
+        settings = RobotiqSettings(**dataclasses.asdict(grip))
         self._gripper = RobotiqClient(settings, self._clock)
         iiwa = config.iiwa
         self._monitor = IiwaStatusMonitor(
@@ -224,16 +217,6 @@ class HardwareStation(Station):
             "gripper": self._gripper,
             "ft_sensor": self._hex,
         }
-
-    @functools.cached_property
-    def _mounting(self) -> Mounting:
-        return Mounting(
-            self.X_SB,
-            self.X_WG.rotation(),
-            self.payload_mass,
-            self.p_SoScm_S,
-            self.g_W,
-        )
 
     def _wire_arm(self, builder: DiagramBuilder) -> None:
         add, connect, iiwa = builder.AddNamedSystem, builder.Connect, self.config.iiwa
@@ -273,7 +256,7 @@ class HardwareStation(Station):
                 self.supervisor,
                 self.devices,
                 self.coordinates,
-                self._mounting,
+                self.mounting,
                 period,
                 self._clock,
             ),
@@ -392,11 +375,7 @@ def refuse_what_is_simulated(scenario: Scenario) -> None:
         raise DisasmError(
             f"randomisation.0 ({parameter}): hardware can't be drawn anew; take it out"
         )
-    if scenario.contact.model != "hydroelastic":
-        raise DisasmError(
-            f"contact.model: '{scenario.contact.model}' is of the twin alone; take it "
-            "out for hardware"
-        )
+    refuse_twins_contact(scenario)
 
 
 def refuse_effects(effects: Sequence[Effect]) -> None:

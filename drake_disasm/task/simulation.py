@@ -43,7 +43,7 @@ from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
 from drake_disasm.scenario import Scenario, draw, with_values
 from drake_disasm.stations import Station, make_station
 from drake_disasm.systems.imprecision import ImprecisionNoise, clamped
-from drake_disasm.systems.observation import Mounting, ObservationProcessor
+from drake_disasm.systems.observation import ObservationProcessor
 from drake_disasm.systems.policy import Policy, PolicySystem
 from drake_disasm.systems.pose_target import PoseTarget
 from drake_disasm.systems.task_monitor import TaskMonitor
@@ -330,14 +330,7 @@ class TaskSimulation:
 
 def make_processor(station: Station, variant: str) -> ObservationProcessor:
     """Returns the observation processing that fits a station, not yet zeroed."""
-    mounting = Mounting(
-        station.X_SB,
-        station.X_WG.rotation(),
-        station.payload_mass,
-        station.p_SoScm_S,
-        station.g_W,
-    )
-    return ObservationProcessor(station.coordinates, mounting, variant)
+    return ObservationProcessor(station.coordinates, station.mounting, variant)
 
 
 def add_motion(

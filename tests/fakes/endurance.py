@@ -48,8 +48,8 @@ class Shuttle:
 class Ages:
     """How old samples are at each control step, and a command's way to its echo."""
 
-    def __init__(self, simulation: TaskSimulation, station: HardwareStation) -> None:
-        self._simulation, self._station = simulation, station
+    def __init__(self, station: HardwareStation) -> None:
+        self._station = station
         self.ages: dict[str, list[float]] = {name: [] for name in station.devices}
         self.times: dict[str, list[float]] = {name: [] for name in station.devices}
         self.echoes: list[float] = []
@@ -95,7 +95,7 @@ def run(config: Path, minutes: float) -> None:
         simulation = TaskSimulation(scenario, "cell", Shuttle(), make=lambda _: station)
         simulation.set_target_realtime_rate(1.0)
         simulation.reset(0)
-        ages = Ages(simulation, station)
+        ages = Ages(station)
         simulation.simulator.set_monitor(ages.monitor)
         begun, trips = time.monotonic(), 0
         try:
