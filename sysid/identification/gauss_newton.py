@@ -16,7 +16,8 @@ from sysid.objective import Objective
 Array = NDArray[np.float64]
 
 _DAMPING = (0.0, 1e-3, 1e-2, 1e-1, 1.0, 10.0)  # all tried at once, as one batch
-_GAIN = 1e-3  # of the objective, below which another iteration does not pay
+#: Of the objective, below which another iteration does not pay.
+GAIN = 1e-3
 
 
 def gauss_newton(
@@ -26,6 +27,7 @@ def gauss_newton(
     callback: Callable[[float], None] | None = None,
     start: Linearisation | None = None,
     central: bool = True,
+    pays: float = GAIN,
 ) -> Linearisation:
     """Returns the linearisation where Gauss-Newton steps from u lead to.
 
@@ -42,6 +44,7 @@ def gauss_newton(
         start: the linearisation at u, if it is known.
         central: whether differences are central, or one-sided at half the price; then
             damping is tried only where the full step does not help.
+        pays: the share of the objective that an iteration is to gain for another.
     """
     here = linearise(objective, u, central=central) if start is None else start
     for _ in range(iterations if len(u) else 0):
@@ -54,7 +57,7 @@ def gauss_newton(
         if reached >= value:
             break
         here = linearise(objective, point, fitting_steps(here), central, residual)
-        if reached > (1.0 - _GAIN) * value:
+        if reached > (1.0 - pays) * value:
             break
     return here
 

@@ -21,7 +21,7 @@ What = tuple[Candidate, ...] | Dependence
 ALPHA = 0.05  # family-wise, in each round
 LEAST_GAIN = 0.01  # of the loss
 LEAST_SHARE = 0.8  # of the blocks
-_LEAST_FIELD = 0.005  # of the loss, that a size must be worth
+LEAST_FIELD = 0.005  # of the loss, that a size must be worth
 _SIMPLER = 0.05  # of the gain, that fewer parameters may cost
 _RIVAL = 0.5  # of the gain, below which nothing is a tie
 _PAIRS_OF = 8
@@ -152,7 +152,7 @@ class Bench:
                 for c in kept
             }
             least = min(losses, key=lambda c: losses[c])
-            if losses[least] > (1.0 + _LEAST_FIELD) * now:
+            if losses[least] > (1.0 + LEAST_FIELD) * now:
                 break
             kept.remove(least)
             now = losses[least]

@@ -121,10 +121,8 @@ def _with_all_rows(
 
     The last has the model's own derivatives; and the tracer that fits so.
     """
-    tracer = dataclasses.replace(tracer, base=base)
-    first, last = tracer.fit(()), tracer.fit(last.effects, last)
-    tracer = dataclasses.replace(tracer, exact=True)
-    return tracer, first, tracer.fit(last.effects, last)
+    tracer = dataclasses.replace(tracer, base=base, exact=True)
+    return tracer, tracer.fit(()), tracer.fit(last.effects, last)
 
 
 def _like(base: ScenarioModel, test: ScenarioModel) -> ScenarioModel:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.identification.gauss_newton import gauss_newton
+from sysid.identification.gauss_newton import GAIN, gauss_newton
 from sysid.identification.linearisation import Linearisation, extend
 from sysid.models.base import ScenarioModel
 from sysid.objective import Objective, tempered
@@ -19,10 +19,10 @@ from sysid.tracing.coarse import rough_fits
 from sysid.tracing.empirical import curves
 from sysid.tracing.evidence import (
     FEW,
+    LEAST_FIELD,
     LEAST_GAIN,
     Bench,
     Evidence,
-    evidence,
     measured,
     simplest,
     together,
@@ -41,8 +41,8 @@ _CLEARLY = 0.5  # of the loss without an effect: no fit is needed to see its wor
 _HOPELESS = 2.0  # times the least loss of rough fits
 _KEEPS_UP = 0.25  # of the loss that is left
 _ITERATIONS = 8
-_LAST_ITERATIONS = 1  # with its own derivatives
 _FEW_ITERATIONS = 6  # where an evaluation takes seconds
+_PAYS = 0.02  # of the objective: what an iteration is to gain there, at least
 _AT_BOUND = 1e-6  # of a parameter's range
 _Z95 = 1.959963984540054
 _TRIES = 4  # effects that are fitted in a round
@@ -222,10 +222,42 @@ class Tracer:
         ties = _ties(best, survey.effects if is_single else trials)
         if not self.base.affine:
             ties = _true_ties(ties, passing, fit, found)
+            found = self._settled(found)
         record = dataclasses.replace(survey, bench=None)
         self.rounds.append(Round(best, ties, record, found.value))
         self.tell(f"{best.name}: objective {found.value:.4g}")
         return found
+
+    def _settled(self, fit: Fit) -> Fit:
+        """Returns the fit at the bottom of its valley, with as few sizes as will do.
+
+        Derivatives of a model that is alike stop short: what they leave, effects would
+        explain that are not there.
+        """
+        tracer = self
+        if self.base.costly and not self.exact and fit.value > 1.0:
+            tracer = dataclasses.replace(self, exact=True)
+            fit = tracer.fit(fit.effects, fit)
+        return tracer.simplified(fit)
+
+    def simplified(self, fit: Fit) -> Fit:
+        """Returns the fit without sizes that gain next to nothing, even if they show.
+
+        They have taken up what the model does a little differently from the device.
+        """
+        effects = tuple(self._with_worthy_sizes(fit, effect) for effect in fit.effects)
+        if effects == fit.effects:
+            return fit
+        simple = self.fit(effects, fit)
+        return simple if simple.loss <= (1.0 + LEAST_GAIN) * fit.loss else fit
+
+    def _with_worthy_sizes(self, fit: Fit, effect: Candidate) -> Candidate:
+        """Returns an effect of a fit with its best size and others that gain enough."""
+        columns = fit.columns_of(effect)
+        gains = [_gain(fit, np.array([c])) for c in columns]
+        enough = min(LEAST_FIELD, max(gains))
+        pairs = zip(effect.fields, gains, strict=True)
+        return effect.only([field for field, gain in pairs if gain >= enough])
 
     def _tried(
         self,
@@ -338,20 +370,7 @@ class Tracer:
         As a share of the loss without it, of blocks that are not fitted; all else is
         fitted again.
         """
-        if not fit.effects:
-            return {}
-        scaling = Scaling(fit.model.parameters)
-        null = scaling.to_unit(nominal_values(fit.model.parameters))
-        study = fit.study()
-        found = {}
-        for effect in fit.effects:
-            own = np.isin(np.arange(len(null)), fit.columns_of(effect))
-            without = study.moved(np.where(own, null - fit.here.u, 0.0))
-            without = dataclasses.replace(without, side=np.zeros(len(null)))
-            beside = without.beside(np.flatnonzero(~own))
-            (says,) = evidence(beside, [((effect,), np.flatnonzero(own))])
-            found[effect.name] = says.gain
-        return found
+        return {e.name: _gain(fit, fit.columns_of(e)) for e in fit.effects}
 
     def fit(
         self,
@@ -383,19 +402,16 @@ class Tracer:
                 [start.here.jacobian, np.stack(more, axis=-1)], axis=-1
             )
             here = dataclasses.replace(start.here, u=u, jacobian=jacobian)
-        most = self._most_iterations(model)
+        most, pays = (_FEW_ITERATIONS, _PAYS) if model.costly else (_ITERATIONS, GAIN)
         here = remembered(
             None if model.affine else self.folder,
             (model, self.huber, self.exact, u, here),
-            lambda: gauss_newton(objective, u, most, start=here, central=False),
+            lambda: gauss_newton(
+                objective, u, most, start=here, central=False, pays=pays
+            ),
         )
         found = objective.scaling.from_unit(here.u)
         return Fit(effects, model, found, here, objective.value(here.residual))
-
-    def _most_iterations(self, model: ScenarioModel) -> int:
-        if not model.costly:
-            return _ITERATIONS
-        return _LAST_ITERATIONS if self.exact else _FEW_ITERATIONS
 
     def _objective(self, model: ScenarioModel) -> Objective:
         alike = None if self.exact else model.alike()
@@ -434,6 +450,21 @@ class Tracer:
             [(d, begin + np.array(d.columns, dtype=np.int64)) for d in dependences],
             episode[np.unique(blocks, return_index=True)[1]],
         )
+
+
+def _gain(fit: Fit, columns: NDArray[np.int64]) -> float:
+    """Returns what some parameters of a fit (k,) gain, as a share of the loss without.
+
+    Of blocks that are not fitted; all other parameters are fitted again.
+    """
+    scaling = Scaling(fit.model.parameters)
+    null = scaling.to_unit(nominal_values(fit.model.parameters))
+    own = np.isin(np.arange(len(null)), columns)
+    without = fit.study().moved(np.where(own, null - fit.here.u, 0.0))
+    without = dataclasses.replace(without, side=np.zeros(len(null)))
+    study = without.beside(np.flatnonzero(~own))
+    total = study.energy.sum()
+    return float((total - study.losses(columns).sum()) / total)
 
 
 def _confirmed(before: Fit, after: Fit, trial: Evidence, tests: int) -> Evidence:
