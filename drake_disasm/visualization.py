@@ -1,5 +1,6 @@
 """Watching a TaskSimulation in Meshcat, live and as a page that plays offline."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,18 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.meshcat import ContactVisualizer, ContactVisualizerParams
-from pydrake.systems.framework import Context, DiagramBuilder, EventStatus, LeafSystem
+from pydrake.systems.framework import (
+    Context,
+    DiagramBuilder,
+    EventStatus,
+    LeafSystem,
+    OutputPort,
+)
 
 from drake_disasm.errors import DisasmError
 from drake_disasm.spatial import pose_from_vector
+from drake_disasm.stations.base import Station
+from drake_disasm.stations.measured_cell import MEASURED_PORTS, MeasuredCell
 from drake_disasm.task.simulation import TaskSimulation
 from drake_disasm.writing import make_folder, write_atomically
 
@@ -46,7 +55,8 @@ def start_meshcat(host: str = "localhost") -> Meshcat:
 class MeshcatView:
     """Shows robot, lock, contact forces, the wrench on the bolt and its path.
 
-    An observer of a TaskSimulation.
+    An observer of a TaskSimulation. Of a station without a simulated plant it shows
+    what is measured, and no contact.
 
     Args:
         meshcat: the server.
@@ -62,16 +72,28 @@ class MeshcatView:
     def connect(self, builder: DiagramBuilder, simulation: TaskSimulation) -> None:
         """Adds Drake's visualisers and the wrench's."""
         station = simulation.station
-        query = station.GetOutputPort("query_object")
-        MeshcatVisualizer.AddToBuilder(
-            builder,
-            query,
-            self.meshcat,
-            MeshcatVisualizerParams(publish_period=_FRAME_PERIOD),
+        if station.HasOutputPort("query_object"):
+            query = station.GetOutputPort("query_object")
+            self._add_contact(builder, station.GetOutputPort("contact_results"), query)
+        else:
+            query = _measured_geometry(builder, station)
+        _add_geometry(builder, query, self.meshcat)
+        self.wrench = builder.AddNamedSystem(
+            "wrench_visualizer", WrenchVisualizer(self.meshcat, station.X_WG)
         )
+        processor = simulation.processor
+        for port in ("observation", "X_GB"):
+            builder.Connect(
+                processor.GetOutputPort(port), self.wrench.GetInputPort(port)
+            )
+        _look_at(self.meshcat, station.X_WG, self._close_up)
+
+    def _add_contact(
+        self, builder: DiagramBuilder, results: OutputPort, query: OutputPort
+    ) -> None:
         ContactVisualizer.AddToBuilder(
             builder,
-            station.GetOutputPort("contact_results"),
+            results,
             query,
             self.meshcat,
             ContactVisualizerParams(
@@ -82,26 +104,6 @@ class MeshcatView:
                 radius=0.0008,
             ),
         )
-        self.wrench = builder.AddNamedSystem(
-            "wrench_visualizer", WrenchVisualizer(self.meshcat, station.X_WG)
-        )
-        processor = simulation.processor
-        for port in ("observation", "X_GB"):
-            builder.Connect(
-                processor.GetOutputPort(port), self.wrench.GetInputPort(port)
-            )
-        self._look_at(station.X_WG)
-
-    def _look_at(self, X_WG: RigidTransform) -> None:
-        """Puts the camera where arm and lock are seen, or at the groove."""
-        A = X_WG.translation()
-        self.meshcat.SetProperty("/Background", "top_color", [0.82, 0.88, 0.94])
-        self.meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.98, 0.99])
-        if self._close_up:
-            eye, target = [0.115, -0.055, 0.055], [0.025, 0.0, 0.025]
-        else:
-            eye, target = [0.50, -0.68, 0.40], [-0.22, 0.0, 0.16]
-        self.meshcat.SetCameraPose(A + np.array(eye), A + np.array(target))
 
     def begin_episode(self) -> None:
         """Clears the path; starts recording if asked to."""
@@ -125,6 +127,68 @@ class MeshcatView:
         page = self.meshcat.StaticHtml().encode()
         make_folder(path.parent)
         write_atomically(path, lambda stream: stream.write(page))
+
+
+class MeasuredView:
+    """Shows where devices say that arm and fingers are; simulates nothing.
+
+    Args:
+        meshcat: the server.
+        station: whose cell it is.
+        close_up: whether to look at the groove rather than at the whole cell.
+    """
+
+    def __init__(
+        self, meshcat: Meshcat, station: Station, close_up: bool = False
+    ) -> None:
+        builder = DiagramBuilder()
+        self._cell = builder.AddNamedSystem(
+            "measured_cell", MeasuredCell(station.scenario)
+        )
+        _add_geometry(builder, self._cell.GetOutputPort("query_object"), meshcat)
+        self._diagram = builder.Build()
+        self._context = self._diagram.CreateDefaultContext()
+        _look_at(meshcat, station.X_WG, close_up)
+
+    def show(self, measured: Mapping[str, np.ndarray]) -> None:
+        """Draws one frame, if all of it is finite.
+
+        Args:
+            measured: by port, MEASURED_PORTS at least: angles (7,) [rad], opening and
+                its rate (2,) [m, m/s].
+        """
+        values = [measured[name] for name in MEASURED_PORTS]
+        if not all(np.isfinite(value).all() for value in values):
+            return
+        cell_context = self._cell.GetMyContextFromRoot(self._context)
+        for name, value in zip(MEASURED_PORTS, values, strict=True):
+            self._cell.GetInputPort(name).FixValue(cell_context, value)
+        self._diagram.ForcedPublish(self._context)
+
+
+def _measured_geometry(builder: DiagramBuilder, station: Station) -> OutputPort:
+    """Returns the query port of a station's cell, where it measures itself to be."""
+    cell = builder.AddNamedSystem("measured_cell", MeasuredCell(station.scenario))
+    for port in MEASURED_PORTS:
+        builder.Connect(station.GetOutputPort(port), cell.GetInputPort(port))
+    return cell.GetOutputPort("query_object")
+
+
+def _add_geometry(builder: DiagramBuilder, query: OutputPort, meshcat: Meshcat) -> None:
+    params = MeshcatVisualizerParams(publish_period=_FRAME_PERIOD)
+    MeshcatVisualizer.AddToBuilder(builder, query, meshcat, params)
+
+
+def _look_at(meshcat: Meshcat, X_WG: RigidTransform, close_up: bool) -> None:
+    """Puts the camera where arm and lock are seen, or at the groove."""
+    A = X_WG.translation()
+    meshcat.SetProperty("/Background", "top_color", [0.82, 0.88, 0.94])
+    meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.98, 0.99])
+    if close_up:
+        eye, target = [0.115, -0.055, 0.055], [0.025, 0.0, 0.025]
+    else:
+        eye, target = [0.50, -0.68, 0.40], [-0.22, 0.0, 0.16]
+    meshcat.SetCameraPose(A + np.array(eye), A + np.array(target))
 
 
 class WrenchVisualizer(LeafSystem):

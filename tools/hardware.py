@@ -11,8 +11,10 @@ from drake_disasm.ports import Health
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.hardware import HardwareStation
 from drake_disasm.stations.hardware_config import load_hardware_config
+from drake_disasm.visualization import MeasuredView
 
 _EVERY = 0.5  # s, between two looks of a dry run
+_FRAMES = 10  # of the view, in that time
 _POLL = 0.001  # s: LCM keeps one message of a channel, the newest
 
 
@@ -32,17 +34,25 @@ def open_station(
     return HardwareStation(scenario, load_hardware_config(config), dry_run)
 
 
-def watch(station: HardwareStation) -> None:
-    """Prints how the devices are until Ctrl-C; commands nothing."""
-    print("dry run: nothing is commanded; Ctrl-C ends it")
+def watch(station: HardwareStation, view: MeasuredView | None) -> None:
+    """Prints and shows how the devices are until Ctrl-C; commands nothing."""
+    print("dry run: nothing is commanded; Ctrl-C ends it", flush=True)
     station.connect()
     while True:
-        end = time.monotonic() + _EVERY
-        while time.monotonic() < end:
-            cli.stop_if_interrupted()
-            station.pump()
-            time.sleep(_POLL)
+        for _ in range(_FRAMES):
+            _pump(station, _EVERY / _FRAMES)
+            if view:
+                view.show(station.measured())
         print(health_table(station), flush=True)
+
+
+def _pump(station: HardwareStation, duration: float) -> None:
+    """Takes what the arm sends for a time [s]."""
+    end = time.monotonic() + duration
+    while time.monotonic() < end:
+        cli.stop_if_interrupted()
+        station.pump()
+        time.sleep(_POLL)
 
 
 def health_table(station: HardwareStation) -> str:

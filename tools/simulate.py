@@ -3,7 +3,7 @@
 One scenario file gives one Drake diagram: an iiwa slides a bolt along a door-chain
 groove under hydroelastic contact. Watch it in the browser page whose address is
 printed, record it as a log, or save a page that plays offline. The same diagram runs
-on the devices of a real cell, without a page; read docs/hardware.md first.
+on the devices of a real cell; read docs/hardware.md first.
 """
 
 import argparse
@@ -18,7 +18,7 @@ from tqdm import tqdm
 from drake_disasm.errors import DisasmError
 from drake_disasm.policies import Exploring
 from drake_disasm.scenario import Scenario, load_scenario
-from drake_disasm.stations import MODELS
+from drake_disasm.stations import MODELS, Station
 from drake_disasm.task.episode import (
     EpisodeRecorder,
     EpisodeSummary,
@@ -26,7 +26,7 @@ from drake_disasm.task.episode import (
     summary_table,
 )
 from drake_disasm.task.simulation import TaskSimulation
-from drake_disasm.visualization import MeshcatView, start_meshcat
+from drake_disasm.visualization import MeasuredView, MeshcatView, start_meshcat
 from drake_disasm.writing import make_folder
 from sysid.logs import LogWriter, flat_columns
 from sysid.logs.recording import transitions_header
@@ -194,20 +194,21 @@ def _on_hardware(
     """Runs one episode on the devices, or only watches them."""
     with hardware.open_station(scenario, args.hardware_config, args.dry_run) as station:
         if args.dry_run:
-            hardware.watch(station)
+            hardware.watch(station, _open_measured_view(args, station))
         policy = cli.named_policy(args.policy, scenario)
         writer = _open_log(args, arguments, scenario) if args.record else None
         if args.explore:
             policy = Exploring(policy, args.explore * _MM, args.seed)
-        simulation = TaskSimulation(scenario, "cell", policy, make=lambda _: station)
+        view = _open_view(args)
+        views = [view] if view else []
+        simulation = TaskSimulation(scenario, "cell", policy, views, lambda _: station)
         simulation.set_target_realtime_rate(1.0)
         print("waiting for the devices", flush=True)
         try:
-            print(summary_table([_run_one(simulation, args.seed, writer, None)]))
+            print(summary_table([_run_one(simulation, args.seed, writer, view)]))
         finally:
             print(hardware.health_table(station))
-    if args.record:
-        print(f"log: {args.record}")
+    _finish(args, view)
     return 0
 
 
@@ -228,11 +229,15 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
                 raise DisasmError(f"--{option}: is for --station hardware")
         return
     one = {"model": "cell", "episodes": 1, "realtime_rate": None}
-    none = {"hidden": None, "html": None, "resume": False}
+    none = {"hidden": None, "resume": False}
     for name, only in (one | none).items():
         if getattr(args, name) != only:
             option = name.replace("_", "-")
             raise DisasmError(f"--{option}: hardware can't do that; leave it out")
+
+    for name in ("record", "html"):
+        if args.dry_run and getattr(args, name):
+            raise DisasmError(f"--{name}: a dry run keeps nothing; leave one out")
 
 
 def _run_one(
@@ -293,6 +298,16 @@ def _open_view(args: argparse.Namespace) -> MeshcatView | None:
     if not args.no_meshcat:
         print(f"watch at {view.meshcat.web_url()}", flush=True)
     return view
+
+
+def _open_measured_view(
+    args: argparse.Namespace, station: Station
+) -> MeasuredView | None:
+    if args.no_meshcat:
+        return None
+    meshcat = start_meshcat(args.meshcat_host)
+    print(f"watch at {meshcat.web_url()}", flush=True)
+    return MeasuredView(meshcat, station, args.close_up)
 
 
 def _rate(args: argparse.Namespace) -> float:

@@ -3,11 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     BodyIndex,
-    Frame,
     PdControllerGains,
     SpatialInertia,
 )
@@ -22,16 +20,16 @@ from pydrake.systems.primitives import (
 )
 
 from drake_disasm.effects import ArmEffect
-from drake_disasm.lock import add_lock, bolt_inertia, plate_bottom
-from drake_disasm.models import add_arm, add_model
+from drake_disasm.lock import bolt_inertia
+from drake_disasm.models import add_arm
 from drake_disasm.ports import CELL_PORTS
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.arm_effects import ArmMechanics
 from drake_disasm.stations.base import refuse_twins_contact
+from drake_disasm.stations.cell_models import add_cell
 from drake_disasm.stations.simulated import SimulatedStation
-from drake_disasm.tool import FINGERS, add_tool, grasp_pose
+from drake_disasm.tool import FINGERS
 
-_BENCH = "package://disasm_models/bench/bench.urdf"
 _ARM_INERTIA = 4.0  # kg m^2, of a joint with its rotor, for the damping ratio
 _PAD_INDENTATION = 3e-5  # m, of a pad (20 MPa, 7.5 mm thick) under some 60 N
 _FINGER_MASS = 0.3  # kg, of a finger with its drive, for its damping
@@ -91,39 +89,17 @@ class CellStation(SimulatedStation):
         config = self.scenario
         frame_Gn = self._add_plant(builder, config.simulation.cell_time_step)
         plant = self.plant
-        self.iiwa, frame_F = add_arm(plant, config.arm.model)
-        self.tool_models = add_tool(plant, frame_F, config)
-        self.lock = add_lock(plant, frame_Gn, config.lock, config.contact)
-        self._add_bench(frame_Gn)
-        self._hold_bolt()
+        models = add_cell(plant, frame_Gn, config)
+        self.iiwa, self.tool_models, self.lock = models.iiwa, models.tool, models.lock
         plant.Finalize()
         self._set_gains()
-        self._mechanics = ArmMechanics(plant, self.iiwa, frame_F)
+        self._mechanics = ArmMechanics(plant, self.iiwa, models.frame_F)
         self._wire_arm(builder)
         self._wire_gripper(builder)
         self._add_sensor(
             builder, self.tool_models.sensor_joint, self.tool_models.frame_S
         )
         self._finish(builder, self.lock.bolt)
-
-    def _add_bench(self, frame_Gn: Frame) -> None:
-        """Puts the bench's top under the plate."""
-        bench = add_model(self.plant, _BENCH)
-        X_WTop = RigidTransform(
-            self.X_WG @ np.array([0.02, plate_bottom(self.scenario.lock), 0.0])
-        )
-        self.plant.WeldFrames(
-            self.plant.world_frame(), self.plant.GetFrameByName("top", bench), X_WTop
-        )
-
-    def _hold_bolt(self) -> None:
-        """Welds the bolt into the gripper, if the scenario says so."""
-        if self.scenario.gripper.hold == "weld":
-            self.plant.WeldFrames(
-                self.tool_models.frame_T,
-                self.lock.bolt.body_frame(),
-                grasp_pose(self.scenario),
-            )
 
     def _set_gains(self) -> None:
         plant, arm, gripper = self.plant, self.scenario.arm, self.scenario.gripper

@@ -172,6 +172,13 @@ class HardwareStation(Station):
         """Returns the newest reading of each device."""
         return {name: device.read() for name, device in self.devices.items()}
 
+    def measured(self) -> dict[str, np.ndarray]:
+        """Returns the newest values of each device, by the port that has them."""
+        return {
+            f"{name}.{_VALUES[name]}": reading.values
+            for name, reading in self.readings().items()
+        }
+
     def connect(self) -> None:
         """Begins to listen to the devices; once more, the sensor streams anew."""
         self._hex.start()

@@ -6,7 +6,7 @@
 import contextlib
 import dataclasses
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from pydrake.lcm import DrakeLcm
@@ -17,6 +17,7 @@ from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.systems.policy import Policy
 from drake_disasm.task.simulation import TaskSimulation
+from drake_disasm.visualization import MeshcatView
 from tests.fakes import hex_box, robotiq_gripper
 from tests.fakes.cell import IIWA_FAULTS, FakeCell, arrival, in_step
 
@@ -54,7 +55,10 @@ class FaultRun:
 
 @contextlib.contextmanager
 def in_lockstep(
-    scenario: Scenario, policy: Policy, seed: int = 0
+    scenario: Scenario,
+    policy: Policy,
+    seed: int = 0,
+    views: Sequence[MeshcatView] = (),
 ) -> Iterator[tuple[TaskSimulation, HardwareStation, FakeCell]]:
     """Yields a diagram on the hardware station, with a fake cell in step with it."""
     lcm = DrakeLcm("memq://")
@@ -68,7 +72,7 @@ def in_lockstep(
             scenario, cell.config(), clock=cell.clock, wait=wait, lcm=lcm
         ) as station:
             simulation = TaskSimulation(
-                scenario, "cell", policy, make=lambda _: station
+                scenario, "cell", policy, views, make=lambda _: station
             )
             read = station.devices["ft_sensor"].read
             simulation.simulator.set_monitor(in_step(cell, read))

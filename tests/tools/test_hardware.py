@@ -27,7 +27,8 @@ _LCM = f"udpm://239.255.76.67:{_PORT}?ttl=0"
             "nowhere.yaml",
         ),
         (("--station", "hardware", "--episodes", "2"), "--episodes"),
-        (("--station", "hardware", "--html", "x.html"), "--html"),
+        (("--station", "hardware", "--dry-run", "--html", "x.html"), "--html"),
+        (("--station", "hardware", "--dry-run", "--record", "x"), "--record"),
         (("--station", "hardware", "--model", "twin"), "--model"),
     ],
 )
@@ -75,7 +76,7 @@ def test_a_dry_run_shows_the_devices_and_commands_nothing(fake: Path) -> None:
         text=True,
     )
     assert process.stdout
-    lines = [process.stdout.readline() for _ in range(7)]
+    lines = [process.stdout.readline() for _ in range(8)]
     os.kill(process.pid, signal.SIGINT)
     assert process.wait(30) == 130
     for name in ("iiwa", "gripper", "ft_sensor"):

@@ -1,0 +1,61 @@
+"""Everything that stands in the cell, added to a plant."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, ModelInstanceIndex
+
+from drake_disasm.lock import Lock, add_lock, plate_bottom
+from drake_disasm.models import add_arm, add_model
+from drake_disasm.scenario import Scenario
+from drake_disasm.tool import ToolModels, add_tool, grasp_pose
+
+_BENCH = "package://disasm_models/bench/bench.urdf"
+
+
+@dataclass(frozen=True)
+class CellModels:
+    """Handles of the cell's models in a plant.
+
+    Attributes:
+        iiwa: model instance of the arm.
+        frame_F: its flange.
+        tool: sensor and gripper.
+        lock: groove and bolt.
+    """
+
+    iiwa: ModelInstanceIndex
+    frame_F: Frame
+    tool: ToolModels
+    lock: Lock
+
+
+def add_cell(plant: MultibodyPlant, frame_Gn: Frame, scenario: Scenario) -> CellModels:
+    """Adds arm, tool, lock and bench; welds the bolt if the scenario says so.
+
+    Args:
+        plant: not yet finalised.
+        frame_Gn: the groove's nominal frame, fixed in the world.
+        scenario: of the cell.
+
+    Raises:
+        DisasmError: a model file is missing or is of another device.
+    """
+    iiwa, frame_F = add_arm(plant, scenario.arm.model)
+    tool = add_tool(plant, frame_F, scenario)
+    lock = add_lock(plant, frame_Gn, scenario.lock, scenario.contact)
+    _add_bench(plant, frame_Gn, scenario)
+    if scenario.gripper.hold == "weld":
+        bolt = lock.bolt.body_frame()
+        plant.WeldFrames(tool.frame_T, bolt, grasp_pose(scenario))
+    return CellModels(iiwa, frame_F, tool, lock)
+
+
+def _add_bench(plant: MultibodyPlant, frame_Gn: Frame, scenario: Scenario) -> None:
+    """Puts the bench's top under the plate, level whatever the groove's yaw."""
+    bench = add_model(plant, _BENCH)
+    X_WG = frame_Gn.GetFixedPoseInBodyFrame()
+    X_WTop = RigidTransform(X_WG @ np.array([0.02, plate_bottom(scenario.lock), 0.0]))
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("top", bench), X_WTop)

@@ -1,0 +1,60 @@
+"""The cell where devices say that it is: what a view of the real one shows."""
+
+import dataclasses
+
+import numpy as np
+from pydrake.geometry import SceneGraph
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import MatrixGain, Multiplexer
+from pydrake.systems.rendering import MultibodyPositionToGeometryPose
+
+from drake_disasm.scenario import Scenario
+from drake_disasm.stations.base import nominal_groove_pose
+from drake_disasm.stations.cell_models import add_cell
+
+#: Its inputs, and output ports of any station with the cell's port table.
+MEASURED_PORTS = ("iiwa.position_measured", "gripper.state_measured")
+
+
+class MeasuredCell(Diagram):
+    """Arm, fingers and lock, posed by measurements; the bolt sits as it was gripped.
+
+    @system
+    name: MeasuredCell
+    input_ports:
+    - iiwa.position_measured
+    - gripper.state_measured
+    output_ports:
+    - query_object
+    @endsystem
+
+    Args:
+        scenario: of the cell.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__()
+        builder = DiagramBuilder()
+        graph = builder.AddNamedSystem("scene_graph", SceneGraph())
+        plant = MultibodyPlant(0.0)
+        source = plant.RegisterAsSourceForSceneGraph(graph)
+        X_WG = nominal_groove_pose(scenario.placement)
+        groove = FixedOffsetFrame("groove_nominal", plant.world_frame(), X_WG)
+        gripped = dataclasses.replace(scenario.gripper, hold="weld")
+        held = dataclasses.replace(scenario, gripper=gripped)
+        add_cell(plant, plant.AddFrame(groove), held)
+        plant.Finalize()
+        position = builder.AddNamedSystem("position", Multiplexer([7, 2]))
+        halves = np.array([[0.5, 0.0], [0.5, 0.0]])
+        fingers = builder.AddNamedSystem("fingers", MatrixGain(D=halves))
+        builder.Connect(fingers.get_output_port(), position.get_input_port(1))
+        inputs = (position.get_input_port(0), fingers.get_input_port())
+        for name, port in zip(MEASURED_PORTS, inputs, strict=True):
+            builder.ExportInput(port, name)
+        poses = builder.AddNamedSystem("poses", MultibodyPositionToGeometryPose(plant))
+        builder.Connect(position.get_output_port(), poses.get_input_port())
+        builder.Connect(poses.get_output_port(), graph.get_source_pose_port(source))
+        builder.ExportOutput(graph.get_query_output_port(), "query_object")
+        builder.BuildInto(self)
