@@ -44,13 +44,19 @@ from drake_disasm.policies import ActionMap, LearnedPolicy, Network, make_policy
 from drake_disasm.quantity import closest
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import TwinStation
+from drake_disasm.stations.hardware_config import load_hardware_config
 from drake_disasm.stations.simulated import copy_state
 from drake_disasm.task.simulation import TaskSimulation, add_motion
 from drake_disasm.timing import boundary
 from drake_disasm.writing import make_folder, write_atomically
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests.fakes import endurance
+
 _REPEATS = 5
 _CLOSING_AIM_S = 300.0
+_LATENCY_MINUTES = 0.5
+_LATENCIES = ("iiwa_age", "gripper_age", "ft_sensor_age", "echo")
 _SCENARIO = "removal_turned"  # the bolt is in contact nearly all the time
 _POLICY = "admittance"
 _WIDTHS = (12, 128, 128, 128, 6)  # of the policy whose inference is timed
@@ -161,6 +167,28 @@ def _replay(scenario: Scenario, rates: list[np.ndarray]) -> float:
         value.SetFromVector(commanded)
         simulator.AdvanceTo(boundary(k + 1, scenario.task.period))
     return time.perf_counter() - start
+
+
+def measure_latency() -> Iterator[Figure]:
+    """Yields what 99 % of samples and commands keep to, beside what is too late.
+
+    Of the hardware station with a fake cell in another process, in real time.
+    """
+    with endurance.playing() as config:
+        limits = load_hardware_config(config).safety
+        try:
+            noted = endurance.run(config, _LATENCY_MINUTES)
+        except DisasmError as error:
+            tqdm.write(f"hardware_..._ms left out: {error}")
+            return
+    for name, ages in noted.ages.items():
+        stale = limits.stale_after(name)
+        age = float(np.percentile(ages, 99))
+        key = f"hardware_{name}_age_ms"
+        yield Figure(key, 1e3 * age, "ms", "when it is stale", age / stale)
+    echo = float(np.percentile(noted.echoes, 99))
+    stale = limits.stale_after("iiwa")
+    yield Figure("hardware_echo_ms", 1e3 * echo, "ms", "a stale arm", echo / stale)
 
 
 def measure_memory() -> Iterator[Figure]:
@@ -321,6 +349,7 @@ MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
     ("close_loop_impact_883_s",): lambda: measure_closing(
         "impact", "close_loop_impact_883_s"
     ),
+    tuple(f"hardware_{of}_ms" for of in _LATENCIES): measure_latency,
     ("peak_mib_simulate", "peak_mib_train", "peak_mib_identify"): measure_memory,
 }
 

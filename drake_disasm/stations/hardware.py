@@ -214,10 +214,10 @@ class HardwareStation(Station):
         iiwa = config.iiwa
         self._monitor = IiwaStatusMonitor(
             self._lcm,
+            self._checked,
             iiwa.status_channel,
             iiwa.status_period,
             self._clock,
-            self._checked,
         )
         self.devices: dict[str, Readable] = {
             "iiwa": self._monitor,

@@ -5,12 +5,14 @@ the bolt to and fro, and prints whether anything tripped, and how old samples we
 """
 
 import argparse
+import contextlib
 import gc
 import signal
 import subprocess
 import tempfile
 import threading
 import time
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +24,7 @@ from drake_disasm.scenario import load_scenario
 from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.stations.hardware_config import load_hardware_config
 from drake_disasm.task.simulation import TaskSimulation
+from drake_disasm.visualization import MeshcatView, start_meshcat
 from tests.tools.programs import command
 
 _LCM = "udpm://239.255.76.67:7672?ttl=0"  # not where another cell may be
@@ -73,26 +76,38 @@ class Ages:
                 del self._sent[: number + 1]
                 break
 
-    def table(self) -> str:
-        """Returns mean, 99 % and greatest age of each, in ms, as Markdown."""
+    def rows(self) -> dict[str, list[float]]:
+        """Returns what was noted [s], by what it is."""
         rows = {f"{name}, age of the newest sample": a for name, a in self.ages.items()}
         rows["iiwa, command to its echo in the status"] = self.echoes
         for name, times in self.times.items():
             rows[f"{name}, between samples"] = np.diff(np.unique(times)).tolist()
+        return rows
+
+    def table(self) -> str:
+        """Returns mean, 99 % and greatest of each row, in ms, as Markdown."""
         lines = ["| | mean | 99 % | greatest |", "|---|---|---|---|"]
-        for name, values in rows.items():
+        for name, values in self.rows().items():
             ms = 1e3 * np.array(values)
             figures = (ms.mean(), np.percentile(ms, 99), ms.max())
             lines.append(f"| {name} | {' | '.join(f'{v:.1f} ms' for v in figures)} |")
         return "\n".join(lines)
 
 
-def run(config: Path, minutes: float) -> None:
-    """Runs, and prints what happened."""
+def run(config: Path, minutes: float, views: Sequence[MeshcatView] = ()) -> Ages:
+    """Runs, prints what happened, and returns what was noted.
+
+    Args:
+        config: where the devices are.
+        minutes: how long.
+        views: that watch.
+    """
     steps = round(600 * minutes)
     scenario = load_scenario("removal", [f"task.steps={steps + 1}"])
     with HardwareStation(scenario, load_hardware_config(config)) as station:
-        simulation = TaskSimulation(scenario, "cell", Shuttle(), make=lambda _: station)
+        simulation = TaskSimulation(
+            scenario, "cell", Shuttle(), views, make=lambda _: station
+        )
         simulation.set_target_realtime_rate(1.0)
         simulation.reset(0)
         ages = Ages(station)
@@ -109,7 +124,26 @@ def run(config: Path, minutes: float) -> None:
               f"{station.supervisor.clamped} commands clamped")  # fmt: skip
         for name, reading in station.readings().items():
             print(f"{name}: {reading.counters.text}")
-        print(ages.table())
+        return ages
+
+
+@contextlib.contextmanager
+def playing() -> Iterator[Path]:
+    """Plays a cell in another process; yields the file by which it is found."""
+    with tempfile.TemporaryDirectory() as folder:
+        config = Path(folder) / "fake.yaml"
+        fake = subprocess.Popen(
+            command("fake_cell", "--config", config, "--lcm-url", _LCM),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+        )
+        try:
+            while not config.exists():
+                time.sleep(0.1)
+            yield config
+        finally:
+            fake.send_signal(signal.SIGINT)
+            fake.wait()
 
 
 def _open() -> tuple[int, int]:
@@ -123,22 +157,13 @@ def main() -> None:
     tqdm.monitor_interval = 0  # a thread of its own
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0, metavar="N")
+    parser.add_argument("--meshcat", action="store_true", help="with a page, unwatched")
     args = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        config = Path(folder) / "fake.yaml"
-        fake = subprocess.Popen(
-            command("fake_cell", "--config", config, "--lcm-url", _LCM),
-            stdin=subprocess.DEVNULL,
-        )
-        try:
-            while not config.exists():
-                time.sleep(0.1)
-            before = _open()
-            run(config, args.minutes)
-            print(f"threads and sockets before {before}, after {_open()}")
-        finally:
-            fake.send_signal(signal.SIGINT)
-            fake.wait()
+    views = [MeshcatView(start_meshcat())] if args.meshcat else []
+    with playing() as config:
+        before = _open()
+        print(run(config, args.minutes, views).table())
+        print(f"threads and sockets before {before}, after {_open()}")
 
 
 if __name__ == "__main__":

@@ -39,19 +39,19 @@ class IiwaStatusMonitor:
 
     Args:
         lcm: where they come from.
+        checked: where good messages are passed on, on the same channel.
         channel: on which.
         period: at which the driver sends [s].
         clock: tells when they came.
-        checked: where good messages are passed on, on the same channel.
     """
 
     def __init__(
         self,
         lcm: DrakeLcmInterface,
+        checked: DrakeLcmInterface,
         channel: str,
         period: float,
         clock: Clock = time.monotonic,
-        checked: DrakeLcmInterface | None = None,
     ) -> None:
         self._mailbox, self._period = Mailbox(JOINTS, clock), period
         self._utime: int | None = None
@@ -77,5 +77,4 @@ class IiwaStatusMonitor:
             self._mailbox.count(lost=max(0, round(gap / self._period) - 1))
         self._utime = message.utime
         self._mailbox.put(np.array(message.joint_position_measured))
-        if self._checked:
-            self._checked.Publish(self._channel, data)
+        self._checked.Publish(self._channel, data)

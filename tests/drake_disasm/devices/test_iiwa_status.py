@@ -74,7 +74,7 @@ def test_what_is_lost_late_or_broken_is_counted_and_only_good_ones_get_on() -> N
     lcm, checked, passed = DrakeLcm("memq://"), DrakeLcm("memq://"), []
     checked.Subscribe("S", passed.append)
     time = 0.0
-    monitor = IiwaStatusMonitor(lcm, "S", 0.005, lambda: time, checked)
+    monitor = IiwaStatusMonitor(lcm, checked, "S", 0.005, lambda: time)
     broken = status(40_000, first=np.nan).encode()
     for data in (
         status(5_000).encode(),
