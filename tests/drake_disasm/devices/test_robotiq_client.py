@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import psutil
@@ -16,6 +17,7 @@ from drake_disasm.devices.robotiq import Activation, RobotiqClient, RobotiqSetti
 from drake_disasm.errors import DisasmError
 from drake_disasm.ports import Health
 from tests.fakes.robotiq_gripper import FakeRobotiqGripper
+from tests.fakes.serial_line import serial_line
 
 OPEN = bytes.fromhex("09 10 03 E8 00 03 06 09 00 00 00 FF FF 72 19")
 RESET = bytes.fromhex("09 10 03 E8 00 03 06 00 00 00 00 00 00 73 30")
@@ -203,7 +205,7 @@ def test_modbus_tcp() -> None:
             assert request[2:] == bytes.fromhex("0000 0006 09 03 07D0 0003")
             reply = bytes.fromhex("0000 0009 09 03 06 F900 0000 E600")
             connection.sendall(request[:2] + reply)  # the number comes back
-            _wait_for_sample(client)
+            _wait_until(lambda: not np.isnan(client.read().time))
             assert client.read().values[0] == 0.0
 
 
@@ -240,6 +242,40 @@ def test_stops_twice_and_starts_again(fake: FakeRobotiqGripper) -> None:
 def test_wrong_settings_are_refused(change: dict, words: str) -> None:
     with pytest.raises(DisasmError, match=words):
         RobotiqClient(dataclasses.replace(SETTINGS, **change))
+
+
+def test_a_serial_line_carries_the_same_frames(fake: FakeRobotiqGripper) -> None:
+    with (
+        serial_line(fake.port) as (path, unplug),
+        RobotiqClient(_at(path)) as client,
+    ):
+        _wait_for_sample(client)
+        np.testing.assert_allclose(client.read().values, [0.140, 0.0])
+        client.command(1.0)
+        _wait_until(lambda: fake.writes)
+        _wait_for_polls(fake)
+        assert fake.writes == [OPEN]
+        assert client.read().counters.invalid == 0
+        unplug()
+        _wait_until(lambda: client.read().counters.invalid)
+
+
+def test_a_serial_device_that_is_not_there_is_waited_for(
+    fake: FakeRobotiqGripper, tmp_path: Path
+) -> None:
+    adapter = tmp_path / "adapter"
+    with (
+        serial_line(fake.port) as (path, _),
+        RobotiqClient(_at(str(adapter))) as client,
+    ):
+        time.sleep(0.1)
+        assert client.read().health(0.0, 0.1) is Health.NO_DATA
+        adapter.symlink_to(path)
+        _wait_for_sample(client)
+
+
+def _at(path: str) -> RobotiqSettings:
+    return dataclasses.replace(SETTINGS, transport="serial", address=path, period=0.005)
 
 
 def test_serial_without_pyserial_tells(monkeypatch: pytest.MonkeyPatch) -> None:
