@@ -118,7 +118,8 @@ def _add_log_arguments(add: Callable[..., object]) -> None:
     add(
         "--resume",
         action="store_true",
-        help="with --record: go on with the log in the folder, which was interrupted",
+        help="with --record: go on with the log in the folder, which was interrupted; "
+        "on hardware: add an episode to it",
     )
     add(
         "--explore",
@@ -197,15 +198,16 @@ def _on_hardware(
             hardware.watch(station, _open_measured_view(args, station))
         policy = cli.named_policy(args.policy, scenario)
         writer = _open_log(args, arguments, scenario) if args.record else None
+        seed = args.seed + (writer.next_number if writer else 0)
         if args.explore:
-            policy = Exploring(policy, args.explore * _MM, args.seed)
+            policy = Exploring(policy, args.explore * _MM, seed)
         view = _open_view(args)
         views = [view] if view else []
         simulation = TaskSimulation(scenario, "cell", policy, views, lambda _: station)
         simulation.set_target_realtime_rate(1.0)
         print("waiting for the devices", flush=True)
         try:
-            print(summary_table([_run_one(simulation, args.seed, writer, view)]))
+            print(summary_table([_run_one(simulation, seed, writer, view)]))
         finally:
             print(hardware.health_table(station))
     _finish(args, view)
@@ -228,9 +230,8 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
                 option = name.replace("_", "-")
                 raise DisasmError(f"--{option}: is for --station hardware")
         return
-    one = {"model": "cell", "episodes": 1, "realtime_rate": None}
-    none = {"hidden": None, "resume": False}
-    for name, only in (one | none).items():
+    fixed = {"model": "cell", "episodes": 1, "realtime_rate": None, "hidden": None}
+    for name, only in fixed.items():
         if getattr(args, name) != only:
             option = name.replace("_", "-")
             raise DisasmError(f"--{option}: hardware can't do that; leave it out")
@@ -282,7 +283,11 @@ def _keep(writer: LogWriter | None, recorder: EpisodeRecorder | None) -> None:
 def _open_log(
     args: argparse.Namespace, arguments: Sequence[str], scenario: Scenario
 ) -> LogWriter:
-    origin = {"policy": args.policy, "explore_mm": args.explore}
+    origin = {
+        "station": args.station,
+        "policy": args.policy,
+        "explore_mm": args.explore,
+    }
     provenance = cli.provenance("simulate", arguments, args.seed) | origin
     provenance["hidden"] = bool(args.hidden)
     header = transitions_header(scenario, args.model, provenance)
