@@ -16,6 +16,7 @@ from pydrake.lcm import DrakeLcm
 from pydrake.systems.framework import Context
 
 from drake_disasm.devices.reading import Reading
+from drake_disasm.devices.robotiq.registers import Stroke
 from drake_disasm.errors import DisasmError
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.cell import CellStation
@@ -29,7 +30,6 @@ IIWA_FAULTS = ("", "loss", "frozen", "reorder", "nan", "jump", "short", "header"
 JUMP = 0.3  # rad, of the fault "jump"
 _DEAF = 0.25  # s after the first status, as in kuka_driver.cc
 _ARRIVES = 0.2  # s, on a busy machine
-_GRIPPED = 120  # position at which the bolt stops the fingers
 
 
 class FakeCell:
@@ -69,7 +69,8 @@ class FakeCell:
         self.time, self._first_status = 0.0, np.nan
         self.hex = FakeHexBox(clock=lambda: self.time)
         self.gripper = FakeRobotiqGripper()
-        self.gripper.object_at = _GRIPPED
+        opening = float(self._evaluate("gripper.state_measured")[0])
+        self.gripper.position = self.gripper.object_at = Stroke().request(opening)
         self.fault, self.commands = "", 0
         self.commanded = self.station.start
         self._late: bytes | None = None

@@ -120,6 +120,7 @@ def run(config: Path, minutes: float, views: Sequence[MeshcatView] = ()) -> Ages
             trips = 1
             print(error)
         took = time.monotonic() - begun
+        simulation.simulator.clear_monitor()  # it would keep the diagram alive
         print(f"{simulation.steps} steps in {took:.1f} s, {trips} trips, "
               f"{station.supervisor.clamped} commands clamped")  # fmt: skip
         for name, reading in station.readings().items():
