@@ -120,7 +120,6 @@ def run(config: Path, minutes: float, views: Sequence[MeshcatView] = ()) -> Ages
             trips = 1
             print(error)
         took = time.monotonic() - begun
-        simulation.simulator.clear_monitor()  # it would keep the diagram alive
         print(f"{simulation.steps} steps in {took:.1f} s, {trips} trips, "
               f"{station.supervisor.clamped} commands clamped")  # fmt: skip
         for name, reading in station.readings().items():
@@ -149,7 +148,7 @@ def playing() -> Iterator[Path]:
 
 def _open() -> tuple[int, int]:
     """Returns how many threads run, and how many sockets are open."""
-    gc.collect()  # LCM's go with the diagram
+    gc.collect()
     return threading.active_count(), len(psutil.Process().net_connections("inet"))
 
 
