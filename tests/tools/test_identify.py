@@ -46,6 +46,7 @@ def transitions(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done = run(
         "--model", "twin", "--no-meshcat", "--policy", "admittance", "--explore", 0.15,
         "--episodes", 3, "--hidden", hidden, "--set", "task.steps=14",
+        "--set", "contact.model=impact",  # an evaluation takes a fourteenth
         "--record", folder / "log", name="simulate",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -164,7 +165,7 @@ def test_a_parameter_that_this_log_does_not_show_is_named(
     arguments = ("--log", transitions, "--parameters", *names, "--workers", 1)
     done = run(*arguments, "--out", tmp_path / "fit")
     assert done.returncode == 2
-    assert "lock.travel" in done.stderr and "range" in done.stderr
+    assert "lock.travel: has no effect" in done.stderr
 
 
 def test_nan_in_the_middle_names_file_and_column(

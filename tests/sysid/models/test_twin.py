@@ -75,7 +75,7 @@ def test_workers_and_chunks_do_not_change_a_bit(log, turned, monkeypatch):
 def test_recovers_parameters_from_nearby(log, turned):
     start = dataclasses.replace(turned, effects=[])
     model = make(log, start, ["contact.friction", "GroovePose.ry"], coarse=False)
-    objective = Objective(model.thin(2), Workers())
+    objective = Objective(model.thin(4), Workers())
     begin = objective.scaling.to_unit(np.array([0.25, 0.033]))
     found = objective.scaling.from_unit(gauss_newton(objective, begin, 5).u)
     np.testing.assert_allclose(found, [0.2, 0.0349], rtol=0.03)
