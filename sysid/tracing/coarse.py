@@ -20,7 +20,8 @@ from sysid.tracing.evidence import What
 from sysid.workers import Workers
 
 if TYPE_CHECKING:
-    from sysid.tracing.selection import Fit, Tracer
+    from sysid.tracing.fits import Fit
+    from sysid.tracing.selection import Tracer
 
 _ROWS = 120
 _SCANNED = 0.5 / 2.5 ** np.arange(5)  # of the range on either side of null

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid.identification.whiteness import ljung_box
-from sysid.tracing.selection import Fit, Survey
+from sysid.tracing.fits import Fit
+from sysid.tracing.selection import Survey
 
 
 @dataclass(frozen=True)

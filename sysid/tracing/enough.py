@@ -4,7 +4,7 @@ import numpy as np
 
 from drake_disasm.errors import DisasmError
 from sysid.models.base import ScenarioModel
-from sysid.tracing.selection import Fit
+from sysid.tracing.fits import Fit
 
 _LEAST_ROWS = 10
 _ROWS_EACH = 2  # for each parameter, so that some can be held out

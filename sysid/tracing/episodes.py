@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.tracing.evidence import ALPHA, Bench
-from sysid.tracing.selection import Fit
+from sysid.tracing.fits import Fit
 from sysid.tracing.study import Columns, Study, family_p
 
 _MOST_EPISODES = 12  # with more, one alone hardly shows, and imprecision is the word

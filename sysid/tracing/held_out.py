@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from sysid.identification.uncertainty import block_length, block_numbers
 from sysid.models.base import Channel, ScenarioModel
 from sysid.tracing.candidates import extended
-from sysid.tracing.selection import Fit, Tracer
+from sysid.tracing.fits import Fit
+from sysid.tracing.selection import Tracer
 
 Array = NDArray[np.float64]
 

@@ -11,9 +11,10 @@ from sysid.identification.noise import with_estimated_noise
 from sysid.models.base import ScenarioModel
 from sysid.tracing.candidates import candidates
 from sysid.tracing.enough import refuse_few_rows, refuse_short_logs
+from sysid.tracing.fits import Fit
 from sysid.tracing.held_out import HeldOut, held_out
 from sysid.tracing.scatter import Scatter, scatter
-from sysid.tracing.selection import Fit, Round, Survey, Tracer
+from sysid.tracing.selection import Round, Survey, Tracer
 from sysid.tracing.verdict import Verdict, verdict
 from sysid.workers import Workers
 

@@ -22,7 +22,7 @@ from sysid.identification.whiteness import ljung_box
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective, tempered
 from sysid.tracing.evidence import ALPHA, LEAST_SHARE
-from sysid.tracing.selection import Fit
+from sysid.tracing.fits import Fit
 from sysid.tracing.study import blocks_of
 from sysid.workers import Workers
 

@@ -10,15 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.identification.gauss_newton import GAIN, gauss_newton
-from sysid.identification.linearisation import Linearisation, extend
+from sysid.identification.linearisation import extend
 from sysid.models.base import ScenarioModel
-from sysid.objective import Objective, tempered
-from sysid.parameters import Scaling, nominal_values
+from sysid.objective import Objective
+from sysid.parameters import nominal_values
 from sysid.tracing.candidates import Candidate, extended
 from sysid.tracing.coarse import rough_fits
 from sysid.tracing.empirical import curves
 from sysid.tracing.evidence import (
-    FEW,
     LEAST_FIELD,
     LEAST_GAIN,
     Bench,
@@ -27,6 +26,7 @@ from sysid.tracing.evidence import (
     simplest,
     together,
 )
+from sysid.tracing.fits import Fit
 from sysid.tracing.kept import remembered
 from sysid.tracing.study import Study, blocks_of
 from sysid.workers import Workers
@@ -43,51 +43,7 @@ _KEEPS_UP = 0.25  # of the loss that is left
 _ITERATIONS = 8
 _FEW_ITERATIONS = 6  # where an evaluation takes seconds
 _PAYS = 0.02  # of the objective: what an iteration is to gain there, at least
-_AT_BOUND = 1e-6  # of a parameter's range
-_Z95 = 1.959963984540054
 _TRIES = 4  # effects that are fitted in a round
-
-
-@dataclass(frozen=True)
-class Fit:
-    """A model with effects, fitted.
-
-    Attributes:
-        effects: that were added.
-        model: with their parameters.
-        theta: (p,) values.
-        here: residuals and derivatives there.
-        value: of the objective.
-    """
-
-    effects: tuple[Candidate, ...]
-    model: ScenarioModel
-    theta: Array
-    here: Linearisation
-    value: float
-
-    @property
-    def loss(self) -> float:
-        """Sum of the squares, less beyond where they end."""
-        return float(np.sum(tempered(self.here.residual, self.here.huber) ** 2))
-
-    def study(self, blocks: NDArray[np.int64] | None = None) -> Study:
-        """Returns its normal equations, by blocks (rows,) of its own or of another."""
-        if blocks is None:
-            blocks = blocks_of(self.here, self.model.measurements.episode)
-        return Study.of(self.here, blocks)
-
-    @property
-    def values(self) -> dict[str, float]:
-        """The parameters' values, by name."""
-        names = [p.name for p in self.model.parameters]
-        return dict(zip(names, self.theta.tolist(), strict=True))
-
-    def columns_of(self, effect: Candidate) -> NDArray[np.int64]:
-        """Returns which of the parameters are an effect's sizes."""
-        names = [f"{effect.name}.{field}" for field in effect.fields]
-        own = [i for i, p in enumerate(self.model.parameters) if p.name in names]
-        return np.array(own, dtype=np.int64)
 
 
 #: Rough fits with one more effect each, by the effect's name, to begin at.
@@ -254,7 +210,7 @@ class Tracer:
     def _with_worthy_sizes(self, fit: Fit, effect: Candidate) -> Candidate:
         """Returns an effect of a fit with its best size and others that gain enough."""
         columns = fit.columns_of(effect)
-        gains = [_gain(fit, np.array([c])) for c in columns]
+        gains = [fit.gain_of(np.array([c])) for c in columns]
         enough = min(LEAST_FIELD, max(gains))
         pairs = zip(effect.fields, gains, strict=True)
         return effect.only([field for field, gain in pairs if gain >= enough])
@@ -283,7 +239,9 @@ class Tracer:
 
     def _keeps_promise(self, fit: Fit, found: Fit, trial: Evidence) -> bool:
         """Returns whether a fit with more effects is truly better."""
-        if found.loss > (1.0 - LEAST_GAIN) * fit.loss or not _all_show(found, trial):
+        if found.loss > (1.0 - LEAST_GAIN) * fit.loss:
+            return False
+        if not found.all_show(trial.effects):
             return False
         tests = len({candidate.name for candidate in self.library})
         return self.base.affine or _confirmed(fit, found, trial, tests).accepted
@@ -296,7 +254,7 @@ class Tracer:
         fit = self.backward(fit)
         if self.base.affine:
             return fit
-        worth = self.worth(fit)
+        worth = fit.worth
         for effect in fit.effects[:-1]:
             if worth[effect.name] > _CLEARLY:
                 continue
@@ -319,7 +277,7 @@ class Tracer:
         }
         while True:
             found = self.fit((*fit.effects, *added), fit, known)
-            kept = _physical(found, added)
+            kept = found.physical(added)
             if kept == added or not kept:
                 break
             added = kept
@@ -343,7 +301,7 @@ class Tracer:
 
     def _with_what_shows(self, fit: Fit, known: int) -> Fit:
         """Returns the fit whose effects after the known ones have sizes that show."""
-        shows = _shows(fit)
+        shows = fit.shows
         new = []
         for effect in fit.effects[known:]:
             columns = fit.columns_of(effect)
@@ -356,21 +314,13 @@ class Tracer:
     def backward(self, fit: Fit) -> Fit:
         """Returns the fit without effects that later ones have made needless."""
         while True:
-            worth = self.worth(fit)
+            worth = fit.worth
             needless = [c for c in fit.effects if worth[c.name] < LEAST_GAIN]
             if not needless:
                 return fit
             least = min(needless, key=lambda c: worth[c.name])
             fit = self.fit(tuple(c for c in fit.effects if c is not least), fit)
             self.tell(f"without {least.text}: objective {fit.value:.4g}")
-
-    def worth(self, fit: Fit) -> dict[str, float]:
-        """Returns by how much the loss would rise without each effect, by its name.
-
-        As a share of the loss without it, of blocks that are not fitted; all else is
-        fitted again.
-        """
-        return {e.name: _gain(fit, fit.columns_of(e)) for e in fit.effects}
 
     def fit(
         self,
@@ -452,21 +402,6 @@ class Tracer:
         )
 
 
-def _gain(fit: Fit, columns: NDArray[np.int64]) -> float:
-    """Returns what some parameters of a fit (k,) gain, as a share of the loss without.
-
-    Of blocks that are not fitted; all other parameters are fitted again.
-    """
-    scaling = Scaling(fit.model.parameters)
-    null = scaling.to_unit(nominal_values(fit.model.parameters))
-    own = np.isin(np.arange(len(null)), columns)
-    without = fit.study().moved(np.where(own, null - fit.here.u, 0.0))
-    without = dataclasses.replace(without, side=np.zeros(len(null)))
-    study = without.beside(np.flatnonzero(~own))
-    total = study.energy.sum()
-    return float((total - study.losses(columns).sum()) / total)
-
-
 def _confirmed(before: Fit, after: Fit, trial: Evidence, tests: int) -> Evidence:
     """Returns the evidence for what was added, by fits before and after.
 
@@ -534,38 +469,3 @@ def _ties(best: Evidence, others: Sequence[Evidence]) -> tuple[Evidence, ...]:
     """Returns what passes, or gains no less, and can't be told from the best."""
     likely = [e for e in others if e.accepted or e.gain >= best.gain]
     return tuple(e for e in likely if e.ties_with(best))
-
-
-def _physical(fit: Fit, added: Sequence[Candidate]) -> list[Candidate]:
-    """Returns new effects without sizes that end at a bound, unphysical or null.
-
-    Of several that were added because they are alike, those go that do not show.
-    """
-    found = []
-    shows = _shows(fit)
-    for effect in added:
-        columns = fit.columns_of(effect)
-        u = fit.here.u[columns]
-        kept = (u > _AT_BOUND) & (u < 1.0 - _AT_BOUND)
-        fields = [f for f, keep in zip(effect.fields, kept, strict=True) if keep]
-        if fields and (len(added) <= FEW or shows[columns].any()):
-            found.append(effect.only(fields))
-    return found
-
-
-def _all_show(fit: Fit, added: Evidence) -> bool:
-    """Returns whether each new effect has a size whose interval excludes null."""
-    shows = _shows(fit)
-    new = [effect for effect in fit.effects if effect.name in added.effects]
-    return bool(new) and all(shows[fit.columns_of(effect)].any() for effect in new)
-
-
-def _shows(fit: Fit) -> NDArray[np.bool_]:
-    """Returns which parameters' (p,) intervals exclude their null value.
-
-    95 %, by the sums of the gradient over blocks (a sandwich): right whatever the
-    correlation within a block.
-    """
-    scaling = Scaling(fit.model.parameters)
-    away = fit.here.u - scaling.to_unit(nominal_values(fit.model.parameters))
-    return np.asarray(np.abs(away) > _Z95 * fit.study().spread())

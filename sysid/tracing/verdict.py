@@ -12,9 +12,10 @@ from sysid.objective import Objective
 from sysid.tracing.episodes import Contradiction, contradictions, in_words
 from sysid.tracing.evidence import FEW, Evidence
 from sysid.tracing.experiments import separating
+from sysid.tracing.fits import Fit
 from sysid.tracing.held_out import HeldOut, improvement
 from sysid.tracing.scatter import BEYOND_NOISE, Scatter
-from sysid.tracing.selection import Fit, Round, Survey, Tracer
+from sysid.tracing.selection import Round, Survey, Tracer
 
 Array = NDArray[np.float64]
 
@@ -117,7 +118,7 @@ def verdict(
     left = [d for d in end.dependences if d.accepted]
     dependence = left[0].name if left else ""
     explained = _explained(first, last, left[0].gain if left else 0.0)
-    worth = tracer.worth(last)
+    worth = last.worth
     values = values_of(tracer, last)
     if loose:
         worth[_SCATTERS] = loose.gain
