@@ -9,7 +9,8 @@ from drake_disasm.effects import Effect, shapes, sizes
 
 _FIRST = 1e-3  # of the range of a field, where the search for its size begins
 _MOST_FIELDS = 2
-_ROUNDS = 6
+_ROUNDS = 6  # that come close; more only to reach the wanted size at all
+_MOST_ROUNDS = 15
 _ATTEMPTS = 4
 _ENOUGH = 0.5  # of the wanted size
 _CLOSE = 0.05  # of the wanted size
@@ -61,14 +62,19 @@ def _attempt(
         name: float(np.exp(random.uniform(*np.log([min(grid), max(grid)]))))
         for name, grid in shapes(kind).items()
     }
-    scale = _FIRST
-    for _ in range(_ROUNDS):
+    scale, before = _FIRST, None
+    for number in range(1, _MOST_ROUNDS + 1):
         effect = kind(**look, **_within(fields, unit, scale))
+        if effect == before:
+            break  # its sizes are at their bounds
         found = residual(effect)
         if abs(found / level - 1.0) < _CLOSE:
             break
+        if number >= _ROUNDS and found >= _ENOUGH * level:
+            break
         # Contact answers late and then steeply, hence no more than threefold at once.
         scale *= float(np.clip(level / max(found, 1e-9), 0.3, 3.0 if found else 10.0))
+        before = effect
     return effect, found
 
 
