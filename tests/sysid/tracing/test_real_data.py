@@ -55,7 +55,6 @@ def test_too_little_of_a_real_arms_motion_is_refused(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("residual_of", ["first", "last"])
 def test_noise_as_correlated_as_a_real_arms_residual_raises_no_alarm(
     residual_of, tmp_path
