@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, Frame
 from pydrake.systems.framework import Context, Diagram
 from pydrake.systems.primitives import RandomSource
 
@@ -133,6 +135,12 @@ def refuse_twins_contact(scenario: Scenario) -> None:
             f"contact.model: '{scenario.contact.model}' is of the twin alone; "
             "use hydroelastic for the cell, or --model twin"
         )
+
+
+def add_nominal_groove(plant: MultibodyPlant, X_WG: RigidTransform) -> Frame:
+    """Returns the groove's nominal frame, added to a plant."""
+    world = plant.world_frame()
+    return plant.AddFrame(FixedOffsetFrame("groove_nominal", world, X_WG))
 
 
 def nominal_groove_pose(placement: PlacementConfig) -> RigidTransform:

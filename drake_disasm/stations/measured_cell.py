@@ -5,13 +5,12 @@ import dataclasses
 import numpy as np
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import MatrixGain, Multiplexer
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from drake_disasm.scenario import Scenario
-from drake_disasm.stations.base import nominal_groove_pose
+from drake_disasm.stations.base import add_nominal_groove, nominal_groove_pose
 from drake_disasm.stations.cell_models import add_cell
 
 #: Its inputs, and output ports of any station with the cell's port table.
@@ -40,11 +39,10 @@ class MeasuredCell(Diagram):
         graph = builder.AddNamedSystem("scene_graph", SceneGraph())
         plant = MultibodyPlant(0.0)
         source = plant.RegisterAsSourceForSceneGraph(graph)
-        X_WG = nominal_groove_pose(scenario.placement)
-        groove = FixedOffsetFrame("groove_nominal", plant.world_frame(), X_WG)
+        frame_Gn = add_nominal_groove(plant, nominal_groove_pose(scenario.placement))
         gripped = dataclasses.replace(scenario.gripper, hold="weld")
         held = dataclasses.replace(scenario, gripper=gripped)
-        add_cell(plant, plant.AddFrame(groove), held)
+        add_cell(plant, frame_Gn, held)
         plant.Finalize()
         position = builder.AddNamedSystem("position", Multiplexer([7, 2]))
         halves = np.array([[0.5, 0.0], [0.5, 0.0]])

@@ -12,7 +12,7 @@ from pydrake.multibody.plant import (
     MultibodyPlant,
     MultibodyPlantConfig,
 )
-from pydrake.multibody.tree import FixedOffsetFrame, Frame, RigidBody, WeldJoint
+from pydrake.multibody.tree import Frame, RigidBody, WeldJoint
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import (
     BasicVector,
@@ -38,7 +38,12 @@ from drake_disasm.errors import DisasmError
 from drake_disasm.lock import Lock, is_alike, set_environment, set_pose
 from drake_disasm.ports import Health, check_ports
 from drake_disasm.scenario import Scenario, validate
-from drake_disasm.stations.base import Beginning, Station, nominal_groove_pose
+from drake_disasm.stations.base import (
+    Beginning,
+    Station,
+    add_nominal_groove,
+    nominal_groove_pose,
+)
 from drake_disasm.systems.outside_force import OutsideForce
 from drake_disasm.timing import newest_step
 
@@ -80,8 +85,7 @@ class SimulatedStation(Station):
         self.plant, self.scene_graph = AddMultibodyPlant(config, builder)
         self.g_W = self.plant.gravity_field().gravity_vector()
         self.X_WG = nominal_groove_pose(self.scenario.placement)
-        world = self.plant.world_frame()
-        return self.plant.AddFrame(FixedOffsetFrame("groove_nominal", world, self.X_WG))
+        return add_nominal_groove(self.plant, self.X_WG)
 
     def _add_sensor(
         self, builder: DiagramBuilder, joint: WeldJoint, frame_S: Frame

@@ -17,10 +17,10 @@ from sysid.models.base import ScenarioModel
 from sysid.objective import Objective
 from sysid.tracing.candidates import extended
 from sysid.tracing.evidence import What
+from sysid.tracing.fits import Fit
 from sysid.workers import Workers
 
 if TYPE_CHECKING:
-    from sysid.tracing.fits import Fit
     from sysid.tracing.selection import Tracer
 
 _ROWS = 120

@@ -95,20 +95,27 @@ class Fit:
 
     @property
     def worth(self) -> dict[str, float]:
-        """What each effect gains, by its name; see `gain_of`."""
-        return {e.name: self.gain_of(self.columns_of(e)) for e in self.effects}
+        """What each effect gains, by its name; see `gains_of`."""
+        gains = self.gains_of([self.columns_of(effect) for effect in self.effects])
+        names = [effect.name for effect in self.effects]
+        return dict(zip(names, gains, strict=True))
 
-    def gain_of(self, columns: NDArray[np.int64]) -> float:
-        """Returns what parameters (k,) gain, as a share of the loss without them.
+    def gains_of(self, groups: Sequence[NDArray[np.int64]]) -> list[float]:
+        """Returns what groups of parameters (k,) gain, as shares of the loss without.
 
         Of blocks that are not fitted; all other parameters are fitted again.
         """
-        own = np.isin(np.arange(len(self.theta)), columns)
-        without = self.study().moved(np.where(own, self._null - self.here.u, 0.0))
-        without = dataclasses.replace(without, side=np.zeros(len(self.theta)))
-        study = without.beside(np.flatnonzero(~own))
-        total = study.energy.sum()
-        return float((total - study.losses(columns).sum()) / total)
+        study, null = self.study(), self._null
+        free = np.zeros(len(null))  # at null a bound is no end
+        found = []
+        for columns in groups:
+            own = np.isin(np.arange(len(null)), columns)
+            without = study.moved(np.where(own, null - self.here.u, 0.0))
+            without = dataclasses.replace(without, side=free)
+            beside = without.beside(np.flatnonzero(~own))
+            total = beside.energy.sum()
+            found.append(float((total - beside.losses(columns).sum()) / total))
+        return found
 
     @property
     def _null(self) -> Array:

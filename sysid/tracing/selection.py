@@ -210,7 +210,7 @@ class Tracer:
     def _with_worthy_sizes(self, fit: Fit, effect: Candidate) -> Candidate:
         """Returns an effect of a fit with its best size and others that gain enough."""
         columns = fit.columns_of(effect)
-        gains = [fit.gain_of(np.array([c])) for c in columns]
+        gains = fit.gains_of([np.array([c]) for c in columns])
         enough = min(LEAST_FIELD, max(gains))
         pairs = zip(effect.fields, gains, strict=True)
         return effect.only([field for field, gain in pairs if gain >= enough])

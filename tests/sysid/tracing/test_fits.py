@@ -41,7 +41,7 @@ def test_an_effect_is_worth_what_the_loss_rises_by_without_it(gain):
         1 - fit.loss / before.loss, abs=0.03
     )
     x = fit.columns_of(gain.library[0].only(["x"]))
-    assert fit.gain_of(x) == pytest.approx(fit.worth["CommandGain"], abs=0.03)
+    assert fit.gains_of([x]) == pytest.approx([fit.worth["CommandGain"]], abs=0.03)
     assert fit.shows[x].all()
 
 
