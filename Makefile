@@ -32,15 +32,15 @@ format: $(VENV)/.dev  ## Put the code in shape
 	$(BIN)/ruff format .
 
 benchmark: $(VENV)/.dev  ## Measure speed (ARGS="--only cell_reset_ms ...")
-	$(BIN)/python tools/benchmark.py $(ARGS)
+	$(BIN)/python benchmarks/benchmark.py $(ARGS)
 
 check-install: $(VENV)/.dev  ## Install into an empty environment, import elsewhere
 	rm -rf build/empty && $(PYTHON) -m venv build/empty
 	build/empty/bin/python -m pip install --quiet --constraint constraints.txt .
-	cd / && $(CURDIR)/build/empty/bin/python -c "import drake_disasm, sysid.logs; \
+	cd / && $(CURDIR)/build/empty/bin/python -c "import drake_disasm, drake_disasm.logs; \
 	from drake_disasm.scenario import load_scenario; \
 	from drake_disasm.stations import make_station; \
-	from drake_disasm.resources import models_dir; \
+	from drake_disasm.common.resources import models_dir; \
 	make_station('cell', load_scenario('removal')); print('installed:', models_dir())"
 
 clean:  ## Remove what was built

@@ -9,7 +9,7 @@ import enum
 
 from pydrake.systems.framework import PortDataType, System
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 
 
 class Health(enum.IntEnum):

@@ -22,12 +22,12 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from drake_disasm.errors import DisasmError
-from drake_disasm.spatial import pose_from_vector
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import make_folder, write_atomically
+from drake_disasm.common.spatial import pose_from_vector
 from drake_disasm.stations.base import Station
 from drake_disasm.stations.measured_cell import MEASURED_PORTS, MeasuredCell
 from drake_disasm.task.simulation import TaskSimulation
-from drake_disasm.writing import make_folder, write_atomically
 
 _FRAME_PERIOD = 1.0 / 32.0  # s
 _NEWTONS_PER_METRE = 150.0  # of the wrench arrow's length

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 
 Vector = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import yaml
 
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
 from drake_disasm.effects import EFFECTS
-from drake_disasm.errors import DisasmError
-from drake_disasm.quantity import closest
 from drake_disasm.scenario import Scenario
 from sysid.parameters import Parameter
 

@@ -13,7 +13,7 @@ from typing import Self, TypeVar
 
 import numpy as np
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from sysid.models.base import Array, LogModel, PredictionError
 
 _ATTEMPTS = 3

@@ -10,16 +10,16 @@ ROOT = Path(__file__).parents[1]
 
 #: Rooms of drake_disasm from the ground up; a module imports from its own or lower.
 FLOORS = (
-    {"errors", "quantity", "resources", "spatial", "timing", "writing", "parallel"},
+    {"common"},
     {"effects"},
     {"scenario", "ports"},
-    {"mdp", "lock", "impact", "devices", "models"},
-    {"tool"},
-    {"coordinates", "safety"},
+    {"mdp", "cell", "logs"},
+    {"impact", "devices"},
+    {"safety"},
     {"systems"},
     {"stations", "policies"},
     {"task"},
-    {"visualization", "learning"},
+    {"visualization", "learning", "fakes"},
     {"studies"},
 )
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}

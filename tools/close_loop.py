@@ -18,17 +18,18 @@ import cli
 import numpy as np
 from tqdm import tqdm
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common import program
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import write_text
+from drake_disasm.logs import Log, read_logs
 from drake_disasm.scenario import dump_scenario, load_scenario
-from drake_disasm.writing import write_atomically
+from sysid.effect_selection.close_loop import HELD_OUT, HUBER, Closed, close_loop
+from sysid.effect_selection.output import to_mapping
 from sysid.identification.split import split_episodes
-from sysid.logs import Log, read_logs
 from sysid.models import ScenarioModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.report import closing_page
 from sysid.scenario_parameters import read_requests
-from sysid.tracing.pipeline import HELD_OUT, HUBER, Closed, close_loop
-from sysid.tracing.plain import to_mapping
 from sysid.workers import Workers
 
 _EXAMPLES = """examples:
@@ -100,7 +101,7 @@ def main(arguments: Sequence[str]) -> int:
     huber = usual if args.huber is None else args.huber
     if not huber > 0.0:
         raise DisasmError("--huber: give a number above zero, or inf")
-    origin = cli.provenance("close_loop", arguments, 0)
+    origin = program.provenance("close_loop", arguments, 0)
     fits = args.out / "fits"
     with (
         tqdm(unit=" runs", desc="simulating", leave=False) as bar,
@@ -129,7 +130,7 @@ def _model(args: argparse.Namespace, logs: Sequence[Log]) -> ScenarioModel:
 
 def _beat(bar: tqdm) -> None:
     """Shows that work goes on; stops it where Ctrl-C was pressed."""
-    cli.stop_if_interrupted()
+    program.stop_if_interrupted()
     bar.update()
 
 
@@ -142,9 +143,8 @@ def _write(folder: Path, closed: Closed, origin: dict[str, object]) -> None:
     }
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
-        data = text.encode()
-        write_atomically(folder / name, lambda stream, data=data: stream.write(data))
+        write_text(folder / name, text)
 
 
 if __name__ == "__main__":
-    cli.run(main)
+    program.run(main)

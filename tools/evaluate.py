@@ -18,13 +18,14 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import cli
 from tqdm import tqdm
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common import program
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.executors import run_jobs
+from drake_disasm.common.files import make_folder, write_atomically
 from drake_disasm.learning.evaluation import Evaluation, evaluate, summed_up
-from drake_disasm.parallel import run_jobs
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import MODELS
 from drake_disasm.task.simulation import TaskSimulation
-from drake_disasm.writing import make_folder, write_atomically
 
 _EXAMPLES = """examples:
   python tools/evaluate.py --policy admittance straight --model cell --episodes 10
@@ -120,7 +121,7 @@ def main(arguments: Sequence[str]) -> int:
             print(table(ordered))
     if args.json:
         _write_json(
-            args.json, ordered, cli.provenance("evaluate", arguments, args.seed)
+            args.json, ordered, program.provenance("evaluate", arguments, args.seed)
         )
     return 0
 
@@ -128,7 +129,7 @@ def main(arguments: Sequence[str]) -> int:
 def _shown(bar: tqdm) -> Callable[[Any], None]:
     def show(_: Any) -> None:
         """Moves the bar by one episode."""
-        cli.stop_if_interrupted()
+        program.stop_if_interrupted()
         bar.update()
 
     return show
@@ -202,4 +203,4 @@ def _write_json(path: Path, found: dict[Row, Evaluation], origin: dict) -> None:
 
 
 if __name__ == "__main__":
-    cli.run(main)
+    program.run(main)

@@ -21,13 +21,12 @@ import cli
 from pydrake.common.yaml import yaml_dump_typed
 from pydrake.lcm import DrakeLcm
 
+from drake_disasm.common import program
+from drake_disasm.common.files import write_atomically
+from drake_disasm.fakes import hex_box, robotiq_gripper
+from drake_disasm.fakes.cell import IIWA_FAULTS, FakeCell
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations.hardware_config import HardwareConfig
-from drake_disasm.writing import write_atomically
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from tests.fakes import hex_box, robotiq_gripper
-from tests.fakes.cell import IIWA_FAULTS, FakeCell
 
 _LCM = "udpm://239.255.76.67:7667?ttl=0"
 _EXAMPLES = """examples:
@@ -79,7 +78,7 @@ def _play(cell: FakeCell) -> None:
     """Advances the cell in real time; obeys what is typed."""
     period, begun, steps = cell.station.control_period, time.monotonic(), 0
     while True:
-        cli.stop_if_interrupted()
+        program.stop_if_interrupted()
         cell.advance()
         steps += 1
         ahead = begun + steps * period - time.monotonic()
@@ -115,4 +114,4 @@ def _order(cell: FakeCell, words: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    cli.run(main)
+    program.run(main)

@@ -3,10 +3,9 @@
 import time
 from pathlib import Path
 
-import cli
-
+from drake_disasm.common import program
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.reading import Reading
-from drake_disasm.errors import DisasmError
 from drake_disasm.ports import Health
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.hardware import HardwareStation
@@ -50,7 +49,7 @@ def _pump(station: HardwareStation, duration: float) -> None:
     """Takes what the arm sends for a time [s]."""
     end = time.monotonic() + duration
     while time.monotonic() < end:
-        cli.stop_if_interrupted()
+        program.stop_if_interrupted()
         station.pump()
         time.sleep(_POLL)
 

@@ -15,16 +15,17 @@ import cli
 import numpy as np
 from tqdm import tqdm
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common import program
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import write_atomically
+from drake_disasm.logs import Log, read_logs
 from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
-from drake_disasm.writing import write_atomically
+from sysid.identification.identify import Settings, identify
 from sysid.identification.journal import Journal
-from sysid.identification.pipeline import Settings, identify
-from sysid.identification.plain import summary, to_mapping
+from sysid.identification.output import summary, to_mapping
 from sysid.identification.result import Identified
 from sysid.identification.search import METHODS, Effort
 from sysid.identification.split import split_episodes
-from sysid.logs import Log, read_logs
 from sysid.models import LogModel, ScenarioModel
 from sysid.models.from_logs import OBJECTIVES, ModelChoice, model_of
 from sysid.optimise import BeesSettings
@@ -183,7 +184,7 @@ def main(arguments: Sequence[str]) -> int:
     logs = read_logs(args.log)
     model = model_of(logs, _choice(args))
     train, test = split_episodes(model.measurements.names, _held_out(args))
-    origin = cli.provenance("identify", arguments, args.seed) | _data(logs)
+    origin = program.provenance("identify", arguments, args.seed) | _data(logs)
     journal = Journal(args.out, _identity(args, logs), args.resume)
     with Workers(args.workers) as workers, _Bars() as bars:
         settings = _settings(args, model)
@@ -273,7 +274,7 @@ class _Bars:
 
     def __call__(self, name: str, done: int, total: int, best: float) -> None:
         """Shows where a part stands."""
-        cli.stop_if_interrupted()
+        program.stop_if_interrupted()
         if name != self._name:
             self._close()
             self._name = name
@@ -313,4 +314,4 @@ def _write_text(path: Path, text: str) -> None:
 
 
 if __name__ == "__main__":
-    cli.run(main)
+    program.run(main)

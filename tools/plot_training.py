@@ -8,12 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import cli
-
-from drake_disasm.errors import DisasmError
+from drake_disasm.common import program
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import make_folder
 from drake_disasm.learning.learning_curve import plot_learning_curves
 from drake_disasm.learning.run import read_episodes
-from drake_disasm.writing import make_folder
 
 _EXAMPLES = """example:
   python tools/plot_training.py "TD3=out/td3" "SAC=out/sac" --out out/compared.png
@@ -62,4 +61,4 @@ def _labelled(text: str) -> tuple[str, list[list[dict[str, Any]]]]:
 
 
 if __name__ == "__main__":
-    cli.run(main)
+    program.run(main)

@@ -15,7 +15,10 @@ import cli
 import hardware
 from tqdm import tqdm
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common import program
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import make_folder
+from drake_disasm.logs import LogWriter, flat_columns
 from drake_disasm.policies import Exploring
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import MODELS, Station
@@ -25,11 +28,9 @@ from drake_disasm.task.episode import (
     run_episode,
     summary_table,
 )
+from drake_disasm.task.recording import transitions_header
 from drake_disasm.task.simulation import TaskSimulation
 from drake_disasm.visualization import MeasuredView, MeshcatView, start_meshcat
-from drake_disasm.writing import make_folder
-from sysid.logs import LogWriter, flat_columns
-from sysid.logs.recording import transitions_header
 
 _MM = 1e-3
 _EXAMPLES = """examples:
@@ -248,7 +249,7 @@ def _run_one(
     view: MeshcatView | None,
 ) -> EpisodeSummary:
     """Runs, shows and records one episode; a policy's error keeps its rows so far."""
-    cli.stop_if_interrupted()
+    program.stop_if_interrupted()
     recorder = EpisodeRecorder(simulation) if writer else None
     if view:
         view.begin_episode()
@@ -266,7 +267,7 @@ def _run_one(
 
 
 def _show(bar: tqdm, summary: EpisodeSummary) -> None:
-    cli.stop_if_interrupted()
+    program.stop_if_interrupted()
     force = f"{summary.max_force:.1f} N"
     bar.set_postfix(reward=f"{summary.reward:.1f}", max_F=force, refresh=False)
     bar.update()
@@ -288,7 +289,7 @@ def _open_log(
         "policy": args.policy,
         "explore_mm": args.explore,
     }
-    provenance = cli.provenance("simulate", arguments, args.seed) | origin
+    provenance = program.provenance("simulate", arguments, args.seed) | origin
     provenance["hidden"] = bool(args.hidden)
     header = transitions_header(scenario, args.model, provenance)
     return LogWriter(args.record, header, resume=args.resume)
@@ -333,4 +334,4 @@ def _finish(args: argparse.Namespace, view: MeshcatView | None) -> None:
 
 
 if __name__ == "__main__":
-    cli.run(main)
+    program.run(main)

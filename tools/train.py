@@ -14,8 +14,8 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # processes work in parallel, not threads
 
 import cli
-from seed_job import seed_jobs, train_seeds
 
+from drake_disasm.common import program
 from drake_disasm.learning.experiment import (
     Experiment,
     open_experiment,
@@ -27,10 +27,11 @@ from drake_disasm.learning.hyperparameters import (
     override,
     preset,
 )
-from drake_disasm.learning.transfer import check_start
+from drake_disasm.learning.jobs import seed_jobs, train_seeds
+from drake_disasm.learning.warm_start import check_start
+from drake_disasm.logs import read_logs
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import MODELS
-from sysid.logs import read_logs
 
 _EXAMPLES = """examples:
   python tools/train.py --out out/first --episodes 30          a first look
@@ -197,7 +198,7 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
         updates=args.updates or 0,
         demonstrations=_hashes(args.demonstrations),
         start=str(args.start_from or ""),
-        provenance=cli.provenance("train", arguments, args.first_seed),
+        provenance=program.provenance("train", arguments, args.first_seed),
     )
 
 
@@ -209,4 +210,4 @@ def _hashes(folders: Sequence[Path]) -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    cli.run(main)
+    program.run(main)

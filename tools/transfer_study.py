@@ -16,9 +16,10 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # processes work in parallel, not threads
 
 import cli
-from seed_job import seed_jobs, train_seeds
 from tqdm import tqdm
 
+from drake_disasm.common import program
+from drake_disasm.common.executors import run_jobs
 from drake_disasm.learning.experiment import Experiment, open_experiment
 from drake_disasm.learning.hyperparameters import (
     ALGORITHMS,
@@ -26,8 +27,8 @@ from drake_disasm.learning.hyperparameters import (
     override,
     preset,
 )
-from drake_disasm.learning.transfer import check_start
-from drake_disasm.parallel import run_jobs
+from drake_disasm.learning.jobs import seed_jobs, train_seeds
+from drake_disasm.learning.warm_start import check_start
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import MODELS
 from drake_disasm.studies.transfer import (
@@ -148,7 +149,7 @@ def _study(args: argparse.Namespace, arguments: Sequence[str]) -> TransferStudy:
         config=override(preset(args.preset, args.agent), changes),
         compiled=not args.eager,
         validation=args.validation,
-        provenance=cli.provenance("transfer_study", arguments, args.first_seed),
+        provenance=program.provenance("transfer_study", arguments, args.first_seed),
     )
     return TransferStudy(
         before=before,
@@ -185,7 +186,7 @@ def _deploy(jobs: Sequence[Deployment], workers: int, title: str) -> None:
 
     def show(_: Any) -> None:
         """Moves the bar by one episode."""
-        cli.stop_if_interrupted()
+        program.stop_if_interrupted()
         bar.update()
 
     with tqdm(total=total, unit="episode", desc=f"{title}, as it is") as bar:
@@ -194,4 +195,4 @@ def _deploy(jobs: Sequence[Deployment], workers: int, title: str) -> None:
 
 
 if __name__ == "__main__":
-    cli.run(main)
+    program.run(main)

@@ -1,6 +1,6 @@
 """The one exception of the codecs."""
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 
 
 class CodecError(DisasmError):

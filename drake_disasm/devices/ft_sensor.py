@@ -16,12 +16,12 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.spatial import wrench_from_spatial_force
+from drake_disasm.common.timing import newest_step
 from drake_disasm.effects import Sensing, SensorEffect, SensorMemoryEffect
-from drake_disasm.errors import DisasmError
 from drake_disasm.ports import Health
 from drake_disasm.scenario import SensorConfig
-from drake_disasm.spatial import wrench_from_spatial_force
-from drake_disasm.timing import newest_step
 
 #: For how many effects with a memory a sensor has room.
 MOST_MEMORIES = 4

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from drake_disasm.quantity import quantity
+from drake_disasm.common.quantity import quantity
 
 #: What an effect remembers from one step to the next: six numbers.
 Memory = np.ndarray

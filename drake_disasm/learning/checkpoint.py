@@ -9,10 +9,10 @@ import numpy as np
 import torch
 from torch.utils._pytree import tree_flatten, tree_unflatten
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import write_atomically
 from drake_disasm.learning.agent import Agent
 from drake_disasm.learning.replay import Replay
-from drake_disasm.writing import write_atomically
 
 
 def save_checkpoint(

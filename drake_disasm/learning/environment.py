@@ -11,8 +11,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Effect
-from drake_disasm.errors import DisasmError
 from drake_disasm.mdp import REWARD_TERMS, Outcome
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.task.simulation import StepResult, TaskSimulation

@@ -12,8 +12,8 @@ from typing import Any
 
 import yaml
 
-from drake_disasm.errors import DisasmError
-from drake_disasm.quantity import check, closest, quantity
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import check, closest, quantity
 
 ALGORITHMS = ("ddpg", "td3", "sac")
 SCHEDULES = ("delayed", "every_step")

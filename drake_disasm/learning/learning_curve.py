@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from drake_disasm.common.files import write_atomically
 from drake_disasm.learning.statistics import (
     bootstrap_interval,
     interquartile_mean,
     moving_mean,
 )
 from drake_disasm.mdp import Outcome
-from drake_disasm.writing import write_atomically
 
 _WINDOW = 10  # episodes that the curves are smoothed over
 

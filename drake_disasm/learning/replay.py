@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from torch import Tensor
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 
 _STATES, _ACTIONS = len(STATE_NAMES), len(ACTION_NAMES)

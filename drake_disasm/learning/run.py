@@ -19,14 +19,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Protocol
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import make_folder, write_atomically
 from drake_disasm.learning.evaluation import summed_up, validate_policy
 from drake_disasm.learning.policy import trained_policy
 from drake_disasm.learning.training import Purpose, Training, seed_for
 from drake_disasm.mdp import REWARD_TERMS, Outcome
 from drake_disasm.policies import save_policy
 from drake_disasm.task.episode import EpisodeRecorder, EpisodeSummary
-from drake_disasm.writing import make_folder, write_atomically
 
 _PATIENCE = 10.0  # s that a killed run's workers have to notice
 

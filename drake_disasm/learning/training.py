@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.agent import Agent
 from drake_disasm.learning.checkpoint import (
     load_agent,

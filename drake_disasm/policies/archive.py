@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 
 Arrays = dict[str, np.ndarray]
 

@@ -18,7 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import write_atomically
+from drake_disasm.common.quantity import closest
+from drake_disasm.common.resources import models_dir
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 from drake_disasm.policies.archive import AGAIN, Arrays, pack, unpack
 from drake_disasm.policies.network import (
@@ -28,10 +31,7 @@ from drake_disasm.policies.network import (
     PolicyDescription,
 )
 from drake_disasm.policies.scripted import SCRIPTED, Admittance, Straight
-from drake_disasm.quantity import closest
-from drake_disasm.resources import models_dir
 from drake_disasm.scenario import Scenario, scenario_to_mapping
-from drake_disasm.writing import write_atomically
 
 FORMAT = "drake_disasm/policy/1"
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 from drake_disasm.policies.scripted import Admittance, Straight
 from drake_disasm.scenario import Scenario

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.errors import DisasmError
-from drake_disasm.quantity import closest
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
 
 
 @dataclasses.dataclass(frozen=True)

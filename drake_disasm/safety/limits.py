@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from drake_disasm.quantity import quantity
+from drake_disasm.common.quantity import quantity
 
 
 @dataclasses.dataclass

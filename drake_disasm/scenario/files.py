@@ -8,9 +8,9 @@ from typing import Any
 import yaml
 from pydrake.common.yaml import yaml_dump_typed
 
-from drake_disasm.errors import DisasmError
-from drake_disasm.quantity import check, closest
-from drake_disasm.resources import models_dir
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import check, closest
+from drake_disasm.common.resources import models_dir
 from drake_disasm.scenario.schema import Scenario
 from drake_disasm.scenario.strict_yaml import parse
 from drake_disasm.scenario.validity import validate

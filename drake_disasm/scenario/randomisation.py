@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from drake_disasm.errors import DisasmError
-from drake_disasm.quantity import closest
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
 from drake_disasm.scenario.schema import Scenario
 
 _STREAM = 0x52414E44  # apart from those of sensor noise and imprecision

@@ -3,8 +3,8 @@
 import dataclasses
 import typing
 
+from drake_disasm.common.quantity import quantity
 from drake_disasm.effects import EFFECTS, Effect
-from drake_disasm.quantity import quantity
 
 
 @dataclasses.dataclass

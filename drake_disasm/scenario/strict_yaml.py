@@ -12,9 +12,9 @@ from typing import Any
 import yaml
 from pydrake.common.yaml import yaml_load_typed
 
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
 from drake_disasm.effects import EFFECTS
-from drake_disasm.errors import DisasmError
-from drake_disasm.quantity import closest
 from drake_disasm.scenario.schema import Range, Scenario
 
 _MODEL = "see models/scenarios/removal.yaml"

@@ -1,8 +1,8 @@
 """Whether a scenario can be: values in their bounds, and fitting one another."""
 
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import check
 from drake_disasm.effects import EFFECTS
-from drake_disasm.errors import DisasmError
-from drake_disasm.quantity import check
 from drake_disasm.scenario.randomisation import refuse_broken_ranges, with_values
 from drake_disasm.scenario.schema import LockConfig, Scenario, Untagged
 

@@ -18,6 +18,8 @@ from pydrake.symbolic import max as maximum
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Multiplexer, SymbolicVectorSystem
 
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
 from drake_disasm.effects import (
     ArmEffect,
     FlangePayload,
@@ -34,8 +36,6 @@ from drake_disasm.effects import (
     shapes,
     sizes,
 )
-from drake_disasm.errors import DisasmError
-from drake_disasm.quantity import closest
 
 #: Friction that Drake's joints lack.
 _Rubbing = (

@@ -11,14 +11,14 @@ from pydrake.multibody.tree import FixedOffsetFrame, Frame
 from pydrake.systems.framework import Context, Diagram
 from pydrake.systems.primitives import RandomSource
 
-from drake_disasm.coordinates import ArmCoordinates, Coordinates
+from drake_disasm.cell.coordinates import ArmCoordinates, Coordinates
+from drake_disasm.cell.tool import Tool
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.ft_sensor import Payload
 from drake_disasm.effects import BoltMotion, Effect
-from drake_disasm.errors import DisasmError
 from drake_disasm.ports import Port
 from drake_disasm.scenario import PlacementConfig, Scenario
 from drake_disasm.systems.observation import Mounting
-from drake_disasm.tool import Tool
 
 
 @dataclasses.dataclass(frozen=True)

@@ -19,16 +19,16 @@ from pydrake.systems.primitives import (
     StateInterpolatorWithDiscreteDerivative,
 )
 
+from drake_disasm.cell.lock import bolt_inertia
+from drake_disasm.cell.parsing import add_arm
+from drake_disasm.cell.tool import FINGERS
 from drake_disasm.effects import ArmEffect
-from drake_disasm.lock import bolt_inertia
-from drake_disasm.models import add_arm
 from drake_disasm.ports import CELL_PORTS
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.arm_effects import ArmMechanics
 from drake_disasm.stations.base import refuse_twins_contact
 from drake_disasm.stations.cell_models import add_cell
 from drake_disasm.stations.simulated import SimulatedStation
-from drake_disasm.tool import FINGERS
 
 _ARM_INERTIA = 4.0  # kg m^2, of a joint with its rotor, for the damping ratio
 _PAD_INDENTATION = 3e-5  # m, of a pad (20 MPa, 7.5 mm thick) under some 60 N

@@ -22,13 +22,14 @@ from pydrake.systems.lcm import (
 )
 from pydrake.systems.primitives import Gain, PassThrough
 
+from drake_disasm.cell.parsing import add_arm
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.timing import COMMAND_DELAY
 from drake_disasm.devices.iiwa import IiwaStatusMonitor
 from drake_disasm.devices.onrobot_hex import HexClient
 from drake_disasm.devices.reading import Clock, Reading
 from drake_disasm.devices.robotiq import RobotiqClient, RobotiqSettings
 from drake_disasm.effects import Effect
-from drake_disasm.errors import DisasmError
-from drake_disasm.models import add_arm
 from drake_disasm.ports import CELL_PORTS, Health, check_ports
 from drake_disasm.safety import Mode, Supervisor, guards
 from drake_disasm.scenario import ArmConfig, Scenario, validate
@@ -37,7 +38,6 @@ from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.systems.device_reader import DeviceReader, Readable
 from drake_disasm.systems.gripper_writer import GripperWriter
 from drake_disasm.systems.safety_filter import SafetyFilter
-from drake_disasm.timing import COMMAND_DELAY
 
 #: drake-iiwa-driver refuses commands within 0.25 s of its first status.
 _LISTENS_FIRST = 0.3

@@ -3,8 +3,8 @@
 import dataclasses
 from pathlib import Path
 
-from drake_disasm.errors import DisasmError
-from drake_disasm.quantity import check, quantity
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import check, quantity
 from drake_disasm.safety import SafetyConfig
 from drake_disasm.scenario.strict_yaml import parse
 

@@ -24,6 +24,9 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
+from drake_disasm.cell.lock import Lock, is_alike, set_environment, set_pose
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.timing import newest_step
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor
 from drake_disasm.effects import (
     ArmEffect,
@@ -34,8 +37,6 @@ from drake_disasm.effects import (
     is_local,
     sensor_chain,
 )
-from drake_disasm.errors import DisasmError
-from drake_disasm.lock import Lock, is_alike, set_environment, set_pose
 from drake_disasm.ports import Health, check_ports
 from drake_disasm.scenario import Scenario, validate
 from drake_disasm.stations.base import (
@@ -45,7 +46,6 @@ from drake_disasm.stations.base import (
     nominal_groove_pose,
 )
 from drake_disasm.systems.outside_force import OutsideForce
-from drake_disasm.timing import newest_step
 
 
 class SimulatedStation(Station):

@@ -23,26 +23,26 @@ from pydrake.systems.primitives import (
     Multiplexer,
 )
 
-from drake_disasm.coordinates import BoltCoordinates
+from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.cell.lock import (
+    GROOVE_FIELDS,
+    add_lock,
+    nominal_environment,
+    reshape_groove,
+)
+from drake_disasm.cell.tool import Tool
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Environment
-from drake_disasm.errors import DisasmError
 from drake_disasm.impact import (
     ImpactConditions,
     ImpactLaw,
     LockShape,
     Surroundings,
 )
-from drake_disasm.lock import (
-    GROOVE_FIELDS,
-    add_lock,
-    nominal_environment,
-    reshape_groove,
-)
 from drake_disasm.ports import TWIN_PORTS
 from drake_disasm.scenario import ImpactConfig, Scenario, TwinConfig, validate
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.systems.impact_contact import ImpactContact
-from drake_disasm.tool import Tool
 
 _AXES = np.eye(3)
 _JOINT_ORDER = (0, 1, 2, 5, 4, 3)  # x, y, z, then yaw, pitch, roll

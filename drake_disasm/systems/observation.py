@@ -7,8 +7,8 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from drake_disasm.coordinates import Coordinates
-from drake_disasm.spatial import (
+from drake_disasm.cell.coordinates import Coordinates
+from drake_disasm.common.spatial import (
     pose_to_vector,
     rotation_vector,
     shift_and_express,

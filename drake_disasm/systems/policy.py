@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.timing import POLICY_DELAY
 from drake_disasm.systems.imprecision import clamped
-from drake_disasm.timing import POLICY_DELAY
 
 #: Observation (12,) to action (6,), both in the groove's nominal frame.
 Policy = Callable[[np.ndarray], np.ndarray]

@@ -13,16 +13,16 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from drake_disasm.coordinates import Coordinates
-from drake_disasm.effects import MotionEffect
-from drake_disasm.errors import DisasmError
-from drake_disasm.spatial import (
+from drake_disasm.cell.coordinates import Coordinates
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.spatial import (
     pose_from_vector,
     pose_to_vector,
     rotation_from_vector,
     rotation_vector,
 )
-from drake_disasm.timing import MOTION_DELAY
+from drake_disasm.common.timing import MOTION_DELAY
+from drake_disasm.effects import MotionEffect
 
 #: For how many effects the pose target has room.
 MOST_MOTION_EFFECTS = 6

@@ -12,9 +12,9 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from drake_disasm.coordinates import Coordinates
+from drake_disasm.cell.coordinates import Coordinates
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.reading import Clock
-from drake_disasm.errors import DisasmError
 from drake_disasm.safety import Situation, Supervisor
 from drake_disasm.systems.device_reader import Readable
 from drake_disasm.systems.observation import Mounting, contact_wrench

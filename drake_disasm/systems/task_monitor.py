@@ -9,9 +9,9 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
+from drake_disasm.common.timing import POLICY_DELAY
 from drake_disasm.mdp import REWARD_TERMS, BoltState, outcome, reward_terms
 from drake_disasm.scenario import TaskConfig
-from drake_disasm.timing import POLICY_DELAY
 
 
 class TaskMonitor(LeafSystem):

@@ -15,18 +15,18 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from drake_disasm.devices.ft_sensor import sensed
-from drake_disasm.effects import BoltMotion
-from drake_disasm.impact import ImpactConditions
-from drake_disasm.scenario import Scenario
-from drake_disasm.spatial import (
+from drake_disasm.common.spatial import (
     pose_from_vector,
     rotation_vector,
     shift_and_express,
 )
+from drake_disasm.common.timing import boundary
+from drake_disasm.devices.ft_sensor import sensed
+from drake_disasm.effects import BoltMotion
+from drake_disasm.impact import ImpactConditions
+from drake_disasm.scenario import Scenario
 from drake_disasm.stations import TwinStation
 from drake_disasm.task.simulation import add_motion, make_processor
-from drake_disasm.timing import boundary
 
 #: Coordinates, their rates and the commanded ones, each (6,).
 _State = tuple[np.ndarray, np.ndarray, np.ndarray]

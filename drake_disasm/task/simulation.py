@@ -32,13 +32,14 @@ from pydrake.systems.primitives import (
     RandomSource,
 )
 
+from drake_disasm.cell.lock import lift_needed
+from drake_disasm.common.timing import MOTION_DELAY, POLICY_DELAY, boundary
 from drake_disasm.effects import (
     BoltMotion,
     Effect,
     is_local,
     motion_chain,
 )
-from drake_disasm.lock import lift_needed
 from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
 from drake_disasm.scenario import Scenario, draw, with_values
 from drake_disasm.stations import Station, make_station
@@ -47,7 +48,6 @@ from drake_disasm.systems.observation import ObservationProcessor
 from drake_disasm.systems.policy import Policy, PolicySystem
 from drake_disasm.systems.pose_target import PoseTarget
 from drake_disasm.systems.task_monitor import TaskMonitor
-from drake_disasm.timing import MOTION_DELAY, POLICY_DELAY, boundary
 
 _RANDOM = 2  # sources of randomness: a simulated sensor's noise, and the imprecision
 

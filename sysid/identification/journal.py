@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.errors import DisasmError
-from drake_disasm.writing import make_folder, write_atomically
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import make_folder, write_atomically
 from sysid.optimise.coordinates import BatchFunction
 
 Array = NDArray[np.float64]

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drake_disasm.errors import DisasmError
-from drake_disasm.quantity import closest
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
 
 
 def split_episodes(

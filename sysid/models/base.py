@@ -8,9 +8,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.logs import Episode, Log
 from drake_disasm.scenario import Scenario, with_values
-from sysid.logs import Episode, Log
 from sysid.parameters import Parameter, by_name, by_path
 
 Array = NDArray[np.float64]

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from drake_disasm.effects import MotionEffect
+from drake_disasm.logs import Episode
 from drake_disasm.systems.pose_target import through_motion
-from sysid.logs import Episode
 from sysid.models.base import Array
 
 

@@ -4,10 +4,10 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drake_disasm.errors import DisasmError
-from drake_disasm.quantity import closest
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
+from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario, scenario_from_mapping
-from sysid.logs import Log
 from sysid.models.base import LogModel
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.static_wrench import DEFAULT_PARAMETERS, StaticWrenchModel

@@ -6,12 +6,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
 from drake_disasm.effects import FlangePayload, JointEffect, JointSamples
-from drake_disasm.errors import DisasmError
-from drake_disasm.quantity import closest
+from drake_disasm.logs import Episode, Log
+from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario, with_values
-from sysid.logs import Episode, Log
-from sysid.logs.refusal import refusal
 from sysid.models.base import Array, Channel, Measurements, ScenarioModel
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
 from sysid.parameters import Parameter, by_name, by_path

@@ -13,9 +13,9 @@ from pydrake.multibody.tree import (
 )
 from scipy.linalg import qr
 
-from drake_disasm.errors import DisasmError
-from drake_disasm.models import add_model
-from drake_disasm.quantity import closest
+from drake_disasm.cell.parsing import add_model
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
 
 Array = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import UniformGravityFieldElement
 from scipy.spatial.transform import Rotation
 
+from drake_disasm.cell.lock import bolt_inertia
+from drake_disasm.cell.tool import Tool
 from drake_disasm.devices.ft_sensor import Payload
 from drake_disasm.effects import SensorEffect, SensorMemoryEffect
-from drake_disasm.lock import bolt_inertia
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.base import nominal_groove_pose
-from drake_disasm.tool import Tool
 from sysid.models.base import Array
 
 _SAMPLES = 10  # of the sensor between two states

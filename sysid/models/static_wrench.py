@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.multibody.tree import UniformGravityFieldElement
 
+from drake_disasm.cell.tool import Tool
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.ft_sensor import sensed
 from drake_disasm.effects import PayloadError, Sensing, SensorEffect, sensor_chain
-from drake_disasm.errors import DisasmError
+from drake_disasm.logs import Episode, Log, rotation_matrices, sensor_wrench
+from drake_disasm.logs.refusal import refusal
+from drake_disasm.logs.schema import WRENCH
 from drake_disasm.scenario import Scenario
-from drake_disasm.tool import Tool
-from sysid.logs import Episode, Log, rotation_matrices, sensor_wrench
-from sysid.logs.refusal import refusal
-from sysid.logs.schema import WRENCH
 from sysid.models.base import Array, Channel, Measurements, ScenarioModel
 from sysid.parameters import Parameter
 

@@ -7,7 +7,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.coordinates import BoltCoordinates
+from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.cell.tool import Tool
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.spatial import pose_from_vector
 from drake_disasm.effects import (
     EnvironmentEffect,
     MotionEffect,
@@ -15,16 +18,13 @@ from drake_disasm.effects import (
     motion_chain,
     sensor_chain,
 )
-from drake_disasm.errors import DisasmError
+from drake_disasm.logs import Episode, Log
+from drake_disasm.logs.refusal import refusal
+from drake_disasm.logs.transitions import observations
 from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.scenario import Scenario
-from drake_disasm.spatial import pose_from_vector
 from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.replay import Steps, TwinReplay
-from drake_disasm.tool import Tool
-from sysid.logs import Episode, Log
-from sysid.logs.refusal import refusal
-from sysid.logs.transitions import observations
 from sysid.models.base import (
     Array,
     Channel,

@@ -18,8 +18,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.errors import DisasmError
-from drake_disasm.writing import write_atomically
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import write_atomically
 from sysid.optimise.coordinates import BatchFunction, Box
 from sysid.optimise.trace import Trace
 

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 
 Points = NDArray[np.float64]
 

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from sysid.effect_selection.close_loop import Closed
+from sysid.effect_selection.evidence import Evidence
+from sysid.effect_selection.held_out import HeldOut
+from sysid.effect_selection.output import to_mapping
+from sysid.effect_selection.search import Survey
 from sysid.report.figures import as_data_url
 from sysid.report.templates import render
-from sysid.tracing.evidence import Evidence
-from sysid.tracing.held_out import HeldOut
-from sysid.tracing.pipeline import Closed
-from sysid.tracing.plain import to_mapping
-from sysid.tracing.selection import Survey
 
 _BEFORE, _AFTER, _DARK = "#b0b0b0", "#c03030", "#202020"
 _PASSES, _FAILS = "#2060a0", "#c8d0d8"

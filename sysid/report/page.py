@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from sysid.identification.plain import to_mapping
+from sysid.identification.output import to_mapping
 from sysid.identification.result import Identified
 from sysid.report import figures
 from sysid.report.templates import render

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from pydrake.lcm import DrakeLcm
 
+from drake_disasm.fakes import hex_box, robotiq_gripper
+from drake_disasm.fakes.cell import IIWA_FAULTS, FakeCell, arrival, in_step
 from drake_disasm.policies import make_policy
 from drake_disasm.safety import Mode
 from drake_disasm.scenario import Scenario, load_scenario
@@ -18,8 +20,6 @@ from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.systems.policy import Policy
 from drake_disasm.task.simulation import TaskSimulation
 from drake_disasm.visualization import MeshcatView
-from tests.fakes import hex_box, robotiq_gripper
-from tests.fakes.cell import IIWA_FAULTS, FakeCell, arrival, in_step
 
 ALL = (
     *(("iiwa", fault) for fault in IIWA_FAULTS if fault),

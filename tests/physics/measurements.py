@@ -12,11 +12,11 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 
+from drake_disasm.common.spatial import rotation_from_vector, rotation_vector
 from drake_disasm.effects import GroovePose
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
-from drake_disasm.spatial import rotation_from_vector, rotation_vector
 from drake_disasm.stations import CellStation
 from drake_disasm.task.simulation import TaskSimulation
 from tests.drake_disasm.conftest import QUIET

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from drake_disasm.common.spatial import rotation_from_vector
 from drake_disasm.effects import GroovePose
 from drake_disasm.scenario import load_scenario
-from drake_disasm.spatial import rotation_from_vector
 from drake_disasm.task.simulation import TaskSimulation
 from tests.physics.measurements import QUIET
 

@@ -21,16 +21,16 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from drake_disasm.logs import Log, read_log
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.identification.journal import Journal
 from sysid.identification.result import MethodResult
 from sysid.identification.search import Effort, Search
 from sysid.identification.uncertainty import uncertainty
-from sysid.logs import Log, read_log
-from sysid.logs.recording import record_transitions
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.optimise import BeesAlgorithm, BeesSettings, Box

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid.logs import LogHeader, LogWriter, flat_columns, write_static_wrench
+from drake_disasm.logs import LogHeader, LogWriter, flat_columns, write_static_wrench
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 

@@ -9,7 +9,7 @@ import numpy as np
 import psutil
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from sysid.identification.linearisation import linearise
 from sysid.objective import FAILED_RESIDUAL, Objective, huber_weights, rms, tempered
 from sysid.workers import Workers

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import GroovePose
-from drake_disasm.errors import DisasmError
 from drake_disasm.scenario import load_scenario
 from sysid.parameters import Parameter, Scaling, by_path
 from sysid.scenario_parameters import Request, read_requests, scenario_parameters

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.policies import (
     ActionMap,
     LearnedPolicy,
@@ -25,7 +25,7 @@ TOOLS = Path(__file__).parents[2] / "tools"
 
 SWALLOWS = """
 import os, signal, time
-import cli
+from drake_disasm.common import program
 
 def main(arguments):
     try:
@@ -33,10 +33,10 @@ def main(arguments):
         time.sleep(1)
     except KeyboardInterrupt:
         pass  # as a library's callback does
-    cli.stop_if_interrupted()
+    program.stop_if_interrupted()
     return 0
 
-cli.run(main)
+program.run(main)
 """
 
 

@@ -10,11 +10,11 @@ from drake_disasm.effects import CommandGain, SensorDrift
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
-from sysid.blind.matrix import nominal
-from sysid.blind.transitions import transitions_log
+from sysid.effect_selection.close_loop import HUBER
 from sysid.objective import tempered
-from sysid.tracing.pipeline import HUBER
-from tests.sysid.tracing.blind import static_log
+from sysid.validation.blind_tests import nominal
+from sysid.validation.synthetic_logs import transitions_log
+from tests.sysid.effect_selection.blind import static_log
 from tests.tools.programs import interrupt, run_program
 
 

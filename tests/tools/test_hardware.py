@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from pydrake.lcm import DrakeLcm
 
-from sysid.logs import read_log
+from drake_disasm.logs import read_log
 from tests.tools.programs import command, run_program
 
 _PORT = 20_000 + os.getpid() % 20_000  # nobody else's: tests run beside each other

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from drake_disasm.logs import read_log, write_static_wrench
 from drake_disasm.scenario import load_scenario
-from sysid.logs import read_log, write_static_wrench
 from tests.tools.programs import interrupt, run_program
 
 QUICK = ("--budget", "60", "--workers", "1")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drake_disasm.logs import read_log
 from drake_disasm.policies import (
     ActionMap,
     LearnedPolicy,
@@ -18,7 +19,6 @@ from drake_disasm.policies import (
     save_policy,
 )
 from drake_disasm.scenario import load_scenario, scenario_from_mapping
-from sysid.logs import read_log
 from tests.tools.programs import ROOT, Runner
 
 TWIN = ("--model", "twin")

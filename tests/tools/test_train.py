@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from drake_disasm.learning.hyperparameters import preset
+from drake_disasm.logs import read_log
 from drake_disasm.policies import load_policy
 from drake_disasm.scenario import load_scenario
-from sysid.logs import read_log
 from tests.tools.programs import ROOT
 
 #: A training of seconds: short episodes, a small network, nothing compiled.

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drake_disasm.logs import read_log
 from drake_disasm.mdp import REWARD_TERMS
 from drake_disasm.policies import load_policy
-from sysid.logs import read_log
 from tests.tools.programs import ROOT
 
 _SMALL = [

@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.codec_error import CodecError
 from drake_disasm.devices.onrobot_hex.codec import (
     PORT,
@@ -20,7 +21,6 @@ from drake_disasm.devices.onrobot_hex.codec import (
     sequence_step,
 )
 from drake_disasm.devices.reading import Clock, Mailbox, Reading
-from drake_disasm.errors import DisasmError
 
 #: A number this far back is no late datagram: the box has begun to count anew.
 BEGUN_ANEW = 100

@@ -9,8 +9,8 @@ import enum
 import math
 import struct
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.codec_error import CodecError
-from drake_disasm.errors import DisasmError
 
 #: The box's UDP port.
 PORT = 49152

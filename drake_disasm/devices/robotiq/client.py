@@ -14,6 +14,7 @@ from pymodbus.exceptions import ModbusException
 from pymodbus.framer import FramerType
 from pymodbus.pdu import ModbusPDU
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.codec_error import CodecError
 from drake_disasm.devices.reading import Clock, Mailbox, Reading
 from drake_disasm.devices.robotiq.registers import (
@@ -31,7 +32,6 @@ from drake_disasm.devices.robotiq.registers import (
     encode_command,
     fault_words,
 )
-from drake_disasm.errors import DisasmError
 
 BAUD_RATE = 115200  # 8N1: the gripper's setting from the factory
 

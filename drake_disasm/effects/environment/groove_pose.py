@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 from pydrake.math import RigidTransform
 
+from drake_disasm.common.spatial import rotation_from_vector
 from drake_disasm.effects.base import (
     BoltMotion,
     Environment,
     EnvironmentEffect,
     parameter,
 )
-from drake_disasm.spatial import rotation_from_vector
 
 
 @dataclasses.dataclass

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 
+from drake_disasm.common.spatial import rotation_from_vector
 from drake_disasm.effects.base import Sensing, SensorEffect, parameter
-from drake_disasm.spatial import rotation_from_vector
 
 
 @dataclasses.dataclass

@@ -9,11 +9,11 @@ import numpy as np
 import psutil
 import pytest
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.onrobot_hex import Command, HexClient, Request
 from drake_disasm.devices.reading import Counters
-from drake_disasm.errors import DisasmError
+from drake_disasm.fakes.hex_box import JUMP, FakeHexBox
 from drake_disasm.ports import Health
-from tests.fakes.hex_box import JUMP, FakeHexBox
 
 WRENCH = (1.0, -2.0, 3.0, 0.1, -0.2, 0.3)
 STREAM = [

@@ -5,6 +5,7 @@ import contextlib
 import numpy as np
 import pytest
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.codec_error import CodecError
 from drake_disasm.devices.onrobot_hex.codec import (
     FILTERS,
@@ -19,7 +20,6 @@ from drake_disasm.devices.onrobot_hex.codec import (
     period_request,
     sequence_step,
 )
-from drake_disasm.errors import DisasmError
 
 REQUESTS = [
     ("1234 0000 00000000", Request(Command.STOP)),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     AT_REST,
     EFFECTS,
@@ -41,7 +42,6 @@ from drake_disasm.effects import (
     sensor_chain,
     sizes,
 )
-from drake_disasm.errors import DisasmError
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation, SimulatedStation, TwinStation

@@ -6,6 +6,12 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from drake_disasm.common.spatial import (
+    pose_from_vector,
+    rotation_vector,
+    shift_and_express,
+    weight_wrench,
+)
 from drake_disasm.effects import (
     AT_REST,
     Effect,
@@ -17,12 +23,6 @@ from drake_disasm.effects import (
 )
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
-from drake_disasm.spatial import (
-    pose_from_vector,
-    rotation_vector,
-    shift_and_express,
-    weight_wrench,
-)
 from drake_disasm.task.simulation import TaskSimulation
 from tests.drake_disasm.conftest import QUIET
 

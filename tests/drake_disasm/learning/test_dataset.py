@@ -10,9 +10,9 @@ from drake_disasm.learning.dataset import remember
 from drake_disasm.learning.hyperparameters import preset
 from drake_disasm.learning.replay import Replay
 from drake_disasm.learning.training import Training, TrainingSpec, action_map
+from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
+from drake_disasm.logs.transitions import observations
 from drake_disasm.scenario import load_scenario
-from sysid.logs import LogHeader, LogWriter, flat_columns, read_log
-from sysid.logs.transitions import observations
 
 SCENARIO = load_scenario("sliding", ["imprecision=0.0002", "task.steps=12"])
 

@@ -8,8 +8,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3 import DDPG
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import GroovePose
-from drake_disasm.errors import DisasmError
 from drake_disasm.learning.environment import IDS, DisassemblyEnv
 from drake_disasm.mdp import REWARD_TERMS
 from drake_disasm.scenario import load_scenario

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.hyperparameters import (
     ALGORITHMS,
     PRESETS,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.replay import WIDTH, Replay
 
 

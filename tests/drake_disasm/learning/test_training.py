@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch.utils._pytree import tree_leaves
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning import run
 from drake_disasm.learning.dataset import remember
 from drake_disasm.learning.evaluation import validate_policy

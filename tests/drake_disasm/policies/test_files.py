@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.resources import models_dir
 from drake_disasm.policies import (
     ActionMap,
     LearnedPolicy,
@@ -25,7 +26,6 @@ from drake_disasm.policies import (
 )
 from drake_disasm.policies.archive import Arrays, pack, unpack
 from drake_disasm.policies.files import FORMAT
-from drake_disasm.resources import models_dir
 from drake_disasm.scenario import load_scenario
 
 MakeNetwork = Callable[..., Network]

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.mdp import Outcome, action_bounds
 from drake_disasm.policies import (
     ActionMap,

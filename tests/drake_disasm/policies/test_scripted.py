@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.mdp import action_bounds
 from drake_disasm.policies import SCRIPTED, Admittance, Straight, make_policy
 from drake_disasm.scenario import TaskConfig

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.resources import models_dir
 from drake_disasm.effects import GrooveFriction, GroovePose
-from drake_disasm.errors import DisasmError
-from drake_disasm.resources import models_dir
 from drake_disasm.scenario import (
     Scenario,
     dump_scenario,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.scenario import load_scenario, scenario_from_mapping
 from drake_disasm.stations import make_station
 

@@ -8,6 +8,7 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     Effect,
     FlangePayload,
@@ -22,7 +23,6 @@ from drake_disasm.effects import (
     TorqueGain,
     TorqueOffset,
 )
-from drake_disasm.errors import DisasmError
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation, TwinStation
 from tests.drake_disasm.conftest import QUIET

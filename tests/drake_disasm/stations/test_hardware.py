@@ -7,8 +7,9 @@ import psutil
 import pytest
 from pydrake.lcm import DrakeLcm
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import GroovePose
-from drake_disasm.errors import DisasmError
+from drake_disasm.fakes.cell import FakeCell
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import find_policy, load_policy, make_policy
 from drake_disasm.ports import CELL_PORTS, Health, port_differences
@@ -19,7 +20,6 @@ from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.task.episode import EpisodeRecorder, run_episode
 from drake_disasm.task.simulation import TaskSimulation
-from tests.fakes.cell import FakeCell
 from tests.fakes.fault_runs import in_lockstep
 
 #: The fake arm follows a control period later than a simulated one: 0.05 mm at the 10

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from drake_disasm.errors import DisasmError
-from drake_disasm.resources import models_dir
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.resources import models_dir
 from drake_disasm.stations.hardware_config import load_hardware_config
 
 

@@ -7,7 +7,7 @@ import yaml
 from pydrake.systems.framework import LeafSystem, System
 
 import drake_disasm
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.ports import CELL_PORTS, TWIN_PORTS, check_ports, port_differences
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation, SimulatedStation, TwinStation

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.experiment import Experiment
 from drake_disasm.learning.hyperparameters import preset
 from drake_disasm.learning.run import write_episodes
-from drake_disasm.learning.transfer import check_start
+from drake_disasm.learning.warm_start import check_start
 from drake_disasm.scenario import load_scenario
 from drake_disasm.studies.transfer import TransferStudy, results, table, write_results
 from drake_disasm.task.episode import EpisodeSummary

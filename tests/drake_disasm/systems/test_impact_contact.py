@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.impact import ImpactLaw
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario

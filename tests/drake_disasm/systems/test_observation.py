@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from drake_disasm.spatial import weight_wrench
+from drake_disasm.common.spatial import weight_wrench
 from drake_disasm.systems.observation import (
     Mounting,
     contact_wrench,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from drake_disasm.coordinates import BoltCoordinates
-from drake_disasm.spatial import (
+from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.common.spatial import (
     pose_to_vector,
     rotation_vector,
     shift_and_express,

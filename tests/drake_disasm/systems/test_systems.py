@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from drake_disasm.coordinates import BoltCoordinates
-from drake_disasm.errors import DisasmError
+from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.spatial import pose_from_vector, rotation_vector
 from drake_disasm.mdp import action_bounds
 from drake_disasm.scenario import TaskConfig, load_scenario
-from drake_disasm.spatial import pose_from_vector, rotation_vector
 from drake_disasm.systems.imprecision import ImprecisionNoise
 from drake_disasm.systems.policy import Policy, ask
 from drake_disasm.systems.pose_target import PoseTarget, moved

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.scenario import load_scenario, with_values
 from drake_disasm.stations import TwinStation
 from drake_disasm.task.replay import TwinReplay, coarse_step

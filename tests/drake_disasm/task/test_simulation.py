@@ -5,13 +5,13 @@ import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import LeafSystem
 
+from drake_disasm.common.timing import POLICY_DELAY, boundary
 from drake_disasm.effects import GroovePose, SensorBias
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.episode import EpisodeRecorder, run_episode, summary_table
 from drake_disasm.task.simulation import TaskSimulation
-from drake_disasm.timing import POLICY_DELAY, boundary
 
 TURNED = [GroovePose(ry=0.03)]
 

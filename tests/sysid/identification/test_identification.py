@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
+from sysid.identification.identify import Settings, identify, noise_floor
 from sysid.identification.journal import Journal
-from sysid.identification.pipeline import Settings, identify, noise_floor
-from sysid.identification.plain import summary, to_mapping
+from sysid.identification.output import summary, to_mapping
 from sysid.identification.search import Effort
 from sysid.identification.sensitivity import sensitivity
 from sysid.objective import Objective

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from statsmodels.stats.diagnostic import acorr_ljungbox
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from sysid.identification.agreement import verdict
 from sysid.identification.linearisation import Linearisation
 from sysid.identification.split import split_episodes

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from drake_disasm.logs import Log
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
-from sysid.logs import Log
-from sysid.logs.recording import record_transitions
 
 
 def record(folder: Path, scenario: Scenario, episodes: int) -> Log:

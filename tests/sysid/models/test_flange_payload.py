@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from drake_disasm.effects import FlangePayload, JointCoulombFriction
+from drake_disasm.logs import Log, LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.scenario import Scenario
-from sysid.logs import Log, LogHeader, LogWriter, flat_columns, read_log
+from sysid.effect_selection.candidates import candidates, extended
+from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.scenario_parameters import Request
-from sysid.tracing.candidates import candidates, extended
-from sysid.tracing.pipeline import close_loop
 from sysid.workers import Workers
 from tests.sysid.models.test_joint_motion import (
     JOINT,

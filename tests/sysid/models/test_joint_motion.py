@@ -4,13 +4,13 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import JointViscousFriction
-from drake_disasm.errors import DisasmError
+from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.scenario import Scenario
+from sysid.identification.identify import Settings, identify
 from sysid.identification.journal import Journal
-from sysid.identification.pipeline import Settings, identify
 from sysid.identification.search import Effort
-from sysid.logs import LogHeader, LogWriter, flat_columns, read_log
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.regressor import ArmDynamics, base_set, body_regressor

@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.cell.tool import Tool
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.logs import read_log, write_static_wrench
 from drake_disasm.scenario import Scenario, load_scenario
-from drake_disasm.tool import Tool
+from sysid.identification.identify import Settings, identify
 from sysid.identification.journal import Journal
 from sysid.identification.noise import with_estimated_noise
-from sysid.identification.pipeline import Settings, identify
 from sysid.identification.search import Effort
-from sysid.logs import read_log, write_static_wrench
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.static_wrench import DEFAULT_PARAMETERS, StaticWrenchModel
 from sysid.scenario_parameters import Request, scenario_parameters

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.spatial import rotation_from_vector, shift_and_express
 from drake_disasm.scenario import load_scenario
-from drake_disasm.spatial import rotation_from_vector, shift_and_express
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models import PredictionError
 from sysid.models.twin import TwinModel, at_sensor

@@ -20,8 +20,8 @@ from drake_disasm.effects import (
 )
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
+from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
-from sysid.logs.recording import record_transitions
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.scenario_parameters import Request, scenario_parameters

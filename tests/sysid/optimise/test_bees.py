@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 
-from drake_disasm.errors import DisasmError
+from drake_disasm.common.errors import DisasmError
 from sysid.optimise import BeesAlgorithm, BeesSettings, Box, Whitened
 from sysid.optimise.bees import Stop
 from tests.sysid.optimise.functions import STANDARD, rosenbrock, sphere

@@ -1,0 +1,426 @@
+"""Measures speed and memory, each figure in this run on this machine.
+
+Prints one table: the figure, what it is compared with in the same run, and their
+ratio. Figures are medians of repeats, in a process of one thread. It is a
+measurement, not a test: nothing here passes or fails.
+"""
+
+import argparse
+import functools
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import timeit
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import endurance
+import numpy as np
+import psutil
+from effect_matrix import closing_time, run_matrix
+from objective_speed import (
+    SIZES,
+    THESIS_S,
+    cores,
+    evaluation_time,
+    recorded_log,
+)
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+from tqdm import tqdm
+from update_speed import measure_updates
+
+from drake_disasm.common import program
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import make_folder, write_atomically
+from drake_disasm.common.quantity import closest
+from drake_disasm.common.timing import boundary
+from drake_disasm.mdp import Outcome
+from drake_disasm.policies import ActionMap, LearnedPolicy, Network, make_policy
+from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.stations import TwinStation
+from drake_disasm.stations.hardware_config import load_hardware_config
+from drake_disasm.stations.simulated import copy_state
+from drake_disasm.task.simulation import TaskSimulation, add_motion
+
+_REPEATS = 5
+_CLOSING_AIM_S = 300.0
+_LATENCY_MINUTES = 0.5
+_LATENCIES = ("iiwa_age", "gripper_age", "ft_sensor_age", "echo")
+_SCENARIO = "removal_turned"  # the bolt is in contact nearly all the time
+_POLICY = "admittance"
+_WIDTHS = (12, 128, 128, 128, 6)  # of the policy whose inference is timed
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One row.
+
+    Attributes:
+        key: the design's fixed name.
+        value: as measured.
+        unit: of the value.
+        reference: what it is compared with.
+        ratio: value over reference (or the other way, as `reference` says).
+    """
+
+    key: str
+    value: float
+    unit: str
+    reference: str = ""
+    ratio: float | None = None
+
+
+def _episode(simulation: TaskSimulation, seed: int) -> tuple[float, int]:
+    """Returns the wall time [s] and steps of one episode, without its reset."""
+    simulation.reset(seed)
+    start, steps = time.perf_counter(), 0
+    outcome = Outcome.RUNNING
+    while outcome is Outcome.RUNNING:
+        outcome, steps = simulation.step().outcome, steps + 1
+    return time.perf_counter() - start, steps
+
+
+def measure_speed(model: str) -> Iterator[Figure]:
+    """Yields real-time factor and steps per second of a model."""
+    simulation = _simulation(model)
+    _episode(simulation, 0)  # warms up
+    runs = [_episode(simulation, seed) for seed in range(_REPEATS)]
+    per_step = statistics.median(wall / steps for wall, steps in runs)
+    period = simulation.scenario.task.period
+    yield Figure(
+        f"{model}_real_time_factor",
+        period / per_step,
+        "1",
+        "real time",
+        period / per_step,
+    )
+    yield Figure(f"{model}_steps_per_s", 1.0 / per_step, "1/s", "10 Hz", 0.1 / per_step)
+
+
+def measure_reset(model: str) -> Iterator[Figure]:
+    """Yields the cost of a reset in place, beside building the diagram anew."""
+    simulation = _simulation(model)
+    simulation.reset(0)
+    reset = _median_time(lambda: simulation.reset(1), 50)
+    build = _median_time(lambda: _simulation(model).reset(0), _REPEATS)
+    yield Figure(
+        f"{model}_reset_ms", 1e3 * reset, "ms", "building and settling", reset / build
+    )
+
+
+def measure_python_share() -> Iterator[Figure]:
+    """Yields the share of a twin step that Drake alone would not need.
+
+    The reference replays the episode's commanded rates through the same station
+    with Drake's C++ systems only: the same motion and contact, no Python at all.
+    """
+    simulation = _simulation("twin")
+    rates = _commanded_rates(simulation)
+    wholes, replays = [], []
+    for _ in range(_REPEATS):  # in turns: what else runs here falls on both
+        wall, steps = _episode(simulation, 0)
+        wholes.append(wall / steps)
+        replays.append(_replay(simulation.scenario, rates) / len(rates))
+    # The fastest of each: other work on the machine only ever adds time.
+    whole, drake = min(wholes), min(replays)
+    yield Figure(
+        "twin_python_share", 1.0 - drake / whole, "1", "Drake alone", drake / whole
+    )
+
+
+def _commanded_rates(simulation: TaskSimulation) -> list[np.ndarray]:
+    """Returns the commanded rate (6,) of each period of an episode."""
+    simulation.reset(0)
+    rates, outcome = [], Outcome.RUNNING
+    while outcome is Outcome.RUNNING:
+        outcome = simulation.step().outcome
+        rates.append(simulation.evaluate(simulation.pose_target, "velocity").copy())
+    return rates
+
+
+def _replay(scenario: Scenario, rates: list[np.ndarray]) -> float:
+    """Returns the wall time [s] that Drake alone takes for the same motion."""
+    builder = DiagramBuilder()
+    station = builder.AddNamedSystem("station", TwinStation(scenario))
+    source = builder.AddNamedSystem("rate", ConstantVectorSource(np.zeros(6)))
+    add_motion(builder, source.get_output_port(), station)
+    simulator = Simulator(builder.Build())
+    root = simulator.get_mutable_context()
+    mine = station.GetMyMutableContextFromRoot(root)
+    station.set_effects(mine, scenario.effects)
+    copy_state(station.settled(scenario.effects), mine)
+    simulator.Initialize()
+    value = source.get_mutable_source_value(source.GetMyMutableContextFromRoot(root))
+    start = time.perf_counter()
+    for k, commanded in enumerate(rates):
+        value.SetFromVector(commanded)
+        simulator.AdvanceTo(boundary(k + 1, scenario.task.period))
+    return time.perf_counter() - start
+
+
+def measure_latency() -> Iterator[Figure]:
+    """Yields what 99 % of samples and commands keep to, beside what is too late.
+
+    Of the hardware station with a fake cell in another process, in real time.
+    """
+    with endurance.playing() as config:
+        limits = load_hardware_config(config).safety
+        try:
+            noted = endurance.run(config, _LATENCY_MINUTES)
+        except DisasmError as error:
+            tqdm.write(f"hardware_..._ms left out: {error}")
+            return
+    for name, ages in noted.ages.items():
+        stale = limits.stale_after(name)
+        age = float(np.percentile(ages, 99))
+        key = f"hardware_{name}_age_ms"
+        yield Figure(key, 1e3 * age, "ms", "when it is stale", age / stale)
+    echo = float(np.percentile(noted.echoes, 99))
+    stale = limits.stale_after("iiwa")
+    yield Figure("hardware_echo_ms", 1e3 * echo, "ms", "a stale arm", echo / stale)
+
+
+def measure_memory() -> Iterator[Figure]:
+    """Yields the peak memory of the programs, beside importing what they build on."""
+    tools = Path(__file__).parent
+    peak = _peak_mib([sys.executable, str(tools / "simulate.py"), "--no-meshcat"])
+    bare = _peak_mib([sys.executable, "-c", "import pydrake.all"])
+    yield Figure("peak_mib_simulate", peak, "MiB", "import pydrake.all", peak / bare)
+    with tempfile.TemporaryDirectory() as folder:
+        training = [
+            "--preset",
+            "chapter4",
+            "--episodes",
+            "20",
+            "--out",
+            f"{folder}/out",
+        ]
+        peak = _peak_mib([sys.executable, str(tools / "train.py"), *training])
+    bare = _peak_mib([sys.executable, "-c", "import torch, pydrake.all"])
+    yield Figure(
+        "peak_mib_train", peak, "MiB", "import torch, pydrake.all", peak / bare
+    )
+    with recorded_log(100) as log, tempfile.TemporaryDirectory() as folder:
+        options = ["--preset", "thesis", "--cycles", "2", "--workers", "1"]
+        fitting = ["--log", str(log), "--parameters", "contact.friction", *options]
+        program = [sys.executable, str(tools / "identify.py"), *fitting]
+        peak = _peak_mib([*program, "--out", f"{folder}/out"])
+    bare = _peak_mib([sys.executable, "-c", "import scipy.stats, pydrake.all"])
+    yield Figure(
+        "peak_mib_identify", peak, "MiB", "import scipy, pydrake.all", peak / bare
+    )
+
+
+def measure_objective(contact: str, prefix: str) -> Iterator[Figure]:
+    """Yields the time of one evaluation of the objective, beside the thesis's."""
+    with recorded_log(max(SIZES)) as log:
+        both = {}
+        for size in SIZES:
+            both[size] = evaluation_time(log, size, cores(), 3, contact)
+            reference = "the thesis's 10 minutes"
+            ratio = both[size] / THESIS_S
+            yield Figure(f"{prefix}_{size}_s", both[size], "s", reference, ratio)
+        alone = evaluation_time(log, SIZES[0], 1, 2, contact)
+    reference = f"{cores()} cores"
+    ratio = alone / both[SIZES[0]]
+    yield Figure(f"{prefix}_883_one_core_s", alone, "s", reference, ratio)
+
+
+def measure_closing(contact: str, key: str) -> Iterator[Figure]:
+    """Yields the time from a log to the verdict."""
+    value = closing_time(SIZES[0], cores(), contact)
+    yield Figure(key, value, "s", "300 s, the aim", value / _CLOSING_AIM_S)
+
+
+def measure_update_speed(name: str) -> Iterator[Figure]:
+    """Yields DDPG updates per second of a preset, beside stable-baselines3's."""
+    ours, theirs = measure_updates(name)
+    ratio = ours / theirs if theirs else None
+    reference = "stable-baselines3" if theirs else "(stable-baselines3 is not there)"
+    yield Figure(f"updates_per_s_{name}", ours, "1/s", reference, ratio)
+    if ratio:
+        yield Figure(f"updates_ratio_sb3_{name}", ratio, "1", reference, ratio)
+
+
+def _peak_mib(command: list[str]) -> float:
+    """Returns the greatest resident memory of a process [MiB]."""
+    with subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        watched, peak = psutil.Process(process.pid), 0
+        while process.poll() is None:
+            try:
+                memory = watched.memory_info()
+            except psutil.NoSuchProcess:
+                break
+            peak = max(peak, memory.rss)
+            time.sleep(0.01)
+    if process.returncode:
+        raise DisasmError(f"{' '.join(command)} failed; run it by hand to see why")
+    return peak / 2**20
+
+
+def _simulation(model: str) -> TaskSimulation:
+    return TaskSimulation(load_scenario(_SCENARIO), model, make_policy(_POLICY))
+
+
+def measure_inference() -> Iterator[Figure]:
+    """Yields the time of one call of a trained policy, beside torch's network alone."""
+    generator = np.random.default_rng(0)
+    sizes = list(zip(_WIDTHS[1:], _WIDTHS, strict=False))
+    network = Network(
+        tuple(generator.normal(0.0, 0.1, size).astype(np.float32) for size in sizes),
+        tuple(np.zeros(rows, np.float32) for rows, _ in sizes),
+    )
+    policy = LearnedPolicy(network, np.ones(12), ActionMap(np.ones(6)))
+    observation = generator.standard_normal(12)
+    ours = _short_time(lambda: policy(observation))
+    theirs = _torch_inference(network)
+    reference, ratio = ("the network in torch", ours / theirs) if theirs else ("", None)
+    yield Figure("policy_inference_us", 1e6 * ours, "us", reference, ratio)
+
+
+def _torch_inference(network: Network) -> float | None:
+    """Returns the time [s] of the same network in eager torch, if there is torch."""
+    try:
+        import torch
+    except ImportError:
+        return None
+    layers: list[torch.nn.Module] = []
+    for weight, bias in zip(network.weights, network.biases, strict=True):
+        layer = torch.nn.Linear(weight.shape[1], weight.shape[0])
+        values = {"weight": torch.from_numpy(weight), "bias": torch.from_numpy(bias)}
+        layer.load_state_dict(values)
+        layers += [layer, torch.nn.ReLU()]
+    module, x = torch.nn.Sequential(*layers[:-1]), torch.ones(_WIDTHS[0])
+    with torch.inference_mode():
+        return _short_time(lambda: module(x))
+
+
+def _short_time(work: Callable[[], object]) -> float:
+    """Returns the time [s] of what takes microseconds, many at a time."""
+    return statistics.median(timeit.repeat(work, number=1000, repeat=20)) / 1000
+
+
+def _median_time(work: Callable[[], object], repeats: int) -> float:
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return statistics.median(times)
+
+
+#: Which keys each measurement gives, in the order of the table.
+MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
+    ("cell_real_time_factor", "cell_steps_per_s"): lambda: measure_speed("cell"),
+    ("twin_real_time_factor", "twin_steps_per_s"): lambda: measure_speed("twin"),
+    ("twin_python_share",): measure_python_share,
+    ("cell_reset_ms",): lambda: measure_reset("cell"),
+    ("twin_reset_ms",): lambda: measure_reset("twin"),
+    ("policy_inference_us",): measure_inference,
+    **{
+        (f"updates_per_s_{name}", f"updates_ratio_sb3_{name}"): functools.partial(
+            measure_update_speed, name
+        )
+        for name in ("chapter3", "chapter4", "chapter5")
+    },
+    **{
+        tuple(f"{prefix}_{of}_s" for of in ("883", "1776", "883_one_core")): (
+            functools.partial(measure_objective, contact, prefix)
+        )
+        for contact, prefix in (
+            ("hydroelastic", "objective"),
+            ("impact", "objective_impact"),
+        )
+    },
+    ("close_loop_883_s",): lambda: measure_closing("hydroelastic", "close_loop_883_s"),
+    ("close_loop_impact_883_s",): lambda: measure_closing(
+        "impact", "close_loop_impact_883_s"
+    ),
+    tuple(f"hardware_{of}_ms" for of in _LATENCIES): measure_latency,
+    ("peak_mib_simulate", "peak_mib_train", "peak_mib_identify"): measure_memory,
+}
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    keys = [key for group in MEASUREMENTS for key in group]
+    parser = argparse.ArgumentParser(
+        prog="benchmark.py",
+        description=__doc__,
+        epilog=f"keys: {', '.join(keys)}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--only", nargs="+", metavar="KEY", help="run a part")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write figures")
+    parser.add_argument(
+        "--effects",
+        type=Path,
+        metavar="DIR",
+        help="instead: blind tests of closing the loop, each effect at three sizes, "
+        "null logs, pairs, effects that the library lacks; takes hours, Ctrl-C and the "
+        "same command go on; writes answers.json, effects.md, confusion.png",
+    )
+    for option, usual, words in (
+        ("seeds", 5, "of each effect at each size"),
+        ("nulls", 100, "logs without an effect, of each correlation of the noise"),
+        ("pairs", 40, "logs with two effects"),
+    ):
+        parser.add_argument(
+            f"--{option}",
+            type=int,
+            default=usual,
+            metavar="N",
+            help=f"with --effects: {words} (default: {usual})",
+        )
+    args = parser.parse_args(arguments)
+    for key in args.only or []:
+        if key not in keys:
+            raise DisasmError(f"--only {key}: no such figure; {closest(key, keys)}")
+    return args
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the program; returns its exit status."""
+    args = parse(arguments)
+    if args.effects:
+        print(run_matrix(args.effects, args.seeds, args.nulls, args.pairs))
+        return 0
+    wanted = set(args.only) if args.only else {k for g in MEASUREMENTS for k in g}
+    groups = {g: m for g, m in MEASUREMENTS.items() if wanted & set(g)}
+    figures: list[Figure] = []
+    for measure in tqdm(groups.values(), unit="group", leave=False):
+        figures += [figure for figure in measure() if figure.key in wanted]
+    print(table(figures))
+    if args.json:
+        _write_json(args.json, figures)
+    return 0
+
+
+def table(figures: list[Figure]) -> str:
+    """Returns the figures as a table for a terminal."""
+    lines = [f"{'figure':26} {'value':>10} {'unit':5} {'ratio':>8}  compared with"]
+    for f in figures:
+        ratio = "" if f.ratio is None else f"{f.ratio:8.3g}"
+        lines.append(f"{f.key:26} {f.value:10.4g} {f.unit:5} {ratio:>8}  {f.reference}")
+    return "\n".join(lines)
+
+
+def _write_json(path: Path, figures: list[Figure]) -> None:
+    text = json.dumps({f.key: f.value for f in figures}, indent=2) + "\n"
+    make_folder(path.parent)
+    write_atomically(path, lambda stream: stream.write(text.encode()))
+
+
+if __name__ == "__main__":
+    program.run(main)

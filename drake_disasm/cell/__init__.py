@@ -1,0 +1,1 @@
+"""Geometry of the cell: parsing of models, the lock, the tool, coordinates."""

@@ -1,0 +1,191 @@
+"""Station coordinates against the bolt's pose: the arm's joints, or the twin's.
+
+The rest of the diagram speaks of X_GB, the bolt in the groove's nominal frame;
+what a station is commanded with is a vector of coordinates. One object per
+station maps both ways, so pose targets and observations need not know which.
+"""
+
+import abc
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.multibody.inverse_kinematics import (
+    DifferentialInverseKinematicsParameters,
+    DifferentialInverseKinematicsStatus,
+    DoDifferentialInverseKinematics,
+    InverseKinematics,
+)
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable
+from pydrake.solvers import Solve
+
+from drake_disasm.cell.parsing import add_arm
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.spatial import rotation_vector
+from drake_disasm.scenario import ArmConfig
+
+_TOLERANCE = 1e-5  # m, of inverse kinematics
+_TURN_TOLERANCE = 1e-4  # rad, of the same
+_SOLUTION = DifferentialInverseKinematicsStatus.kSolutionFound
+
+
+class Coordinates(abc.ABC):
+    """Maps a station's coordinates to the bolt's pose and back."""
+
+    size: int
+
+    @abc.abstractmethod
+    def pose(self, coordinates: np.ndarray) -> RigidTransform:
+        """Returns X_GB of coordinates (size,)."""
+
+    @abc.abstractmethod
+    def solve(self, X_GB: RigidTransform, near: np.ndarray) -> np.ndarray:
+        """Returns the coordinates (size,) of a pose close to that of `near`."""
+
+
+class BoltCoordinates(Coordinates):
+    """The twin's joints: x, y, z [m], then yaw, pitch, roll [rad] of B in Gn."""
+
+    size = 6
+
+    def pose(self, coordinates: np.ndarray) -> RigidTransform:
+        """See Coordinates."""
+        return RigidTransform(RollPitchYaw(coordinates[:2:-1]), coordinates[:3])
+
+    def solve(self, X_GB: RigidTransform, near: np.ndarray) -> np.ndarray:
+        """See Coordinates; exact, `near` is not needed."""
+        rpy = RollPitchYaw(X_GB.rotation()).vector()
+        return np.concatenate([X_GB.translation(), rpy[::-1]])
+
+
+class ArmCoordinates(Coordinates):
+    """The arm's joint angles [rad]; poses by Drake's differential IK.
+
+    Args:
+        arm: the arm's configuration.
+        X_WG: nominal groove frame.
+        X_FB: bolt in the flange frame, as grasped.
+        period: time that one step of motion may take [s], for velocity limits.
+    """
+
+    def __init__(
+        self, arm: ArmConfig, X_WG: RigidTransform, X_FB: RigidTransform, period: float
+    ) -> None:
+        self._X_GW = X_WG.inverse()
+        self._X_WG = X_WG
+        self._plant, self._frame_B = _arm_alone(arm, X_FB)
+        self._context = self._plant.CreateDefaultContext()
+        self._posture = np.array(arm.posture)
+        self._parameters = self._differential_ik_parameters(period)
+        self.size = self._plant.num_positions()
+
+    def pose(self, coordinates: np.ndarray) -> RigidTransform:
+        """See Coordinates."""
+        self._plant.SetPositions(self._context, coordinates)
+        return self._X_GW @ self._frame_B.CalcPoseInWorld(self._context)
+
+    def solve(self, X_GB: RigidTransform, near: np.ndarray) -> np.ndarray:
+        """See Coordinates.
+
+        Raises:
+            DisasmError: no joint motion within the limits goes there.
+        """
+        q = near
+        for _ in range(2):  # the second step removes the first one's curvature
+            self._plant.SetPositions(self._context, q)
+            result = DoDifferentialInverseKinematics(
+                self._plant,
+                self._context,
+                self._X_WG @ X_GB,
+                self._frame_B,
+                self._parameters,
+            )
+            if result.status != _SOLUTION:
+                break
+            q = q + self._parameters.get_time_step() * result.joint_velocities
+        self._refuse_a_miss(X_GB, self.pose(q))
+        return q
+
+    def _refuse_a_miss(self, wanted: RigidTransform, reached: RigidTransform) -> None:
+        miss = np.linalg.norm(reached.translation() - wanted.translation())
+        R = wanted.rotation().inverse() @ reached.rotation()
+        turn = np.linalg.norm(rotation_vector(R))
+        if miss > _TOLERANCE or turn > _TURN_TOLERANCE:
+            raise DisasmError(
+                f"the arm can't follow the command within its limits (off by "
+                f"{1e3 * miss:.2f} mm and {np.rad2deg(turn):.2f} degrees); "
+                "move the lock by placement.p_WG"
+            )
+
+    def start(self, X_GB: RigidTransform) -> np.ndarray:
+        """Returns joint angles for a pose, as near the preferred posture as can be.
+
+        Raises:
+            DisasmError: the pose is out of reach.
+        """
+        X_WB = self._X_WG @ X_GB
+        ik = InverseKinematics(self._plant)
+        world = self._plant.world_frame()
+        p = X_WB.translation()
+        ik.AddPositionConstraint(self._frame_B, np.zeros(3), world, p, p)
+        ik.AddOrientationConstraint(
+            world, X_WB.rotation(), self._frame_B, RotationMatrix(), 1e-4
+        )
+        ik.prog().AddQuadraticErrorCost(np.eye(self.size), self._posture, ik.q())
+        result = Solve(ik.prog(), self._posture)
+        if not result.is_success():
+            raise DisasmError(
+                f"the arm can't reach the lock at {np.round(p, 3)} m; "
+                "move it by placement.p_WG"
+            )
+        # Polished to rounding error: the solver stops at its own tolerance.
+        return self.solve(X_GB, result.GetSolution(ik.q()))
+
+    def stiffness(self, joint_stiffness: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Returns the 6x6 stiffness at Bo in G, [translation; rotation] order.
+
+        K = (J diag(k)^-1 J^T)^-1, the joints being springs in series.
+        """
+        self._plant.SetPositions(self._context, q)
+        J = self._jacobian_G()
+        return np.linalg.inv(J @ np.diag(1.0 / joint_stiffness) @ J.T)
+
+    def _jacobian_G(self) -> np.ndarray:
+        world = self._plant.world_frame()
+        J = self._plant.CalcJacobianSpatialVelocity(
+            self._context,
+            JacobianWrtVariable.kV,
+            self._frame_B,
+            np.zeros(3),
+            world,
+            world,
+        )
+        R_GW = self._X_GW.rotation().matrix()
+        return np.vstack([R_GW @ J[3:], R_GW @ J[:3]])
+
+    def _differential_ik_parameters(
+        self, period: float
+    ) -> DifferentialInverseKinematicsParameters:
+        plant = self._plant
+        parameters = DifferentialInverseKinematicsParameters(
+            plant.num_positions(), plant.num_velocities()
+        )
+        parameters.set_time_step(period)
+        parameters.set_nominal_joint_position(self._posture)
+        parameters.set_joint_position_limits(
+            (plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits())
+        )
+        parameters.set_joint_velocity_limits(
+            (plant.GetVelocityLowerLimits(), plant.GetVelocityUpperLimits())
+        )
+        return parameters
+
+
+def _arm_alone(
+    arm: ArmConfig, X_FB: RigidTransform
+) -> tuple[MultibodyPlant, FixedOffsetFrame]:
+    plant = MultibodyPlant(0.0)
+    _, flange = add_arm(plant, arm.model)
+    frame_B = plant.AddFrame(FixedOffsetFrame("bolt", flange, X_FB))
+    plant.Finalize()
+    return plant, frame_B

@@ -1,0 +1,61 @@
+"""Adding model files to a plant."""
+
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, ModelInstanceIndex
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.resources import model_path, package_map
+
+
+def add_model(plant: MultibodyPlant, url: str) -> ModelInstanceIndex:
+    """Adds the one model of a file to the plant.
+
+    Raises:
+        DisasmError: the file is missing or does not hold one model.
+    """
+    path = model_path(url)
+    parser = Parser(plant)
+    parser.package_map().AddMap(package_map())
+    try:
+        instances = parser.AddModels(str(path))
+    except RuntimeError as error:
+        reason = " ".join(str(error).split())
+        raise DisasmError(f"model file {url} can't be read: {reason}") from None
+    if len(instances) != 1:
+        raise DisasmError(f"model file {url} holds {len(instances)} models; give one")
+    return instances[0]
+
+
+def model_frame(
+    plant: MultibodyPlant, instance: ModelInstanceIndex, name: str, url: str
+) -> Frame:
+    """Returns a frame that a model must have to serve in its place.
+
+    Args:
+        url: of the model's file, for the message.
+
+    Raises:
+        DisasmError: the model has no such frame.
+    """
+    if not plant.HasFrameNamed(name, instance):
+        raise DisasmError(
+            f"model file {url} has no link or frame '{name}', which its place in the "
+            "cell needs; check the `model` key in the scenario"
+        )
+    return plant.GetFrameByName(name, instance)
+
+
+def add_arm(plant: MultibodyPlant, url: str) -> tuple[ModelInstanceIndex, Frame]:
+    """Adds the arm with its base on the world's origin.
+
+    Returns:
+        Its model instance and its flange frame F.
+
+    Raises:
+        DisasmError: the file is missing or is not an arm.
+    """
+    instance = add_model(plant, url)
+    base = model_frame(plant, instance, "iiwa_link_0", url)
+    plant.WeldFrames(plant.world_frame(), base)
+    return instance, model_frame(plant, instance, "iiwa_link_ee", url)

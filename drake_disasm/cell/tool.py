@@ -1,0 +1,121 @@
+"""Sensor and gripper on the flange, and where the bolt sits in them.
+
+Frames: F flange, S sensor, T the gripper's tcp (z towards the tips), B bolt.
+"""
+
+import dataclasses
+from typing import Self
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    Frame,
+    ModelInstanceIndex,
+    SpatialInertia,
+    WeldJoint,
+)
+
+from drake_disasm.cell.lock import bolt_inertia, lip_height
+from drake_disasm.cell.parsing import add_model, model_frame
+from drake_disasm.scenario import Scenario
+
+FINGERS = ("left_finger_joint", "right_finger_joint")
+PAD_LENGTH = 0.065  # m, along z_T; T sits in its middle
+
+
+@dataclasses.dataclass(frozen=True)
+class Tool:
+    """Rigid geometry and mass of everything beyond the sensor's joint.
+
+    Attributes:
+        X_FB, X_SB: pose of the bolt, as grasped, in flange and sensor frame.
+        M_F: spatial inertia about Fo in F, sensor's body and bolt included.
+        p_SoScm_S: centre of mass in the sensor frame (3,) [m].
+    """
+
+    X_FB: RigidTransform
+    X_SB: RigidTransform
+    M_F: SpatialInertia
+    p_SoScm_S: np.ndarray
+
+    @property
+    def mass(self) -> float:
+        """Mass of what hangs on the sensor's joint [kg]."""
+        return self.M_F.get_mass()
+
+    @classmethod
+    def from_models(cls, scenario: Scenario) -> Self:
+        """Returns the tool of the scenario's sensor, gripper and lock."""
+        plant = MultibodyPlant(0.0)
+        models = add_tool(plant, plant.world_frame(), scenario)
+        bolt = plant.AddRigidBody(
+            "bolt", plant.AddModelInstance("bolt"), bolt_inertia(scenario.lock)
+        )
+        plant.WeldFrames(models.frame_T, bolt.body_frame(), grasp_pose(scenario))
+        plant.Finalize()
+        context = plant.CreateDefaultContext()
+        for name in FINGERS:
+            half_width = scenario.lock.grip_size[2] / 2
+            plant.GetJointByName(name).set_translation(context, half_width)
+        X_SF = models.frame_S.CalcPoseInWorld(context).inverse()
+        X_FB = plant.EvalBodyPoseInWorld(context, bolt)
+        bodies = [b for i in models.instances for b in plant.GetBodyIndices(i)]
+        M_F = plant.CalcSpatialInertia(
+            context, plant.world_frame(), [*bodies, bolt.index()]
+        )
+        return cls(X_FB, X_SF @ X_FB, M_F, X_SF @ M_F.get_com())
+
+
+@dataclasses.dataclass(frozen=True)
+class ToolModels:
+    """Handles of sensor and gripper in a plant.
+
+    Attributes:
+        sensor_joint: the weld between flange and sensor whose reaction is read.
+        frame_S, frame_T: sensing frame and tool centre point.
+        sensor, gripper: model instances.
+    """
+
+    sensor_joint: WeldJoint
+    frame_S: Frame
+    frame_T: Frame
+    sensor: ModelInstanceIndex
+    gripper: ModelInstanceIndex
+
+    @property
+    def instances(self) -> tuple[ModelInstanceIndex, ModelInstanceIndex]:
+        """Both model instances."""
+        return self.sensor, self.gripper
+
+
+def add_tool(plant: MultibodyPlant, frame_F: Frame, scenario: Scenario) -> ToolModels:
+    """Adds the sensor to the flange and the gripper to the sensor.
+
+    The sensor's link, its origin on the robot-side face, sits on F. The weld's child
+    frame is S, so the joint's reaction is what is sensed there.
+
+    Raises:
+        DisasmError: a model file is missing or is of another device.
+    """
+    url = scenario.ft_sensor.model
+    sensor = add_model(plant, url)
+    frame_S = model_frame(plant, sensor, "sensor", url)
+    joint = plant.WeldFrames(frame_F, frame_S, frame_S.GetFixedPoseInBodyFrame())
+    tool_side = model_frame(plant, sensor, "tool_side", url)
+    url = scenario.gripper.model
+    gripper = add_model(plant, url)
+    plant.WeldFrames(tool_side, model_frame(plant, gripper, "gripper_base", url))
+    frame_T = model_frame(plant, gripper, "tcp", url)
+    return ToolModels(joint, frame_S, frame_T, sensor, gripper)
+
+
+def grasp_pose(scenario: Scenario) -> RigidTransform:
+    """Returns X_TB: y_B points back at the robot, the fingertips end above the plate.
+
+    x_B = -x_T, since the flange's x axis points back at the base when the tool
+    points down with joint 7 at zero.
+    """
+    R_TB = RotationMatrix(np.array([[-1.0, 0, 0], [0, 0, -1.0], [0, -1.0, 0]]))
+    tip = lip_height(scenario.lock) + scenario.gripper.fingertip_gap
+    return RigidTransform(R_TB, [0.0, 0.0, tip + PAD_LENGTH / 2])

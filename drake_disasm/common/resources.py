@@ -1,0 +1,49 @@
+"""Where the models are, in a checkout and in an installed wheel."""
+
+import importlib.util
+from functools import cache
+from pathlib import Path
+
+from pydrake.multibody.parsing import PackageMap
+
+from drake_disasm.common.errors import DisasmError
+
+MODELS_PACKAGE = "disasm_models"
+
+
+@cache
+def models_dir() -> Path:
+    """Returns the folder that `package://disasm_models/` stands for."""
+    checkout = Path(__file__).resolve().parents[2] / "models"
+    if (checkout / "package.xml").is_file():
+        return checkout
+    spec = importlib.util.find_spec(MODELS_PACKAGE)
+    for folder in (spec.submodule_search_locations or []) if spec else []:
+        if (Path(folder) / "package.xml").is_file():
+            return Path(folder)
+    raise DisasmError(
+        f"package {MODELS_PACKAGE} is not installed; run `pip install .` again"
+    )
+
+
+def package_map() -> PackageMap:
+    """Returns a map that knows our models alone, so nothing is downloaded."""
+    packages = PackageMap.MakeEmpty()
+    packages.Add(MODELS_PACKAGE, str(models_dir()))
+    return packages
+
+
+def model_path(url: str) -> Path:
+    """Returns the file of a `package://disasm_models/...` URL or a plain path.
+
+    Raises:
+        DisasmError: there is no such file.
+    """
+    prefix = f"package://{MODELS_PACKAGE}/"
+    path = models_dir() / url.removeprefix(prefix) if url.startswith(prefix) else url
+    if not Path(path).is_file():
+        raise DisasmError(
+            f"model file {url} is missing (looked at {path}); "
+            "check the `model` key in the scenario"
+        )
+    return Path(path)

@@ -1,0 +1,1 @@
+"""Played devices: an OnRobot Compute Box, a Robotiq gripper, an arm behind LCM."""

@@ -1,0 +1,209 @@
+"""Our simulated cell behind the devices' own protocols: a simulated stand-in.
+
+It runs in step with whoever calls `advance`, in virtual time, so that a test has the
+same trajectory each time; `tools/fake_cell.py` advances it in real time.
+"""
+
+import dataclasses
+import time
+from collections.abc import Callable
+from typing import Self
+
+import numpy as np
+from drake import lcmt_iiwa_command, lcmt_iiwa_status
+from pydrake.common import RandomGenerator
+from pydrake.lcm import DrakeLcm
+from pydrake.systems.framework import Context
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.timing import COMMAND_DELAY, boundary
+from drake_disasm.devices.reading import Reading
+from drake_disasm.devices.robotiq.registers import Stroke
+from drake_disasm.fakes.hex_box import FakeHexBox
+from drake_disasm.fakes.robotiq_gripper import FakeRobotiqGripper
+from drake_disasm.scenario import Scenario
+from drake_disasm.stations.cell import CellStation
+from drake_disasm.stations.hardware_config import HardwareConfig
+
+#: Of the arm's status messages.
+IIWA_FAULTS = ("", "loss", "frozen", "reorder", "nan", "jump", "short", "header")
+JUMP = 0.3  # rad, of the fault "jump"
+_DEAF = 0.25  # s after the first status, as in kuka_driver.cc
+_ARRIVES = 0.2  # s, on a busy machine
+
+
+class FakeCell:
+    """Arm, sensor and gripper of a simulated cell, as devices on the loopback.
+
+    The driver's rules hold: torques that are measured or commanded have KUKA's sign,
+    and a command within 0.25 s of the first status stops it.
+
+    Attributes:
+        time: virtual [s]; the clock of what listens.
+        hex, gripper: the devices behind sockets, with their faults.
+        fault: of the arm's status, one of IIWA_FAULTS.
+        commands: how many the arm got.
+        commanded: (7,) the last of them [rad]; the start before the first.
+
+    Args:
+        scenario: of the simulated cell, with the effects that it hides.
+        lcm: over which the arm talks.
+        seed: of the sensor's noise, which begins at switching on and not with an
+            episode: the same seed gives other readings than a simulated station's.
+    """
+
+    def __init__(self, scenario: Scenario, lcm: DrakeLcm, seed: int = 0) -> None:
+        self.station = CellStation(scenario)
+        self.simulator = self.station.at_start(scenario.effects)
+        self._context = self.simulator.get_mutable_context()
+        number = int(np.random.SeedSequence(seed).generate_state(2)[0])
+        noise = self.station.sensor_noise
+        noise.SetRandomContext(
+            self.station.part_context(noise, self._context), RandomGenerator(number)
+        )
+        self.simulator.Initialize()
+        self._steps = round(self.station.settling_time / self.station.control_period)
+        self.simulator.AdvanceTo(boundary(self._steps, self.station.control_period))
+        self._lcm, self._channels = lcm, HardwareConfig().iiwa
+        lcm.Subscribe(self._channels.command_channel, self._obey)
+        self.time, self._first_status = 0.0, np.nan
+        self.hex = FakeHexBox(clock=lambda: self.time)
+        self.gripper = FakeRobotiqGripper()
+        opening = float(self._evaluate("gripper.state_measured")[0])
+        self.gripper.position = self.gripper.object_at = Stroke().request(opening)
+        self.fault, self.commands = "", 0
+        self.commanded = self.station.start
+        self._late: bytes | None = None
+        self._utime = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """Switches all of it off."""
+        self.hex.stop()
+        self.gripper.stop()
+
+    def clock(self) -> float:
+        """Returns the virtual time [s]."""
+        return self.time
+
+    def config(self) -> HardwareConfig:
+        """Returns where it is to be found."""
+        config = HardwareConfig()
+        config.ft_sensor = dataclasses.replace(
+            config.ft_sensor, address="127.0.0.1", port=self.hex.port
+        )
+        config.gripper = dataclasses.replace(
+            config.gripper, address="127.0.0.1", port=self.gripper.port
+        )
+        return config
+
+    def advance(self, heard: Callable[[], bool] = lambda: True) -> None:
+        """Moves the cell by a control period, by the newest command; then tells.
+
+        The arm takes the command up at the end of the period, as one over a network:
+        it follows a control period later than one in the same diagram.
+
+        Args:
+            heard: whether the sensor's sample has arrived; waited for, so that the
+                sockets' own time plays no part.
+        """
+        self._lcm.HandleSubscriptions(0)
+        position = self.station.GetInputPort("iiwa.position")
+        position.FixValue(self._context, self.commanded)
+        self._steps += 1
+        self.simulator.AdvanceTo(boundary(self._steps, self.station.control_period))
+        self.tell(heard)
+
+    def tell(self, heard: Callable[[], bool] = lambda: True) -> None:
+        """Lets a control period pass, and sends what is measured at its end."""
+        self.time += self.station.control_period
+        self._send_status()
+        if self.hex.started:
+            self.hex.send(self._evaluate("ft_sensor.wrench").tolist())
+            comes = self.hex.fault not in ("loss", "delay", "reorder")
+            deadline = time.monotonic() + (_ARRIVES if comes else 0.0)
+            while not heard() and time.monotonic() < deadline:
+                time.sleep(1e-5)
+
+    def position_measured(self) -> np.ndarray:
+        """Returns where the arm truly is (7,) [rad]."""
+        return self._evaluate("iiwa.position_measured")
+
+    def _evaluate(self, port: str) -> np.ndarray:
+        return self.station.GetOutputPort(port).Eval(self._context)
+
+    def _obey(self, data: bytes) -> None:
+        message = lcmt_iiwa_command.decode(data)
+        since = self.time - self._first_status
+        if not since > _DEAF:  # NaN before the first status
+            raise DisasmError("the iiwa driver stops: a command came before it listens")
+        if not np.isfinite(message.joint_position).all():
+            raise DisasmError("the iiwa driver stops: a command is not finite")
+        self.commands += 1
+        self.commanded = np.array(message.joint_position)
+
+    def _send_status(self) -> None:
+        if np.isnan(self._first_status):
+            self._first_status = self.time
+        data = self._status().encode()
+        if self.fault == "short":
+            data = data[:20]
+        elif self.fault == "header":
+            data = bytes(8) + data[8:]
+        elif self.fault == "reorder":
+            data, self._late = self._late or data, data
+        if self.fault != "loss":
+            self._lcm.Publish(self._channels.status_channel, data)
+
+    def _status(self) -> lcmt_iiwa_status:
+        message = lcmt_iiwa_status()
+        if self.fault != "frozen":
+            self._utime = round(1e6 * self.time)
+        message.utime, message.num_joints = self._utime, 7
+        q = self.position_measured().copy()
+        if self.fault in ("nan", "jump"):
+            q[3] = np.nan if self.fault == "nan" else q[3] + JUMP
+        message.joint_position_measured = q.tolist()
+        message.joint_position_commanded = self.commanded.tolist()
+        message.joint_position_ipo = self.commanded.tolist()
+        for name, port, sign in (
+            ("joint_velocity_estimated", "velocity_estimated", 1.0),
+            ("joint_torque_measured", "torque_measured", -1.0),
+            ("joint_torque_commanded", "torque_commanded", -1.0),
+            ("joint_torque_external", "torque_external", 1.0),
+        ):
+            setattr(message, name, (sign * self._evaluate(f"iiwa.{port}")).tolist())
+        return message
+
+
+def in_step(cell: FakeCell, read: Callable[[], Reading]) -> Callable[[Context], None]:
+    """Returns what advances a cell whenever a diagram has stepped by a period.
+
+    It is the monitor of the diagram's simulator: the cell is then one period ahead,
+    and what it sends is there when the diagram takes its next step.
+
+    Args:
+        cell: that is advanced.
+        read: the sensor's client's, to see that a sample has arrived.
+    """
+    period, steps = cell.station.control_period, 0
+
+    def monitor(root: Context) -> None:
+        """Advances the played devices up to the simulator's time."""
+        nonlocal steps
+        while steps * period + COMMAND_DELAY / 2 < root.get_time():
+            cell.advance(arrival(read))
+            steps += 1
+
+    return monitor
+
+
+def arrival(read: Callable[[], Reading]) -> Callable[[], bool]:
+    """Returns whether anything has come since now, good or bad."""
+    before = read()
+    return lambda: read() is not before

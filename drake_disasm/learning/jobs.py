@@ -1,0 +1,153 @@
+"""Trains the seeds of an experiment, each in whatever process it runs."""
+
+import dataclasses
+from collections.abc import Callable, Collection, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from drake_disasm.common import program
+from drake_disasm.common.executors import run_jobs
+from drake_disasm.learning.checkpoint import load_memory
+from drake_disasm.learning.dataset import remember
+from drake_disasm.learning.experiment import Experiment
+from drake_disasm.learning.replay import Replay
+from drake_disasm.learning.run import News, learn_offline, run_training
+from drake_disasm.learning.training import Training, action_map
+from drake_disasm.learning.warm_start import start_checkpoint, start_hash
+from drake_disasm.logs import LogWriter, flat_columns, read_logs
+from drake_disasm.logs.transitions import observations
+from drake_disasm.mdp import Outcome
+from drake_disasm.task.episode import EpisodeRecorder
+from drake_disasm.task.recording import transitions_header
+
+
+@dataclasses.dataclass(frozen=True)
+class SeedJob:
+    """What a worker is asked for.
+
+    Attributes:
+        experiment: what all seeds have in common.
+        seed: this one's.
+        folder: this one's.
+    """
+
+    experiment: Experiment
+    seed: int
+    folder: Path
+
+
+def seed_jobs(
+    experiment: Experiment, seeds: Iterable[int], folder: Path
+) -> list[SeedJob]:
+    """Returns one job for each seed, in a folder of its own within the folder."""
+    return [SeedJob(experiment, s, folder / f"seed_{s:03d}") for s in seeds]
+
+
+def train_seeds(jobs: Sequence[SeedJob], workers: int, title: str = "") -> None:
+    """Trains all of them, with a progress bar of this title."""
+    total = sum(job.experiment.config.episodes for job in jobs)
+    unit = "round" if jobs[0].experiment.logs else "episode"
+    with tqdm(total=total, unit=unit, desc=title or None) as bar:
+        for _ in run_jobs(train_seed, jobs, workers, _Progress(bar)):
+            pass
+
+
+class _Progress:
+    """A bar over all seeds' episodes, with the latest rewards and successes."""
+
+    def __init__(self, bar: tqdm) -> None:
+        self._bar = bar
+        self._done: dict[int, int] = {}
+        self._rewards: list[float] = []
+        self._successes: list[bool] = []
+
+    def __call__(self, news: News) -> None:
+        program.stop_if_interrupted()
+        self._done[news.seed] = news.number
+        if news.summary is not None:
+            self._rewards.append(news.summary.reward)
+            self._successes.append(news.summary.outcome is Outcome.SUCCESS)
+            recent = self._successes[-20:]
+            self._bar.set_postfix(
+                reward=f"{sum(self._rewards[-20:]) / len(recent):.1f}",
+                success=f"{sum(recent)}/{len(recent)}",
+                refresh=False,
+            )
+        self._bar.update(sum(self._done.values()) - self._bar.n)
+
+
+class _Log:
+    """Writes each episode to the seed's log, once."""
+
+    def __init__(self, job: SeedJob) -> None:
+        experiment = job.experiment
+        header = transitions_header(
+            experiment.scenario,
+            experiment.model,
+            experiment.provenance | {"seed": job.seed},
+        )
+        self._writer = LogWriter(job.folder / "log", header, resume=True)
+
+    def write(self, number: int, recorder: EpisodeRecorder) -> None:
+        """Writes the episode, unless a killed run had come as far as this."""
+        if number >= self._writer.next_number:
+            self._writer.write_episode(flat_columns("transitions", recorder.columns()))
+
+
+def train_seed(job: SeedJob, report: Callable[[News | None], None]) -> dict[str, Any]:
+    """Trains one seed to its end and returns its result."""
+    experiment = job.experiment
+    finished = job.folder / "result.json"
+    if finished.exists():
+        report(News(job.seed, experiment.config.episodes, None))
+        return {}
+    provenance = experiment.provenance | {
+        "seed": job.seed,
+        "preset": experiment.preset,
+        "data": experiment.logs | experiment.demonstrations,
+    }
+    demonstrations = _demonstrations(job)
+    dataset = _memory(experiment, experiment.logs)
+    training = Training(experiment.spec(job.seed), demonstrations, dataset)
+    if experiment.start:
+        training.start_from(start_checkpoint(experiment.start, job.seed))
+        provenance["start"] = {
+            experiment.start: start_hash(experiment.start, job.seed),
+        }
+    end = (provenance, experiment.validation, report)
+    if dataset:
+        updates = experiment.updates or dataset.size
+        return learn_offline(training, job.folder, updates, *end)
+    return run_training(training, job.folder, _Log(job), *end)
+
+
+def _demonstrations(job: SeedJob) -> Replay | None:
+    """Returns what to mix into each batch: logs, or else what the start remembers."""
+    experiment = job.experiment
+    shown = _memory(experiment, experiment.demonstrations)
+    if shown or not (experiment.start and experiment.config.demonstrations):
+        return shown
+    return load_memory(start_checkpoint(experiment.start, job.seed))
+
+
+def _memory(experiment: Experiment, folders: Collection[str]) -> Replay | None:
+    """Returns a memory that holds all transitions of some logs, if there are any."""
+    task, config = experiment.scenario.task, experiment.config
+    if not folders:
+        return None
+    episodes = [e for log in read_logs(folders) for e in log.episodes]
+    replay = Replay(sum(episode.rows - 1 for episode in episodes))
+    actions = action_map(experiment.scenario, config)
+    for episode in episodes:
+        remember(
+            replay,
+            observations(episode),
+            episode["action"][:-1],
+            bool(episode["terminated"][-1]),
+            task,
+            actions,
+            config,
+        )
+    return replay

@@ -1,0 +1,70 @@
+"""Going on elsewhere with what was learned: from twin to cell, from ψ to ψ.
+
+A training that starts from another takes over its agent (networks, targets, Adam's
+moments), seed by seed. Its own memory is empty, its exploration begins anew. What was
+remembered there can be rehearsed: with the hyper-parameter `demonstrations` that share
+of each batch comes from it (half and half: Ball et al., 2023, RLPD). Both must mean
+the same by what the networks read and give.
+"""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.learning.experiment import Experiment, read_json
+
+_NETWORKS = ("algorithm", "hidden", "layer_norm", "critics")
+_SCALES = ("position_scale", "rotation_scale", "force_scale", "torque_scale")
+_ACTIONS = ("base", "residual")
+_TASK = ("period", "max_translation", "max_rotation")
+
+
+def start_checkpoint(folder: Path | str, seed: int) -> Path:
+    """Returns where a training keeps what one seed has learned."""
+    return Path(folder) / f"seed_{seed:03d}" / "checkpoint.npz"
+
+
+def start_hash(folder: Path | str, seed: int) -> str:
+    """Returns the SHA-256 of that file."""
+    return hashlib.sha256(start_checkpoint(folder, seed).read_bytes()).hexdigest()
+
+
+def check_start(experiment: Experiment, seeds: Sequence[int]) -> None:
+    """Refuses an experiment that can't go on from its start.
+
+    Raises:
+        DisasmError: the start lacks a seed or has not finished it, or its agent reads
+            or gives something else; names the first difference.
+    """
+    for seed in seeds:
+        if (
+            not start_checkpoint(experiment.start, seed)
+            .with_name("result.json")
+            .exists()
+        ):
+            raise DisasmError(
+                f"{experiment.start}: has not finished seed {seed}; train it there "
+                "first (tools/train.py), or name another folder"
+            )
+    before = read_json(Path(experiment.start) / "training.json")
+    for name, then, now in _compared(before, experiment.to_mapping()):
+        if then != now:
+            raise DisasmError(
+                f"{experiment.start}: was trained with {name} {then}, not {now}; go on "
+                "with the same"
+            )
+
+
+def _compared(
+    before: dict[str, Any], after: dict[str, Any]
+) -> Iterator[tuple[str, Any, Any]]:
+    """Yields what an agent's networks depend on: name, then, now."""
+    for name in (*_NETWORKS, *_ACTIONS, *_SCALES):
+        yield name, before["config"][name], after["config"][name]
+    old, new = before["scenario"], after["scenario"]
+    for name in _TASK:
+        yield f"task.{name}", old["task"][name], new["task"][name]
+    name = "observation.variant"
+    yield name, old["observation"]["variant"], new["observation"]["variant"]

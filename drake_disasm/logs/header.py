@@ -1,0 +1,259 @@
+"""`log.yaml`: what a log says about itself."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from drake_disasm.common.files import write_atomically
+from drake_disasm.logs.files import read_bytes
+from drake_disasm.logs.refusal import did_you_mean, quoted, refusal
+from drake_disasm.logs.schema import KINDS, SCHEMA, SI_UNITS, UNIT_SPELLINGS, Kind, Rule
+
+HEADER_NAME = "log.yaml"
+_REQUIRED = ("schema", "kind", "units", "frames", "task", "provenance")
+_KEYS = (*_REQUIRED, "period", "joints", "urdf", "scenario")
+
+
+@dataclass(frozen=True)
+class LogHeader:
+    """The content of `log.yaml`; schema and units are constants of the format.
+
+    Attributes:
+        kind: "transitions", "static_wrench" or "joint_motion".
+        task: name of the task, for people and for choosing logs.
+        provenance: free: program, version, command, date, seed, commit, ...
+        frames: the frame in which each quantity is expressed. What the kind leaves
+            no choice about is filled in.
+        period: nominal time between rows [s]; None for static readings, and for
+            joint motion that was not sampled evenly.
+        joints: names of the joints, in the order of the columns `q.0`, `q.1`, ...
+        urdf: the URDF that describes the arm, as `package://` or a path.
+        scenario: the scenario, as plain data, so that a log describes itself.
+    """
+
+    kind: str
+    task: str
+    provenance: Mapping[str, Any]
+    frames: Mapping[str, str] = field(default_factory=dict)
+    period: float | None = None
+    joints: tuple[str, ...] = ()
+    urdf: str | None = None
+    scenario: Mapping[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        """Fills in the frames that the kind leaves no choice about."""
+        frames = {**_only_frames(self.kind), **self.frames}
+        object.__setattr__(self, "frames", frames)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """The content of `log.yaml` as plain data, in its usual order of keys."""
+        values = {
+            "schema": SCHEMA,
+            "kind": self.kind,
+            "task": self.task,
+            "units": dict(SI_UNITS),
+            "frames": dict(self.frames),
+            "period": _plain(self.period),
+            "joints": list(self.joints) or None,
+            "urdf": self.urdf,
+            "scenario": _plain(self.scenario),
+            "provenance": _plain(self.provenance),
+        }
+        optional = ("joints", "urdf", "scenario")
+        return {k: v for k, v in values.items() if k not in optional or v is not None}
+
+
+def parse_header(raw: object, where: str) -> LogHeader:
+    """The header that plain data describes.
+
+    Args:
+        raw: the content of a `log.yaml`.
+        where: the file, for messages.
+
+    Raises:
+        DisasmError: wrong schema, a missing, unknown or wrong key, a unit that is
+            not SI, or a frame that the kind does not have.
+    """
+    values = _checked_mapping(raw, where)
+    kind = _checked_kind(values, where)
+    _check_units(values["units"], where)
+    return LogHeader(
+        kind=kind.name,
+        task=_text(values, "task", where),
+        provenance=_mapping(values, "provenance", where),
+        frames=_checked_frames(kind, _mapping(values, "frames", where), where),
+        period=_checked_period(values, where),
+        joints=_checked_joints(values, where),
+        urdf=_text(values, "urdf", where) if values.get("urdf") else None,
+        scenario=_mapping(values, "scenario", where)
+        if values.get("scenario") is not None
+        else None,
+    )
+
+
+def read_header(folder: Path) -> LogHeader:
+    """The header of the log in a folder; see `parse_header` for what is refused."""
+    path = folder / HEADER_NAME
+    data = read_bytes(path, f"write the log's {HEADER_NAME}, see docs/log-format.md")
+    try:
+        raw = yaml.safe_load(data)
+    except yaml.YAMLError as error:
+        raise refusal(path, f"not YAML ({error})", "mend that line") from error
+    return parse_header(raw, str(path))
+
+
+def write_header(folder: Path, header: LogHeader) -> None:
+    """Writes `log.yaml`, whole or not at all."""
+    data = _to_yaml(header, folder / HEADER_NAME)
+    write_atomically(folder / HEADER_NAME, lambda stream: stream.write(data))
+
+
+def as_read(header: LogHeader, folder: Path) -> LogHeader:
+    """The header as it comes back after being written to the folder.
+
+    Raises:
+        DisasmError: as `parse_header`, or what is not plain data.
+    """
+    path = folder / HEADER_NAME
+    return parse_header(yaml.safe_load(_to_yaml(header, path)), str(path))
+
+
+def _to_yaml(header: LogHeader, path: Path) -> bytes:
+    try:
+        text = yaml.safe_dump(header.to_mapping(), sort_keys=False, allow_unicode=True)
+    except yaml.YAMLError as error:
+        raise refusal(
+            path,
+            f"not plain data ({error})",
+            "give strings, numbers, booleans, lists and mappings alone",
+        ) from error
+    return text.encode()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return dict(value)
+    return float(value) if isinstance(value, float) else value
+
+
+def _only_frames(kind: str) -> dict[str, str]:
+    quantities = KINDS[kind].quantities if kind in KINDS else ()
+    return {
+        q.name: q.frames[0]
+        for q in quantities
+        if q.frame_is_stated and len(q.frames) == 1
+    }
+
+
+def _checked_mapping(raw: object, where: str) -> Mapping[str, Any]:
+    if not isinstance(raw, Mapping):
+        raise refusal(where, "not a mapping", "write 'key: value' lines")
+    if raw.get("schema") != SCHEMA:
+        raise refusal(
+            where,
+            f"wrong schema: key 'schema' is {raw.get('schema')!r}",
+            f"convert the log to '{SCHEMA}', the one that is read here",
+        )
+    missing = [key for key in _REQUIRED if key not in raw]
+    if missing:
+        raise refusal(where, f"missing key {quoted(missing)}", "add it")
+    unknown = [str(key) for key in raw if key not in _KEYS]
+    if unknown:
+        raise refusal(
+            where,
+            f"unknown key {quoted(unknown)}",
+            f"{did_you_mean(unknown[0], _KEYS)}rename it or move it to 'provenance'",
+        )
+    return raw
+
+
+def _checked_kind(values: Mapping[str, Any], where: str) -> Kind:
+    name = values["kind"]
+    if name not in KINDS:
+        raise refusal(where, f"key 'kind' is {name!r}", f"use one of {quoted(KINDS)}")
+    for key, rule in KINDS[name].keys.items():
+        absent = values.get(key) in (None, [])
+        if rule is Rule.REQUIRED and absent:
+            raise refusal(where, f"missing key '{key}'", f"a {name} log must say it")
+        if rule is Rule.FORBIDDEN and not absent:
+            raise refusal(where, f"key '{key}' in a {name} log", "remove it")
+    return KINDS[name]
+
+
+def _check_units(units: object, where: str) -> None:
+    table = units if isinstance(units, Mapping) else {}
+    for quantity, unit in SI_UNITS.items():
+        given = table.get(quantity)
+        if UNIT_SPELLINGS.get(str(given), given) != unit:
+            raise refusal(
+                where,
+                f"key 'units.{quantity}' is {given!r}",
+                f"convert the columns to SI and write '{quantity}: {unit}'",
+            )
+    unknown = [str(key) for key in table if key not in SI_UNITS]
+    if unknown:
+        raise refusal(
+            where, f"unknown key 'units.{unknown[0]}'", f"state {quoted(SI_UNITS)} only"
+        )
+
+
+def _checked_frames(
+    kind: Kind, frames: Mapping[str, Any], where: str
+) -> Mapping[str, str]:
+    stated = [q.name for q in kind.quantities if q.frame_is_stated]
+    for name in [*stated, *frames]:
+        quantity = kind.quantity(name)
+        allowed = quantity.frames if quantity else ()
+        if not allowed:
+            raise refusal(
+                where, f"unknown key 'frames.{name}'", f"state {quoted(stated)} only"
+            )
+        if frames.get(name) not in allowed:
+            raise refusal(
+                where,
+                f"key 'frames.{name}' is {frames.get(name)!r}",
+                f"express it in {' or '.join(allowed)} and say so",
+            )
+    return frames
+
+
+def _checked_period(values: Mapping[str, Any], where: str) -> float | None:
+    period = values.get("period")
+    if period is None:
+        return None
+    number = isinstance(period, int | float) and not isinstance(period, bool)
+    if not number or not math.isfinite(period) or period <= 0:
+        raise refusal(
+            where,
+            f"key 'period' is {period!r}",
+            "give seconds as a positive number, such as 0.005 or 5.0e-3",
+        )
+    return float(period)
+
+
+def _checked_joints(values: Mapping[str, Any], where: str) -> tuple[str, ...]:
+    joints = values.get("joints") or []
+    names = isinstance(joints, list) and all(isinstance(j, str) for j in joints)
+    if not names or len(set(joints)) != len(joints):
+        raise refusal(
+            where, f"key 'joints' is {joints!r}", "give a list of different names"
+        )
+    return tuple(joints)
+
+
+def _text(values: Mapping[str, Any], key: str, where: str) -> str:
+    value = values[key]
+    if not isinstance(value, str) or not value.strip():
+        raise refusal(where, f"key '{key}' is {value!r}", "give a text")
+    return value
+
+
+def _mapping(values: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
+    value = values[key]
+    if not isinstance(value, Mapping):
+        raise refusal(where, f"key '{key}' is {value!r}", "give a mapping, or {}")
+    return value

@@ -1,0 +1,24 @@
+"""The one form of every refusal: file, what is wrong, remedy."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from pathlib import Path
+
+from drake_disasm.common.errors import DisasmError
+
+
+def refusal(where: str | Path, what: str, remedy: str) -> DisasmError:
+    """The error `<where>: <what>; <remedy>`, on one line, ready to be raised."""
+    return DisasmError(" ".join(f"{where}: {what}; {remedy}".split()))
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """`did you mean 'x'? ` for the nearest known word, or nothing."""
+    names = {name.lower(): name for name in known}
+    near = get_close_matches(word.lower(), list(names), n=1)
+    return f"did you mean '{names[near[0]]}'? " if near else ""
+
+
+def quoted(names: Iterable[str]) -> str:
+    """The names in quotes, separated by commas."""
+    return ", ".join(f"'{name}'" for name in names)

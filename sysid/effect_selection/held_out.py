@@ -1,0 +1,157 @@
+"""Errors before and after, on rows that were not fitted."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.effect_selection.candidates import extended
+from sysid.effect_selection.fit import Fit
+from sysid.effect_selection.search import Tracer
+from sysid.identification.uncertainty import block_length, block_numbers
+from sysid.models.base import Channel, ScenarioModel
+
+Array = NDArray[np.float64]
+
+_FOLDS = 10
+_DRAWS = 2000
+_RCOND = 1e-6  # of directions that the log does not fix
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Measured and predicted rows that no fit had seen.
+
+    Attributes:
+        measured, before, after: (rows, channels), SI.
+        episode: (rows,) number of each row's episode.
+        channels: what the columns are.
+        how: how the rows were kept apart.
+    """
+
+    measured: Array
+    before: Array
+    after: Array
+    episode: NDArray[np.int64]
+    channels: tuple[Channel, ...]
+    how: str
+
+    def rms(self, predicted: Array) -> Array:
+        """Returns the rms error (channels,) of a prediction, SI."""
+        return np.asarray(np.sqrt(np.mean((predicted - self.measured) ** 2, axis=0)))
+
+    def rms_by_unit(self, predicted: Array) -> dict[str, float]:
+        """Returns the rms error over all channels of each unit, SI."""
+        squares = self.rms(predicted) ** 2
+        return {
+            unit: float(
+                np.sqrt(squares[[c.unit == unit for c in self.channels]].mean())
+            )
+            for unit in dict.fromkeys(c.unit for c in self.channels)
+        }
+
+    def relative(self, predicted: Array) -> float:
+        """Returns the norm of the error over the norm of what was measured."""
+        error = np.linalg.norm(predicted - self.measured)
+        return float(error / np.linalg.norm(self.measured))
+
+    def in_noise(self, predicted: Array) -> float:
+        """Returns the rms error in units of the channels' noise."""
+        noise = np.array([channel.noise for channel in self.channels])
+        return float(np.sqrt(np.mean(((predicted - self.measured) / noise) ** 2)))
+
+    def interval(self, predicted: Array, seed: int = 0) -> Array:
+        """Returns 95 % intervals (channels, 2) of the rms error, by blocks."""
+        error = predicted - self.measured
+        blocks = block_numbers(self.episode, block_length(error, self.episode))
+        count = int(blocks.max()) + 1
+        squares = np.zeros((count, error.shape[1]))
+        np.add.at(squares, blocks, error**2)
+        rows = np.bincount(blocks, minlength=count)
+        draws = np.random.default_rng(seed).integers(0, count, (_DRAWS, count))
+        drawn = squares[draws].sum(axis=1) / rows[draws].sum(axis=1)[:, None]
+        return np.sqrt(np.quantile(drawn, [0.025, 0.975], axis=0)).T
+
+
+def held_out(
+    tracer: Tracer, first: Fit, last: Fit, test: ScenarioModel | None
+) -> HeldOut:
+    """Returns the errors of the base model and of the one with effects.
+
+    Args:
+        tracer: that found them.
+        first, last: the fits without and with the effects.
+        test: model of the rows that were kept; None if there are none: then
+            contiguous blocks are predicted by fits to all others.
+    """
+    if test is not None:
+        before, after = (_predicted(test, fit) for fit in (first, last))
+        measured = test.measurements
+        how = f"{len(measured.names)} episodes that were not fitted"
+        return HeldOut(
+            measured.values, before, after, measured.episode, measured.channels, how
+        )
+    measured = tracer.base.measurements
+    folds = contiguous_folds(measured.episode)
+    before, after = (_cross_predicted(tracer, fit, folds) for fit in (first, last))
+    how = f"{folds.max() + 1} contiguous blocks, each predicted by a fit to the others"
+    if not tracer.base.affine:
+        how += " (linearised)"
+    return HeldOut(
+        measured.values, before, after, measured.episode, measured.channels, how
+    )
+
+
+def contiguous_folds(episode: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Returns the number of the fold (rows,) of each row."""
+    length = max(1, -(-len(episode) // _FOLDS))
+    return block_numbers(episode, length)
+
+
+def _predicted(test: ScenarioModel, fit: Fit) -> Array:
+    model, _ = extended(test, fit.effects, with_shapes=True)
+    return model.predictions(fit.theta)
+
+
+def _cross_predicted(tracer: Tracer, fit: Fit, folds: NDArray[np.int64]) -> Array:
+    """Returns predictions (rows, channels) of each fold by a fit to the others.
+
+    Where an evaluation is a simulation, the fit to the others is one Gauss-Newton
+    step away from the fit to all, and its prediction linear.
+    """
+    if not tracer.base.affine:
+        return _linearly_predicted(fit, folds)
+    found = np.zeros(tracer.base.measurements.values.shape)
+    for fold in range(int(folds.max()) + 1):
+        others = dataclasses.replace(tracer, base=tracer.base.of_rows(folds != fold))
+        kept = others.fit(fit.effects, fit)
+        found[folds == fold] = _predicted(tracer.base.of_rows(folds == fold), kept)
+    return found
+
+
+def _linearly_predicted(fit: Fit, folds: NDArray[np.int64]) -> Array:
+    here, measured = fit.here, fit.model.measurements
+    residual = here.residual.copy()
+    root = np.sqrt(here.weights)
+    J, r = root[..., None] * here.jacobian, root * here.residual
+    channels = r.shape[1]
+    for fold in range(int(folds.max()) + 1):
+        own = folds == fold
+        A = J[~own].reshape((~own).sum() * channels, len(here.u))
+        b = r[~own].reshape(-1)
+        step = -np.linalg.lstsq(A, b, rcond=_RCOND)[0]
+        step = np.clip(here.u + step, 0.0, 1.0) - here.u
+        residual[own] += here.jacobian[own] @ step
+    return np.asarray(measured.values + residual * measured.noise)
+
+
+def improvement(found: HeldOut) -> str:
+    """Returns the error before and after in words."""
+    before, after = (found.rms_by_unit(p) for p in (found.before, found.after))
+    parts = [f"{before[unit]:.3g} -> {after[unit]:.3g} {unit}" for unit in before]
+    relative = [found.relative(p) for p in (found.before, found.after)]
+    return (
+        ", ".join(parts)
+        + f"; {100 * relative[0]:.2g} -> {100 * relative[1]:.2g} % of the readings"
+    )

@@ -1,0 +1,67 @@
+"""What a residual looks like, channel by channel, before anybody explains it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sysid.effect_selection.fit import Fit
+from sysid.effect_selection.search import Survey
+from sysid.identification.whiteness import ljung_box
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """One channel's residual.
+
+    Attributes:
+        channel, unit: which.
+        rms: in units of the channel's noise.
+        whiteness: p-value of Ljung and Box: is it white?
+        between_episodes: share of its power that lies in the episodes' means; 0 if
+            there is one episode.
+        dependence: what it depends on most, in words, and the share that explains.
+        gain: of the channels' common loss, by that dependence.
+        is_significant: whether that is more than chance.
+    """
+
+    channel: str
+    unit: str
+    rms: float
+    whiteness: float
+    between_episodes: float
+    dependence: str
+    gain: float
+    is_significant: bool
+
+
+def diagnose(fit: Fit, survey: Survey) -> list[Diagnosis]:
+    """Returns the diagnosis of each channel at a fit."""
+    measured, residual = fit.model.measurements, fit.here.residual
+    found = []
+    for i, channel in enumerate(measured.channels):
+        own = [d for d in survey.dependences if d.name.startswith(f"{channel.name} ")]
+        best = own[0] if own else None
+        found.append(
+            Diagnosis(
+                channel.name,
+                channel.unit,
+                float(np.sqrt(np.mean(residual[:, i] ** 2))),
+                ljung_box(residual[:, i]),
+                _between(residual[:, i], measured.episode),
+                best.name.removeprefix(f"{channel.name} depends on ") if best else "",
+                best.gain if best else 0.0,
+                best.accepted if best else False,
+            )
+        )
+    return found
+
+
+def _between(residual: np.ndarray, episode: np.ndarray) -> float:
+    """Returns the share of power in the means of episodes."""
+    count = int(episode.max()) + 1
+    power = float(np.sum(residual**2))
+    if count < 2 or power == 0.0:
+        return 0.0
+    rows = np.bincount(episode)
+    means = np.bincount(episode, residual) / rows
+    return float(np.sum(rows * means**2) / power)

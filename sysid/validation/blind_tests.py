@@ -1,0 +1,252 @@
+"""How often an effect that nobody declared gets its name: the confusion matrix."""
+
+import json
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drake_disasm.common.files import write_atomically
+from drake_disasm.effects import (
+    EFFECTS,
+    BaseTilt,
+    Effect,
+    EnvironmentEffect,
+    MotionEffect,
+    PayloadError,
+    SensorEffect,
+)
+from drake_disasm.logs import read_log
+from drake_disasm.scenario import Scenario
+from sysid.effect_selection.close_loop import HELD_OUT, HUBER, close_loop
+from sysid.identification.split import split_episodes
+from sysid.models.twin import TwinModel
+from sysid.objective import rms, tempered
+from sysid.validation.random_effects import drawn
+from sysid.validation.synthetic_logs import transitions_log
+from sysid.workers import Workers
+
+_SMALL = (3, 25)  # episodes and steps of the log by which a size is found
+
+
+@dataclass(frozen=True)
+class Case:
+    """One blind test.
+
+    Attributes:
+        effects: names of the classes that are put in; none for a null log.
+        level: rms that each leaves, in units of the noise.
+        seed: of all that is drawn.
+        left_out: names of classes that the search does not know.
+        correlation: of the noise from step to step.
+    """
+
+    effects: tuple[str, ...]
+    level: float
+    seed: int
+    left_out: tuple[str, ...] = ()
+    correlation: float = 0.0
+
+    @property
+    def key(self) -> str:
+        """A text that tells cases apart."""
+        return json.dumps(asdict(self))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What closing the loop said of a case.
+
+    Attributes:
+        case: the same as asked.
+        drawn: what was put in, as text.
+        ending: "none", "explained" or "unexplained"; "refused" for a log that is
+            said to be too short.
+        names: found, the most important first.
+        ties: of each.
+        before, after: error on held-out episodes, in units of the noise.
+    """
+
+    case: Case
+    drawn: tuple[str, ...]
+    ending: str
+    names: tuple[str, ...]
+    ties: tuple[tuple[str, ...], ...]
+    before: float
+    after: float
+
+    @property
+    def named_first(self) -> bool:
+        """Whether the effect, or each of several, leads the list."""
+        count = len(self.case.effects)
+        return set(self.names[:count]) == set(self.case.effects)
+
+    @property
+    def in_tie(self) -> bool:
+        """Whether each effect is named or in a tie with what is."""
+        said = set(self.names) | {name for tie in self.ties for name in tie}
+        return set(self.case.effects) <= said
+
+
+def nominal() -> Scenario:
+    """Returns what the logs state: the thesis's task, with the contact that is fast."""
+    scenario = Scenario()
+    scenario.contact.model = "impact"
+    return scenario
+
+
+def traceable() -> tuple[type[Effect], ...]:
+    """Returns the effects that transitions of the twin can show."""
+    acts = (EnvironmentEffect, MotionEffect, SensorEffect)
+    silent = (PayloadError, BaseTilt)  # zeroing takes them off
+    return tuple(e for e in EFFECTS if issubclass(e, acts) and e not in silent)
+
+
+def answer(case: Case) -> Answer:
+    """Returns what closing the loop says of a case's log, which states nothing."""
+    kinds = {effect.__name__: effect for effect in EFFECTS}
+    random = np.random.default_rng([case.seed, len(case.effects)])
+    with tempfile.TemporaryDirectory() as folder:
+        effects = [
+            drawn(kinds[name], random, case.level, lambda e: residual(e, folder))
+            for name in case.effects
+        ]
+        log = Path(folder) / "log"
+        transitions_log(
+            log, nominal(), effects, case.seed, correlation=case.correlation
+        )
+        model = TwinModel([read_log(log)], nominal(), ())
+        train, test = split_episodes(model.measurements.names, HELD_OUT)
+        library = [e for e in EFFECTS if e.__name__ not in case.left_out]
+        closed = close_loop(
+            model, train, test, HUBER, Workers(), lambda _: None, library
+        )
+    found, errors = closed.verdict, closed.errors
+    return Answer(
+        case,
+        tuple(repr(effect) for effect in effects),
+        found.ending,
+        found.names,
+        tuple(tuple(tie.name for tie in ties) for ties in found.ties),
+        errors.in_noise(errors.before),
+        errors.in_noise(errors.after),
+    )
+
+
+def residual(effect: Effect, folder: str) -> float:
+    """Returns the rms residual of the nominal twin on a small log with an effect.
+
+    In units of the noise; the log has none. Beyond `HUBER` a residual counts as in the
+    objective: else the one row in which the bolt misses an edge would be all.
+    """
+    silent = nominal()
+    silent.ft_sensor.noise = [0.0] * 6
+    episodes, steps = _SMALL
+    log = Path(folder) / f"probe_{len(list(Path(folder).iterdir()))}"
+    transitions_log(log, silent, [effect], 0, episodes, steps)
+    model = TwinModel([read_log(log)], nominal(), ())
+    measured = model.measurements
+    error = model.predictions(np.zeros(0)) - measured.values
+    return rms(tempered(error / measured.noise, HUBER))
+
+
+def answers(
+    cases: Sequence[Case],
+    executor: Executor,
+    path: Path,
+    tell: Callable[[], object] = lambda: None,
+) -> list[Answer]:
+    """Returns the answers to cases, those that are in a file already from there.
+
+    Args:
+        cases: to ask.
+        executor: does the work.
+        path: of a JSON file that gets each answer when it is there.
+        tell: called after each.
+    """
+    known = {a.case.key: a for a in read_answers(path)}
+    open_cases = [case for case in cases if case.key not in known]
+    for _ in range(len(cases) - len(open_cases)):
+        tell()
+    futures = [executor.submit(answer, case) for case in open_cases]
+    try:
+        for future in as_completed(futures):
+            found = future.result()
+            known[found.case.key] = found
+            _write(path, list(known.values()))
+            tell()
+    finally:
+        for future in futures:
+            future.cancel()
+    return [known[case.key] for case in cases]
+
+
+def _write(path: Path, found: Sequence[Answer]) -> None:
+    data = json.dumps([asdict(each) for each in found], indent=1).encode()
+    write_atomically(path, lambda stream: stream.write(data))
+
+
+def read_answers(path: Path) -> list[Answer]:
+    """Returns the answers of a file; none if there is no such file."""
+    if not path.exists():
+        return []
+    return [_answer_of(entry) for entry in json.loads(path.read_text("utf-8"))]
+
+
+def _answer_of(entry: dict[str, Any]) -> Answer:
+    case = entry["case"]
+    return Answer(
+        **entry
+        | {
+            "case": Case(
+                **case | {key: tuple(case[key]) for key in ("effects", "left_out")}
+            ),
+            "drawn": tuple(entry["drawn"]),
+            "names": tuple(entry["names"]),
+            "ties": tuple(tuple(tie) for tie in entry["ties"]),
+        }
+    )
+
+
+def single_cases(levels: Sequence[float], seeds: Sequence[int]) -> list[Case]:
+    """Returns every effect at every level with every seed."""
+    return [
+        Case((effect.__name__,), level, seed)
+        for effect in traceable()
+        for level in levels
+        for seed in seeds
+    ]
+
+
+def pair_cases(level: float, seeds: Sequence[int]) -> list[Case]:
+    """Returns two effects at once, drawn from all pairs."""
+    return [
+        Case(pair, level, seed) for seed, pair in zip(seeds, _pairs(), strict=False)
+    ]
+
+
+def null_cases(correlations: Sequence[float], seeds: Sequence[int]) -> list[Case]:
+    """Returns logs without an effect."""
+    return [Case((), 0.0, s, correlation=rho) for rho in correlations for s in seeds]
+
+
+def left_out_cases(level: float, seeds: Sequence[int]) -> list[Case]:
+    """Returns effects that the search does not know."""
+    return [
+        Case((effect.__name__,), level, seed, left_out=(effect.__name__,))
+        for effect in traceable()
+        for seed in seeds
+    ]
+
+
+def _pairs() -> Iterator[tuple[str, str]]:
+    """Yields pairs of different effects in a random order that is always the same."""
+    names = [effect.__name__ for effect in traceable()]
+    random = np.random.default_rng(0)
+    while True:
+        first, second = random.choice(len(names), 2, replace=False)
+        yield names[first], names[second]

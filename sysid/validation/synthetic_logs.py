@@ -1,0 +1,197 @@
+"""Logs of transitions that carry effects nobody declared; simulated, and called that.
+
+Episodes run side by side: all that happens in a period is one batch of the replay that
+steps the twin with IMPACT (`ImpactReplay`), so that a log of hundreds of steps takes a
+second. `tests` hold it against the diagram.
+"""
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from drake_disasm.cell.tool import Tool
+from drake_disasm.effects import (
+    Effect,
+    EnvironmentEffect,
+    motion_chain,
+    sensor_chain,
+)
+from drake_disasm.logs import LogWriter, flat_columns
+from drake_disasm.scenario import Scenario
+from drake_disasm.systems.pose_target import through_motion
+from drake_disasm.task.impact_replay import ImpactReplay
+from drake_disasm.task.recording import transitions_header
+from drake_disasm.task.replay import Steps
+from sysid.models.base import Array
+from sysid.models.commands import twin_coordinates
+from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
+
+_FORWARD, _BACK = 2.2e-3, -1.2e-3  # m per step, on average
+_ACROSS, _TURN = 1.6e-4, 6e-3  # m, rad: how far commands stray
+_FORGETS = 0.6  # of where a command strayed to, per step
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """What episodes of n steps gave, E of them side by side.
+
+    Attributes:
+        commanded: (E, n + 1, 6) position and rotation vector of B in G.
+        states: (E, n + 1, 12) measured, the wrench at So in S.
+        readings: (E, n + 1, 6) of the sensor, raw, in S.
+    """
+
+    commanded: Array
+    states: Array
+    readings: Array
+
+
+def transitions_log(
+    folder: Path,
+    scenario: Scenario,
+    effects: Sequence[Effect],
+    seed: int,
+    episodes: int = 12,
+    steps: int = 25,
+    correlation: float = 0.0,
+) -> None:
+    """Writes a log that states a scenario and was made with effects beside it.
+
+    Args:
+        folder: of the log.
+        scenario: with IMPACT contact.
+        effects: that nobody declares.
+        seed: of commands and noise.
+        episodes, steps: how much.
+        correlation: of the noise from one step to the next.
+    """
+    random = np.random.default_rng(seed)
+    commanded = commands(random, episodes, steps)
+    noise = sensor_noise(scenario, random, episodes, steps, correlation)
+    found = rollout(scenario, effects, commanded, noise)
+    header = transitions_header(scenario, "twin", {"policy": "strokes"})
+    with LogWriter(folder, header) as writer:
+        rows = zip(found.commanded, found.states, found.readings, strict=True)
+        for path, states, readings in rows:
+            columns = _columns(scenario, path, states) | {"ft_sensor": readings}
+            writer.write_episode(flat_columns("transitions", columns))
+
+
+def commands(random: np.random.Generator, episodes: int, steps: int) -> Array:
+    """Returns commanded displacements (E, n + 1, 6): strokes forth and back.
+
+    Several speeds, both directions, pressing to all sides: what tells effects apart.
+    """
+    stroke = np.zeros((episodes, steps))
+    for e in range(episodes):
+        k = 0
+        while k < steps:
+            length = int(random.integers(3, 8))
+            mean = _FORWARD if random.random() < 0.75 else _BACK
+            stroke[e, k : k + length] = mean * random.uniform(0.2, 1.8)
+            k += length
+    path: Array = np.zeros((episodes, steps + 1, 6))
+    travel = np.cumsum(stroke, axis=1)
+    path[:, 1:, 0] = np.clip(travel, 0.0, 0.05)
+    spread = np.array([_ACROSS] * 2 + [_TURN] * 3) * np.sqrt(1.0 - _FORGETS**2)
+    for k in range(steps):
+        pushed = spread * random.standard_normal((episodes, 5))
+        path[:, k + 1, 1:] = _FORGETS * path[:, k, 1:] + pushed
+    return path
+
+
+def sensor_noise(
+    scenario: Scenario,
+    random: np.random.Generator,
+    episodes: int,
+    steps: int,
+    correlation: float = 0.0,
+) -> Array:
+    """Returns noise of the sensor's channels (E, n + 1, 6), correlated over steps."""
+    white = random.standard_normal((episodes, steps + 1, 6))
+    noise: Array = np.array(white)
+    for k in range(1, steps + 1):
+        fresh = np.sqrt(1.0 - correlation**2) * white[:, k]
+        noise[:, k] = correlation * noise[:, k - 1] + fresh
+    noise *= np.array(scenario.ft_sensor.noise)
+    return noise
+
+
+def rollout(
+    scenario: Scenario, effects: Sequence[Effect], commanded: Array, noise: Array
+) -> Rollout:
+    """Returns what a twin with effects measures while it is commanded.
+
+    Args:
+        scenario: with IMPACT contact.
+        effects: beside the scenario's.
+        commanded: (E, n + 1, 6), from rest at A.
+        noise: (E, n + 1, 6) of the sensor.
+    """
+    real = copy.deepcopy(scenario)
+    real.effects = [*real.effects, *effects]
+    motion, sensor = motion_chain(real.effects), sensor_chain(real.effects)
+    real.effects = [e for e in real.effects if isinstance(e, EnvironmentEffect)]
+    replay = ImpactReplay(real, coarse=True)  # as the model of the log has it
+    reading = SensorReading(scenario, Tool.from_models(scenario))
+    count, size, _ = commanded.shape
+    clean, states = np.zeros((2, count, size, 12))
+    states[:, 0, 6:] = noise[:, 0]
+    executed = np.array(commanded)
+    memories = np.zeros((count, len(motion), 6))
+    times = np.arange(1, size, dtype=np.float64) * scenario.task.period
+    zero = replay.reading_at_zeroing
+    for k in range(size - 1):
+        in_G = at_bolt(states[:, k], reading.X_SB)
+        for e in range(count):
+            executed[e, k + 1], memories[e] = through_motion(
+                motion, commanded[e, k + 1], in_G[e, 6:], memories[e], times[0]
+            )
+        step = _steps(k, states[:, : k + 1], executed[:, k : k + 2], times[0])
+        clean[:, k + 1] = at_sensor(replay.transitions(step), reading.X_SB)
+        for e in range(count):
+            so_far = clean[e, 1 : k + 2]
+            read = reading.read(sensor, so_far, zero, times[: k + 1])
+            states[e, k + 1] = read[-1]
+        states[:, k + 1, 6:] += noise[:, k + 1]
+    readings = np.array([reading.raw(s, zero) for s in states])
+    return Rollout(commanded, states, readings)
+
+
+def _steps(k: int, states: Array, executed: Array, period: float) -> Steps:
+    """Returns step k of all episodes; states (E, k + 1, 12), executed (E, 2, 6)."""
+    q = twin_coordinates(states[:, k, :6])
+    before = twin_coordinates(states[:, max(k - 1, 0), :6])
+    begin, end = (twin_coordinates(executed[:, i]) for i in (0, 1))
+    rate = (end - begin) / period
+    return Steps(np.full(len(q), k), q, (q - before) / period, begin, rate)
+
+
+def _columns(scenario: Scenario, path: Array, states: Array) -> dict[str, Array]:
+    """Returns the columns of an episode's log."""
+    X_SB = Tool.from_models(scenario).X_SB
+    actions = np.zeros_like(path)
+    turn = Rotation.from_rotvec(path[:, 3:])
+    actions[:-1, :3] = np.diff(path[:, :3], axis=0)
+    actions[:-1, 3:] = (turn[1:] * turn[:-1].inv()).as_rotvec()
+    rows = len(path)
+    last = np.arange(rows) == rows - 1
+    return {
+        "time": np.arange(rows) * scenario.task.period,
+        "X_GB_measured": _poses(states[:, :6]),
+        "X_GB_commanded": _poses(path),
+        "wrench": at_bolt(states, X_SB)[:, 6:],
+        "action": actions,
+        "terminated": np.zeros(rows, dtype=bool),
+        "truncated": last,
+    }
+
+
+def _poses(path: Array) -> Array:
+    """Returns poses (n, 7) of positions and rotation vectors (n, 6)."""
+    quaternion = Rotation.from_rotvec(path[:, 3:]).as_quat()[:, [3, 0, 1, 2]]
+    return np.hstack([path[:, :3], quaternion])

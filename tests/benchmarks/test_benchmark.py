@@ -1,0 +1,55 @@
+"""benchmarks/benchmark.py: its keys and its files, not its figures."""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.tools.programs import ROOT
+
+
+def _benchmark(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, str(ROOT / "benchmarks/benchmark.py"), *arguments],
+        capture_output=True,
+        text=True,
+        timeout=280,
+        check=False,
+    )
+
+
+def test_only_and_json(tmp_path: Path) -> None:
+    file = tmp_path / "figures.json"
+    keys = ["twin_reset_ms", "twin_steps_per_s", "twin_python_share"]
+    keys.append("policy_inference_us")
+    done = _benchmark("--only", *keys, "--json", str(file))
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(file.read_text())
+    assert set(figures) == set(keys)
+    assert figures["twin_reset_ms"] > 0.0
+    # From below there is no bound: on a busy machine a share of times can be negative.
+    assert -math.inf < figures["twin_python_share"] < 1.0
+    assert figures["policy_inference_us"] > 0.0
+    assert "the network in torch" in done.stdout
+    assert all(key in done.stdout for key in keys)
+
+
+def test_unknown_key_is_one_line() -> None:
+    done = _benchmark("--only", "twin_reset")
+    assert done.returncode == 2
+    assert "error: --only twin_reset: no such figure" in done.stderr
+    assert "twin_reset_ms" in done.stderr
+
+
+@pytest.mark.slow
+def test_the_objectives_keys(tmp_path: Path) -> None:
+    file = tmp_path / "figures.json"
+    keys = ["objective_883_s", "objective_1776_s", "objective_883_one_core_s"]
+    done = _benchmark("--only", *keys, "--json", str(file))
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(file.read_text())
+    assert set(figures) == set(keys) and min(figures.values()) > 0.0
+    assert "the thesis's 10 minutes" in done.stdout

@@ -1,0 +1,72 @@
+"""Coordinates map to poses and back, for the arm and for the twin."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from drake_disasm.cell.coordinates import ArmCoordinates
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.scenario import load_scenario
+from drake_disasm.stations import CellStation, SimulatedStation, TwinStation
+
+
+def _error(X: RigidTransform, Y: RigidTransform) -> tuple[float, float]:
+    """Distance [m] and angle [rad] between two poses."""
+    difference = X.inverse() @ Y
+    angle = difference.rotation().ToAngleAxis().angle()
+    return float(np.linalg.norm(difference.translation())), float(angle)
+
+
+@pytest.mark.parametrize("name", ["cell", "twin"])
+def test_start_is_the_identity(name: str, request: pytest.FixtureRequest) -> None:
+    station: SimulatedStation = request.getfixturevalue(name)
+    X_GB = station.coordinates.pose(station.start)
+    assert X_GB.IsNearlyEqualTo(RigidTransform(), 1e-7)
+
+
+@pytest.mark.parametrize("name", ["cell", "twin"])
+@pytest.mark.parametrize("seed", range(4))
+def test_solve_inverts_pose(
+    name: str, seed: int, request: pytest.FixtureRequest
+) -> None:
+    """Over the greatest step, 3 mm and 1 degree on each axis, along a path."""
+    station: SimulatedStation = request.getfixturevalue(name)
+    generator, q, X_GB = np.random.default_rng(seed), station.start, RigidTransform()
+    for _ in range(5):
+        p = X_GB.translation() + generator.uniform(-0.003, 0.003, 3)
+        rpy = generator.uniform(-0.0175, 0.0175, 3)
+        X_GB = RigidTransform(RollPitchYaw(rpy).ToRotationMatrix() @ X_GB.rotation(), p)
+        q = station.coordinates.solve(X_GB, q)
+        distance, angle = _error(X_GB, station.coordinates.pose(q))
+        assert distance < 1e-6 and angle < 1e-5
+
+
+def test_twin_coordinates_are_xyz_yaw_pitch_roll(twin: TwinStation) -> None:
+    X_GB = twin.coordinates.pose(np.array([1, 2, 3, 0.3, 0.2, 0.1]))
+    expected = RigidTransform(RollPitchYaw(0.1, 0.2, 0.3), [1, 2, 3])
+    assert X_GB.IsNearlyEqualTo(expected, 1e-15)
+
+
+def test_out_of_reach_is_one_line() -> None:
+    scenario = load_scenario("removal", ["placement.p_WG=[1.4, 0, 0.2]"])
+    with pytest.raises(DisasmError, match=r"can't reach.*placement\.p_WG"):
+        CellStation(scenario)
+
+
+def test_a_motion_beyond_the_limits_is_one_line(cell: CellStation) -> None:
+    assert isinstance(cell.coordinates, ArmCoordinates)
+    with pytest.raises(DisasmError, match=r"can't follow.*placement\.p_WG"):
+        cell.coordinates.solve(RigidTransform([0.9, 0.5, 0.0]), cell.start)
+
+
+def test_a_turn_beyond_the_joints_limits_is_one_line(cell: CellStation) -> None:
+    """The bolt's place alone could be kept: the orientation must not be lost."""
+    X_GB = RigidTransform([0.0, 0.05, 0.0])
+    assert isinstance(cell.coordinates, ArmCoordinates)
+    q = cell.coordinates.start(X_GB)
+    with pytest.raises(DisasmError, match=r"can't follow"):
+        for _ in range(100):  # a degree at a time, until joint 6 is at its end
+            turned = RollPitchYaw(0, 0, np.deg2rad(1)).ToRotationMatrix()
+            X_GB = RigidTransform(turned @ X_GB.rotation(), X_GB.translation())
+            q = cell.coordinates.solve(X_GB, q)
+            assert _error(X_GB, cell.coordinates.pose(q))[1] < 1e-3

@@ -1,0 +1,125 @@
+"""The lock's geometry: its gaps are the scenario's clearances, and nothing overlaps."""
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+
+from drake_disasm.cell.lock import (
+    bolt_inertia,
+    facet_length,
+    groove_boxes,
+    head_top,
+    lift_needed,
+    lip_height,
+    plate_bottom,
+    set_environment,
+)
+from drake_disasm.scenario import LockConfig
+from drake_disasm.stations import SimulatedStation
+
+LOCKS = [
+    LockConfig(),
+    LockConfig(clearance=1e-4, travel=0.1, head_diameter=0.014),
+    LockConfig(clearance=1e-3, axial_clearance=1e-3, lip_thickness=0.004),
+]
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_gaps_are_the_clearances(lock: LockConfig) -> None:
+    boxes = groove_boxes(lock)
+    low = {name: box[0] for name, box in boxes.items()}
+    high = {name: box[1] for name, box in boxes.items()}
+    slot = low["lip_left"][2] - high["lip_right"][2]
+    channel = low["wall_left"][2] - high["wall_right"][2]
+    height = low["lip_left"][1] - high["floor"][1]
+    hole = low["stop_b"][0] - high["lip_left"][0]
+    assert slot == pytest.approx(lock.neck_diameter + lock.clearance)
+    assert channel == pytest.approx(lock.head_diameter + lock.channel_clearance)
+    assert height == pytest.approx(lock.head_thickness + lock.axial_clearance)
+    assert hole == pytest.approx(lock.head_diameter + lock.keyhole_clearance)
+    assert (low["stop_b"][0] + high["lip_left"][0]) / 2 == pytest.approx(lock.travel)
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_solid_parts_do_not_overlap(lock: LockConfig) -> None:
+    for first, second in itertools.combinations(groove_boxes(lock).values(), 2):
+        low, high = np.maximum(first[0], second[0]), np.minimum(first[1], second[1])
+        assert np.any(high - low < 1e-12), (first, second)
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_groove_is_its_own_mirror_image(lock: LockConfig) -> None:
+    boxes = groove_boxes(lock)
+    mirror = np.array([1.0, 1.0, -1.0])
+    for name in ("lip", "wall", "keyhole"):
+        corners = [boxes[f"{name}_right"][i] * mirror for i in (0, 1)]
+        low, high = np.minimum(*corners), np.maximum(*corners)
+        np.testing.assert_allclose(boxes[f"{name}_left"][0], low)
+        np.testing.assert_allclose(boxes[f"{name}_left"][1], high)
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_heights_add_up(lock: LockConfig) -> None:
+    """The head hangs midway in the channel; to be out it rises past lip and itself."""
+    play = lock.axial_clearance / 2
+    assert -lip_height(lock) - head_top(lock) == pytest.approx(play)
+    underside = head_top(lock) - lock.head_thickness
+    channel_floor = groove_boxes(lock)["floor"][1][1]
+    assert underside - channel_floor == pytest.approx(play)
+    assert plate_bottom(lock) < channel_floor
+    expected = lock.lip_thickness + play + lock.head_thickness + 0.002
+    assert lift_needed(lock, 0.002) == pytest.approx(expected)
+
+
+def test_bolt_weighs_what_the_scenario_says() -> None:
+    lock = LockConfig(bolt_mass=0.3)
+    M_B = bolt_inertia(lock)
+    assert M_B.get_mass() == 0.3
+    middle = lock.lip_thickness / 2 + lock.grip_standoff + lock.grip_size[1] / 2
+    np.testing.assert_allclose(M_B.get_com(), [0, middle, 0])
+    assert M_B.IsPhysicallyValid()
+
+
+@pytest.mark.parametrize("diameter", [0.002, 0.005, 0.0073, 0.02])
+@pytest.mark.parametrize("resolution", [1e-4, 0.8e-3, 1.6e-3, 5e-3])
+def test_facets_are_a_multiple_of_four(diameter: float, resolution: float) -> None:
+    """By Drake's count: the circumference over the hint, rounded up."""
+    edge = facet_length(diameter, resolution)
+    facets = np.ceil(np.pi * diameter / edge)
+    assert facets % 4 == 0
+    assert edge <= resolution * (1 + 1e-5)
+    assert facets < np.pi * diameter / resolution + 4
+
+
+@pytest.mark.parametrize("name", ["cell", "twin"])
+def test_bolt_starts_free_of_the_groove(
+    name: str, request: pytest.FixtureRequest
+) -> None:
+    station: SimulatedStation = request.getfixturevalue(name)
+    context = station.settled([])
+    contacts = station.GetOutputPort("contact_results").Eval(context)
+    groove = set(station.lock.groove_ids)
+    for i in range(contacts.num_hydroelastic_contacts()):
+        surface = contacts.hydroelastic_contact_info(i).contact_surface()
+        assert not {surface.id_M(), surface.id_N()} & groove
+
+
+@pytest.mark.parametrize("name", ["cell", "twin"])
+def test_environment_reaches_every_contact_property(
+    name: str, request: pytest.FixtureRequest
+) -> None:
+    station: SimulatedStation = request.getfixturevalue(name)
+    context, lock = station.CreateDefaultContext(), station.lock
+    changed = dataclasses.replace(lock.nominal, friction=0.55, modulus=3e8)
+    plant = station.part_context(station.plant, context)
+    scene = station.part_context(station.scene_graph, context)
+    set_environment(lock, changed, plant, station.scene_graph, scene)
+    inspector = station.GetOutputPort("query_object").Eval(context).inspector()
+    for geometry in (*lock.groove_ids, *lock.bolt_ids.values()):
+        properties = inspector.GetProximityProperties(geometry)
+        friction = properties.GetProperty("material", "coulomb_friction")
+        assert friction.static_friction() == friction.dynamic_friction() == 0.55
+    neck = inspector.GetProximityProperties(lock.bolt_ids["neck"])
+    assert neck.GetProperty("hydroelastic", "hydroelastic_modulus") == 3e8

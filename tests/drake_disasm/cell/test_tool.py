@@ -1,0 +1,84 @@
+"""What hangs on the sensor: masses, and where the bolt is held."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drake_disasm.cell.tool import Tool
+from drake_disasm.common.resources import models_dir
+from drake_disasm.common.spatial import weight_wrench
+from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.stations import CellStation
+from tests.drake_disasm.conftest import QUIET
+
+
+@pytest.fixture(scope="module")
+def tool(quiet_scenario: Scenario) -> Tool:
+    """The default scenario's tool."""
+    return Tool.from_models(quiet_scenario)
+
+
+def test_mass_is_that_of_the_parts(tool: Tool) -> None:
+    """Sensor and gripper by their sheets, bolt by the scenario."""
+    assert tool.mass == pytest.approx(0.347 + 1.025 + 0.2)
+    assert tool.M_F.get_mass() == tool.mass
+    assert tool.M_F.IsPhysicallyValid()
+
+
+def test_first_moment_is_the_sum_of_the_parts(tool: Tool) -> None:
+    """About So: sensor at 25 mm, gripper at 50 + 70 mm, bolt in the pads."""
+    grip = tool.X_SB @ np.array([0, 0.00125 + 0.003 + 0.015, 0])
+    moment = 0.347 * 0.025 + 1.025 * (0.050 + 0.070) + 0.2 * grip[2]
+    np.testing.assert_allclose(
+        tool.mass * tool.p_SoScm_S, [0, 0, moment], rtol=1e-3, atol=1e-9
+    )
+
+
+def test_bolt_points_back_at_the_robot(tool: Tool) -> None:
+    """y_B, out of the plate, is -z_S; x_B is -x_S; a right-handed frame."""
+    R_SB = tool.X_SB.rotation().matrix()
+    np.testing.assert_allclose(R_SB.T @ [0, 0, -1], [0, 1, 0], atol=1e-12)
+    np.testing.assert_allclose(R_SB.T @ [-1, 0, 0], [1, 0, 0], atol=1e-12)
+    assert np.linalg.det(R_SB) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("gap", [0.0015, 0.004])
+def test_fingertips_end_above_the_plate(gap: float, tool: Tool) -> None:
+    """Each millimetre of gap brings the bolt a millimetre farther from the sensor."""
+    scenario = load_scenario("removal", [f"gripper.fingertip_gap={gap}"])
+    farther = Tool.from_models(scenario).X_SB.translation() - tool.X_SB.translation()
+    np.testing.assert_allclose(farther, [0, 0, gap - 0.0015], atol=1e-12)
+
+
+def _sensor_frame_at(xyz: str, rpy: str, folder: Path) -> str:
+    """Writes the sensor's model with its sensing frame moved; returns the file."""
+    text = (models_dir() / "hex_e" / "hex_e.urdf").read_text()
+    frame = '<frame name="sensor" link="hex_e" xyz="0 0 0" rpy="0 0 0"/>'
+    assert frame in text
+    moved = f'<frame name="sensor" link="hex_e" xyz="{xyz}" rpy="{rpy}"/>'
+    file = folder / "hex_e.urdf"
+    file.write_text(text.replace(frame, moved))
+    return str(file)
+
+
+@pytest.mark.parametrize(
+    ("xyz", "rpy"),
+    [("0.01 0 0.02", "0 0 0"), ("0 0 0", "0.2 0 1.5"), ("0 0 0", "0 0 0")],
+)
+def test_wrench_is_at_the_sensing_frame_of_the_model(
+    xyz: str, rpy: str, tmp_path: Path
+) -> None:
+    """The URDF calls that frame a parameter to calibrate: the reading follows it."""
+    model = _sensor_frame_at(xyz, rpy, tmp_path)
+    station = CellStation(load_scenario("removal", [QUIET, f"ft_sensor.model={model}"]))
+    R_WS = station.X_WG.rotation() @ station.X_SB.rotation().inverse()
+    g_W = np.array([0, 0, -9.81])
+    expected = weight_wrench(station.payload_mass, station.p_SoScm_S, R_WS, g_W)
+    reading = station.reading_at_zeroing(station.settled([]))
+    np.testing.assert_allclose(reading, expected, atol=2e-3)
+
+
+def test_flange_and_sensor_agree_on_the_bolt(tool: Tool) -> None:
+    """S lies on the flange's face in the shipped model."""
+    assert tool.X_FB.IsNearlyEqualTo(tool.X_SB, 1e-12)

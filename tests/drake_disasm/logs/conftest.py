@@ -1,0 +1,118 @@
+"""Sample logs: a header and one episode's columns for each kind."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drake_disasm.logs import LogHeader, LogWriter, flat_columns
+
+SAMPLE_HEADERS = {
+    "transitions": LogHeader(
+        "transitions",
+        "door_chain_lock",
+        {"program": "test", "seed": 3},
+        period=0.1,
+        scenario={"effects": [{"name": "friction", "mu": 0.15}], "seed": 3},
+    ),
+    "static_wrench": LogHeader(
+        "static_wrench", "weigh", {"sensor": "a"}, frames={"wrench": "W"}
+    ),
+    "joint_motion": LogHeader(
+        "joint_motion",
+        "excite",
+        {},
+        period=0.01,
+        joints=("a", "b", "c"),
+        urdf="package://arm/arm.urdf",
+    ),
+}
+
+# Doubles that a careless text format changes.
+AWKWARD = (0.1, -0.0, 5e-324, 1.7976931348623157e308, 1 / 3, 1e22, 123456789.123456789)
+
+
+def _poses(rng: np.random.Generator, rows: int) -> np.ndarray:
+    quaternions = rng.normal(size=(rows, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+    return np.hstack([rng.normal(size=(rows, 3)), quaternions])
+
+
+def _transitions(rng: np.random.Generator, rows: int) -> dict[str, Any]:
+    action = rng.normal(size=(rows, 6))
+    action[-1] = 0.0
+    reward = np.append(rng.normal(size=rows - 1), 0.0)
+    return {
+        "time": 0.1 * np.arange(rows),
+        "X_GB_measured": _poses(rng, rows),
+        "X_GB_commanded": _poses(rng, rows),
+        "wrench": rng.normal(size=(rows, 6)),
+        "action": action,
+        "action_executed": 2.0 * action,
+        "ft_sensor": rng.normal(size=(rows, 6)),
+        "q": rng.normal(size=(rows, 7)),
+        "reward.distance": reward,
+        "reward.force": -reward,
+        "terminated": np.arange(rows) == rows - 1,
+        "truncated": np.zeros(rows, dtype=bool),
+    }
+
+
+def _static_wrench(rng: np.random.Generator, rows: int) -> dict[str, Any]:
+    wrench = rng.normal(size=(rows, 6))
+    wrench[: len(AWKWARD), 0] = AWKWARD[:rows]
+    return {
+        "order": np.arange(rows, dtype=float),
+        "R_WS": _poses(rng, rows)[:, 3:],
+        "wrench": wrench,
+        "extra.temperature": 20.0 + rng.normal(size=rows),
+    }
+
+
+def _joint_motion(rng: np.random.Generator, rows: int) -> dict[str, Any]:
+    names = ("q", "v", "vd", "tau")
+    motion = {name: rng.normal(size=(rows, 3)) for name in names}
+    return {"time": 1.5e9 + 0.01 * np.arange(rows), **motion}
+
+
+SAMPLES = {
+    "transitions": _transitions,
+    "static_wrench": _static_wrench,
+    "joint_motion": _joint_motion,
+}
+
+
+@pytest.fixture
+def headers() -> dict[str, LogHeader]:
+    """A valid header of each kind."""
+    return SAMPLE_HEADERS
+
+
+@pytest.fixture
+def sample() -> Callable[..., dict[str, np.ndarray]]:
+    """`sample(kind, seed=0, rows=12)`: valid columns of an episode."""
+
+    def make(kind: str, seed: int = 0, rows: int = 12) -> dict[str, np.ndarray]:
+        vectors = SAMPLES[kind](np.random.default_rng(seed), rows)
+        return flat_columns(kind, vectors)
+
+    return make
+
+
+@pytest.fixture
+def written(
+    tmp_path: Path,
+    headers: dict[str, LogHeader],
+    sample: Callable[..., dict[str, np.ndarray]],
+) -> Callable[..., Path]:
+    """`written(kind, file_format, episodes=1)`: the folder of a sample log."""
+
+    def write(kind: str, file_format: str = "csv", episodes: int = 1) -> Path:
+        with LogWriter(tmp_path / kind, headers[kind], file_format) as writer:
+            for seed in range(episodes):
+                writer.write_episode(sample(kind, seed))
+        return tmp_path / kind
+
+    return write

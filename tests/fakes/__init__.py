@@ -1,1 +1,0 @@
-"""Devices that tests talk to over loopback sockets, and that fail on demand."""

@@ -1,0 +1,135 @@
+"""Closing the loop on simulated readings that carry an effect nobody declared."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import EFFECTS, SensorDrift, SensorGain, SensorMounting
+from drake_disasm.logs import read_log
+from sysid.effect_selection.block_regression import family_p, worse_p
+from sysid.effect_selection.close_loop import close_loop
+from sysid.effect_selection.experiments import separating
+from sysid.effect_selection.output import to_mapping
+from sysid.models.from_logs import ModelChoice, model_of
+from sysid.objective import Objective
+from sysid.report import closing_page
+from sysid.workers import Workers
+from tests.sysid.effect_selection.blind import closed, static_log, verdict_of
+
+_BIASED = ("SensorDrift", "SensorGain", "SensorMounting")
+_LIBRARY = [e for e in EFFECTS if e.__name__ in _BIASED]
+
+
+@pytest.mark.parametrize("kind", [SensorDrift, SensorMounting, SensorGain])
+def test_names_the_effect_or_a_tie_with_it(kind, tmp_path):
+    found = closed(static_log(tmp_path, [kind], 2.0, seed=0).folder)
+    verdict = found.verdict
+    assert verdict.ending == "explained"
+    assert kind.__name__ in (verdict.names[0], *(t.name for t in verdict.ties[0]))
+    errors = found.errors
+    assert errors.in_noise(errors.after) < 0.9 * errors.in_noise(errors.before)
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5])
+def test_says_none_where_there_is_none(correlation, tmp_path):
+    verdict = verdict_of(static_log(tmp_path, [], 0.0, 3, correlation).folder)
+    assert (verdict.ending, verdict.names) == ("none", ())
+    assert "missing: none" in verdict.text
+
+
+def test_an_effect_outside_the_library_gets_no_wrong_name(tmp_path):
+    log = static_log(tmp_path, [SensorDrift], 5.0, seed=1).folder
+    verdict = verdict_of(log, [e for e in _LIBRARY if e is not SensorDrift])
+    assert verdict.ending == "unexplained" and "time" in verdict.dependence
+
+
+def test_two_effects_are_both_found_the_more_important_first(tmp_path):
+    log = static_log(tmp_path, [SensorDrift, SensorMounting], 5.0, seed=2).folder
+    found = closed(log, _LIBRARY)
+    verdict = found.verdict
+    assert set(verdict.names) == {"SensorDrift", "SensorMounting"}
+    assert list(verdict.worth) == sorted(verdict.worth, reverse=True)
+    objectives = [found.first.value, *(r.value for r in found.rounds)]
+    assert objectives == sorted(objectives, reverse=True)
+
+
+def test_a_round_costs_one_evaluation_for_each_size(tmp_path, monkeypatch):
+    log = static_log(tmp_path, [], 0.0, seed=3).folder
+    model = model_of([read_log(log)], ModelChoice())
+    counted = []
+    residuals = Objective.residuals
+
+    def count(self, thetas):
+        counted.append(len(np.atleast_2d(thetas)))
+        return residuals(self, thetas)
+
+    monkeypatch.setattr(Objective, "residuals", count)
+    closed(log, _LIBRARY)
+    sizes = 6 * 6 + 6 + 3  # a drift of six durations, a gain, a mounting
+    assert counted.count(sizes) == 1  # the survey
+    assert max(counted) <= max(sizes, 2 * len(model.parameters) + 1)
+
+
+def test_episodes_that_contradict_each_other_are_named(tmp_path):
+    logs = [
+        read_log(static_log(tmp_path / name, kinds, 5.0, seed).folder)
+        for name, kinds, seed in (("a", [SensorDrift], 0), ("b", [], 1))
+    ]
+    logs = [
+        dataclasses.replace(log, folder=tmp_path / name)
+        for log, name in zip(logs, ("drifting", "steady"), strict=True)
+    ]
+    model = model_of(logs, ModelChoice())
+    found = close_loop(
+        model, [0, 1], [], np.inf, Workers(), lambda _: None, library=_LIBRARY
+    )
+    [against] = found.verdict.contradictions
+    assert [name.split("/")[0] for name in against.episodes] == ["drifting", "steady"]
+    assert against.effect.startswith("SensorDrift")
+    assert "no common effect" in found.verdict.text
+    assert "contradict" in closing_page(found, {})
+    assert to_mapping(found)["contradictions"][0]["effect"] == against.effect
+
+
+def test_a_common_effect_is_no_contradiction(tmp_path):
+    logs = [
+        read_log(static_log(tmp_path / str(seed), [], 0.0, seed).folder)
+        for seed in (0, 1)
+    ]
+    model = model_of(logs, ModelChoice())
+    found = close_loop(model, [0, 1], [], np.inf, Workers(), lambda _: None)
+    assert found.verdict.contradictions == () and found.verdict.ending == "none"
+
+
+def test_a_log_that_is_too_short_is_refused_with_what_it_needs(tmp_path):
+    log = read_log(static_log(tmp_path, [SensorDrift], 5.0, seed=0).folder)
+    model = model_of([log], ModelChoice()).of_rows(np.arange(100) < 12)
+    with pytest.raises(DisasmError, match=r"too short.* at least 8 rows more"):
+        close_loop(model, [0], [], np.inf, Workers(), lambda _: None)
+
+
+def test_ties_name_the_experiment_that_separates():
+    drifts = separating("SensorWarmUp", "SensorDrift")
+    assert drifts == separating("SensorDrift", "SensorWarmUp") and "rest" in drifts
+    joints = separating("JointCoulombFriction.j1", "JointLoadFriction.j1")
+    assert "payload" in joints
+    assert separating("Unheard", "Of")
+
+
+def test_gains_are_compared_block_by_block():
+    random = np.random.default_rng(0)
+    best = 10.0 ** random.uniform(-1, 2, 12)  # one block far beyond the others
+    assert worse_p(best, best) == 1.0
+    assert worse_p(0.9 * best, best) < 0.01
+    assert worse_p(best + random.standard_normal(12), best) > 0.05
+
+
+def test_the_family_wise_p_is_uniform_under_the_null():
+    random = np.random.default_rng(0)
+    alarms = sum(
+        family_p(random.standard_normal((20, 12)), seed).min() < 0.05
+        for seed in range(100)
+    )
+    assert alarms <= 12

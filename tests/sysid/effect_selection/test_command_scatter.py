@@ -1,0 +1,60 @@
+"""An effect on the variance is told from effects on the mean."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.effects import (
+    EFFECTS,
+    CommandGain,
+    GrooveFriction,
+    Imprecision,
+    SensorBias,
+)
+from drake_disasm.logs import read_log
+from sysid.effect_selection.close_loop import HUBER, close_loop
+from sysid.effect_selection.command_scatter import scatter
+from sysid.effect_selection.search import Tracer
+from sysid.models.twin import TwinModel
+from sysid.validation.blind_tests import nominal
+from sysid.validation.synthetic_logs import transitions_log
+from sysid.workers import Workers
+
+
+def _model(folder, effects):
+    transitions_log(folder / "log", nominal(), effects, 0)
+    return TwinModel([read_log(folder / "log")], nominal(), ())
+
+
+def _scatter(model):
+    fit = Tracer(model, (), Workers(), HUBER, lambda _: None).fit(())
+    return scatter(fit, Workers(), HUBER)
+
+
+def test_finds_by_how_much_commands_scatter(tmp_path):
+    """The encoders' noise is allowed for, which this simulated log does not have."""
+    truth = np.array([0.0, 1e-4, 0.0])
+    found = _scatter(_model(tmp_path, [Imprecision(*truth)]))
+    np.testing.assert_allclose(found.std, truth, atol=5e-6)
+    assert found.interval[1, 0] < 1e-4 < found.interval[1, 1]
+    assert found.value < 1.3 and found.gain > 0.9
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [[], [CommandGain(z=0.3)], [GrooveFriction(0.1)], [SensorBias(fy=0.5)]],
+    ids=lambda effects: "".join(type(e).__name__ for e in effects) or "nothing",
+)
+def test_what_follows_on_something_is_no_scatter(effects, tmp_path):
+    assert _scatter(_model(tmp_path, effects)) is None
+
+
+def test_closing_the_loop_adds_it_to_the_scenario(tmp_path):
+    model = _model(tmp_path, [Imprecision(y=4e-5, z=4e-5)])
+    episodes = range(len(model.measurements.names))
+    library = [e for e in EFFECTS if e in (CommandGain, SensorBias, Imprecision)]
+    closed = close_loop(model, episodes, [], HUBER, Workers(), lambda _: None, library)
+    verdict = closed.verdict
+    assert (verdict.ending, verdict.names) == ("explained", ("Imprecision",))
+    assert "missing: Imprecision" in verdict.text
+    [effect] = closed.scenario.effects
+    assert isinstance(effect, Imprecision) and effect.x < effect.y

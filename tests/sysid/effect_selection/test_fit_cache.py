@@ -1,0 +1,55 @@
+"""A search that was stopped goes on, and ends as it would have."""
+
+import pytest
+
+import sysid.effect_selection.search as selection
+from drake_disasm.effects import CommandGain, GrooveFriction, SensorBias
+from drake_disasm.logs import read_log
+from sysid.effect_selection.close_loop import HUBER, close_loop
+from sysid.effect_selection.output import to_mapping
+from sysid.models.twin import TwinModel
+from sysid.validation.blind_tests import nominal
+from sysid.validation.synthetic_logs import transitions_log
+from sysid.workers import Workers
+
+_LIBRARY = [CommandGain, GrooveFriction, SensorBias]
+
+
+class _StopError(Exception):
+    """What Ctrl-C is here."""
+
+
+def test_what_was_fitted_is_not_fitted_again_and_the_verdict_is_the_same(
+    tmp_path, monkeypatch
+):
+    hidden = [CommandGain(x=0.03), SensorBias(fy=0.3)]
+    transitions_log(tmp_path / "log", nominal(), hidden, 0, episodes=6, steps=12)
+    fitted = []
+    fit = selection.gauss_newton
+
+    def counted(*arguments, **options):
+        if len(fitted) == stop_at:
+            raise _StopError
+        fitted.append(arguments)
+        return fit(*arguments, **options)
+
+    def closed(folder):
+        model = TwinModel([read_log(tmp_path / "log")], nominal(), ())
+        return close_loop(
+            model, range(5), [5], HUBER, Workers(), lambda _: None, _LIBRARY, folder
+        )
+
+    monkeypatch.setattr(selection, "gauss_newton", counted)
+    stop_at = None
+    whole = closed(tmp_path / "whole")
+    count = len(fitted)
+    fitted.clear()
+    stop_at = count // 2
+    with pytest.raises(_StopError):
+        closed(tmp_path / "fits")
+    assert len(list((tmp_path / "fits").iterdir())) == stop_at
+    fitted.clear()
+    stop_at = None
+    resumed = closed(tmp_path / "fits")
+    assert len(fitted) == count - count // 2
+    assert to_mapping(resumed) == to_mapping(whole)

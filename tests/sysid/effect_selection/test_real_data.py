@@ -1,0 +1,81 @@
+"""What real measurements lack, from the models that their authors used."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.logs import read_logs
+from sysid.effect_selection.close_loop import Closed, close_loop
+from sysid.models.from_logs import ModelChoice, model_of
+from sysid.workers import Workers
+from tests.sysid.effect_selection.blind import sieve
+from tests.sysid.real_data import write_arm, write_motion, write_static
+
+_NULLS = 40
+
+
+def _closed(folders, train, test) -> Closed:
+    model = model_of(read_logs(folders), ModelChoice())
+    return close_loop(model, train, test, np.inf, Workers(), lambda _: None)
+
+
+def test_a_real_force_sensor_drifts_and_stops(tmp_path):
+    found = _closed([write_static(100, tmp_path / "log")], [0], [])
+    assert found.verdict.names == ("SensorDrift",)
+    values = {value.name: value for value in found.verdict.values}
+    assert values["SensorDrift.fz"].interval[1] < 0.0
+    assert 45.0 < values["SensorDrift.duration"].value < 65.0
+    before, after = (
+        found.errors.rms_by_unit(p) for p in (found.errors.before, found.errors.after)
+    )
+    assert before["N"] > 0.29 and after["N"] < 0.1 and after["N m"] < before["N m"]
+
+
+@pytest.mark.slow
+def test_a_real_arm_has_friction_and_offsets(tmp_path):
+    arm = write_arm(tmp_path / "arm.urdf")
+    folders = [write_motion(n, tmp_path / f"run_{n}", arm) for n in (1, 2)]
+    found = _closed(folders, [0], [1])
+    kinds = {name.partition(".")[0] for name in found.verdict.names}
+    assert kinds == {"JointCoulombFriction", "TorqueOffset"}
+    assert found.errors.relative(found.errors.before) > 0.06
+    assert found.errors.relative(found.errors.after) < 0.03
+
+
+@pytest.mark.slow
+def test_too_little_of_a_real_arms_motion_is_refused(tmp_path):
+    arm = write_arm(tmp_path / "arm.urdf")
+    log = write_motion(1, tmp_path / "run", arm)
+    model = model_of(read_logs([log]), ModelChoice())
+    short = model.of_rows(np.arange(model.measurements.rows) < 500)
+    with pytest.raises(DisasmError, match="too short to decide"):
+        close_loop(short, [0], [], np.inf, Workers(), lambda _: None)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("residual_of", ["first", "last"])
+def test_noise_as_correlated_as_a_real_arms_residual_raises_no_alarm(
+    residual_of, tmp_path
+):
+    """Of the model without effects, and of the one with all that were found."""
+    arm = write_arm(tmp_path / "arm.urdf")
+    log = read_logs([write_motion(1, tmp_path / "run", arm)])
+    model = model_of(log, ModelChoice())
+    model = model.of_rows(np.arange(model.measurements.rows) % 5 == 0)
+
+    def closed(model):
+        return close_loop(model, [0], [], np.inf, Workers(), lambda _: None)
+
+    found = closed(model)
+    fit = getattr(found, residual_of)
+    residual = fit.here.residual * fit.model.measurements.noise
+    clean = found.first.model.predictions(found.first.theta)
+    alarms = []
+    for seed in range(_NULLS):
+        random = np.random.default_rng(seed)
+        noise = np.column_stack([sieve(r, 30, random) for r in residual.T])
+        null = dataclasses.replace(model.measurements, values=clean + noise)
+        alarms.append(closed(model.with_measurements(null)).verdict.ending != "none")
+    assert sum(alarms) <= 0.05 * _NULLS

@@ -1,0 +1,116 @@
+"""Blind tests: what is put in is found, and a log does not tell."""
+
+from concurrent.futures import Executor, Future
+
+import numpy as np
+import pytest
+
+from drake_disasm.effects import CommandGain, SensorBias
+from drake_disasm.logs import read_log
+from sysid.models.twin import TwinModel
+from sysid.validation.blind_tests import (
+    Answer,
+    Case,
+    answer,
+    answers,
+    nominal,
+    pair_cases,
+    read_answers,
+    residual,
+    single_cases,
+    traceable,
+)
+from sysid.validation.random_effects import drawn
+from sysid.validation.synthetic_logs import transitions_log
+from sysid.validation.tables import confusion_figure, errors_table, table
+
+
+class _Here(Executor):
+    """Does the work at once; counts it."""
+
+    done = 0
+
+    def submit(self, function, /, *arguments):
+        """Returns a future that is done."""
+        self.done += 1
+        future = Future()
+        future.set_result(Answer(arguments[0], (), "none", (), (), 1.0, 1.0))
+        return future
+
+
+@pytest.mark.parametrize("name", ["CommandGain", "GrooveFriction"])
+def test_an_effect_at_twice_the_noise_gets_its_name(name):
+    found = answer(Case((name,), 2.0, 0))
+    assert found.named_first and found.ending == "explained"
+    assert found.after < found.before
+
+
+def test_nothing_is_found_where_nothing_is():
+    assert answer(Case((), 0.0, 1)).ending == "none"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", single_cases((5.0,), (0,)), ids=lambda c: c.effects[0])
+def test_the_whole_library_at_five_times_the_noise(case):
+    assert answer(case).in_tie
+
+
+def test_a_log_states_nothing_of_what_was_put_in(tmp_path):
+    transitions_log(tmp_path / "log", nominal(), [SensorBias(fx=1.0)], 0, 2, 5)
+    log = read_log(tmp_path / "log")
+    assert log.header.scenario["effects"] == []
+    text = (tmp_path / "log" / "log.yaml").read_text("utf-8")
+    assert "SensorBias" not in text
+
+
+def test_a_model_with_the_effects_explains_a_blind_log(tmp_path):
+    scenario = nominal()
+    effects = [CommandGain(x=0.02), SensorBias(fy=0.4)]
+    transitions_log(tmp_path / "log", scenario, effects, 3, 4, 12)
+    scenario.effects = list(effects)
+    model = TwinModel([read_log(tmp_path / "log")], scenario, ())
+    error = model.predictions(np.zeros(0)) - model.measurements.values
+    rms = np.sqrt(np.mean((error / model.measurements.noise) ** 2, axis=0))
+    assert rms[:6].max() < 1e-3
+    np.testing.assert_allclose(rms[6:], 1.0, atol=0.35)
+
+
+def test_effects_are_drawn_by_the_residual_they_leave(tmp_path):
+    random = np.random.default_rng(0)
+    effect = drawn(SensorBias, random, 2.0, lambda e: residual(e, str(tmp_path)))
+    assert residual(effect, str(tmp_path)) == pytest.approx(2.0, rel=0.1)
+
+
+def test_answers_are_kept_and_not_asked_for_again(tmp_path):
+    cases = single_cases((1.0, 2.0), (0,))
+    executor = _Here()
+    first = answers(cases[:3], executor, tmp_path / "answers.json")
+    second = answers(cases[:5], executor, tmp_path / "answers.json")
+    assert executor.done == 5
+    assert second[:3] == first
+    assert set(second) == set(read_answers(tmp_path / "answers.json"))
+
+
+def test_pairs_are_of_two_effects_that_can_show():
+    names = {effect.__name__ for effect in traceable()}
+    for case in pair_cases(3.0, range(20)):
+        assert len(set(case.effects)) == 2 and set(case.effects) <= names
+
+
+def test_tables_and_figure_count_what_was_said():
+    right = Answer(
+        Case(("SensorBias",), 2.0, 0), (), "explained", ("SensorBias",), ((),), 2.0, 1.0
+    )
+    tied = Answer(
+        Case(("SensorBias",), 2.0, 1),
+        (),
+        "explained",
+        ("SensorGain",),
+        (("SensorBias",),),
+        2.0,
+        1.1,
+    )
+    assert "| SensorBias | 1/2 | 2/2 |" in table([right, tied])
+    assert "2.00 → 1.05" in errors_table([right, tied])
+    labels = confusion_figure([right, tied]).axes[0].get_xticklabels()
+    assert [label.get_text() for label in labels] == ["SensorBias", "SensorGain"]
