@@ -42,8 +42,8 @@ class Objective:
         self,
         model: LogModel,
         workers: Workers,
-        huber: float = np.inf,
-        alike: LogModel | None = None,
+        huber_delta: float = np.inf,
+        surrogate: LogModel | None = None,
     ) -> None:
         """Evaluates nothing yet.
 
@@ -53,14 +53,14 @@ class Objective:
             huber: where squares end.
             alike: a faster model with the same parameters, for derivatives.
         """
-        self.model, self.huber = model, huber
+        self.model, self.huber_delta = model, huber_delta
         self.scaling = Scaling(model.parameters)
         self.evaluations = 0
         self.failures: list[tuple[Array, str]] = []
         self._workers = workers
         self.differences = self
-        if alike is not None and alike is not model:
-            self.differences = Objective(alike, workers, huber)
+        if surrogate is not None and surrogate is not model:
+            self.differences = Objective(surrogate, workers, huber_delta)
 
     def __call__(self, thetas: Array) -> Array:
         """Returns the values (b,) of parameter sets (b, p)."""
@@ -68,7 +68,7 @@ class Objective:
 
     def value(self, residual: Array) -> float:
         """Returns f of weighted residuals (rows, channels)."""
-        return rms(tempered(residual, self.huber))
+        return rms(pseudo_residual(residual, self.huber_delta))
 
     def residuals(self, thetas: Array) -> list[Array]:
         """Returns the weighted residuals (rows, channels) of each of (b, p) sets.
@@ -120,18 +120,18 @@ class Objective:
         return np.clip(residual, -FAILED_RESIDUAL, FAILED_RESIDUAL)
 
 
-def tempered(residual: Array, huber: float) -> Array:
+def pseudo_residual(residual: Array, huber_delta: float) -> Array:
     """Returns residuals whose squares are Huber's loss, signs kept."""
     size = np.abs(residual)
-    if huber == np.inf:
+    if huber_delta == np.inf:
         return residual
-    bent = np.sqrt(np.maximum(2.0 * huber * size - huber**2, 0.0))
-    return np.where(size <= huber, residual, np.sign(residual) * bent)
+    bent = np.sqrt(np.maximum(2.0 * huber_delta * size - huber_delta**2, 0.0))
+    return np.where(size <= huber_delta, residual, np.sign(residual) * bent)
 
 
-def huber_weights(residual: Array, huber: float) -> Array:
+def huber_weights(residual: Array, huber_delta: float) -> Array:
     """Returns the weight of each residual in a least-squares step, 1 within `huber`."""
-    return np.minimum(1.0, huber / np.maximum(np.abs(residual), 1e-300))
+    return np.minimum(1.0, huber_delta / np.maximum(np.abs(residual), 1e-300))
 
 
 def rms(residual: NDArray[np.float64]) -> float:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from drake_disasm.effects import EFFECTS, shapes, sizes
+from drake_disasm.effects import EFFECTS, amplitudes, shape_parameters
 
 _PAGE = (Path(__file__).parents[1] / "docs" / "effects.md").read_text("utf-8")
 
@@ -16,9 +16,9 @@ def test_every_effect_is_listed_with_its_fields():
     assert sorted(rows) == sorted(effect.__name__ for effect in EFFECTS)
     for effect in EFFECTS:
         row = rows[effect.__name__]
-        fields = [*sizes(effect), *shapes(effect)]
+        fields = [*amplitudes(effect), *shape_parameters(effect)]
         assert (
             all(name in row for name in fields)
             or f"{len(fields)} such" in row
-            or (len(sizes(effect)) > 6)
+            or (len(amplitudes(effect)) > 6)
         )

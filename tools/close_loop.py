@@ -98,8 +98,8 @@ def main(arguments: Sequence[str]) -> int:
     share = HELD_OUT if is_twin else 0.0
     train, test = split_episodes(names, args.held_out or share)
     usual = HUBER if is_twin else np.inf
-    huber = usual if args.huber is None else args.huber
-    if not huber > 0.0:
+    huber_delta = usual if args.huber is None else args.huber
+    if not huber_delta > 0.0:
         raise DisasmError("--huber: give a number above zero, or inf")
     origin = program.provenance("close_loop", arguments, 0)
     fits = args.out / "fits"
@@ -107,7 +107,9 @@ def main(arguments: Sequence[str]) -> int:
         tqdm(unit=" runs", desc="simulating", leave=False) as bar,
         Workers(args.workers, beat=lambda: _beat(bar)) as workers,
     ):
-        closed = close_loop(model, train, test, huber, workers, tqdm.write, folder=fits)
+        closed = close_loop(
+            model, train, test, huber_delta, workers, tqdm.write, folder=fits
+        )
     _write(args.out, closed, origin)
     shutil.rmtree(fits, ignore_errors=True)
     print(closed.verdict.text)

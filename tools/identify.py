@@ -219,11 +219,13 @@ def _settings(args: argparse.Namespace, model: LogModel) -> Settings:
     )
     # Where the model is affine, plain squares have one exact optimum.
     usual = np.inf if thesis or model.affine else 3.0
-    huber = usual if args.huber is None else args.huber
-    if not huber > 0.0:
+    huber_delta = usual if args.huber is None else args.huber
+    if not huber_delta > 0.0:
         raise DisasmError("--huber: give a number above zero, or inf")
     methods = METHODS if args.method == "both" else (args.method,)
-    return Settings(methods, effort, huber, args.unidentifiable, tuple(args.profile))
+    return Settings(
+        methods, effort, huber_delta, args.unidentifiable, tuple(args.profile)
+    )
 
 
 def _surrogate() -> Callable[..., np.ndarray]:

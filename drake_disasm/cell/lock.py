@@ -196,7 +196,7 @@ def set_pose(lock: Lock, environment: Environment, plant_context: Context) -> No
     lock.frame.SetPoseInParentFrame(plant_context, environment.X_GnG)
 
 
-def is_alike(one: Environment, other: Environment) -> bool:
+def has_same_material(one: Environment, other: Environment) -> bool:
     """Returns whether environments differ in pose and pull alone, or not noticeably.
 
     Other materials are made anew in the scene graph, which takes milliseconds.

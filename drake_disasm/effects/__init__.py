@@ -22,12 +22,12 @@ from drake_disasm.effects.base import (
     Sensing,
     SensorEffect,
     SensorMemoryEffect,
+    amplitudes,
     environment_at,
     is_local,
     motion_chain,
     sensor_chain,
-    shapes,
-    sizes,
+    shape_parameters,
 )
 from drake_disasm.effects.environment.chain_pull import ChainPull
 from drake_disasm.effects.environment.contact_exponent import ContactExponent
@@ -147,10 +147,10 @@ __all__ = [
     "SensorWarmUp",
     "TorqueGain",
     "TorqueOffset",
+    "amplitudes",
     "environment_at",
     "is_local",
     "motion_chain",
     "sensor_chain",
-    "shapes",
-    "sizes",
+    "shape_parameters",
 ]

@@ -24,12 +24,12 @@ from drake_disasm.common.quantity import quantity
 Memory = np.ndarray
 
 
-def parameter(unit: str, low: float, high: float, doc: str) -> Any:
+def amplitude(unit: str, low: float, high: float, doc: str) -> Any:
     """Returns a field of an effect; its default and null value is zero."""
     return quantity(0.0, unit, doc, low=low, high=high)
 
 
-def shape(
+def shape_parameter(
     default: float,
     unit: str,
     low: float,
@@ -41,12 +41,12 @@ def shape(
     return quantity(default, unit, doc, low=low, high=high, grid=grid)
 
 
-def sizes(effect: type["Effect"]) -> tuple[str, ...]:
+def amplitudes(effect: type["Effect"]) -> tuple[str, ...]:
     """Returns the names of an effect's parameters that are zero at null."""
     return tuple(f.name for f in _numbers(effect) if not f.metadata["grid"])
 
 
-def shapes(effect: type["Effect"]) -> dict[str, tuple[float, ...]]:
+def shape_parameters(effect: type["Effect"]) -> dict[str, tuple[float, ...]]:
     """Returns the names of an effect's shape parameters, each with its grid."""
     return {f.name: f.metadata["grid"] for f in _numbers(effect) if f.metadata["grid"]}
 
@@ -136,7 +136,7 @@ class Effect:
     @property
     def is_null(self) -> bool:
         """Whether all its sizes are zero: it does nothing."""
-        return not any(getattr(self, name) for name in sizes(type(self)))
+        return not any(getattr(self, name) for name in amplitudes(type(self)))
 
 
 class EnvironmentEffect(Effect, abc.ABC):

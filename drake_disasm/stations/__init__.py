@@ -1,7 +1,7 @@
 """Stations: the one part of the diagram that is swapped (cell, twin, hardware)."""
 
 from drake_disasm.scenario import Scenario
-from drake_disasm.stations.base import Beginning, Station
+from drake_disasm.stations.base import InitialState, Station
 from drake_disasm.stations.cell import CellStation
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.stations.twin import TwinStation
@@ -17,8 +17,8 @@ def make_station(model: str, scenario: Scenario) -> SimulatedStation:
 
 __all__ = [
     "MODELS",
-    "Beginning",
     "CellStation",
+    "InitialState",
     "SimulatedStation",
     "Station",
     "TwinStation",

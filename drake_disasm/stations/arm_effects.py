@@ -33,8 +33,8 @@ from drake_disasm.effects import (
     RotorInertia,
     TorqueGain,
     TorqueOffset,
-    shapes,
-    sizes,
+    amplitudes,
+    shape_parameters,
 )
 
 #: Friction that Drake's joints lack.
@@ -249,7 +249,7 @@ def _misreadings(effects: Sequence[JointEffect]) -> np.ndarray:
 
 def _numbers(kind: type[JointEffect]) -> list[str]:
     """Returns the names of a kind's sizes and shapes."""
-    return [*sizes(kind), *shapes(kind)]
+    return [*amplitudes(kind), *shape_parameters(kind)]
 
 
 def _torque(effect: JointEffect, v: Variable, load: float) -> Expression:

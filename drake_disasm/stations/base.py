@@ -22,7 +22,7 @@ from drake_disasm.systems.observation import Mounting
 
 
 @dataclasses.dataclass(frozen=True)
-class Beginning:
+class InitialState:
     """Where an episode begins.
 
     Attributes:
@@ -59,7 +59,7 @@ class Station(Diagram):
     has_velocity_input: bool
     control_period: float
     grip_command: float | None = None
-    repeats: bool = True
+    start_is_reusable: bool = True
     coordinates: Coordinates
     start: np.ndarray
     X_SB: RigidTransform
@@ -89,7 +89,7 @@ class Station(Diagram):
         """What is random in it: seeded anew in each episode."""
         return ()
 
-    def begin(self, context: Context, effects: Sequence[Effect]) -> Beginning:
+    def begin(self, context: Context, effects: Sequence[Effect]) -> InitialState:
         """Brings the station to where an episode begins.
 
         Args:
@@ -98,7 +98,7 @@ class Station(Diagram):
         """
         raise NotImplementedError  # Drake's metaclass leaves no room for ABC's
 
-    def follow(
+    def update_local_effects(
         self, context: Context, effects: Sequence[Effect], bolt: BoltMotion
     ) -> None:
         """Brings what depends on the bolt's motion up to date; see the simulated."""

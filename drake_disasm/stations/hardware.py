@@ -33,7 +33,7 @@ from drake_disasm.effects import Effect
 from drake_disasm.ports import CELL_PORTS, Health, check_ports
 from drake_disasm.safety import Mode, Supervisor, guards
 from drake_disasm.scenario import ArmConfig, Scenario, validate
-from drake_disasm.stations.base import Beginning, Station, refuse_twins_contact
+from drake_disasm.stations.base import InitialState, Station, refuse_twins_contact
 from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.systems.device_reader import DeviceReader, Readable
 from drake_disasm.systems.gripper_writer import GripperWriter
@@ -99,7 +99,7 @@ class HardwareStation(Station):
     table = CELL_PORTS
     arm = "iiwa"
     has_velocity_input = False
-    repeats = False
+    start_is_reusable = False
 
     def __init__(
         self,
@@ -130,7 +130,7 @@ class HardwareStation(Station):
         builder.BuildInto(self)
         check_ports(self, self.table)
 
-    def begin(self, context: Context, effects: Sequence[Effect]) -> Beginning:
+    def begin(self, context: Context, effects: Sequence[Effect]) -> InitialState:
         """See Station: waits for every device, and zeroes the sensor where the arm is.
 
         Raises:
@@ -147,7 +147,7 @@ class HardwareStation(Station):
         self.safety_filter.zero(reading)
         self.safety_filter.begin()
         self.supervisor.begin()
-        return Beginning(position, reading)
+        return InitialState(position, reading)
 
     def check(self) -> None:
         """Raises HoldError, with the reason, while the robot is held."""

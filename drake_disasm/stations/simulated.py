@@ -24,7 +24,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
-from drake_disasm.cell.lock import Lock, is_alike, set_environment, set_pose
+from drake_disasm.cell.lock import Lock, has_same_material, set_environment, set_pose
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.timing import newest_step
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor
@@ -40,7 +40,7 @@ from drake_disasm.effects import (
 from drake_disasm.ports import Health, check_ports
 from drake_disasm.scenario import Scenario, validate
 from drake_disasm.stations.base import (
-    Beginning,
+    InitialState,
     Station,
     add_nominal_groove,
     nominal_groove_pose,
@@ -171,7 +171,7 @@ class SimulatedStation(Station):
             sensor_chain(effects),
         )
 
-    def follow(
+    def update_local_effects(
         self, context: Context, effects: Sequence[Effect], bolt: BoltMotion
     ) -> None:
         """Brings what depends on the bolt's motion up to date, if anything does.
@@ -200,7 +200,7 @@ class SimulatedStation(Station):
     def _change_environment(self, context: Context, environment: Environment) -> None:
         """Puts what has changed of the world around the bolt into a Context."""
         outside = self.part_context(self.outside_force, context)
-        if is_alike(self.outside_force.material(outside), environment):
+        if has_same_material(self.outside_force.material(outside), environment):
             set_pose(self.lock, environment, self.part_context(self.plant, context))
             self.outside_force.set_force(outside, np.array(environment.force_Gn))
         else:
@@ -248,12 +248,12 @@ class SimulatedStation(Station):
         """See Station."""
         return (self.sensor_noise,)
 
-    def begin(self, context: Context, effects: Sequence[Effect]) -> Beginning:
+    def begin(self, context: Context, effects: Sequence[Effect]) -> InitialState:
         """See Station: the bolt is gripped at A, at rest, and the sensor is zeroed."""
         settled = self.settled(effects)
         self.set_effects(context, effects)
         copy_state(settled, context)
-        return Beginning(self.start, self.reading_at_zeroing(settled))
+        return InitialState(self.start, self.reading_at_zeroing(settled))
 
     def bolt_is_out(self, context: Context, lift_needed: float) -> bool:
         """See Station."""

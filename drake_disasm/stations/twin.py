@@ -90,11 +90,11 @@ class TwinStation(SimulatedStation):
         builder = DiagramBuilder()
         self._build(builder)
 
-    def can_become(self, scenario: Scenario) -> bool:
+    def can_reconfigure(self, scenario: Scenario) -> bool:
         """Returns whether `become` can turn this station into another scenario's."""
         return _structure(scenario) == _structure(self.scenario)
 
-    def become(self, context: Context, scenario: Scenario) -> None:
+    def reconfigure(self, context: Context, scenario: Scenario) -> None:
         """Turns this station into that of another scenario without a rebuild.
 
         Identification asks for hundreds of parameter sets; in place, one costs a few
@@ -111,7 +111,7 @@ class TwinStation(SimulatedStation):
             DisasmError: the scenario is out of bounds, or differs elsewhere.
         """
         validate(scenario)
-        if not self.can_become(scenario):
+        if not self.can_reconfigure(scenario):
             raise DisasmError(
                 "the twin can't take this scenario in place; build a station of it"
             )

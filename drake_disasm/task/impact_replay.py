@@ -49,12 +49,12 @@ class ImpactReplay:
         g_Gn = R_WGn.matrix().T @ g_W.gravity_vector()
         self._bolt = (M_B.get_mass(), M_B.get_com(), I_B, g_Gn)
 
-    def become(self, scenario: Scenario) -> None:
+    def reconfigure(self, scenario: Scenario) -> None:
         """See TwinReplay."""
-        if not self._diagram.can_become(scenario):
+        if not self._diagram.can_reconfigure(scenario):
             self._build(scenario)
             return
-        self._diagram.become(scenario)
+        self._diagram.reconfigure(scenario)
         self._diagram.zero()
         self._scenario = scenario
 

@@ -99,19 +99,19 @@ class TwinReplay:
             self._coarse = ReplayDiagram(with_time_step(scenario, time_step))
             self._switch = self._period - time_step
 
-    def become(self, scenario: Scenario) -> None:
+    def reconfigure(self, scenario: Scenario) -> None:
         """Takes a scenario's parameters, in place where the station can.
 
         Raises:
             DisasmError: the scenario is out of bounds.
         """
-        if not self._fine.can_become(scenario):
+        if not self._fine.can_reconfigure(scenario):
             self._build(scenario, self._coarse is not None)
             return
-        self._fine.become(scenario)
+        self._fine.reconfigure(scenario)
         self._fine.zero()
         if self._coarse:
-            self._coarse.become(with_time_step(scenario, self._coarse.time_step))
+            self._coarse.reconfigure(with_time_step(scenario, self._coarse.time_step))
 
     @property
     def reading_at_zeroing(self) -> np.ndarray:
@@ -168,16 +168,16 @@ class TwinReplay:
         motion = BoltMotion(q[:3], qd_rate[:3])
         if self._coarse:
             switch = begin + self._switch
-            self._coarse.follow(motion)
+            self._coarse.update_local_effects(motion)
             self._coarse.start(begin, *(self._state or self._fine.state()))
             self._coarse.advance(qd_rate, switch)
-            self._fine.follow(motion)
+            self._fine.update_local_effects(motion)
             self._fine.start(switch, *self._coarse.state())
         elif self._state:
-            self._fine.follow(motion)
+            self._fine.update_local_effects(motion)
             self._fine.start(begin, *self._state)
         else:
-            self._fine.follow(motion)
+            self._fine.update_local_effects(motion)
         self._state = None
         self._fine.advance(qd_rate, end)
         return self._fine.observation()
@@ -201,16 +201,16 @@ class ReplayDiagram:
         """Of the plant [s]."""
         return self.station.time_step
 
-    def can_become(self, scenario: Scenario) -> bool:
+    def can_reconfigure(self, scenario: Scenario) -> bool:
         """Returns whether `become` can take a scenario's parameters."""
-        return self.station.can_become(noise_free(scenario))
+        return self.station.can_reconfigure(noise_free(scenario))
 
-    def become(self, scenario: Scenario) -> None:
+    def reconfigure(self, scenario: Scenario) -> None:
         """Takes a scenario's parameters in place, from a clean Context."""
         self._simulator.reset_context(self._clean.Clone())
         self._find_contexts()
         self.effects = scenario.effects
-        self.station.become(self.station_context, noise_free(scenario))
+        self.station.reconfigure(self.station_context, noise_free(scenario))
 
     def zero(self) -> None:
         """Lets the bolt settle at A and zeroes the sensor, as an episode does."""
@@ -221,9 +221,9 @@ class ReplayDiagram:
         self.reading_at_zeroing = reading
         self.processor.zero(self.processor_context, reading)
 
-    def follow(self, motion: BoltMotion) -> None:
+    def update_local_effects(self, motion: BoltMotion) -> None:
         """Brings effects that depend on the bolt's motion up to date."""
-        self.station.follow(self.station_context, self.effects, motion)
+        self.station.update_local_effects(self.station_context, self.effects, motion)
 
     def start(self, time: float, q: np.ndarray, v: np.ndarray, qd: np.ndarray) -> None:
         """Puts the twin into a state (see `TwinReplay`) at a time [s]."""

@@ -147,7 +147,11 @@ class TaskSimulation:
         wanted = copy.deepcopy(
             list(self._built.effects if effects is None else effects)
         )
-        if self._start is None or wanted != self._set or not self.station.repeats:
+        if (
+            self._start is None
+            or wanted != self._set
+            or not self.station.start_is_reusable
+        ):
             self._start, self._set = self._starting_context(wanted), wanted
         self.context.SetTimeStateAndParametersFrom(self._start)
         sources = self._random_sources
@@ -182,7 +186,7 @@ class TaskSimulation:
         """
         if action is not None:
             self._set_action(action)
-        self._follow()
+        self._update_local_effects()
         self.steps += 1
         self.simulator.AdvanceTo(boundary(self.steps, self.scenario.task.period))
         self.station.check()
@@ -198,7 +202,7 @@ class TaskSimulation:
         value = self._action_source.get_mutable_source_value(context)
         value.SetFromVector(clamped(action, self.bounds))
 
-    def _follow(self) -> None:
+    def _update_local_effects(self) -> None:
         """Brings effects that depend on the bolt's motion up to date for a step."""
         if not is_local(self._set):
             return
@@ -210,7 +214,7 @@ class TaskSimulation:
         action = self.evaluate(self.imprecision, "action_executed")
         motion = BoltMotion(X_GnB.translation(), action[:3] / period)
         context = self.station.GetMyMutableContextFromRoot(self.context)
-        self.station.follow(context, self._set, motion)
+        self.station.update_local_effects(context, self._set, motion)
 
     def observation(self) -> np.ndarray:
         """Returns the present state (12,)."""

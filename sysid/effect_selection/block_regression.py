@@ -16,7 +16,7 @@ from scipy.stats import rankdata, wilcoxon
 
 from sysid.identification.linearisation import Linearisation
 from sysid.identification.uncertainty import block_length, block_numbers
-from sysid.objective import huber_weights, tempered
+from sysid.objective import huber_weights, pseudo_residual
 
 Array = NDArray[np.float64]
 Columns = NDArray[np.int64]
@@ -34,7 +34,7 @@ _MOST_ROWS = 0.95  # of the rows, whose leverage none may exceed
 
 
 @dataclass(frozen=True)
-class Study:
+class BlockRegression:
     """Residuals and P columns that may explain them, by blocks of rows.
 
     Only the normal equations of what is asked for are ever made: of hundreds of
@@ -56,12 +56,12 @@ class Study:
     scale: Array
     side: Array
     channels: int
-    huber: float
+    huber_delta: float
 
     @classmethod
     def of(
         cls,
-        here: Linearisation,
+        linearisation: Linearisation,
         blocks: NDArray[np.int64],
         extra: Array | None = None,
     ) -> Self:
@@ -73,21 +73,23 @@ class Study:
             extra: (rows, channels, k) further columns, of empirical dependences.
         """
         if extra is None:
-            extra = np.zeros((*here.residual.shape, 0))
+            extra = np.zeros((*linearisation.residual.shape, 0))
         order = np.argsort(blocks, kind="stable")
-        A = np.concatenate([here.jacobian, extra], axis=2)[order]
+        A = np.concatenate([linearisation.jacobian, extra], axis=2)[order]
         scale = np.maximum(np.sqrt(np.mean(A**2, axis=(0, 1))), 1e-300)
         A /= scale
         rows, channels, count = A.shape
-        side = (here.u < _AT_BOUND).astype(float) - (here.u > 1.0 - _AT_BOUND)
+        side = (linearisation.u < _AT_BOUND).astype(float) - (
+            linearisation.u > 1.0 - _AT_BOUND
+        )
         return cls(
             A.reshape(rows * channels, count),
-            here.residual[order].reshape(-1),
+            linearisation.residual[order].reshape(-1),
             np.unique(blocks[order], return_index=True)[1] * channels,
             scale,
             np.append(side, np.zeros(extra.shape[2])),
             channels,
-            here.huber,
+            linearisation.huber_delta,
         )
 
     @property
@@ -95,11 +97,11 @@ class Study:
         """Loss of each block (B,): squares, and less beyond `huber`."""
         return self._loss(self.r)
 
-    def moved(self, change: Array) -> "Study":
+    def moved(self, change: Array) -> "BlockRegression":
         """Returns the study of residuals elsewhere, a change (P,) of u away."""
         return dataclasses.replace(self, r=self.r + self.A @ (change * self.scale))
 
-    def apart(self, mine: NDArray[np.bool_], size: int) -> "Study":
+    def apart(self, mine: NDArray[np.bool_], size: int) -> "BlockRegression":
         """Returns the study with parameters once more, acting in some blocks alone.
 
         Args:
@@ -115,7 +117,7 @@ class Study:
             side=np.zeros(len(self.scale) + size),
         )
 
-    def beside(self, base: Columns) -> "Study":
+    def project_out(self, base: Columns) -> "BlockRegression":
         """Returns the study of all columns with some projected out, fitted to all rows.
 
         What a candidate adds is then judged apart from how well the base carries over:
@@ -143,7 +145,7 @@ class Study:
         """
         a = self.A[:, self._possible(columns)]
         starts = [np.ones(len(self.r))]
-        if np.isfinite(self.huber) and a.shape[1]:
+        if np.isfinite(self.huber_delta) and a.shape[1]:
             starts.append(self._calm(a))
         found = [self._left_out(a, w) for w in starts]
         return min(found, key=np.sum)
@@ -156,7 +158,7 @@ class Study:
             calm: (n,) weights to begin with.
         """
         w = calm * self._weights(self.r)
-        for _ in range(_REWEIGHTED if np.isfinite(self.huber) else 0):
+        for _ in range(_REWEIGHTED if np.isfinite(self.huber_delta) else 0):
             phi = -_solve((a.T @ (w[:, None] * a))[None], (a.T @ (w * self.r))[None])
             w = calm * self._weights(self.r + a @ phi[0])
         H, g = self._parts(a, w)
@@ -174,14 +176,14 @@ class Study:
 
     def _weights(self, r: Array) -> Array:
         """Returns the weights (n,) of residuals: Huber's, and less far beyond."""
-        if not np.isfinite(self.huber):
+        if not np.isfinite(self.huber_delta):
             return np.ones(len(r))
-        far = np.minimum(1.0, _FAR * self.huber / np.maximum(np.abs(r), 1e-300))
-        return huber_weights(r, self.huber) * far**2
+        far = np.minimum(1.0, _FAR * self.huber_delta / np.maximum(np.abs(r), 1e-300))
+        return huber_weights(r, self.huber_delta) * far**2
 
     def _loss(self, r: Array) -> Array:
         """Returns the loss of each block (B,) of residuals (n,)."""
-        squares = tempered(r, self.huber) ** 2
+        squares = pseudo_residual(r, self.huber_delta) ** 2
         return np.asarray(np.add.reduceat(squares, self.begins))
 
     def spread(self) -> Array:
@@ -240,10 +242,12 @@ def family_p(gains: Array, seed: int = 0) -> Array:
     return p
 
 
-def blocks_of(here: Linearisation, episode: NDArray[np.int64]) -> NDArray[np.int64]:
+def blocks_of(
+    linearisation: Linearisation, episode: NDArray[np.int64]
+) -> NDArray[np.int64]:
     """Returns the block (rows,) of each row: longer than residuals stay correlated."""
     rows = len(episode)
-    length = block_length(here.residual, episode)
+    length = block_length(linearisation.residual, episode)
     length = max(length, rows // _MOST_BLOCKS)
     return block_numbers(episode, int(min(length, max(1, rows // _LEAST_BLOCKS))))
 

@@ -16,8 +16,8 @@ from drake_disasm.effects import (
     MotionEffect,
     SensorEffect,
     SensorMemoryEffect,
-    shapes,
-    sizes,
+    amplitudes,
+    shape_parameters,
 )
 from drake_disasm.scenario import Scenario
 from sysid.models.base import ScenarioModel
@@ -46,7 +46,7 @@ class Candidate:
         """Returns the candidate of an effect with all its sizes free."""
         kind, joint = type(effect), getattr(effect, "joint", "")
         name = f"{kind.__name__}.{joint}" if joint else kind.__name__
-        return cls(name, effect, sizes(kind))
+        return cls(name, effect, amplitudes(kind))
 
     def only(self, fields: Sequence[str]) -> Self:
         """Returns the same with fewer sizes free."""
@@ -61,7 +61,10 @@ class Candidate:
     @property
     def shape(self) -> dict[str, float]:
         """Values of its shape parameters."""
-        return {name: getattr(self.effect, name) for name in shapes(type(self.effect))}
+        return {
+            name: getattr(self.effect, name)
+            for name in shape_parameters(type(self.effect))
+        }
 
 
 def candidates(
@@ -114,7 +117,9 @@ def extended(
         number = _place(scenario, candidate)
         kind = type(candidate.effect)
         name = candidate.name if with_shapes else candidate.text
-        fields = candidate.fields + (tuple(shapes(kind)) if with_shapes else ())
+        fields = candidate.fields + (
+            tuple(shape_parameters(kind)) if with_shapes else ()
+        )
         paths = {f"effects.{number}.{field}": field for field in fields}
         requests = [Request(path) for path in paths if path not in taken]
         _, found = scenario_parameters(scenario, requests)
@@ -145,7 +150,7 @@ def _places(kind: type[ArmEffect], joints: Sequence[str]) -> list[dict[str, str]
 
 
 def _in_all_shapes(kind: type[Effect], **fields: Any) -> list[Effect]:
-    grids = shapes(kind)
+    grids = shape_parameters(kind)
     return [
         kind(**fields, **dict(zip(grids, values, strict=True)))
         for values in itertools.product(*grids.values())
@@ -158,5 +163,5 @@ def _looks(effect: Effect) -> tuple[object, ...]:
     return tuple(
         getattr(effect, f.name)
         for f in dataclasses.fields(kind)  # type: ignore[arg-type]
-        if f.name not in sizes(kind)
+        if f.name not in amplitudes(kind)
     )

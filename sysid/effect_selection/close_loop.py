@@ -61,7 +61,7 @@ def close_loop(
     model: ScenarioModel,
     train: Sequence[int],
     test: Sequence[int],
-    huber: float,
+    huber_delta: float,
     workers: Workers,
     tell: Callable[[str], None],
     library: Sequence[type[Effect]] = EFFECTS,
@@ -83,12 +83,12 @@ def close_loop(
     Raises:
         DisasmError: the log is too short to decide anything.
     """
-    base = with_estimated_noise(model.of_episodes(train), workers, huber)
+    base = with_estimated_noise(model.of_episodes(train), workers, huber_delta)
     assert isinstance(base, ScenarioModel)
     refuse_few_rows(base)
     library_here = candidates(base, library)
     tracer = Tracer(
-        _affordable(base), library_here, workers, huber, tell, folder=folder
+        _affordable(base), library_here, workers, huber_delta, tell, folder=folder
     )
     tell("the model as it is")
     first = tracer.fit(())
@@ -101,7 +101,7 @@ def close_loop(
     refuse_short_logs(last)
     kept = _like(base, model.of_episodes(test)) if test else None
     errors = held_out(tracer, first, last, kept)
-    loose = scatter(last, workers, huber) if Imprecision in library else None
+    loose = scatter(last, workers, huber_delta) if Imprecision in library else None
     found = verdict(tracer, first, last, end, errors, loose)
     rounds = tuple(tracer.rounds)
     return Closed(found, first, last, rounds, begin, end, errors, loose)

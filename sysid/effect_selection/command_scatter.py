@@ -23,7 +23,7 @@ from sysid.effect_selection.evidence import ALPHA, LEAST_SHARE
 from sysid.effect_selection.fit import Fit
 from sysid.identification.whiteness import ljung_box
 from sysid.models.twin import TwinModel
-from sysid.objective import Objective, tempered
+from sysid.objective import Objective, pseudo_residual
 from sysid.workers import Workers
 
 Array = NDArray[np.float64]
@@ -67,7 +67,7 @@ class _Likelihood:
 
     r: Array
     J: Array
-    huber: float
+    huber_delta: float
 
     def rows(self, std: Array) -> tuple[Array, Array]:
         """Returns twice the negative log likelihood (n,), and the squares (n,) in it.
@@ -79,7 +79,7 @@ class _Likelihood:
         squares = np.einsum("nc,nc->n", self.r, self.r) - taken
         channels = self.r.shape[1]
         level = np.sqrt(np.maximum(squares, 0.0) / channels)
-        bent = channels * tempered(level, self.huber) ** 2
+        bent = channels * pseudo_residual(level, self.huber_delta) ** 2
         return bent + np.linalg.slogdet(M)[1], bent
 
     def best(self) -> Array:
@@ -131,7 +131,7 @@ class _Likelihood:
         return dataclasses.replace(self, r=self.r[mask], J=self.J[mask])
 
 
-def scatter(fit: Fit, workers: Workers, huber: float) -> Scatter | None:
+def scatter(fit: Fit, workers: Workers, huber_delta: float) -> Scatter | None:
     """Returns how an arm scatters, if that is what a fit leaves; else None.
 
     Args:
@@ -141,14 +141,14 @@ def scatter(fit: Fit, workers: Workers, huber: float) -> Scatter | None:
     """
     if not isinstance(fit.model, TwinModel) or fit.value <= BEYOND_NOISE:
         return None
-    led = np.zeros((len(fit.here.residual), 3))
+    led = np.zeros((len(fit.linearisation.residual), 3))
     for _ in range(_ROUNDS):
-        seen = _seen(fit, workers, huber, led)
+        seen = _seen(fit, workers, huber_delta, led)
         std = seen.best()
         if not std.any():
             return None
         led = seen.led(std)
-    blocks = blocks_of(fit.here, fit.model.measurements.episode)
+    blocks = blocks_of(fit.linearisation, fit.model.measurements.episode)
     if not _carries_over(seen, blocks) or _depends(fit.model, led, std > 0.0):
         return None
     before, after = (seen.rows(s)[1] for s in (np.zeros(3), std))
@@ -163,21 +163,21 @@ def scatter(fit: Fit, workers: Workers, huber: float) -> Scatter | None:
     )
 
 
-def _seen(fit: Fit, workers: Workers, huber: float, led: Array) -> _Likelihood:
+def _seen(fit: Fit, workers: Workers, huber_delta: float, led: Array) -> _Likelihood:
     """Returns residuals and derivatives where steps led (n, 3), as from no scatter."""
     assert isinstance(fit.model, TwinModel)
 
     def residual(model: TwinModel, push: Array) -> Array:
         """Returns the residuals where steps lead by a push (n, 3) further."""
         there = model.pushed(led * _UNIT + push)
-        return Objective(there, workers, huber).residuals(fit.theta)[0]
+        return Objective(there, workers, huber_delta).residuals(fit.theta)[0]
 
     ways = _PUSH * np.eye(3)[:, None] * np.ones((len(led), 1))
-    alike = fit.model.alike()
-    columns = [residual(alike, w) - residual(alike, -w) for w in ways]
+    surrogate = fit.model.surrogate()
+    columns = [residual(surrogate, w) - residual(surrogate, -w) for w in ways]
     J = np.stack(columns, axis=-1) * (_UNIT / (2.0 * _PUSH))
-    here = residual(fit.model, np.zeros_like(led))
-    return _Likelihood(here - np.einsum("nci,ni->nc", J, led), J, huber)
+    linearisation = residual(fit.model, np.zeros_like(led))
+    return _Likelihood(linearisation - np.einsum("nci,ni->nc", J, led), J, huber_delta)
 
 
 def _carries_over(seen: _Likelihood, blocks: NDArray[np.int64]) -> bool:

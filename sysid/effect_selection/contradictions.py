@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.effect_selection.block_regression import Columns, Study, family_p
+from sysid.effect_selection.block_regression import BlockRegression, Columns, family_p
 from sysid.effect_selection.evidence import ALPHA, Bench
 from sysid.effect_selection.fit import Fit
 
@@ -67,14 +67,16 @@ def _differs(
 ) -> tuple[str, float] | None:
     """Returns what differs in an episode and by how much that explains; else None."""
     count, size = len(fit.theta), len(bench.fields)
-    study = bench.raw.apart(bench.episodes == number, size).beside(np.arange(count))
+    regression = bench.raw.apart(bench.episodes == number, size).project_out(
+        np.arange(count)
+    )
     begin = len(bench.raw.scale)
     sets = [(text, columns) for text, columns in bench.groups.items() if len(columns)]
     sets += [(e.text, fit.columns_of(e)) for e in fit.effects]
     sets.append((_OWN, np.arange(own)))
-    gains = np.column_stack([_gains(study, columns, begin) for _, columns in sets])
+    gains = np.column_stack([_gains(regression, columns, begin) for _, columns in sets])
     p, share = family_p(gains) * tests, np.mean(gains > 0.0, axis=0)
-    gain = gains.sum(axis=0) / study.energy.sum()
+    gain = gains.sum(axis=0) / regression.energy.sum()
     passed = (p < ALPHA) & (share >= _LEAST_SHARE) & (gain >= _LEAST_GAIN)
     if not passed.any():
         return None
@@ -84,10 +86,12 @@ def _differs(
     return sets[best][0], float(gain[best])
 
 
-def _gains(study: Study, columns: Columns, begin: int) -> NDArray[np.float64]:
+def _gains(
+    regression: BlockRegression, columns: Columns, begin: int
+) -> NDArray[np.float64]:
     """Returns what blocks gain, (B,), if columns may differ in the episode."""
     both = np.concatenate([columns, begin + columns])
-    return study.losses(columns) - study.losses(both)
+    return regression.losses(columns) - regression.losses(both)
 
 
 def in_words(found: Sequence[Contradiction]) -> str:

@@ -42,9 +42,9 @@ def refuse_short_logs(last: Fit) -> None:
     Raises:
         DisasmError: there are too few; it says how much more is needed.
     """
-    study = last.study()
-    alone = study.losses(np.arange(len(last.theta)))
-    excess = float(np.median(alone / np.maximum(study.energy, 1e-300))) - 1.0
+    regression = last.regression()
+    alone = regression.losses(np.arange(len(last.theta)))
+    excess = float(np.median(alone / np.maximum(regression.energy, 1e-300))) - 1.0
     if excess <= _MOST_EXCESS:
         return
     rows = last.model.measurements.rows

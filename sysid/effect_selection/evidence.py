@@ -10,7 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import wilcoxon
 
-from sysid.effect_selection.block_regression import Columns, Study, family_p, worse_p
+from sysid.effect_selection.block_regression import (
+    BlockRegression,
+    Columns,
+    family_p,
+    worse_p,
+)
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.residual_curves import Dependence
 from sysid.identification.linearisation import Linearisation
@@ -93,10 +98,10 @@ class Bench:
         episodes: (B,) the episode that each block is of.
     """
 
-    here: Linearisation
+    linearisation: Linearisation
     fields: tuple[str, ...]
-    raw: Study
-    study: Study
+    raw: BlockRegression
+    regression: BlockRegression
     groups: Mapping[str, Columns]
     dependences: Sequence[tuple[Dependence, Columns]]
     episodes: NDArray[np.int64]
@@ -108,7 +113,7 @@ class Bench:
 
         They are one family: a log without an effect raises neither alarm.
         """
-        found = evidence(self.study, [*self._columns(sets), *self.dependences])
+        found = evidence(self.regression, [*self._columns(sets), *self.dependences])
         return (
             [e for e in found if not isinstance(e.what, Dependence)],
             [e for e in found if isinstance(e.what, Dependence)],
@@ -128,7 +133,7 @@ class Bench:
         best = list(promising.values())[:_PAIRS_OF]
         pairs = list(itertools.combinations(best, 2))
         tests = math.comb(len(promising), 2) / max(1, len(pairs))
-        found = evidence(self.study, self._columns(pairs))
+        found = evidence(self.regression, self._columns(pairs))
         return [
             counted
             for e in found
@@ -145,10 +150,10 @@ class Bench:
     def pruned(self, added: Sequence[Candidate]) -> list[Candidate]:
         """Returns effects with only those sizes free that blocks get better by."""
         kept = [int(c) for candidate in added for c in self.groups[candidate.text]]
-        now = self.study.losses(np.array(kept)).sum()
+        now = self.regression.losses(np.array(kept)).sum()
         while len(kept) > 1:
             losses = {
-                c: self.study.losses(np.array([k for k in kept if k != c])).sum()
+                c: self.regression.losses(np.array([k for k in kept if k != c])).sum()
                 for c in kept
             }
             least = min(losses, key=lambda c: losses[c])
@@ -164,12 +169,16 @@ class Bench:
         return found
 
 
-def evidence(study: Study, columns: Sequence[tuple[What, Columns]]) -> list[Evidence]:
+def evidence(
+    regression: BlockRegression, columns: Sequence[tuple[What, Columns]]
+) -> list[Evidence]:
     """Returns the evidence for groups of columns, the highest gain first."""
     if not columns:
         return []
-    gains = np.array([study.energy - study.losses(group) for _, group in columns]).T
-    p, total = family_p(gains), study.energy.sum()
+    gains = np.array(
+        [regression.energy - regression.losses(group) for _, group in columns]
+    ).T
+    p, total = family_p(gains), regression.energy.sum()
     found = [
         Evidence(
             what,
@@ -234,10 +243,10 @@ def together(library: Sequence[Candidate]) -> list[tuple[Candidate, ...]]:
     An arm that lacks friction at one joint lacks it at the others, and one alone would
     take up what the others lack through the rigid bodies in between.
     """
-    alike: dict[str, list[Candidate]] = {}
+    surrogate: dict[str, list[Candidate]] = {}
     for candidate in library:
-        alike.setdefault(_kind_text(candidate), []).append(candidate)
-    return [tuple(group) for group in alike.values() if len(group) > 1]
+        surrogate.setdefault(_kind_text(candidate), []).append(candidate)
+    return [tuple(group) for group in surrogate.values() if len(group) > 1]
 
 
 def _kind_text(candidate: Candidate) -> str:

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.effect_selection.block_regression import Study, blocks_of
+from sysid.effect_selection.block_regression import BlockRegression, blocks_of
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import FEW
 from sysid.identification.linearisation import Linearisation
 from sysid.models.base import ScenarioModel
-from sysid.objective import tempered
+from sysid.objective import pseudo_residual
 from sysid.parameters import Scaling, nominal_values
 
 Array = NDArray[np.float64]
@@ -36,19 +36,26 @@ class Fit:
     effects: tuple[Candidate, ...]
     model: ScenarioModel
     theta: Array
-    here: Linearisation
+    linearisation: Linearisation
     value: float
 
     @property
     def loss(self) -> float:
         """Sum of the squares, less beyond where they end."""
-        return float(np.sum(tempered(self.here.residual, self.here.huber) ** 2))
+        return float(
+            np.sum(
+                pseudo_residual(
+                    self.linearisation.residual, self.linearisation.huber_delta
+                )
+                ** 2
+            )
+        )
 
-    def study(self, blocks: NDArray[np.int64] | None = None) -> Study:
+    def regression(self, blocks: NDArray[np.int64] | None = None) -> BlockRegression:
         """Returns its normal equations, by blocks (rows,) of its own or of another."""
         if blocks is None:
-            blocks = blocks_of(self.here, self.model.measurements.episode)
-        return Study.of(self.here, blocks)
+            blocks = blocks_of(self.linearisation, self.model.measurements.episode)
+        return BlockRegression.of(self.linearisation, blocks)
 
     @property
     def values(self) -> dict[str, float]:
@@ -69,8 +76,8 @@ class Fit:
         95 %, by the sums of the gradient over blocks (a sandwich): right whatever the
         correlation within a block.
         """
-        away = self.here.u - self._null
-        return np.asarray(np.abs(away) > _Z95 * self.study().spread())
+        away = self.linearisation.u - self._null
+        return np.asarray(np.abs(away) > _Z95 * self.regression().spread())
 
     def all_show(self, names: Sequence[str]) -> bool:
         """Returns whether each of some effects has a size that shows."""
@@ -86,7 +93,7 @@ class Fit:
         found, shows = [], self.shows
         for effect in added:
             columns = self.columns_of(effect)
-            u = self.here.u[columns]
+            u = self.linearisation.u[columns]
             kept = (u > _AT_BOUND) & (u < 1.0 - _AT_BOUND)
             fields = [f for f, keep in zip(effect.fields, kept, strict=True) if keep]
             if fields and (len(added) <= FEW or shows[columns].any()):
@@ -105,16 +112,16 @@ class Fit:
 
         Of blocks that are not fitted; all other parameters are fitted again.
         """
-        study, null = self.study(), self._null
+        regression, null = self.regression(), self._null
         free = np.zeros(len(null))  # at null a bound is no end
         found = []
         for columns in groups:
             own = np.isin(np.arange(len(null)), columns)
-            without = study.moved(np.where(own, null - self.here.u, 0.0))
+            without = regression.moved(np.where(own, null - self.linearisation.u, 0.0))
             without = dataclasses.replace(without, side=free)
-            beside = without.beside(np.flatnonzero(~own))
-            total = beside.energy.sum()
-            found.append(float((total - beside.losses(columns).sum()) / total))
+            project_out = without.project_out(np.flatnonzero(~own))
+            total = project_out.energy.sum()
+            found.append(float((total - project_out.losses(columns).sum()) / total))
         return found
 
     @property

@@ -16,7 +16,7 @@ import numpy as np
 from drake_disasm.common.files import make_folder, write_atomically
 from sysid.identification.linearisation import Linearisation
 
-_ARRAYS = ("u", "residual", "jacobian", "weights", "huber")
+_ARRAYS = ("u", "residual", "jacobian", "weights", "huber_delta")
 
 
 def remembered(
@@ -36,7 +36,7 @@ def remembered(
     if path.exists():
         with np.load(path) as data:
             arrays = {key: data[key] for key in _ARRAYS[:-1]}
-            return Linearisation(**arrays, huber=float(data["huber"]))
+            return Linearisation(**arrays, huber_delta=float(data["huber_delta"]))
     found = find()
     make_folder(folder)
     arrays = {key: getattr(found, key) for key in _ARRAYS}

@@ -131,18 +131,18 @@ def _cross_predicted(tracer: Tracer, fit: Fit, folds: NDArray[np.int64]) -> Arra
 
 
 def _linearly_predicted(fit: Fit, folds: NDArray[np.int64]) -> Array:
-    here, measured = fit.here, fit.model.measurements
-    residual = here.residual.copy()
-    root = np.sqrt(here.weights)
-    J, r = root[..., None] * here.jacobian, root * here.residual
+    linearisation, measured = fit.linearisation, fit.model.measurements
+    residual = linearisation.residual.copy()
+    root = np.sqrt(linearisation.weights)
+    J, r = root[..., None] * linearisation.jacobian, root * linearisation.residual
     channels = r.shape[1]
     for fold in range(int(folds.max()) + 1):
         own = folds == fold
-        A = J[~own].reshape((~own).sum() * channels, len(here.u))
+        A = J[~own].reshape((~own).sum() * channels, len(linearisation.u))
         b = r[~own].reshape(-1)
         step = -np.linalg.lstsq(A, b, rcond=_RCOND)[0]
-        step = np.clip(here.u + step, 0.0, 1.0) - here.u
-        residual[own] += here.jacobian[own] @ step
+        step = np.clip(linearisation.u + step, 0.0, 1.0) - linearisation.u
+        residual[own] += linearisation.jacobian[own] @ step
     return np.asarray(measured.values + residual * measured.noise)
 
 

@@ -37,7 +37,7 @@ def rough_fits(
         fit: to all rows, where they begin.
         whats: effects that are added, each alone.
     """
-    base = tracer.base.alike()
+    base = tracer.base.surrogate()
     base = base.thin(max(1, round(base.measurements.rows / _ROWS)))
     small = dataclasses.replace(
         tracer, base=base, library=(), workers=Workers(), tell=_silent
@@ -83,7 +83,7 @@ class _RoughFit:
         thetas = np.tile(theta, (len(tries), 1))
         for row, (i, _, value) in zip(thetas, tries, strict=True):
             row[i] = value
-        found = Objective(model, self.tracer.workers, self.tracer.huber)(thetas)
+        found = Objective(model, self.tracer.workers, self.tracer.huber_delta)(thetas)
         best = int(np.argmin(found))
         _, name, value = tries[best]
         return {name: value} if found[best] < self.before.value else {}

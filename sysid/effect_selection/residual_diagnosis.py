@@ -36,7 +36,7 @@ class Diagnosis:
 
 def diagnose(fit: Fit, survey: Survey) -> list[Diagnosis]:
     """Returns the diagnosis of each channel at a fit."""
-    measured, residual = fit.model.measurements, fit.here.residual
+    measured, residual = fit.model.measurements, fit.linearisation.residual
     found = []
     for i, channel in enumerate(measured.channels):
         own = [d for d in survey.dependences if d.name.startswith(f"{channel.name} ")]

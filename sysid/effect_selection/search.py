@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.effect_selection.block_regression import Study, blocks_of
+from sysid.effect_selection.block_regression import BlockRegression, blocks_of
 from sysid.effect_selection.candidates import Candidate, extended
 from sysid.effect_selection.evidence import (
     LEAST_FIELD,
@@ -105,7 +105,7 @@ class Tracer:
     base: ScenarioModel
     library: Sequence[Candidate]
     workers: Workers
-    huber: float
+    huber_delta: float
     tell: Callable[[str], None]
     rounds: list[Round] = field(default_factory=list)
     exact: bool = False
@@ -271,7 +271,9 @@ class Tracer:
         assert bench is not None and isinstance(chosen.what, tuple)
         added = bench.pruned(chosen.what)
         known = {
-            f"{candidate.name}.{bench.fields[column]}": bench.here.jacobian[..., column]
+            f"{candidate.name}.{bench.fields[column]}": bench.linearisation.jacobian[
+                ..., column
+            ]
             for candidate in added
             for column in bench.groups[candidate.text]
         }
@@ -343,29 +345,37 @@ class Tracer:
         theta = [begin.get(p.name, p.nominal) for p in model.parameters]
         objective = self._objective(model)
         u = objective.scaling.to_unit(np.array(theta))
-        here = None
+        linearisation = None
         if start and known is not None:
             names = [p.name for p in model.parameters[len(start.theta) :]]
-            zero = np.zeros_like(start.here.residual)
+            zero = np.zeros_like(start.linearisation.residual)
             more = [known.get(name, zero) for name in names]
             jacobian = np.concatenate(
-                [start.here.jacobian, np.stack(more, axis=-1)], axis=-1
+                [start.linearisation.jacobian, np.stack(more, axis=-1)], axis=-1
             )
-            here = dataclasses.replace(start.here, u=u, jacobian=jacobian)
+            linearisation = dataclasses.replace(
+                start.linearisation, u=u, jacobian=jacobian
+            )
         most, pays = (_FEW_ITERATIONS, _PAYS) if model.costly else (_ITERATIONS, GAIN)
-        here = remembered(
+        linearisation = remembered(
             None if model.affine else self.folder,
-            (model, self.huber, self.exact, u, here),
+            (model, self.huber_delta, self.exact, u, linearisation),
             lambda: gauss_newton(
-                objective, u, most, start=here, central=False, pays=pays
+                objective, u, most, start=linearisation, central=False, pays=pays
             ),
         )
-        found = objective.scaling.from_unit(here.u)
-        return Fit(effects, model, found, here, objective.value(here.residual))
+        found = objective.scaling.from_unit(linearisation.u)
+        return Fit(
+            effects,
+            model,
+            found,
+            linearisation,
+            objective.value(linearisation.residual),
+        )
 
     def _objective(self, model: ScenarioModel) -> Objective:
-        alike = None if self.exact else model.alike()
-        return Objective(model, self.workers, self.huber, alike)
+        surrogate = None if self.exact else model.surrogate()
+        return Objective(model, self.workers, self.huber_delta, surrogate)
 
     def survey(self, fit: Fit) -> Survey:
         """Returns what speaks for each candidate that the fit does not have."""
@@ -373,7 +383,7 @@ class Tracer:
         rest = [c for c in self.library if c.name not in names]
         bench = self._bench(fit, rest)
         effects, dependences = bench.everything([(c,) for c in rest] + together(rest))
-        return Survey(effects, dependences, len(bench.study.begins), bench)
+        return Survey(effects, dependences, len(bench.regression.begins), bench)
 
     def _bench(self, fit: Fit, library: Sequence[Candidate]) -> Bench:
         """Returns the linearisation beside a fit, and its normal equations."""
@@ -382,17 +392,17 @@ class Tracer:
         objective = self._objective(model)
         rest = nominal_values(model.parameters)[count:]
         u = objective.scaling.to_unit(np.concatenate([fit.theta, rest]))
-        here = extend(fit.here, objective, u)
+        linearisation = extend(fit.linearisation, objective, u)
         episode = model.measurements.episode
         extra, dependences = curves(model)
-        blocks = blocks_of(here, episode)
-        raw = Study.of(here, blocks, extra)
+        blocks = blocks_of(linearisation, episode)
+        raw = BlockRegression.of(linearisation, blocks, extra)
         begin = len(model.parameters)
         return Bench(
-            here,
+            linearisation,
             tuple(p.name.rpartition(".")[2] for p in model.parameters),
             raw,
-            raw.beside(np.arange(count)),
+            raw.project_out(np.arange(count)),
             {
                 c.text: np.array(group, dtype=np.int64)
                 for c, group in zip(library, groups, strict=True)
@@ -408,9 +418,9 @@ def _confirmed(before: Fit, after: Fit, trial: Evidence, tests: int) -> Evidence
     Each block is judged by what the fit after would cost it, were it fitted to all
     others; the p-value is for as many tests as there are effects (Bonferroni).
     """
-    blocks = blocks_of(before.here, before.model.measurements.episode)
-    energy = before.study(blocks).energy
-    gains = energy - after.study(blocks).losses(np.arange(len(after.theta)))
+    blocks = blocks_of(before.linearisation, before.model.measurements.episode)
+    energy = before.regression(blocks).energy
+    gains = energy - after.regression(blocks).losses(np.arange(len(after.theta)))
     return measured(trial, gains, float(energy.sum()), tests)
 
 

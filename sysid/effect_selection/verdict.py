@@ -193,9 +193,9 @@ def _ending(is_something: bool, is_believed: bool) -> str:
 def values_of(tracer: Tracer, fit: Fit) -> tuple[Value, ...]:
     """Returns the effects' parameters with their intervals."""
     count = len(tracer.base.parameters)
-    spread = uncertainty(fit.here, fit.model.measurements.episode)
-    scaling = Objective(fit.model, tracer.workers, tracer.huber).scaling
-    ends = np.clip(fit.here.u[:, None] + spread.bootstrap, 0.0, 1.0)
+    spread = uncertainty(fit.linearisation, fit.model.measurements.episode)
+    scaling = Objective(fit.model, tracer.workers, tracer.huber_delta).scaling
+    ends = np.clip(fit.linearisation.u[:, None] + spread.bootstrap, 0.0, 1.0)
     low, high = (scaling.from_unit(side) for side in ends.T)
     return tuple(
         Value(
@@ -226,8 +226,12 @@ def _tied(name: str, rounds: Sequence[Round]) -> tuple[Tie, ...]:
 
 def _other(tie: Evidence, joint: str) -> str:
     """Returns what a tie names: at a joint, where it acts alike at several."""
-    here = [name for name in tie.effects if joint and name.endswith(f".{joint}")]
-    return " and ".join(here if len(tie.effects) > FEW and here else tie.effects)
+    linearisation = [
+        name for name in tie.effects if joint and name.endswith(f".{joint}")
+    ]
+    return " and ".join(
+        linearisation if len(tie.effects) > FEW and linearisation else tie.effects
+    )
 
 
 def _missing(

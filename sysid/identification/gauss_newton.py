@@ -46,20 +46,22 @@ def gauss_newton(
             damping is tried only where the full step does not help.
         pays: the share of the objective that an iteration is to gain for another.
     """
-    here = linearise(objective, u, central=central) if start is None else start
+    linearisation = linearise(objective, u, central=central) if start is None else start
     for _ in range(iterations if len(u) else 0):
-        value = objective.value(here.residual)
+        value = objective.value(linearisation.residual)
         if callback:
             callback(value)
-        points = np.clip(here.u + _steps(here), 0.0, 1.0)
+        points = np.clip(linearisation.u + _steps(linearisation), 0.0, 1.0)
         point, residual = _best(objective, points, value, all_at_once=central)
         reached = objective.value(residual)
         if reached >= value:
             break
-        here = linearise(objective, point, fitting_steps(here), central, residual)
+        linearisation = linearise(
+            objective, point, fitting_steps(linearisation), central, residual
+        )
         if reached > (1.0 - pays) * value:
             break
-    return here
+    return linearisation
 
 
 def _best(
@@ -79,18 +81,20 @@ def _best(
     return batch[best], residuals[best]
 
 
-def _steps(here: Linearisation) -> Array:
+def _steps(linearisation: Linearisation) -> Array:
     """Returns weighted least-squares steps (d, p) that stay in the box, one for each
     damping.
     """
-    root = np.sqrt(here.weights).reshape(-1)
-    system = np.column_stack([here.flat_jacobian, here.residual.reshape(-1)])
+    root = np.sqrt(linearisation.weights).reshape(-1)
+    system = np.column_stack(
+        [linearisation.flat_jacobian, linearisation.residual.reshape(-1)]
+    )
     factor = np.asarray(np.linalg.qr(root[:, None] * system, mode="r"))
     R, Qr = factor[:, :-1], factor[:, -1]
     size = np.linalg.norm(R, axis=0)
     least = 1e-9 * max(1.0, float(size.max()))
-    b = np.concatenate([-Qr, np.zeros(len(here.u))])
-    bounds = (-here.u - 1e-12, 1.0 - here.u + 1e-12)
+    b = np.concatenate([-Qr, np.zeros(len(linearisation.u))])
+    bounds = (-linearisation.u - 1e-12, 1.0 - linearisation.u + 1e-12)
     ridges = [np.sqrt(damping) * size + least for damping in _DAMPING]
     return np.array(
         [lsq_linear(np.vstack([R, np.diag(r)]), b, bounds).x for r in ridges]

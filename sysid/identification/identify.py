@@ -29,7 +29,7 @@ from sysid.identification.sensitivity import (
 from sysid.identification.uncertainty import uncertainty
 from sysid.identification.whiteness import ljung_box
 from sysid.models.base import LogModel
-from sysid.objective import Objective, tempered
+from sysid.objective import Objective, pseudo_residual
 from sysid.parameters import nominal_values
 from sysid.workers import Workers
 
@@ -54,7 +54,7 @@ class Settings:
 
     methods: tuple[str, ...] = METHODS
     effort: Effort = field(default_factory=Effort)
-    huber: float = 3.0
+    huber_delta: float = 3.0
     unidentifiable: str = "stop"
     profiles: tuple[str, ...] = ()
 
@@ -82,23 +82,25 @@ def identify(
         DisasmError: fewer rows than parameters, or something that the log can't
             tell, unless it is to be frozen.
     """
-    model = with_estimated_noise(model, workers, settings.huber)
+    model = with_estimated_noise(model, workers, settings.huber_delta)
     fitted = model.of_episodes(train)
     _refuse_small_logs(fitted)
     _refuse_unknown_profiles(fitted, settings.profiles)
     news("sensitivities", 0, 0, np.nan)
-    whole = Objective(fitted, workers, settings.huber)
+    whole = Objective(fitted, workers, settings.huber_delta)
     first = sensitivity(whole, whole.start)
     frozen = _frozen(first, fitted, settings)
     model, fitted = model.freeze(frozen), fitted.freeze(frozen)
-    ladder = [Objective(m, workers, settings.huber) for m in thinned(fitted)]
+    ladder = [Objective(m, workers, settings.huber_delta) for m in thinned(fitted)]
     full = ladder[-1]
     methods = {
         name: Search(name, ladder, settings.effort, journal, news).run()
         for name in settings.methods
     }
     held_out = (
-        Objective(model.of_episodes(test), workers, settings.huber) if test else None
+        Objective(model.of_episodes(test), workers, settings.huber_delta)
+        if test
+        else None
     )
     news("uncertainty", 0, 0, np.nan)
     judged = _Judgement(full, held_out, methods, settings)
@@ -124,11 +126,13 @@ def thinned(model: LogModel) -> list[LogModel]:
     return [model.thin(every) for every in steps if every >= 2] + [model]
 
 
-def noise_floor(huber: float) -> float:
+def noise_floor(huber_delta: float) -> float:
     """Returns the objective of a perfect model: rms of tempered Gaussian noise."""
     z = np.linspace(-12.0, 12.0, 20001)
     density = norm.pdf(z)
-    return float(np.sqrt(np.trapezoid(tempered(z, huber) ** 2 * density, z)))
+    return float(
+        np.sqrt(np.trapezoid(pseudo_residual(z, huber_delta) ** 2 * density, z))
+    )
 
 
 def _refuse_small_logs(model: LogModel) -> None:
@@ -188,10 +192,10 @@ class _Judgement:
         self._full, self._held_out = full, held_out
         self._methods, self._settings = dict(methods), settings
         self._best = min(methods.values(), key=lambda result: result.value)
-        here = _linearised(full, self._best.u)
-        self._u = here.u
-        self._spread = uncertainty(here, full.model.measurements.episode)
-        self._after = of_linearisation(here, full.model.parameters)
+        linearisation = _linearised(full, self._best.u)
+        self._u = linearisation.u
+        self._spread = uncertainty(linearisation, full.model.measurements.episode)
+        self._after = of_linearisation(linearisation, full.model.parameters)
 
     def findings(self) -> dict[str, Any]:
         """Returns the fields of `Identified` that judge the result."""
@@ -217,7 +221,7 @@ class _Judgement:
                 _comparison(self._held_out, start, theta) if self._held_out else None
             ),
             "whiteness": np.array([ljung_box(column) for column in residual.T]),
-            "floor": noise_floor(self._settings.huber),
+            "floor": noise_floor(self._settings.huber_delta),
             "derived": self._derived(),
         }
 

@@ -33,7 +33,7 @@ class Linearisation:
     residual: Array
     jacobian: Array
     weights: Array
-    huber: float = np.inf
+    huber_delta: float = np.inf
 
     @property
     def information(self) -> Array:
@@ -83,12 +83,15 @@ def linearise(
     way = np.diagonal(ahead - behind)
     difference = found[1 : size + 1] - found[size + 1 :]
     jacobian = np.moveaxis(difference / way[:, None, None], 0, -1)
-    weights = huber_weights(found[0], objective.huber)
-    return Linearisation(u, found[0], jacobian, weights, objective.huber)
+    weights = huber_weights(found[0], objective.huber_delta)
+    return Linearisation(u, found[0], jacobian, weights, objective.huber_delta)
 
 
 def extend(
-    here: Linearisation, objective: Objective, u: Array, steps: Array | None = None
+    linearisation: Linearisation,
+    objective: Objective,
+    u: Array,
+    steps: Array | None = None,
 ) -> Linearisation:
     """Returns a linearisation with more parameters, one evaluation for each.
 
@@ -99,31 +102,33 @@ def extend(
         steps: (k,) of the one-sided differences by the new ones, away from the bound
             that is nearer.
     """
-    known = len(here.u)
+    known = len(linearisation.u)
     steps = np.full(len(u) - known, FIRST_STEP) if steps is None else steps
     if not len(steps):
-        return here
+        return linearisation
     way = np.where(u[known:] > 0.5, -steps, steps)
     points = np.tile(u, (len(way), 1))
     points[:, known:] += np.diag(way)
-    source, origin = objective.differences, here.residual
+    source, origin = objective.differences, linearisation.residual
     if source is not objective:
         points = np.vstack([points, u])
     found = source.residuals(objective.scaling.from_unit(points))
     if source is not objective:
         origin = found.pop()
     columns = [(r - origin) / w for r, w in zip(found, way, strict=True)]
-    jacobian = np.concatenate([here.jacobian, np.stack(columns, axis=-1)], axis=-1)
-    return dataclasses.replace(here, u=u, jacobian=jacobian)
+    jacobian = np.concatenate(
+        [linearisation.jacobian, np.stack(columns, axis=-1)], axis=-1
+    )
+    return dataclasses.replace(linearisation, u=u, jacobian=jacobian)
 
 
 def _at(objective: Objective, u: Array, residual: Array | None) -> Linearisation:
     """Returns the residuals at a point (p,), with no parameter."""
     if residual is None:
         residual = objective.residuals(objective.scaling.from_unit(u))[0]
-    weights = huber_weights(residual, objective.huber)
+    weights = huber_weights(residual, objective.huber_delta)
     nothing = np.zeros((*residual.shape, 0))
-    return Linearisation(u[:0], residual, nothing, weights, objective.huber)
+    return Linearisation(u[:0], residual, nothing, weights, objective.huber_delta)
 
 
 def fitting_steps(linearisation: Linearisation) -> Array:

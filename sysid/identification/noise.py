@@ -12,7 +12,9 @@ from sysid.workers import Workers
 _LEAST = 1e-12  # of the channel's spread: a channel that is fitted exactly
 
 
-def with_estimated_noise(model: LogModel, workers: Workers, huber: float) -> LogModel:
+def with_estimated_noise(
+    model: LogModel, workers: Workers, huber_delta: float
+) -> LogModel:
     """Returns the model with each unknown noise taken from a fit's residual.
 
     Weighted least squares as usual for arms: all channels of one unit count alike in
@@ -30,7 +32,7 @@ def with_estimated_noise(model: LogModel, workers: Workers, huber: float) -> Log
     spread = np.maximum(_pooled(centred, units), 1e-12)
     noise = np.where(unknown, spread, measured.noise)
     first = model.with_measurements(measured.with_noise(noise, "spread"))
-    objective = Objective(first, workers, huber)
+    objective = Objective(first, workers, huber_delta)
     residual = gauss_newton(objective, objective.start).residual * noise
     found = np.maximum(_pooled(residual, model.noise_groups), _LEAST * spread)
     estimated = np.where(unknown, found, measured.noise)

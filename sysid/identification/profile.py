@@ -61,7 +61,7 @@ def profile(
         there = u.copy()
         there[number] = value
         theta = float(objective.scaling.from_unit(there)[number])
-        rest = Objective(model.freeze({name: theta}), workers, objective.huber)
+        rest = Objective(model.freeze({name: theta}), workers, objective.huber_delta)
         values.append(_fitted(rest, np.delete(there, number)))
         if callback:
             callback(i + 1)

@@ -144,14 +144,18 @@ class Search:
         first, *others = self._ladder
         for count, iterations in _HALVING:
             valleys = [gauss_newton(first, u, iterations, tell) for u in starts]
-            valleys.sort(key=lambda here: first.value(here.residual))
-            starts = [here.u for here in valleys[:count]]
-        here = valleys[0]
+            valleys.sort(key=lambda linearisation: first.value(linearisation.residual))
+            starts = [linearisation.u for linearisation in valleys[:count]]
+        linearisation = valleys[0]
         for objective in others:
             last = objective is self._full
             iterations = _LAST_ITERATIONS if last else _ITERATIONS
-            here = gauss_newton(objective, here.u, iterations, tell)
-        valley = _Valley(here.u, self._full.value(here.residual), _factor(here))
+            linearisation = gauss_newton(objective, linearisation.u, iterations, tell)
+        valley = _Valley(
+            linearisation.u,
+            self._full.value(linearisation.residual),
+            _factor(linearisation),
+        )
         self._journal.finish(
             name, [valley.u.tolist(), valley.value, valley.factor.tolist()]
         )
@@ -239,9 +243,9 @@ def _starts(trace: Trace) -> list[Array]:
     return chosen
 
 
-def _factor(here: Linearisation) -> Array:
+def _factor(linearisation: Linearisation) -> Array:
     """Returns L with L L^T the covariance, no direction wider than half the box."""
-    values, vectors = np.linalg.eigh(here.information)
+    values, vectors = np.linalg.eigh(linearisation.information)
     width = 1.0 / np.sqrt(np.maximum(values, 1e-300))
     factor: Array = vectors * np.minimum(width, 0.1)
     return factor

@@ -104,32 +104,38 @@ class Sensitivity:
 
 def sensitivity(objective: Objective, u: Array) -> Sensitivity:
     """Returns what the log can say at a point (p,) of the unit box."""
-    here = linearise(objective, u)
-    weak = here.effect * 2.0 * FIRST_STEP < _WEAK
+    linearisation = linearise(objective, u)
+    weak = linearisation.effect * 2.0 * FIRST_STEP < _WEAK
     if weak.any():
-        here = linearise(objective, u, np.where(weak, WIDE_STEP, FIRST_STEP))
-    flat = np.flatnonzero(here.effect <= _SILENT)
+        linearisation = linearise(objective, u, np.where(weak, WIDE_STEP, FIRST_STEP))
+    flat = np.flatnonzero(linearisation.effect <= _SILENT)
     names = [p.name for p in objective.model.parameters]
-    silent = [names[i] for i in flat if _is_silent(objective, here, int(i))]
-    return of_linearisation(here, objective.model.parameters, silent)
+    silent = [names[i] for i in flat if _is_silent(objective, linearisation, int(i))]
+    return of_linearisation(linearisation, objective.model.parameters, silent)
 
 
 def of_linearisation(
-    here: Linearisation, parameters: Sequence[Parameter], silent: Sequence[str] = ()
+    linearisation: Linearisation,
+    parameters: Sequence[Parameter],
+    silent: Sequence[str] = (),
 ) -> Sensitivity:
     """Returns what derivatives that are there already say."""
     names = tuple(p.name for p in parameters)
     active = np.array([name not in silent for name in names])
-    return Sensitivity(names, here.effect, tuple(silent), _combinations(here, active))
+    return Sensitivity(
+        names, linearisation.effect, tuple(silent), _combinations(linearisation, active)
+    )
 
 
 def _combinations(
-    here: Linearisation, active: NDArray[np.bool_]
+    linearisation: Linearisation, active: NDArray[np.bool_]
 ) -> tuple[Combination, ...]:
     """Returns the right singular vectors of the scaled Jacobian."""
     if not active.any():
         return ()
-    _, s, Vt = np.linalg.svd(here.flat_jacobian[:, active], full_matrices=False)
+    _, s, Vt = np.linalg.svd(
+        linearisation.flat_jacobian[:, active], full_matrices=False
+    )
     combinations = []
     for size, row in zip(s, Vt, strict=True):
         weights = np.zeros(len(active))
@@ -138,9 +144,9 @@ def _combinations(
     return tuple(combinations)
 
 
-def _is_silent(objective: Objective, here: Linearisation, number: int) -> bool:
+def _is_silent(objective: Objective, linearisation: Linearisation, number: int) -> bool:
     """Returns whether a parameter without slope changes nothing elsewhere either."""
-    points = np.tile(here.u, (len(_PROBES), 1))
+    points = np.tile(linearisation.u, (len(_PROBES), 1))
     points[:, number] = _PROBES
     found = objective.residuals(objective.scaling.from_unit(points))
-    return all(np.abs(r - here.residual).max() <= _SILENT for r in found)
+    return all(np.abs(r - linearisation.residual).max() <= _SILENT for r in found)

@@ -58,7 +58,7 @@ class Uncertainty:
 
 
 def uncertainty(
-    here: Linearisation, episode: NDArray[np.int64], seed: int = 0
+    linearisation: Linearisation, episode: NDArray[np.int64], seed: int = 0
 ) -> Uncertainty:
     """Returns the spread of the estimate at which residuals were linearised.
 
@@ -71,13 +71,13 @@ def uncertainty(
         episode: (rows,) of each row; a block never spans two.
         seed: of the draws.
     """
-    block = block_length(here.residual, episode)
+    block = block_length(linearisation.residual, episode)
     blocks = block_numbers(episode, block)
-    inverse: Array = np.array(np.linalg.pinv(here.information, hermitian=True))
+    inverse: Array = np.array(np.linalg.pinv(linearisation.information, hermitian=True))
     return Uncertainty(
-        _white(here, inverse),
-        np.array(_mean_square(here) * inverse),
-        _block_bootstrap(here, blocks, seed),
+        _white(linearisation, inverse),
+        np.array(_mean_square(linearisation) * inverse),
+        _block_bootstrap(linearisation, blocks, seed),
         block,
     )
 
@@ -118,31 +118,31 @@ def block_numbers(episode: NDArray[np.int64], length: int) -> NDArray[np.int64]:
     return numbers
 
 
-def _mean_square(here: Linearisation) -> float:
-    r, w = here.residual, here.weights
-    return float(np.sum(w * r**2) / max(1, r.size - len(here.u)))
+def _mean_square(linearisation: Linearisation) -> float:
+    r, w = linearisation.residual, linearisation.weights
+    return float(np.sum(w * r**2) / max(1, r.size - len(linearisation.u)))
 
 
-def _white(here: Linearisation, inverse: Array) -> Array:
+def _white(linearisation: Linearisation, inverse: Array) -> Array:
     """Returns the covariance (p, p) of an estimate from white residuals.
 
     H^-1 (sum_c s_c^2 J_c^T J_c) H^-1 with H = J^T W J and s_c^2 = mean (w r)^2 of
     channel c (Huber 1981, 7.6); s^2 H^-1 where all channels are alike.
     """
-    J, w, r = here.jacobian, here.weights, here.residual
-    dof = max(1, r.size - len(here.u))
+    J, w, r = linearisation.jacobian, linearisation.weights, linearisation.residual
+    dof = max(1, r.size - len(linearisation.u))
     power = np.mean((w * r) ** 2, axis=0) * r.size / dof
     B = np.einsum("rci,c,rcj->ij", J, power, J)
     return np.array(inverse @ B @ inverse)
 
 
 def _block_bootstrap(
-    here: Linearisation, blocks: NDArray[np.int64], seed: int
+    linearisation: Linearisation, blocks: NDArray[np.int64], seed: int
 ) -> Array:
     """Returns draws (b, p) of the estimate's error."""
-    J, w, r = here.jacobian, here.weights, here.residual
+    J, w, r = linearisation.jacobian, linearisation.weights, linearisation.residual
     count = int(blocks.max()) + 1
-    size = len(here.u)
+    size = len(linearisation.u)
     H, g = np.zeros((count, size, size)), np.zeros((count, size))
     np.add.at(H, blocks, np.einsum("rci,rc,rcj->rij", J, w, J))
     np.add.at(g, blocks, np.einsum("rci,rc,rc->ri", J, w, r))

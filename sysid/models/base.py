@@ -127,7 +127,7 @@ class LogModel(abc.ABC):
         """Whether an evaluation takes seconds: a search is to ask for few rows."""
         return False
 
-    def alike(self) -> Self:
+    def surrogate(self) -> Self:
         """Returns a model that behaves alike and is faster; itself if there is none.
 
         Its parameters are the same. Differences of its predictions serve where those

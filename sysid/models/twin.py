@@ -153,7 +153,7 @@ class TwinModel(ScenarioModel):
         """See LogModel."""
         return not self._has_impact
 
-    def alike(self) -> Self:
+    def surrogate(self) -> Self:
         """See LogModel: IMPACT, where all parameters mean the same to it."""
         paths = [parameter.path for parameter in self.parameters]
         own = [p for p in paths if p.startswith("contact.") and p != _FRICTION]
@@ -235,7 +235,7 @@ class TwinModel(ScenarioModel):
         if self._replay is None:
             self._replay = self._new_replay(_environment_alone(scenario))
         elif self._simulated != key:
-            self._replay.become(_environment_alone(scenario))
+            self._replay.reconfigure(_environment_alone(scenario))
         self._simulated = key
         return self._replay
 

@@ -25,7 +25,7 @@ from drake_disasm.scenario import Scenario
 from sysid.effect_selection.close_loop import HELD_OUT, HUBER, close_loop
 from sysid.identification.split import split_episodes
 from sysid.models.twin import TwinModel
-from sysid.objective import rms, tempered
+from sysid.objective import pseudo_residual, rms
 from sysid.validation.random_effects import drawn
 from sysid.validation.synthetic_logs import transitions_log
 from sysid.workers import Workers
@@ -151,7 +151,7 @@ def residual(effect: Effect, folder: str) -> float:
     model = TwinModel([read_log(log)], nominal(), ())
     measured = model.measurements
     error = model.predictions(np.zeros(0)) - measured.values
-    return rms(tempered(error / measured.noise, HUBER))
+    return rms(pseudo_residual(error / measured.noise, HUBER))
 
 
 def answers(

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from drake_disasm.effects import Effect, shapes, sizes
+from drake_disasm.effects import Effect, amplitudes, shape_parameters
 
 _FIRST = 1e-3  # of the range of a field, where the search for its size begins
 _MOST_FIELDS = 2
@@ -51,7 +51,7 @@ def _attempt(
 ) -> tuple[Effect, float]:
     """Returns an effect of about a wanted size, and the size that was reached."""
     fields = {f.name: f.metadata for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
-    names = sizes(kind)
+    names = amplitudes(kind)
     count = int(random.integers(1, min(_MOST_FIELDS, len(names)) + 1))
     unit = {}
     for name in random.choice(names, count, replace=False):
@@ -60,7 +60,7 @@ def _attempt(
         unit[str(name)] = sign * reach * random.uniform(0.5, 1.0)
     look = {
         name: float(np.exp(random.uniform(*np.log([min(grid), max(grid)]))))
-        for name, grid in shapes(kind).items()
+        for name, grid in shape_parameters(kind).items()
     }
     scale, before = _FIRST, None
     for number in range(1, _MOST_ROUNDS + 1):

@@ -134,17 +134,22 @@ def measure_recovery(name: str, seeds: int = 10) -> None:
             objective = Objective(fitted, workers, HUBER)
             quarter = Objective(objective.model.thin(4), workers, HUBER)
             near = gauss_newton(quarter, quarter.scaling.to_unit(case.start), 10)
-            here = gauss_newton(objective, near.u, 3)
-            spread = uncertainty(here, objective.model.measurements.episode)
-            scaling, theta = objective.scaling, objective.scaling.from_unit(here.u)
+            linearisation = gauss_newton(objective, near.u, 3)
+            spread = uncertainty(linearisation, objective.model.measurements.episode)
+            scaling, theta = (
+                objective.scaling,
+                objective.scaling.from_unit(linearisation.u),
+            )
             inside = []
             for interval in (spread.gauss_newton, spread.bootstrap):
-                low, high = (scaling.from_unit(here.u + side) for side in interval.T)
+                low, high = (
+                    scaling.from_unit(linearisation.u + side) for side in interval.T
+                )
                 inside.append((low < truth) & (truth < high))
             rows.append((theta, high - low, *inside))
             print(
-                f"seed {seed}: f {objective.value(here.residual):.3f} at truth "
-                f"{objective(truth)[0]:.3f}",
+                f"seed {seed}: f {objective.value(linearisation.residual):.3f} "
+                f"at truth {objective(truth)[0]:.3f}",
                 " ".join(f"{v:.5g}" for v in theta),
                 f"block {spread.block}, {time.perf_counter() - begin:.0f} s",
                 flush=True,

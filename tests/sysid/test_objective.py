@@ -11,7 +11,13 @@ import pytest
 
 from drake_disasm.common.errors import DisasmError
 from sysid.identification.linearisation import linearise
-from sysid.objective import FAILED_RESIDUAL, Objective, huber_weights, rms, tempered
+from sysid.objective import (
+    FAILED_RESIDUAL,
+    Objective,
+    huber_weights,
+    pseudo_residual,
+    rms,
+)
 from sysid.workers import Workers
 from tests.sysid.toys import NOISE, Decay
 
@@ -86,9 +92,9 @@ def test_workers_that_die_again_and_again_are_an_error():
 def test_tempered_squares_are_hubers_loss():
     r = np.array([-50.0, -3.0, -1.0, 0.0, 2.0, 3.0, 7.0])
     expected = np.where(np.abs(r) <= 3, r**2, 2 * 3 * np.abs(r) - 9)
-    np.testing.assert_allclose(tempered(r, 3.0) ** 2, expected)
-    np.testing.assert_array_equal(np.sign(tempered(r, 3.0)), np.sign(r))
-    np.testing.assert_array_equal(tempered(r, np.inf), r)
+    np.testing.assert_allclose(pseudo_residual(r, 3.0) ** 2, expected)
+    np.testing.assert_array_equal(np.sign(pseudo_residual(r, 3.0)), np.sign(r))
+    np.testing.assert_array_equal(pseudo_residual(r, np.inf), r)
     np.testing.assert_allclose(huber_weights(r, 3.0), [0.06, 1, 1, 1, 1, 1, 3 / 7])
 
 
@@ -138,14 +144,14 @@ def test_derivatives_may_be_those_of_a_model_alike():
         def predict(self, theta, rows):
             return 2.0 * super().predict(theta, rows)
 
-    own, alike = (
+    own, surrogate = (
         linearise(
-            Objective(Decay(), Workers(), alike=a), np.full(3, 0.4), central=False
+            Objective(Decay(), Workers(), surrogate=a), np.full(3, 0.4), central=False
         )
         for a in (None, Alike())
     )
-    assert np.array_equal(alike.residual, own.residual)
-    np.testing.assert_allclose(alike.jacobian, 2.0 * own.jacobian, atol=1e-6)
+    assert np.array_equal(surrogate.residual, own.residual)
+    np.testing.assert_allclose(surrogate.jacobian, 2.0 * own.jacobian, atol=1e-6)
 
 
 def test_jobs_go_to_the_workers_and_come_back_in_order():

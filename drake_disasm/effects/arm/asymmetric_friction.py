@@ -7,9 +7,9 @@ import numpy as np
 from drake_disasm.effects.base import (
     JointEffect,
     JointSamples,
+    amplitude,
     joint_name,
-    parameter,
-    shape,
+    shape_parameter,
 )
 
 #: Below it a joint rests, for all that filtered velocities can tell.
@@ -25,9 +25,11 @@ class JointAsymmetricFriction(JointEffect):
     """
 
     joint: str = joint_name()
-    coulomb: float = parameter("N m", -200.0, 200.0, "dry part")
-    viscous: float = parameter("N m s/rad", -500.0, 500.0, "viscous part")
-    creep: float = shape(0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP)
+    coulomb: float = amplitude("N m", -200.0, 200.0, "dry part")
+    viscous: float = amplitude("N m s/rad", -500.0, 500.0, "viscous part")
+    creep: float = shape_parameter(
+        0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP
+    )
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

@@ -7,9 +7,9 @@ import numpy as np
 from drake_disasm.effects.base import (
     JointEffect,
     JointSamples,
+    amplitude,
     joint_name,
-    parameter,
-    shape,
+    shape_parameter,
 )
 
 #: Below it a joint rests, for all that filtered velocities can tell.
@@ -25,8 +25,10 @@ class JointCoulombFriction(JointEffect):
     """
 
     joint: str = joint_name()
-    size: float = parameter("N m", 0.0, 200.0, "friction torque")
-    creep: float = shape(0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP)
+    size: float = amplitude("N m", 0.0, 200.0, "friction torque")
+    creep: float = shape_parameter(
+        0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP
+    )
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import ArmEffect, parameter
+from drake_disasm.effects.base import ArmEffect, amplitude
 
 _LIGHTEST = 0.1  # kg, that has an inertia of its own
 
@@ -24,10 +24,10 @@ class FlangePayload(ArmEffect):
     compensation does not carry it: the joints yield by tau / k.
     """
 
-    mass: float = parameter("kg", 0.0, 50.0, "of the payload")
-    cx: float = parameter("kg m", -10.0, 10.0, "its first moment along x_F")
-    cy: float = parameter("kg m", -10.0, 10.0, "its first moment along y_F")
-    cz: float = parameter("kg m", -10.0, 10.0, "its first moment along z_F")
+    mass: float = amplitude("kg", 0.0, 50.0, "of the payload")
+    cx: float = amplitude("kg m", -10.0, 10.0, "its first moment along x_F")
+    cy: float = amplitude("kg m", -10.0, 10.0, "its first moment along y_F")
+    cz: float = amplitude("kg m", -10.0, 10.0, "its first moment along z_F")
 
     @property
     def first_moment(self) -> np.ndarray:

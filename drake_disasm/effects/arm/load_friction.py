@@ -7,9 +7,9 @@ import numpy as np
 from drake_disasm.effects.base import (
     JointEffect,
     JointSamples,
+    amplitude,
     joint_name,
-    parameter,
-    shape,
+    shape_parameter,
 )
 
 #: Below it a joint rests, for all that filtered velocities can tell.
@@ -25,8 +25,10 @@ class JointLoadFriction(JointEffect):
     """
 
     joint: str = joint_name()
-    coefficient: float = parameter("1", 0.0, 1.0, "share of the load")
-    creep: float = shape(0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP)
+    coefficient: float = amplitude("1", 0.0, 1.0, "share of the load")
+    creep: float = shape_parameter(
+        0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP
+    )
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

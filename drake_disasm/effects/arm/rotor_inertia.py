@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import JointEffect, JointSamples, joint_name, parameter
+from drake_disasm.effects.base import JointEffect, JointSamples, amplitude, joint_name
 
 
 @dataclasses.dataclass
@@ -16,7 +16,7 @@ class RotorInertia(JointEffect):
     """
 
     joint: str = joint_name()
-    inertia: float = parameter("kg m^2", 0.0, 50.0, "reflected to the joint")
+    inertia: float = amplitude("kg m^2", 0.0, 50.0, "reflected to the joint")
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

@@ -7,9 +7,9 @@ import numpy as np
 from drake_disasm.effects.base import (
     JointEffect,
     JointSamples,
+    amplitude,
     joint_name,
-    parameter,
-    shape,
+    shape_parameter,
 )
 
 
@@ -23,9 +23,11 @@ class JointStribeckFriction(JointEffect):
     """
 
     joint: str = joint_name()
-    size: float = parameter("N m", 0.0, 200.0, "at breakaway, beyond Coulomb's")
-    speed: float = shape(0.1, "rad/s", 1e-3, 5.0, "of the film", (0.05, 0.15, 0.5))
-    creep: float = shape(
+    size: float = amplitude("N m", 0.0, 200.0, "at breakaway, beyond Coulomb's")
+    speed: float = shape_parameter(
+        0.1, "rad/s", 1e-3, 5.0, "of the film", (0.05, 0.15, 0.5)
+    )
+    creep: float = shape_parameter(
         0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", (0.02,)
     )
 

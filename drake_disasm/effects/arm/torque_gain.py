@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import JointEffect, JointSamples, joint_name, parameter
+from drake_disasm.effects.base import JointEffect, JointSamples, amplitude, joint_name
 
 
 @dataclasses.dataclass
@@ -16,7 +16,7 @@ class TorqueGain(JointEffect):
     """
 
     joint: str = joint_name()
-    share: float = parameter("1", -0.9, 0.9, "too much")
+    share: float = amplitude("1", -0.9, 0.9, "too much")
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import JointEffect, JointSamples, joint_name, parameter
+from drake_disasm.effects.base import JointEffect, JointSamples, amplitude, joint_name
 
 
 @dataclasses.dataclass
@@ -16,7 +16,7 @@ class TorqueOffset(JointEffect):
     """
 
     joint: str = joint_name()
-    size: float = parameter("N m", -200.0, 200.0, "offset")
+    size: float = amplitude("N m", -200.0, 200.0, "offset")
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

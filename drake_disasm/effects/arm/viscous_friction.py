@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import JointEffect, JointSamples, joint_name, parameter
+from drake_disasm.effects.base import JointEffect, JointSamples, amplitude, joint_name
 
 
 @dataclasses.dataclass
@@ -16,7 +16,7 @@ class JointViscousFriction(JointEffect):
     """
 
     joint: str = joint_name()
-    coefficient: float = parameter("N m s/rad", 0.0, 500.0, "viscous coefficient")
+    coefficient: float = amplitude("N m s/rad", 0.0, 500.0, "viscous coefficient")
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

@@ -8,7 +8,7 @@ from drake_disasm.effects.base import (
     BoltMotion,
     Environment,
     EnvironmentEffect,
-    parameter,
+    amplitude,
 )
 
 
@@ -22,10 +22,10 @@ class ChainPull(EnvironmentEffect):
     Where it acts: a force on the bolt at Bo.
     """
 
-    fx: float = parameter("N", -30.0, 30.0, "constant, along x_G")
-    fy: float = parameter("N", -30.0, 30.0, "constant, along y_G")
-    fz: float = parameter("N", -30.0, 30.0, "constant, along z_G")
-    k: float = parameter("N/m", -500.0, 500.0, "of a spring that pulls back to A")
+    fx: float = amplitude("N", -30.0, 30.0, "constant, along x_G")
+    fy: float = amplitude("N", -30.0, 30.0, "constant, along y_G")
+    fz: float = amplitude("N", -30.0, 30.0, "constant, along z_G")
+    k: float = amplitude("N/m", -500.0, 500.0, "of a spring that pulls back to A")
 
     is_local = True
 

@@ -6,7 +6,7 @@ from drake_disasm.effects.base import (
     BoltMotion,
     Environment,
     EnvironmentEffect,
-    parameter,
+    amplitude,
 )
 
 
@@ -18,7 +18,7 @@ class ContactExponent(EnvironmentEffect):
     Where it acts: IMPACT's law; hydroelastic contact has no exponent and ignores it.
     """
 
-    change: float = parameter("1", -1.0, 3.0, "of the exponent e")
+    change: float = amplitude("1", -1.0, 3.0, "of the exponent e")
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Changes the exponent."""

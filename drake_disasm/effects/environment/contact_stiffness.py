@@ -8,7 +8,7 @@ from drake_disasm.effects.base import (
     BoltMotion,
     Environment,
     EnvironmentEffect,
-    parameter,
+    amplitude,
 )
 
 
@@ -21,7 +21,7 @@ class ContactStiffness(EnvironmentEffect):
     Where it acts: the contact material of the bolt, or IMPACT's law.
     """
 
-    log_factor: float = parameter("1", -5.0, 5.0, "natural logarithm of the factor")
+    log_factor: float = amplitude("1", -5.0, 5.0, "natural logarithm of the factor")
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Scales the stiffness."""

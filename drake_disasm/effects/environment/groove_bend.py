@@ -10,7 +10,7 @@ from drake_disasm.effects.base import (
     BoltMotion,
     Environment,
     EnvironmentEffect,
-    parameter,
+    amplitude,
 )
 
 
@@ -24,8 +24,8 @@ class GrooveBend(EnvironmentEffect):
     Where it acts: the pose of the lock in the plant, anew in each step of the MDP.
     """
 
-    ky: float = parameter("1/m", -2.0, 2.0, "curvature out of the plate")
-    kz: float = parameter("1/m", -2.0, 2.0, "curvature across the groove")
+    ky: float = amplitude("1/m", -2.0, 2.0, "curvature out of the plate")
+    kz: float = amplitude("1/m", -2.0, 2.0, "curvature across the groove")
 
     is_local = True
 

@@ -6,7 +6,7 @@ from drake_disasm.effects.base import (
     BoltMotion,
     Environment,
     EnvironmentEffect,
-    parameter,
+    amplitude,
 )
 
 _LEAST = 2e-5  # m: a bolt that is no wider than its slot
@@ -21,7 +21,7 @@ class GrooveClearance(EnvironmentEffect):
     Where it acts: the lips of the groove in the scene graph.
     """
 
-    change: float = parameter("m", -5e-4, 1e-3, "of the clearance")
+    change: float = amplitude("m", -5e-4, 1e-3, "of the clearance")
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Changes the clearance."""

@@ -6,7 +6,7 @@ from drake_disasm.effects.base import (
     BoltMotion,
     Environment,
     EnvironmentEffect,
-    parameter,
+    amplitude,
 )
 
 
@@ -19,7 +19,7 @@ class GrooveFriction(EnvironmentEffect):
     Where it acts: the contact material of the groove and of the bolt.
     """
 
-    coefficient: float = parameter("1", -1.0, 1.0, "added to the nominal mu")
+    coefficient: float = amplitude("1", -1.0, 1.0, "added to the nominal mu")
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds the coefficient, never below a frictionless groove."""

@@ -10,7 +10,7 @@ from drake_disasm.effects.base import (
     BoltMotion,
     Environment,
     EnvironmentEffect,
-    parameter,
+    amplitude,
 )
 
 
@@ -27,12 +27,12 @@ class GroovePose(EnvironmentEffect):
     which it still finds the slot.
     """
 
-    rx: float = parameter("rad", -0.2, 0.2, "turned about the groove's axis")
-    ry: float = parameter("rad", -0.2, 0.2, "turned about the plate's normal")
-    rz: float = parameter("rad", -0.2, 0.2, "tilted: the far end goes up")
-    x: float = parameter("m", -0.01, 0.003, "shifted along the groove")
-    y: float = parameter("m", -0.001, 0.001, "shifted out of the plate")
-    z: float = parameter("m", -0.002, 0.002, "shifted across the groove")
+    rx: float = amplitude("rad", -0.2, 0.2, "turned about the groove's axis")
+    ry: float = amplitude("rad", -0.2, 0.2, "turned about the plate's normal")
+    rz: float = amplitude("rad", -0.2, 0.2, "tilted: the far end goes up")
+    x: float = amplitude("m", -0.01, 0.003, "shifted along the groove")
+    y: float = amplitude("m", -0.001, 0.001, "shifted out of the plate")
+    z: float = amplitude("m", -0.002, 0.002, "shifted across the groove")
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Composes the true groove frame onto the pose so far."""

@@ -8,8 +8,8 @@ from drake_disasm.effects.base import (
     BoltMotion,
     Environment,
     EnvironmentEffect,
-    parameter,
-    shape,
+    amplitude,
+    shape_parameter,
 )
 
 
@@ -22,10 +22,10 @@ class RustyPatch(EnvironmentEffect):
     Where it acts: the contact material of the groove and of the bolt.
     """
 
-    coefficient: float = parameter(
+    coefficient: float = amplitude(
         "1", -1.0, 2.0, "a, added in the middle of the patch"
     )
-    position: float = shape(
+    position: float = shape_parameter(
         0.03,
         "m",
         -0.02,
@@ -33,7 +33,9 @@ class RustyPatch(EnvironmentEffect):
         "x_0, its middle",
         (0.005, 0.015, 0.025, 0.035, 0.045, 0.055),
     )
-    width: float = shape(0.008, "m", 0.001, 0.1, "w, its half width", (0.008,))
+    width: float = shape_parameter(
+        0.008, "m", 0.001, 0.1, "w, its half width", (0.008,)
+    )
 
     is_local = True
 

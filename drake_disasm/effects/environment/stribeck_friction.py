@@ -8,8 +8,8 @@ from drake_disasm.effects.base import (
     BoltMotion,
     Environment,
     EnvironmentEffect,
-    parameter,
-    shape,
+    amplitude,
+    shape_parameter,
 )
 
 
@@ -22,8 +22,8 @@ class GrooveStribeckFriction(EnvironmentEffect):
     Where it acts: the contact material of the groove and of the bolt.
     """
 
-    coefficient: float = parameter("1", -1.0, 1.0, "a, added at rest")
-    velocity: float = shape(
+    coefficient: float = amplitude("1", -1.0, 1.0, "a, added at rest")
+    velocity: float = shape_parameter(
         0.01, "m/s", 1e-4, 1.0, "v_s, at which it has mostly gone", (0.005, 0.015)
     )
 

@@ -8,7 +8,7 @@ from drake_disasm.effects.base import (
     BoltMotion,
     Environment,
     EnvironmentEffect,
-    parameter,
+    amplitude,
 )
 
 
@@ -20,7 +20,7 @@ class GrooveViscousFriction(EnvironmentEffect):
     Where it acts: a force on the bolt at Bo.
     """
 
-    coefficient: float = parameter("N s/m", 0.0, 1000.0, "c")
+    coefficient: float = amplitude("N s/m", 0.0, 1000.0, "c")
 
     is_local = True
 

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Memory, MotionEffect, parameter
+from drake_disasm.effects.base import Memory, MotionEffect, amplitude
 
 
 @dataclasses.dataclass
@@ -17,12 +17,12 @@ class Backlash(MotionEffect):
     shows it.
     """
 
-    x: float = parameter("m", 0.0, 0.005, "play along x_G")
-    y: float = parameter("m", 0.0, 0.005, "play along y_G")
-    z: float = parameter("m", 0.0, 0.005, "play along z_G")
-    u: float = parameter("rad", 0.0, 0.05, "play about x_G")
-    v: float = parameter("rad", 0.0, 0.05, "play about y_G")
-    w: float = parameter("rad", 0.0, 0.05, "play about z_G")
+    x: float = amplitude("m", 0.0, 0.005, "play along x_G")
+    y: float = amplitude("m", 0.0, 0.005, "play along y_G")
+    z: float = amplitude("m", 0.0, 0.005, "play along z_G")
+    u: float = amplitude("rad", 0.0, 0.05, "play about x_G")
+    v: float = amplitude("rad", 0.0, 0.05, "play about y_G")
+    w: float = amplitude("rad", 0.0, 0.05, "play about z_G")
 
     stage = 2
 

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Memory, MotionEffect, parameter
+from drake_disasm.effects.base import Memory, MotionEffect, amplitude
 
 
 @dataclasses.dataclass
@@ -16,12 +16,12 @@ class CommandGain(MotionEffect):
     Where it acts: on the commanded pose, before inverse kinematics.
     """
 
-    x: float = parameter("1", -0.5, 0.5, "more displacement along x_G")
-    y: float = parameter("1", -0.5, 0.5, "more displacement along y_G")
-    z: float = parameter("1", -0.5, 0.5, "more displacement along z_G")
-    u: float = parameter("1", -0.5, 0.5, "more rotation about x_G")
-    v: float = parameter("1", -0.5, 0.5, "more rotation about y_G")
-    w: float = parameter("1", -0.5, 0.5, "more rotation about z_G")
+    x: float = amplitude("1", -0.5, 0.5, "more displacement along x_G")
+    y: float = amplitude("1", -0.5, 0.5, "more displacement along y_G")
+    z: float = amplitude("1", -0.5, 0.5, "more displacement along z_G")
+    u: float = amplitude("1", -0.5, 0.5, "more rotation about x_G")
+    v: float = amplitude("1", -0.5, 0.5, "more rotation about y_G")
+    w: float = amplitude("1", -0.5, 0.5, "more rotation about z_G")
 
     def execute(
         self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float

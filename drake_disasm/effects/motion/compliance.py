@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Memory, MotionEffect, parameter
+from drake_disasm.effects.base import Memory, MotionEffect, amplitude
 
 
 @dataclasses.dataclass
@@ -18,12 +18,12 @@ class Compliance(MotionEffect):
     Where it acts: on the commanded pose, before inverse kinematics.
     """
 
-    x: float = parameter("m/N", 0.0, 4e-5, "along x_G")
-    y: float = parameter("m/N", 0.0, 4e-5, "along y_G")
-    z: float = parameter("m/N", 0.0, 4e-5, "along z_G")
-    u: float = parameter("rad/(N m)", 0.0, 1.5e-3, "about x_G")
-    v: float = parameter("rad/(N m)", 0.0, 1.5e-3, "about y_G")
-    w: float = parameter("rad/(N m)", 0.0, 4e-4, "about z_G")
+    x: float = amplitude("m/N", 0.0, 4e-5, "along x_G")
+    y: float = amplitude("m/N", 0.0, 4e-5, "along y_G")
+    z: float = amplitude("m/N", 0.0, 4e-5, "along z_G")
+    u: float = amplitude("rad/(N m)", 0.0, 1.5e-3, "about x_G")
+    v: float = amplitude("rad/(N m)", 0.0, 1.5e-3, "about y_G")
+    w: float = amplitude("rad/(N m)", 0.0, 4e-4, "about z_G")
 
     stage = 3
 

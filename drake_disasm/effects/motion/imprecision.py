@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Memory, MotionEffect, parameter
+from drake_disasm.effects.base import Memory, MotionEffect, amplitude
 
 
 @dataclasses.dataclass
@@ -21,9 +21,9 @@ class Imprecision(MotionEffect):
     any other differently.
     """
 
-    x: float = parameter("m", 0.0, 0.002, "standard deviation along x_G")
-    y: float = parameter("m", 0.0, 0.002, "standard deviation along y_G")
-    z: float = parameter("m", 0.0, 0.002, "standard deviation along z_G")
+    x: float = amplitude("m", 0.0, 0.002, "standard deviation along x_G")
+    y: float = amplitude("m", 0.0, 0.002, "standard deviation along y_G")
+    z: float = amplitude("m", 0.0, 0.002, "standard deviation along z_G")
 
     stage = 4
     is_random = True

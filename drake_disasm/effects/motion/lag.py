@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Memory, MotionEffect, parameter
+from drake_disasm.effects.base import Memory, MotionEffect, amplitude
 
 
 @dataclasses.dataclass
@@ -17,7 +17,7 @@ class MotionLag(MotionEffect):
     Where it acts: on the commanded pose, before inverse kinematics.
     """
 
-    delay: float = parameter("s", 0.0, 0.1, "of the motion behind its command")
+    delay: float = amplitude("s", 0.0, 0.1, "of the motion behind its command")
 
     stage = 1
 

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Memory, MotionEffect, parameter
+from drake_disasm.effects.base import Memory, MotionEffect, amplitude
 
 
 @dataclasses.dataclass
@@ -17,9 +17,9 @@ class BoltSlip(MotionEffect):
     Where it acts: between gripper and bolt.
     """
 
-    x: float = parameter("m/(N s)", 0.0, 1e-3, "creep along x_G")
-    y: float = parameter("m/(N s)", 0.0, 1e-3, "creep along y_G")
-    z: float = parameter("m/(N s)", 0.0, 1e-3, "creep along z_G")
+    x: float = amplitude("m/(N s)", 0.0, 1e-3, "creep along x_G")
+    y: float = amplitude("m/(N s)", 0.0, 1e-3, "creep along y_G")
+    z: float = amplitude("m/(N s)", 0.0, 1e-3, "creep along z_G")
 
     stage = 3
 

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from drake_disasm.common.spatial import rotation_from_vector
-from drake_disasm.effects.base import Sensing, SensorEffect, parameter
+from drake_disasm.effects.base import Sensing, SensorEffect, amplitude
 
 
 @dataclasses.dataclass
@@ -18,8 +18,8 @@ class BaseTilt(SensorEffect):
     Where it acts: the weight of the payload, before the sensor.
     """
 
-    rx: float = parameter("rad", -0.2, 0.2, "tilted about x_W")
-    ry: float = parameter("rad", -0.2, 0.2, "tilted about y_W")
+    rx: float = amplitude("rad", -0.2, 0.2, "tilted about x_W")
+    ry: float = amplitude("rad", -0.2, 0.2, "tilted about y_W")
 
     stage = -1
 

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, parameter
+from drake_disasm.effects.base import Sensing, SensorEffect, amplitude
 
 
 @dataclasses.dataclass
@@ -16,12 +16,12 @@ class SensorBias(SensorEffect):
     it; an offset that was there before is what zeroing removes.
     """
 
-    fx: float = parameter("N", -50.0, 50.0, "force offset along x_S")
-    fy: float = parameter("N", -50.0, 50.0, "force offset along y_S")
-    fz: float = parameter("N", -50.0, 50.0, "force offset along z_S")
-    tx: float = parameter("N m", -5.0, 5.0, "torque offset about x_S")
-    ty: float = parameter("N m", -5.0, 5.0, "torque offset about y_S")
-    tz: float = parameter("N m", -5.0, 5.0, "torque offset about z_S")
+    fx: float = amplitude("N", -50.0, 50.0, "force offset along x_S")
+    fy: float = amplitude("N", -50.0, 50.0, "force offset along y_S")
+    fz: float = amplitude("N", -50.0, 50.0, "force offset along z_S")
+    tx: float = amplitude("N m", -5.0, 5.0, "torque offset about x_S")
+    ty: float = amplitude("N m", -5.0, 5.0, "torque offset about y_S")
+    tz: float = amplitude("N m", -5.0, 5.0, "torque offset about z_S")
 
     present_at_zeroing = False
 

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, parameter
+from drake_disasm.effects.base import Sensing, SensorEffect, amplitude
 
 
 @dataclasses.dataclass
@@ -16,36 +16,36 @@ class SensorCrossTalk(SensorEffect):
     Where it acts: the force/torque sensor's calibration; zeroing sees it.
     """
 
-    fx_fy: float = parameter("1", -0.5, 0.5, "what fx picks up of fy")
-    fx_fz: float = parameter("1", -0.5, 0.5, "what fx picks up of fz")
-    fx_tx: float = parameter("1/m", -10.0, 10.0, "what fx picks up of tx")
-    fx_ty: float = parameter("1/m", -10.0, 10.0, "what fx picks up of ty")
-    fx_tz: float = parameter("1/m", -10.0, 10.0, "what fx picks up of tz")
-    fy_fx: float = parameter("1", -0.5, 0.5, "what fy picks up of fx")
-    fy_fz: float = parameter("1", -0.5, 0.5, "what fy picks up of fz")
-    fy_tx: float = parameter("1/m", -10.0, 10.0, "what fy picks up of tx")
-    fy_ty: float = parameter("1/m", -10.0, 10.0, "what fy picks up of ty")
-    fy_tz: float = parameter("1/m", -10.0, 10.0, "what fy picks up of tz")
-    fz_fx: float = parameter("1", -0.5, 0.5, "what fz picks up of fx")
-    fz_fy: float = parameter("1", -0.5, 0.5, "what fz picks up of fy")
-    fz_tx: float = parameter("1/m", -10.0, 10.0, "what fz picks up of tx")
-    fz_ty: float = parameter("1/m", -10.0, 10.0, "what fz picks up of ty")
-    fz_tz: float = parameter("1/m", -10.0, 10.0, "what fz picks up of tz")
-    tx_fx: float = parameter("m", -0.1, 0.1, "what tx picks up of fx")
-    tx_fy: float = parameter("m", -0.1, 0.1, "what tx picks up of fy")
-    tx_fz: float = parameter("m", -0.1, 0.1, "what tx picks up of fz")
-    tx_ty: float = parameter("1", -0.5, 0.5, "what tx picks up of ty")
-    tx_tz: float = parameter("1", -0.5, 0.5, "what tx picks up of tz")
-    ty_fx: float = parameter("m", -0.1, 0.1, "what ty picks up of fx")
-    ty_fy: float = parameter("m", -0.1, 0.1, "what ty picks up of fy")
-    ty_fz: float = parameter("m", -0.1, 0.1, "what ty picks up of fz")
-    ty_tx: float = parameter("1", -0.5, 0.5, "what ty picks up of tx")
-    ty_tz: float = parameter("1", -0.5, 0.5, "what ty picks up of tz")
-    tz_fx: float = parameter("m", -0.1, 0.1, "what tz picks up of fx")
-    tz_fy: float = parameter("m", -0.1, 0.1, "what tz picks up of fy")
-    tz_fz: float = parameter("m", -0.1, 0.1, "what tz picks up of fz")
-    tz_tx: float = parameter("1", -0.5, 0.5, "what tz picks up of tx")
-    tz_ty: float = parameter("1", -0.5, 0.5, "what tz picks up of ty")
+    fx_fy: float = amplitude("1", -0.5, 0.5, "what fx picks up of fy")
+    fx_fz: float = amplitude("1", -0.5, 0.5, "what fx picks up of fz")
+    fx_tx: float = amplitude("1/m", -10.0, 10.0, "what fx picks up of tx")
+    fx_ty: float = amplitude("1/m", -10.0, 10.0, "what fx picks up of ty")
+    fx_tz: float = amplitude("1/m", -10.0, 10.0, "what fx picks up of tz")
+    fy_fx: float = amplitude("1", -0.5, 0.5, "what fy picks up of fx")
+    fy_fz: float = amplitude("1", -0.5, 0.5, "what fy picks up of fz")
+    fy_tx: float = amplitude("1/m", -10.0, 10.0, "what fy picks up of tx")
+    fy_ty: float = amplitude("1/m", -10.0, 10.0, "what fy picks up of ty")
+    fy_tz: float = amplitude("1/m", -10.0, 10.0, "what fy picks up of tz")
+    fz_fx: float = amplitude("1", -0.5, 0.5, "what fz picks up of fx")
+    fz_fy: float = amplitude("1", -0.5, 0.5, "what fz picks up of fy")
+    fz_tx: float = amplitude("1/m", -10.0, 10.0, "what fz picks up of tx")
+    fz_ty: float = amplitude("1/m", -10.0, 10.0, "what fz picks up of ty")
+    fz_tz: float = amplitude("1/m", -10.0, 10.0, "what fz picks up of tz")
+    tx_fx: float = amplitude("m", -0.1, 0.1, "what tx picks up of fx")
+    tx_fy: float = amplitude("m", -0.1, 0.1, "what tx picks up of fy")
+    tx_fz: float = amplitude("m", -0.1, 0.1, "what tx picks up of fz")
+    tx_ty: float = amplitude("1", -0.5, 0.5, "what tx picks up of ty")
+    tx_tz: float = amplitude("1", -0.5, 0.5, "what tx picks up of tz")
+    ty_fx: float = amplitude("m", -0.1, 0.1, "what ty picks up of fx")
+    ty_fy: float = amplitude("m", -0.1, 0.1, "what ty picks up of fy")
+    ty_fz: float = amplitude("m", -0.1, 0.1, "what ty picks up of fz")
+    ty_tx: float = amplitude("1", -0.5, 0.5, "what ty picks up of tx")
+    ty_tz: float = amplitude("1", -0.5, 0.5, "what ty picks up of tz")
+    tz_fx: float = amplitude("m", -0.1, 0.1, "what tz picks up of fx")
+    tz_fy: float = amplitude("m", -0.1, 0.1, "what tz picks up of fy")
+    tz_fz: float = amplitude("m", -0.1, 0.1, "what tz picks up of fz")
+    tz_tx: float = amplitude("1", -0.5, 0.5, "what tz picks up of tx")
+    tz_ty: float = amplitude("1", -0.5, 0.5, "what tz picks up of ty")
 
     stage = 2
 

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, parameter, shape
+from drake_disasm.effects.base import Sensing, SensorEffect, amplitude, shape_parameter
 
 _NEVER = 1e6  # s
 _GRID = (10.0, 30.0, 50.0, 100.0, 300.0, _NEVER)
@@ -20,13 +20,15 @@ class SensorDrift(SensorEffect):
     Where it acts: the reading of the force/torque sensor, after zeroing.
     """
 
-    fx: float = parameter("N/s", -5.0, 5.0, "drift of the force along x_S")
-    fy: float = parameter("N/s", -5.0, 5.0, "drift of the force along y_S")
-    fz: float = parameter("N/s", -5.0, 5.0, "drift of the force along z_S")
-    tx: float = parameter("N m/s", -0.5, 0.5, "drift of the torque about x_S")
-    ty: float = parameter("N m/s", -0.5, 0.5, "drift of the torque about y_S")
-    tz: float = parameter("N m/s", -0.5, 0.5, "drift of the torque about z_S")
-    duration: float = shape(_NEVER, "s", 1.0, _NEVER, "T, when it ends", _GRID)
+    fx: float = amplitude("N/s", -5.0, 5.0, "drift of the force along x_S")
+    fy: float = amplitude("N/s", -5.0, 5.0, "drift of the force along y_S")
+    fz: float = amplitude("N/s", -5.0, 5.0, "drift of the force along z_S")
+    tx: float = amplitude("N m/s", -0.5, 0.5, "drift of the torque about x_S")
+    ty: float = amplitude("N m/s", -0.5, 0.5, "drift of the torque about y_S")
+    tz: float = amplitude("N m/s", -0.5, 0.5, "drift of the torque about z_S")
+    duration: float = shape_parameter(
+        _NEVER, "s", 1.0, _NEVER, "T, when it ends", _GRID
+    )
 
     present_at_zeroing = False
 

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, parameter
+from drake_disasm.effects.base import Sensing, SensorEffect, amplitude
 
 
 @dataclasses.dataclass
@@ -15,12 +15,12 @@ class SensorGain(SensorEffect):
     Where it acts: the force/torque sensor's calibration; zeroing sees it.
     """
 
-    fx: float = parameter("1", -0.5, 0.5, "share too much of the force along x_S")
-    fy: float = parameter("1", -0.5, 0.5, "share too much of the force along y_S")
-    fz: float = parameter("1", -0.5, 0.5, "share too much of the force along z_S")
-    tx: float = parameter("1", -0.5, 0.5, "share too much of the torque about x_S")
-    ty: float = parameter("1", -0.5, 0.5, "share too much of the torque about y_S")
-    tz: float = parameter("1", -0.5, 0.5, "share too much of the torque about z_S")
+    fx: float = amplitude("1", -0.5, 0.5, "share too much of the force along x_S")
+    fy: float = amplitude("1", -0.5, 0.5, "share too much of the force along y_S")
+    fz: float = amplitude("1", -0.5, 0.5, "share too much of the force along z_S")
+    tx: float = amplitude("1", -0.5, 0.5, "share too much of the torque about x_S")
+    ty: float = amplitude("1", -0.5, 0.5, "share too much of the torque about y_S")
+    tz: float = amplitude("1", -0.5, 0.5, "share too much of the torque about z_S")
 
     stage = 2
 

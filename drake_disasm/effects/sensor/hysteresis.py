@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import SensorMemoryEffect, parameter, shape
+from drake_disasm.effects.base import SensorMemoryEffect, amplitude, shape_parameter
 
 _LEVER = 0.05  # m: how a width of force and one of torque belong together
 
@@ -18,8 +18,8 @@ class SensorHysteresis(SensorMemoryEffect):
     Where it acts: the sensor's elastic elements.
     """
 
-    share: float = parameter("1", 0.0, 1.0, "a, that hangs back")
-    width: float = shape(2.0, "N", 0.01, 50.0, "W", (0.5, 2.0, 6.0))
+    share: float = amplitude("1", 0.0, 1.0, "a, that hangs back")
+    width: float = shape_parameter(2.0, "N", 0.01, 50.0, "W", (0.5, 2.0, 6.0))
 
     stage = 2
 

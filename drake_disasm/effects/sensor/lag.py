@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import SensorMemoryEffect, parameter, shape
+from drake_disasm.effects.base import SensorMemoryEffect, amplitude, shape_parameter
 
 
 @dataclasses.dataclass
@@ -17,8 +17,8 @@ class SensorLag(SensorMemoryEffect):
     Where it acts: the filter of the sensor's electronics.
     """
 
-    share: float = parameter("1", 0.0, 1.0, "a, that goes through the filter")
-    time_constant: float = shape(0.1, "s", 0.005, 5.0, "T", (0.05, 0.15, 0.5))
+    share: float = amplitude("1", 0.0, 1.0, "a, that goes through the filter")
+    time_constant: float = shape_parameter(0.1, "s", 0.005, 5.0, "T", (0.05, 0.15, 0.5))
 
     stage = 3
 

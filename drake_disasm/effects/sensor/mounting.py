@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from drake_disasm.common.spatial import rotation_from_vector
-from drake_disasm.effects.base import Sensing, SensorEffect, parameter
+from drake_disasm.effects.base import Sensing, SensorEffect, amplitude
 
 
 @dataclasses.dataclass
@@ -17,9 +17,9 @@ class SensorMounting(SensorEffect):
     Where it acts: between flange and sensor; zeroing sees it.
     """
 
-    rx: float = parameter("rad", -0.5, 0.5, "turned about x_S")
-    ry: float = parameter("rad", -0.5, 0.5, "turned about y_S")
-    rz: float = parameter("rad", -0.5, 0.5, "turned about z_S")
+    rx: float = amplitude("rad", -0.5, 0.5, "turned about x_S")
+    ry: float = amplitude("rad", -0.5, 0.5, "turned about y_S")
+    rz: float = amplitude("rad", -0.5, 0.5, "turned about z_S")
 
     stage = 1
 

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, parameter
+from drake_disasm.effects.base import Sensing, SensorEffect, amplitude
 
 
 @dataclasses.dataclass
@@ -20,10 +20,10 @@ class PayloadError(SensorEffect):
     motion, where inertial forces are negligible. Zeroing sees it.
     """
 
-    mass: float = parameter("kg", -10.0, 10.0, "mass that the tool data lack")
-    cx: float = parameter("kg m", -2.0, 2.0, "first moment lacking, along x_S")
-    cy: float = parameter("kg m", -2.0, 2.0, "first moment lacking, along y_S")
-    cz: float = parameter("kg m", -2.0, 2.0, "first moment lacking, along z_S")
+    mass: float = amplitude("kg", -10.0, 10.0, "mass that the tool data lack")
+    cx: float = amplitude("kg m", -2.0, 2.0, "first moment lacking, along x_S")
+    cy: float = amplitude("kg m", -2.0, 2.0, "first moment lacking, along y_S")
+    cz: float = amplitude("kg m", -2.0, 2.0, "first moment lacking, along z_S")
 
     stage = 0
 

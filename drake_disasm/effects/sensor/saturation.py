@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, parameter, shape
+from drake_disasm.effects.base import Sensing, SensorEffect, amplitude, shape_parameter
 
 _LEVER = 0.05  # m: how a range of force and one of torque belong together
 
@@ -18,8 +18,8 @@ class SensorSaturation(SensorEffect):
     Where it acts: the range of the sensor's electronics.
     """
 
-    share: float = parameter("1", 0.0, 1.0, "a, of what exceeds the limit, is lost")
-    limit: float = shape(10.0, "N", 0.1, 1000.0, "L", (3.0, 6.0, 12.0))
+    share: float = amplitude("1", 0.0, 1.0, "a, of what exceeds the limit, is lost")
+    limit: float = shape_parameter(10.0, "N", 0.1, 1000.0, "L", (3.0, 6.0, 12.0))
 
     stage = 4
 

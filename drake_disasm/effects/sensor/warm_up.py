@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, parameter, shape
+from drake_disasm.effects.base import Sensing, SensorEffect, amplitude, shape_parameter
 
 _GRID = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 
@@ -19,13 +19,13 @@ class SensorWarmUp(SensorEffect):
     Where it acts: the reading of the force/torque sensor, after zeroing.
     """
 
-    fx: float = parameter("N", -50.0, 50.0, "final offset of the force along x_S")
-    fy: float = parameter("N", -50.0, 50.0, "final offset of the force along y_S")
-    fz: float = parameter("N", -50.0, 50.0, "final offset of the force along z_S")
-    tx: float = parameter("N m", -5.0, 5.0, "final offset of the torque about x_S")
-    ty: float = parameter("N m", -5.0, 5.0, "final offset of the torque about y_S")
-    tz: float = parameter("N m", -5.0, 5.0, "final offset of the torque about z_S")
-    time_constant: float = shape(30.0, "s", 0.1, 1e4, "T", _GRID)
+    fx: float = amplitude("N", -50.0, 50.0, "final offset of the force along x_S")
+    fy: float = amplitude("N", -50.0, 50.0, "final offset of the force along y_S")
+    fz: float = amplitude("N", -50.0, 50.0, "final offset of the force along z_S")
+    tx: float = amplitude("N m", -5.0, 5.0, "final offset of the torque about x_S")
+    ty: float = amplitude("N m", -5.0, 5.0, "final offset of the torque about y_S")
+    tz: float = amplitude("N m", -5.0, 5.0, "final offset of the torque about z_S")
+    time_constant: float = shape_parameter(30.0, "s", 0.1, 1e4, "T", _GRID)
 
     present_at_zeroing = False
 

@@ -39,8 +39,8 @@ from drake_disasm.effects import (
     SensorWarmUp,
     TorqueGain,
     TorqueOffset,
+    amplitudes,
     sensor_chain,
-    sizes,
 )
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
@@ -74,11 +74,11 @@ def test_is_declared_in_full(effect: type[Effect]) -> None:
     """A size is zero at null; a shape has a grid within its bounds."""
     assert "Equation:" in (effect.__doc__ or "")
     assert "Where it acts:" in (effect.__doc__ or "")
-    assert sizes(effect)
+    assert amplitudes(effect)
     for field in dataclasses.fields(effect):  # type: ignore[arg-type]
         data = field.metadata
         assert data["doc"]
-        if field.name in sizes(effect):
+        if field.name in amplitudes(effect):
             assert data["unit"] and field.default == 0.0
             assert data["low"] <= 0.0 < data["high"]
         for value in (field.default, *data["grid"]) if data["grid"] else ():
@@ -131,7 +131,7 @@ def test_vanishes_at_null_bit_for_bit(
 @pytest.mark.parametrize("effect", IN_CELL)
 def test_shows_away_from_null(effect: type[Effect], without: np.ndarray) -> None:
     fields = {f.name: f for f in dataclasses.fields(effect)}  # type: ignore[arg-type]
-    sized = {name: 0.05 * fields[name].metadata["high"] for name in sizes(effect)}
+    sized = {name: 0.05 * fields[name].metadata["high"] for name in amplitudes(effect)}
     if effect is ContactExponent:
         with pytest.raises(DisasmError, match="ContactExponent"):
             _trajectory([effect(**sized)], 1)

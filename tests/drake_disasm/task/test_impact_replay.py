@@ -60,8 +60,8 @@ def test_becoming_another_scenario_is_building_it_anew_bit_for_bit():
     replay = ImpactReplay(TURNED)
     before = replay.transitions(steps())
     for scenario in (other, with_values(TURNED, {"lock.neck_diameter": 0.0051})):
-        replay.become(scenario)
+        replay.reconfigure(scenario)
         expected = ImpactReplay(scenario).transitions(steps())
         assert replay.transitions(steps()).tobytes() == expected.tobytes()
-    replay.become(TURNED)
+    replay.reconfigure(TURNED)
     assert replay.transitions(steps()).tobytes() == before.tobytes()

@@ -55,16 +55,16 @@ def test_it_is_the_task_simulation_open_loop():
 def test_becoming_another_scenario_is_building_it_anew_bit_for_bit(coarse):
     replay = TwinReplay(TURNED, coarse)
     before = replayed(replay)
-    replay.become(OTHER)
+    replay.reconfigure(OTHER)
     assert replayed(replay).tobytes() == replayed(TwinReplay(OTHER, coarse)).tobytes()
-    replay.become(TURNED)
+    replay.reconfigure(TURNED)
     assert replayed(replay).tobytes() == before.tobytes()
 
 
 def test_what_cannot_be_changed_in_place_is_built_anew():
     replay = TwinReplay(TURNED)
     thick = with_values(TURNED, {"lock.neck_diameter": 0.0051})
-    replay.become(thick)
+    replay.reconfigure(thick)
     assert replayed(replay).tobytes() == replayed(TwinReplay(thick)).tobytes()
 
 
@@ -94,12 +94,12 @@ def test_coarse_steps_divide_the_period():
 def test_a_station_refuses_in_place_what_needs_another_plant():
     station = TwinStation(TURNED)
     thick = with_values(TURNED, {"lock.neck_diameter": 0.0051})
-    assert station.can_become(OTHER) and not station.can_become(thick)
+    assert station.can_reconfigure(OTHER) and not station.can_reconfigure(thick)
     context = station.CreateDefaultContext()
     with pytest.raises(DisasmError, match="in place"):
-        station.become(context, thick)
+        station.reconfigure(context, thick)
     with pytest.raises(DisasmError, match=r"contact\.friction"):
-        station.become(context, with_values(TURNED, {"contact.friction": 7.0}))
+        station.reconfigure(context, with_values(TURNED, {"contact.friction": 7.0}))
 
 
 def test_impact_too_changes_in_place():
@@ -119,7 +119,7 @@ def test_impact_too_changes_in_place():
     )
     replay = TwinReplay(first)
     before = replayed(replay)
-    replay.become(second)
+    replay.reconfigure(second)
     assert replayed(replay).tobytes() == replayed(TwinReplay(second)).tobytes()
-    replay.become(first)
+    replay.reconfigure(first)
     assert replayed(replay).tobytes() == before.tobytes()

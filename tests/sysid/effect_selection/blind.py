@@ -14,7 +14,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from drake_disasm.effects import Effect, SensorBias, SensorEffect, sizes
+from drake_disasm.effects import Effect, SensorBias, SensorEffect, amplitudes
 from drake_disasm.effects.sensor.payload_error import PayloadError
 from drake_disasm.logs import read_log, write_static_wrench
 from drake_disasm.scenario import Scenario
@@ -115,7 +115,7 @@ def _drawn(
 ) -> Effect:
     """Returns an effect of a kind whose unexplained part has the wanted size."""
     effect = kind()
-    fields = sizes(kind)
+    fields = amplitudes(kind)
     chosen = random.choice(fields, size=min(2, len(fields)), replace=False)
     directions = random.choice([-1.0, 1.0], len(chosen)) * random.uniform(0.5, 1, 2)
     units = {"f": FORCE_NOISE, "t": TORQUE_NOISE}

@@ -67,9 +67,9 @@ def test_a_round_costs_one_evaluation_for_each_size(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Objective, "residuals", count)
     closed(log, _LIBRARY)
-    sizes = 6 * 6 + 6 + 3  # a drift of six durations, a gain, a mounting
-    assert counted.count(sizes) == 1  # the survey
-    assert max(counted) <= max(sizes, 2 * len(model.parameters) + 1)
+    amplitudes = 6 * 6 + 6 + 3  # a drift of six durations, a gain, a mounting
+    assert counted.count(amplitudes) == 1  # the survey
+    assert max(counted) <= max(amplitudes, 2 * len(model.parameters) + 1)
 
 
 def test_episodes_that_contradict_each_other_are_named(tmp_path):

@@ -70,7 +70,7 @@ def test_noise_as_correlated_as_a_real_arms_residual_raises_no_alarm(
 
     found = closed(model)
     fit = getattr(found, residual_of)
-    residual = fit.here.residual * fit.model.measurements.noise
+    residual = fit.linearisation.residual * fit.model.measurements.noise
     clean = found.first.model.predictions(found.first.theta)
     alarms = []
     for seed in range(_NULLS):

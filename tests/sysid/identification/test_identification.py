@@ -143,7 +143,7 @@ def test_the_thesis_search_counts_as_the_thesis_does(tmp_path):
     from sysid.optimise import BeesSettings
 
     effort = Effort(cycles=10, close=0, bees=BeesSettings.thesis())
-    settings = Settings(effort=effort, huber=np.inf)
+    settings = Settings(effort=effort, huber_delta=np.inf)
     found = run(Decay(), tmp_path / "fit", settings)
     (part,) = found.methods["bees"].parts
     assert part.trace.cycle_ends[:11] == list(range(6, 67, 6))  # then SBPLX
@@ -165,9 +165,9 @@ def test_a_profile_has_its_minimum_at_the_estimate(tmp_path):
 def test_the_floor_is_that_of_gaussian_noise():
     assert noise_floor(np.inf) == pytest.approx(1.0, abs=1e-6)
     z = np.random.default_rng(0).normal(size=200_000)
-    from sysid.objective import rms, tempered
+    from sysid.objective import pseudo_residual, rms
 
-    assert noise_floor(1.0) == pytest.approx(rms(tempered(z, 1.0)), rel=0.01)
+    assert noise_floor(1.0) == pytest.approx(rms(pseudo_residual(z, 1.0)), rel=0.01)
 
 
 def test_the_report_needs_nothing_else_and_says_it_all(tmp_path):

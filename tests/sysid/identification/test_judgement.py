@@ -113,8 +113,10 @@ def test_the_bootstrap_has_the_spread_of_a_mean(rho):
     """For r = u - y with AR(1) errors the mean's variance is (1+rho)/(1-rho) larger."""
     n = 4000
     r = coloured(n, rho)[:, None]
-    here = Linearisation(np.array([0.5]), r, np.ones((n, 1, 1)), np.ones((n, 1)))
-    spread = uncertainty(here, np.zeros(n, dtype=int))
+    linearisation = Linearisation(
+        np.array([0.5]), r, np.ones((n, 1, 1)), np.ones((n, 1))
+    )
+    spread = uncertainty(linearisation, np.zeros(n, dtype=int))
     truth = 1.0 / (1.0 - rho) / np.sqrt(n)
     assert np.std(spread.draws) == pytest.approx(truth, rel=0.3)
     white = np.sqrt(spread.covariance[0, 0])
@@ -127,8 +129,8 @@ def test_channels_may_have_noise_of_any_size():
     noisy, exact = coloured(n, 0.0), 1e-3 * np.sin(np.arange(n) / 300.0)
     J = np.stack([np.ones(n), 1e-3 * np.ones(n)], axis=1)[:, :, None]
     r = np.column_stack([noisy, exact])
-    here = Linearisation(np.array([0.5]), r, J, np.ones((n, 2)))
-    spread = uncertainty(here, np.zeros(n, dtype=int))
+    linearisation = Linearisation(np.array([0.5]), r, J, np.ones((n, 2)))
+    spread = uncertainty(linearisation, np.zeros(n, dtype=int))
     assert spread.block <= 4
     for deviation in (np.sqrt(spread.covariance[0, 0]), np.std(spread.draws)):
         assert deviation == pytest.approx(1.0 / np.sqrt(n), rel=0.1)

@@ -107,7 +107,7 @@ def test_the_base_set_predicts_all_that_the_full_one_does(urdf):
 
 def test_recovers_the_base_parameters(urdf, tmp_path):
     model = JointMotionModel([motion_log(tmp_path / "log", urdf, noise=0.01)])
-    settings = Settings(effort=Effort(evaluations=60, close=10), huber=np.inf)
+    settings = Settings(effort=Effort(evaluations=60, close=10), huber_delta=np.inf)
     journal = Journal(tmp_path / "fit", {}, False)
     found = identify(model, [0], [], settings, Workers(), journal, lambda *_: None)
     truth = np.array(list(model.urdf_values().values()))

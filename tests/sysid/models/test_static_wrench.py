@@ -17,7 +17,7 @@ from sysid.workers import Workers
 from tests.sysid.real_data import write_static
 
 TRUTH = np.array([1.1, 0.01, -0.02, 0.06, 1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
-SETTINGS = Settings(effort=Effort(evaluations=60, close=10), huber=np.inf)
+SETTINGS = Settings(effort=Effort(evaluations=60, close=10), huber_delta=np.inf)
 EQUAL = ("PayloadError.mass", "PayloadError.cz", *DEFAULT_PARAMETERS[4:])
 
 

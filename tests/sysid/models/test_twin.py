@@ -86,9 +86,13 @@ def test_recovers_the_stiffness_of_impact(impact_log, impact):
     objective = Objective(make(impact_log, impact, names, coarse=False), Workers())
     at_truth = objective(truth(objective.model))[0]
     assert at_truth == pytest.approx(0.707, abs=0.07)
-    here = gauss_newton(objective, objective.scaling.to_unit(np.array([400.0])), 6)
-    assert objective.value(here.residual) < at_truth + 1e-3
-    assert objective.scaling.from_unit(here.u)[0] == pytest.approx(1000.0, rel=0.1)
+    linearisation = gauss_newton(
+        objective, objective.scaling.to_unit(np.array([400.0])), 6
+    )
+    assert objective.value(linearisation.residual) < at_truth + 1e-3
+    assert objective.scaling.from_unit(linearisation.u)[0] == pytest.approx(
+        1000.0, rel=0.1
+    )
 
 
 def test_with_impact_too_chunks_do_not_change_a_bit(impact_log, impact, monkeypatch):
@@ -163,9 +167,9 @@ def test_the_wrench_at_the_sensor_is_the_inverse_of_the_shift_to_the_bolt():
 
 def test_what_is_alike_has_impact_unless_a_parameter_means_nothing_to_it(log, turned):
     model = make(log, turned)
-    alike = model.alike()
-    assert alike.scenario.contact.model == "impact" and not alike.costly
+    surrogate = model.surrogate()
+    assert surrogate.scenario.contact.model == "impact" and not surrogate.costly
     assert model.scenario.contact.model == "hydroelastic" and model.costly
-    assert alike.alike() is alike
+    assert surrogate.surrogate() is surrogate
     own = make(log, turned, ["contact.modulus"])
-    assert own.alike() is own
+    assert own.surrogate() is own
