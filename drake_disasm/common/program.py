@@ -1,16 +1,20 @@
-"""What every command-line program does: exit statuses, Ctrl-C, provenance."""
+"""What every command-line program does: exit statuses, Ctrl-C, progress, provenance."""
 
 import importlib.metadata
+import math
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from types import FrameType
-from typing import Any
+from types import FrameType, TracebackType
+from typing import Any, Self
+
+from tqdm import tqdm
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.progress import ProgressUpdate
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -51,6 +55,72 @@ def run(main: Callable[[Sequence[str]], int]) -> None:
     except KeyboardInterrupt:
         print("interrupted; what was finished is kept", file=sys.stderr)
         sys.exit(EXIT_INTERRUPTED)
+
+
+class ProgressBar:
+    """Shows progress on the terminal: one bar per stage, lines above it.
+
+    Give it to a library call as its `progress`:
+
+        with ProgressBar(unit="episode") as progress:
+            train(..., progress=progress)
+
+    Ctrl-C is raised at the next update even where a library swallowed it.
+    """
+
+    def __init__(self, unit: str = "", keep: bool = False) -> None:
+        """Shows nothing yet.
+
+        Args:
+            unit: of the work that is counted, such as "episode".
+            keep: whether a finished bar stays on the terminal.
+        """
+        self._unit = f" {unit}" if unit else ""
+        self._keep = keep
+        self._bar: tqdm | None = None
+        self._stage = ""
+
+    def __call__(self, update: ProgressUpdate) -> None:
+        """Shows an update."""
+        stop_if_interrupted()
+        if not (update.done or update.total):
+            if update.message:
+                tqdm.write(update.message)
+            return
+        bar = self._bar_of(update)
+        remarks = [update.message] if update.message else []
+        if math.isfinite(update.value):
+            remarks.insert(0, f"{update.value:.4g}")
+        bar.set_postfix_str(", ".join(remarks), refresh=False)
+        bar.update(update.done - bar.n)
+
+    def close(self) -> None:
+        """Ends the bar."""
+        if self._bar is not None:
+            self._bar.close()
+        self._bar = None
+
+    def _bar_of(self, update: ProgressUpdate) -> tqdm:
+        """Returns the stage's bar; a new one where the stage is new."""
+        if self._bar is None or update.stage != self._stage:
+            self.close()
+            self._stage = update.stage
+            self._bar = tqdm(desc=update.stage, unit=self._unit, leave=self._keep)
+        self._bar.total = update.total or None
+        return self._bar
+
+    def __enter__(self) -> Self:
+        """Returns the bar."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Ends the bar."""
+        self.close()
 
 
 def provenance(program: str, arguments: Sequence[str], seed: int) -> dict[str, Any]:

@@ -1,0 +1,42 @@
+"""Progress of library calls on the terminal."""
+
+import pytest
+
+from drake_disasm.common import program
+from drake_disasm.common.program import ProgressBar
+from drake_disasm.common.progress import ProgressUpdate
+
+
+def test_a_bar_shows_stage_count_figure_and_remark(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with ProgressBar(unit="episode", keep=True) as progress:
+        progress(ProgressUpdate("training", 0, 4))
+        progress(ProgressUpdate("training", 3, 4, "2/3 solved", 12.345))
+    shown = capsys.readouterr().err
+    for word in ("training", "3/4", "12.3", "2/3 solved", "episode"):
+        assert word in shown
+
+
+def test_each_stage_has_its_own_bar(capsys: pytest.CaptureFixture[str]) -> None:
+    with ProgressBar(keep=True) as progress:
+        progress(ProgressUpdate("fitting", 5))
+        progress(ProgressUpdate("simulating", 1, 2))
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert "simulating" in last and "1/2" in last
+
+
+def test_a_message_without_a_count_is_a_line(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with ProgressBar() as progress:
+        progress(ProgressUpdate("fitting", message="GroovePose: objective 12"))
+    assert capsys.readouterr().out == "GroovePose: objective 12\n"
+
+
+def test_a_swallowed_ctrl_c_stops_at_the_next_update(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(program._interrupt, "pressed", True)
+    with ProgressBar() as progress, pytest.raises(KeyboardInterrupt):
+        progress(ProgressUpdate("fitting", 1))
