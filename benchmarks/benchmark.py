@@ -7,7 +7,6 @@ measurement, not a test: nothing here passes or fails.
 
 import argparse
 import functools
-import json
 import os
 import statistics
 import subprocess
@@ -40,7 +39,7 @@ from update_speed import measure_updates
 
 from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import make_folder, write_atomically
+from drake_disasm.common.files import make_folder, write_json
 from drake_disasm.common.quantity import closest
 from drake_disasm.common.timing import boundary
 from drake_disasm.mdp import Outcome
@@ -403,7 +402,8 @@ def main(arguments: Sequence[str]) -> int:
         figures += [figure for figure in measure() if figure.key in wanted]
     print(table(figures))
     if args.json:
-        _write_json(args.json, figures)
+        make_folder(args.json.parent)
+        write_json(args.json, {f.key: f.value for f in figures})
     return 0
 
 
@@ -414,12 +414,6 @@ def table(figures: list[Figure]) -> str:
         ratio = "" if f.ratio is None else f"{f.ratio:8.3g}"
         lines.append(f"{f.key:26} {f.value:10.4g} {f.unit:5} {ratio:>8}  {f.reference}")
     return "\n".join(lines)
-
-
-def _write_json(path: Path, figures: list[Figure]) -> None:
-    text = json.dumps({f.key: f.value for f in figures}, indent=2) + "\n"
-    make_folder(path.parent)
-    write_atomically(path, lambda stream: stream.write(text.encode()))
 
 
 if __name__ == "__main__":

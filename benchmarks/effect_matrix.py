@@ -12,7 +12,7 @@ from pathlib import Path
 from objective_speed import recorded_log
 from tqdm import tqdm
 
-from drake_disasm.common.files import make_folder, write_atomically
+from drake_disasm.common.files import make_folder, write_figure, write_text
 from drake_disasm.effects import GroovePose
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
@@ -66,11 +66,10 @@ def run_matrix(folder: Path, seeds: int, nulls: int, pairs: int) -> str:
         found = answers(cases, executor, folder / "answers.json", bar.update)
     by_key = {a.case.key: a for a in found}
     text = in_words({n: [by_key[c.key] for c in g] for n, g in groups.items()})
-    data = (text + "\n").encode()
-    write_atomically(folder / "effects.md", lambda stream: stream.write(data))
+    write_text(folder / "effects.md", text + "\n")
     singles = [by_key[c.key] for c in groups["singles"]]
     if singles:
-        confusion_figure(singles).savefig(folder / "confusion.png", dpi=110)
+        write_figure(folder / "confusion.png", confusion_figure(singles), dpi=110)
     return text
 
 

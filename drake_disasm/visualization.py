@@ -23,7 +23,7 @@ from pydrake.systems.framework import (
 )
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import make_folder, write_atomically
+from drake_disasm.common.files import make_folder, write_text
 from drake_disasm.common.spatial import pose_from_vector
 from drake_disasm.stations.base import Station
 from drake_disasm.stations.measured_cell import MEASURED_PORTS, MeasuredCell
@@ -124,9 +124,8 @@ class MeshcatView:
         Raises:
             DisasmError: it can't be written there.
         """
-        page = self.meshcat.StaticHtml().encode()
         make_folder(path.parent)
-        write_atomically(path, lambda stream: stream.write(page))
+        write_text(path, self.meshcat.StaticHtml())
 
 
 class MeasuredView:

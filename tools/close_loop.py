@@ -9,7 +9,6 @@ report that opens offline. After Ctrl-C the same command goes on where it was.
 """
 
 import argparse
-import json
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -20,7 +19,7 @@ from tqdm import tqdm
 
 from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import write_text
+from drake_disasm.common.files import make_folder, write_json, write_text
 from drake_disasm.logs import Log, read_logs
 from drake_disasm.scenario import dump_scenario, load_scenario
 from sysid.effect_selection.close_loop import HELD_OUT, HUBER, Closed, close_loop
@@ -137,15 +136,10 @@ def _beat(bar: tqdm) -> None:
 
 
 def _write(folder: Path, closed: Closed, origin: dict[str, object]) -> None:
-    result = to_mapping(closed) | {"provenance": origin}
-    files = {
-        "scenario.yaml": dump_scenario(closed.scenario),
-        "result.json": json.dumps(result, indent=2) + "\n",
-        "report.html": closing_page(closed, origin),
-    }
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in files.items():
-        write_text(folder / name, text)
+    make_folder(folder)
+    write_text(folder / "scenario.yaml", dump_scenario(closed.scenario))
+    write_json(folder / "result.json", to_mapping(closed) | {"provenance": origin})
+    write_text(folder / "report.html", closing_page(closed, origin))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ The same seeds give the same episodes. It touches no training.
 
 import argparse
 import dataclasses
-import json
 import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -21,7 +20,7 @@ from tqdm import tqdm
 from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.executors import run_jobs
-from drake_disasm.common.files import make_folder, write_atomically
+from drake_disasm.common.files import make_folder, write_json
 from drake_disasm.learning.evaluation import Evaluation, evaluate, summed_up
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import MODELS
@@ -197,9 +196,8 @@ def _write_json(path: Path, found: dict[Row, Evaluation], origin: dict) -> None:
         | dataclasses.asdict(figures)
         for row, figures in found.items()
     ]
-    text = json.dumps({"provenance": origin, "rows": rows}, indent=2) + "\n"
     make_folder(path.parent)
-    write_atomically(path, lambda stream: stream.write(text.encode()))
+    write_json(path, {"provenance": origin, "rows": rows})
 
 
 if __name__ == "__main__":

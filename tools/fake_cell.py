@@ -22,7 +22,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from pydrake.lcm import DrakeLcm
 
 from drake_disasm.common import program
-from drake_disasm.common.files import write_atomically
+from drake_disasm.common.files import write_text
 from drake_disasm.fakes import hex_box, robotiq_gripper
 from drake_disasm.fakes.cell import IIWA_FAULTS, FakeCell
 from drake_disasm.scenario import load_scenario
@@ -68,7 +68,7 @@ def main(arguments: Sequence[str]) -> int:
         config = cell.config()
         config.iiwa.lcm_url = args.lcm_url
         text = yaml_dump_typed(config, schema=HardwareConfig)
-        write_atomically(args.config, lambda stream: stream.write(text.encode()))
+        write_text(args.config, text)
         print(f"playing a cell; --hardware-config {args.config}", flush=True)
         _play(cell)
     return 0

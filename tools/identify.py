@@ -7,7 +7,6 @@ Writes the identified scenario, `result.json`, and a report that opens offline.
 """
 
 import argparse
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from tqdm import tqdm
 
 from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import write_atomically
+from drake_disasm.common.files import write_json, write_text
 from drake_disasm.logs import Log, read_logs
 from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
 from sysid.identification.identify import Settings, identify
@@ -306,13 +305,9 @@ def _write(
     fitted = model.freeze(found.frozen)
     if isinstance(fitted, ScenarioModel):
         scenario = fitted.scenario_at(found.theta)
-        _write_text(folder / "scenario.yaml", dump_scenario(scenario))
-    _write_text(folder / "result.json", json.dumps(mapping, indent=2) + "\n")
-    _write_text(folder / "report.html", report_page(found, origin))
-
-
-def _write_text(path: Path, text: str) -> None:
-    write_atomically(path, lambda stream: stream.write(text.encode()))
+        write_text(folder / "scenario.yaml", dump_scenario(scenario))
+    write_json(folder / "result.json", mapping)
+    write_text(folder / "report.html", report_page(found, origin))
 
 
 if __name__ == "__main__":

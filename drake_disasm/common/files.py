@@ -1,15 +1,21 @@
-"""Writing files whole or not at all."""
+"""Writing files atomically: text, JSON, arrays, figures."""
 
 import contextlib
+import json
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
 
 from drake_disasm.common.errors import DisasmError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure  # slow to import
 
 
 def make_folder(folder: Path) -> None:
@@ -56,8 +62,34 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Writes a text file, UTF-8, whole or not at all; see `write_atomically`."""
-    write_atomically(path, lambda stream: stream.write(text.encode()))
+    """Writes a text file, UTF-8; see `write_atomically`."""
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Writes a binary file; see `write_atomically`."""
+    write_atomically(path, lambda stream: stream.write(content))
+
+
+def write_json(path: Path, content: Any, indent: int | None = 2) -> None:
+    """Writes plain data as JSON; see `write_atomically`.
+
+    Args:
+        path: the file.
+        content: dictionaries, lists, text and numbers.
+        indent: spaces per level; None for one line.
+    """
+    write_text(path, json.dumps(content, indent=indent) + "\n")
+
+
+def write_npz(path: Path, **arrays: Any) -> None:
+    """Writes arrays under their names; see `write_atomically`."""
+    write_atomically(path, lambda stream: np.savez(stream, **arrays))
+
+
+def write_figure(path: Path, figure: "Figure", dpi: float = 120.0) -> None:
+    """Writes a Matplotlib figure as PNG; see `write_atomically`."""
+    write_atomically(path, lambda s: figure.savefig(s, format="png", dpi=dpi))
 
 
 @contextlib.contextmanager

@@ -10,7 +10,7 @@ import torch
 from torch.utils._pytree import tree_flatten, tree_unflatten
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import write_atomically
+from drake_disasm.common.files import write_npz
 from drake_disasm.learning.agent import Agent
 from drake_disasm.learning.replay import Replay
 
@@ -28,7 +28,7 @@ def save_checkpoint(
     arrays = {f"state_{i:03d}": leaf.numpy() for i, leaf in enumerate(leaves)}
     own = {"updates": agent.updates, "following": following, "notes": notes}
     text = np.frombuffer(json.dumps(own).encode(), dtype=np.uint8)
-    write_atomically(path, lambda f: np.savez(f, text=text, replay=rows, **arrays))
+    write_npz(path, text=text, replay=rows, **arrays)
 
 
 def load_checkpoint(path: Path, agent: Agent, replay: Replay) -> dict[str, Any]:

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import make_folder
+from drake_disasm.common.files import make_folder, write_json
 from drake_disasm.learning.hyperparameters import Hyperparameters
-from drake_disasm.learning.run import read_episodes, write_json
+from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.learning.training import TrainingSpec
 from drake_disasm.scenario import Scenario, scenario_to_mapping

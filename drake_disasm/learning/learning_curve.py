@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from drake_disasm.common.files import write_atomically
+from drake_disasm.common.files import write_figure
 from drake_disasm.learning.statistics import (
     bootstrap_interval,
     interquartile_mean,
@@ -55,7 +55,7 @@ def plot_learning_curves(trainings: Mapping[str, Seeds], path: Path) -> None:
         _draw(axes[0], rewards, name, colour, thin=len(trainings) == 1)
         _draw(axes[1], success, name, colour, thin=len(trainings) == 1)
     _label(axes)
-    write_atomically(path, lambda stream: figure.savefig(stream, format="png", dpi=120))
+    write_figure(path, figure)
     pyplot.close(figure)
 
 

@@ -13,14 +13,13 @@ import csv
 import dataclasses
 import fcntl
 import io
-import json
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Protocol
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import make_folder, write_atomically
+from drake_disasm.common.files import make_folder, write_json, write_text
 from drake_disasm.learning.evaluation import summed_up, validate_policy
 from drake_disasm.learning.policy import trained_policy
 from drake_disasm.learning.training import Purpose, Training, seed_for
@@ -155,12 +154,6 @@ def _figures(summaries: list[EpisodeSummary]) -> dict[str, Any]:
     }
 
 
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Writes plain data as JSON, whole or not at all."""
-    text = json.dumps(content, indent=2) + "\n"
-    write_atomically(path, lambda stream: stream.write(text.encode()))
-
-
 def write_episodes(path: Path, summaries: list[EpisodeSummary]) -> None:
     """Writes one row per episode as CSV."""
     text = io.StringIO(newline="")
@@ -173,7 +166,7 @@ def write_episodes(path: Path, summaries: list[EpisodeSummary]) -> None:
         row = [number, *(getattr(s, name) for name in plain), s.outcome.label]
         row += [s.reward, *(s.reward_terms.get(name, 0.0) for name in REWARD_TERMS)]
         writer.writerow(row)
-    write_atomically(path, lambda stream: stream.write(text.getvalue().encode()))
+    write_text(path, text.getvalue())
 
 
 def read_episodes(path: Path) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from drake_disasm.common.files import write_atomically
+from drake_disasm.common.files import write_bytes
 from drake_disasm.logs.files import read_bytes
 from drake_disasm.logs.refusal import did_you_mean, quoted, refusal
 from drake_disasm.logs.schema import KINDS, SCHEMA, SI_UNITS, UNIT_SPELLINGS, Kind, Rule
@@ -108,8 +108,8 @@ def read_header(folder: Path) -> LogHeader:
 
 def write_header(folder: Path, header: LogHeader) -> None:
     """Writes `log.yaml`, whole or not at all."""
-    data = _to_yaml(header, folder / HEADER_NAME)
-    write_atomically(folder / HEADER_NAME, lambda stream: stream.write(data))
+    path = folder / HEADER_NAME
+    write_bytes(path, _to_yaml(header, path))
 
 
 def as_read(header: LogHeader, folder: Path) -> LogHeader:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import write_atomically
+from drake_disasm.common.files import write_bytes
 from drake_disasm.common.quantity import closest
 from drake_disasm.common.resources import models_dir
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
@@ -65,8 +65,7 @@ def save_policy(path: Path, policy: LearnedPolicy) -> None:
         }
     except DisasmError as error:
         raise DisasmError(f"policy {path}: is not written, it {error}") from None
-    data = pack(arrays, text)
-    write_atomically(path, lambda stream: stream.write(data))
+    write_bytes(path, pack(arrays, text))
 
 
 def load_policy(path: Path) -> LearnedPolicy:

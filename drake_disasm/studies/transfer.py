@@ -19,10 +19,11 @@ from typing import Any
 
 import numpy as np
 
+from drake_disasm.common.files import write_json
 from drake_disasm.learning.evaluation import evaluate, summed_up
 from drake_disasm.learning.experiment import Experiment, read_json
 from drake_disasm.learning.learning_curve import plot_learning_curves
-from drake_disasm.learning.run import read_episodes, write_json
+from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.training import Purpose, seed_for
 from drake_disasm.policies import load_policy
 from drake_disasm.scenario import Scenario

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from drake_disasm.common.files import make_folder, write_atomically
+from drake_disasm.common.files import make_folder, write_npz
 from sysid.identification.linearisation import Linearisation
 
 _ARRAYS = ("u", "residual", "jacobian", "weights", "huber_delta")
@@ -40,5 +40,5 @@ def remembered(
     found = find()
     make_folder(folder)
     arrays = {key: getattr(found, key) for key in _ARRAYS}
-    write_atomically(path, lambda stream: np.savez(stream, **arrays))
+    write_npz(path, **arrays)
     return found

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import write_atomically
+from drake_disasm.common.files import write_json
 from sysid.optimise.coordinates import BatchFunction, Box
 from sysid.optimise.trace import Trace
 
@@ -198,8 +198,7 @@ class BeesAlgorithm:
 
     def save(self, path: Path) -> None:
         """Writes the whole search to a file, or nothing."""
-        text = json.dumps(self.state())
-        write_atomically(path, lambda stream: stream.write(text.encode()))
+        write_json(path, self.state(), indent=None)
 
     def state(self) -> dict[str, Any]:
         """Returns the search as plain data that keeps every bit in JSON."""

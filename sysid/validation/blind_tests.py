@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from drake_disasm.common.files import write_atomically
+from drake_disasm.common.files import write_json
 from drake_disasm.effects import (
     EFFECTS,
     BaseTilt,
@@ -186,8 +186,7 @@ def answers(
 
 
 def _write(path: Path, found: Sequence[Answer]) -> None:
-    data = json.dumps([asdict(each) for each in found], indent=1).encode()
-    write_atomically(path, lambda stream: stream.write(data))
+    write_json(path, [asdict(each) for each in found], indent=1)
 
 
 def read_answers(path: Path) -> list[Answer]:
