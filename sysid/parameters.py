@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from drake_disasm.common.errors import DisasmError
 
 Vector = NDArray[np.float64]
+
+#: Bounds of one sign with a larger ratio than this are searched by logarithm.
+DECADES = 1e3
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,34 @@ class Parameter:
     log_scale: bool = False
     path: str = ""
     is_shape: bool = False
+
+    @classmethod
+    def of_field(
+        cls, name: str, path: str, value: float, metadata: Mapping[str, Any]
+    ) -> Self:
+        """Returns the parameter that stands for a field of a dataclass.
+
+        Args:
+            name: of the parameter.
+            path: of the field.
+            value: nominal.
+            metadata: of the field, as `common.quantity.quantity` makes it.
+
+        Raises:
+            DisasmError: the field has no finite bounds.
+        """
+        low, high = metadata["low"], metadata["high"]
+        return cls(
+            name,
+            value,
+            low,
+            high,
+            metadata["unit"],
+            metadata["doc"],
+            low > 0.0 and high > DECADES * low,
+            path,
+            bool(metadata.get("grid")),
+        )
 
     def __post_init__(self) -> None:
         """Refuses bounds that no search can use."""

@@ -14,7 +14,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cli
-import numpy as np
 from tqdm import tqdm
 
 from drake_disasm.common import program
@@ -22,10 +21,10 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, write_json, write_text
 from drake_disasm.logs import Log, read_logs
 from drake_disasm.scenario import dump_scenario, load_scenario
-from sysid.effect_selection.close_loop import HELD_OUT, HUBER, Closed, close_loop
+from sysid.effect_selection.close_loop import Closed, close_loop
 from sysid.effect_selection.output import to_mapping
 from sysid.identification.split import split_episodes
-from sysid.models import ScenarioModel
+from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.report import closing_page
 from sysid.scenario_parameters import read_requests
@@ -93,11 +92,8 @@ def main(arguments: Sequence[str]) -> int:
     logs = read_logs(args.log)
     model = _model(args, logs)
     names = model.measurements.names
-    is_twin = logs[0].header.kind == "transitions"
-    share = HELD_OUT if is_twin else 0.0
-    train, test = split_episodes(names, args.held_out or share)
-    usual = HUBER if is_twin else np.inf
-    huber_delta = usual if args.huber is None else args.huber
+    train, test = split_episodes(names, args.held_out or model.held_out_share)
+    huber_delta = model.default_huber_delta if args.huber is None else args.huber
     if not huber_delta > 0.0:
         raise DisasmError("--huber: give a number above zero, or inf")
     origin = program.provenance("close_loop", arguments, 0)
@@ -116,7 +112,7 @@ def main(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _model(args: argparse.Namespace, logs: Sequence[Log]) -> ScenarioModel:
+def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
     """Returns the model of the logs that the command line asks for."""
     choice = ModelChoice(
         scenario=load_scenario(args.scenario) if args.scenario else None,
@@ -124,9 +120,7 @@ def _model(args: argparse.Namespace, logs: Sequence[Log]) -> ScenarioModel:
         urdf=args.urdf,
         fixed=True,
     )
-    model = model_of(logs, choice)
-    assert isinstance(model, ScenarioModel)
-    return model
+    return model_of(logs, choice)
 
 
 def _beat(bar: tqdm) -> None:
@@ -137,7 +131,8 @@ def _beat(bar: tqdm) -> None:
 
 def _write(folder: Path, closed: Closed, origin: dict[str, object]) -> None:
     make_folder(folder)
-    write_text(folder / "scenario.yaml", dump_scenario(closed.scenario))
+    if closed.scenario:
+        write_text(folder / "scenario.yaml", dump_scenario(closed.scenario))
     write_json(folder / "result.json", to_mapping(closed) | {"provenance": origin})
     write_text(folder / "report.html", closing_page(closed, origin))
 

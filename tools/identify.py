@@ -25,7 +25,7 @@ from sysid.identification.output import summary, to_mapping
 from sysid.identification.result import Identified
 from sysid.identification.search import METHODS, Effort
 from sysid.identification.split import split_episodes
-from sysid.models import LogModel, ScenarioModel
+from sysid.models import LogModel
 from sysid.models.from_logs import OBJECTIVES, ModelChoice, model_of
 from sysid.optimise import BeesSettings
 from sysid.report import report_page
@@ -303,8 +303,7 @@ def _write(
 ) -> None:
     mapping = to_mapping(found) | {"provenance": origin}
     fitted = model.freeze(found.frozen)
-    if isinstance(fitted, ScenarioModel):
-        scenario = fitted.scenario_at(found.theta)
+    if scenario := fitted.scenario_at(found.theta):
         write_text(folder / "scenario.yaml", dump_scenario(scenario))
     write_json(folder / "result.json", mapping)
     write_text(folder / "report.html", report_page(found, origin))

@@ -2,29 +2,13 @@
 
 import copy
 import dataclasses
-import itertools
 from collections.abc import Sequence
-from typing import Any, Self
+from typing import Self
 
-from drake_disasm.effects import (
-    EFFECTS,
-    ArmEffect,
-    ContactExponent,
-    Effect,
-    EnvironmentEffect,
-    JointEffect,
-    MotionEffect,
-    SensorEffect,
-    SensorMemoryEffect,
-    amplitudes,
-    shape_parameters,
-)
-from drake_disasm.scenario import Scenario
-from sysid.models.base import ScenarioModel
-from sysid.models.joint_motion import JointMotionModel
-from sysid.models.static_wrench import StaticWrenchModel
+from drake_disasm.effects import EFFECTS, Effect, amplitudes, shape_parameters
+from sysid.models.base import LogModel
+from sysid.models.effects import effect_parameter
 from sysid.parameters import Parameter
-from sysid.scenario_parameters import Request, scenario_parameters
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,93 +52,51 @@ class Candidate:
 
 
 def candidates(
-    model: ScenarioModel, library: Sequence[type[Effect]] = EFFECTS
+    model: LogModel, library: Sequence[type[Effect]] = EFFECTS
 ) -> list[Candidate]:
     """Returns what of a library could act on a model's channels."""
-    if isinstance(model, JointMotionModel):
-        joints = [channel.name for channel in model.measurements.channels]
-        kinds = [kind for kind in library if issubclass(kind, ArmEffect)]
-        return [
-            Candidate.of(effect)
-            for kind in kinds
-            for place in _places(kind, joints)
-            for effect in _in_all_shapes(kind, **place)
-        ]
-    acts: tuple[type[Effect], ...] = (EnvironmentEffect, MotionEffect, SensorEffect)
-    silent: tuple[type[Effect], ...] = (ContactExponent,)
-    if isinstance(model, StaticWrenchModel):
-        acts, silent = (SensorEffect,), (SensorMemoryEffect,)
-    elif model.scenario.contact.model == "impact":
-        silent = ()
-    return [
-        Candidate.of(effect)
-        for kind in library
-        if issubclass(kind, acts) and not issubclass(kind, silent)
-        if not kind.is_random  # see scatter.py
-        for effect in _in_all_shapes(kind)
-    ]
+    return [Candidate.of(effect) for effect in model.applicable_effects(library)]
 
 
 def extended(
-    model: ScenarioModel, chosen: Sequence[Candidate], with_shapes: bool = False
-) -> tuple[ScenarioModel, list[range]]:
-    """Returns a model with candidates in its scenario, and their sizes as parameters.
+    model: LogModel, chosen: Sequence[Candidate], with_shapes: bool = False
+) -> tuple[LogModel, list[range]]:
+    """Returns a model with candidates among its effects, and their sizes as parameters.
 
     And which of its parameters are new, candidate by candidate.
 
-    An effect that the scenario has already gets the parameters that were not free.
+    An effect that the model has already gets the parameters that were not free.
 
     Args:
         model: to extend.
         chosen: candidates.
         with_shapes: whether their shapes are parameters, too.
     """
-    scenario = copy.deepcopy(model.scenario)
+    effects = list(copy.deepcopy(model.effects))
     taken = {parameter.path for parameter in model.parameters}
     parameters: list[Parameter] = []
     groups = []
     for candidate in chosen:
-        number = _place(scenario, candidate)
-        kind = type(candidate.effect)
+        number = _place(effects, candidate)
         name = candidate.name if with_shapes else candidate.text
-        fields = candidate.fields + (
-            tuple(shape_parameters(kind)) if with_shapes else ()
-        )
-        paths = {f"effects.{number}.{field}": field for field in fields}
-        requests = [Request(path) for path in paths if path not in taken]
-        _, found = scenario_parameters(scenario, requests)
-        parameters += [
-            dataclasses.replace(p, name=f"{name}.{paths[p.path]}") for p in found
-        ]
-        taken |= set(paths)
-        count = len(model.parameters) + len(parameters)
-        groups.append(range(count - len(found), count))
-    return model.extended(scenario, parameters), groups
+        begin = len(model.parameters) + len(parameters)
+        for field in candidate.fields + (tuple(candidate.shape) * with_shapes):
+            added = effect_parameter(effects, number, field, f"{name}.{field}")
+            if added.path not in taken:
+                parameters.append(added)
+                taken.add(added.path)
+        groups.append(range(begin, len(model.parameters) + len(parameters)))
+    return model.with_effects(effects, parameters), groups
 
 
-def _place(scenario: Scenario, candidate: Candidate) -> int:
-    """Returns where a candidate stands in the scenario, which gets it if need be."""
+def _place(effects: list[Effect], candidate: Candidate) -> int:
+    """Returns a candidate's place among effects, to which it is added if need be."""
     wanted = candidate.effect
-    for number, effect in enumerate(scenario.effects):
+    for number, effect in enumerate(effects):
         if type(effect) is type(wanted) and _looks(effect) == _looks(wanted):
             return number
-    scenario.effects.append(copy.deepcopy(wanted))
-    return len(scenario.effects) - 1
-
-
-def _places(kind: type[ArmEffect], joints: Sequence[str]) -> list[dict[str, str]]:
-    """Returns where an arm's effect may act: at each joint, or on the arm."""
-    if issubclass(kind, JointEffect):
-        return [{"joint": joint} for joint in joints]
-    return [{}]
-
-
-def _in_all_shapes(kind: type[Effect], **fields: Any) -> list[Effect]:
-    grids = shape_parameters(kind)
-    return [
-        kind(**fields, **dict(zip(grids, values, strict=True)))
-        for values in itertools.product(*grids.values())
-    ]
+    effects.append(copy.deepcopy(wanted))
+    return len(effects) - 1
 
 
 def _looks(effect: Effect) -> tuple[object, ...]:

@@ -15,13 +15,11 @@ from sysid.effect_selection.held_out import HeldOut, held_out
 from sysid.effect_selection.search import Round, Survey, Tracer
 from sysid.effect_selection.verdict import Verdict, verdict
 from sysid.identification.noise import with_estimated_noise
-from sysid.models.base import ScenarioModel
+from sysid.models.base import LogModel
 from sysid.workers import Workers
 
-#: Of a log of transitions: the share of episodes that is judged, not fitted.
-HELD_OUT = 0.25
-#: For the twin, where squares end: a stop that is hit a moment later is an outlier.
-HUBER = 3.0
+#: As models of transitions have them; ask the model instead.
+HELD_OUT, HUBER = 0.25, 3.0
 _SEARCHED = 250  # rows, of a model whose evaluation takes seconds
 
 
@@ -48,17 +46,17 @@ class Closed:
     scatter: Scatter | None
 
     @property
-    def scenario(self) -> Scenario:
-        """What was identified, with the effects that were found."""
+    def scenario(self) -> Scenario | None:
+        """What was identified, with the effects that were found; None without one."""
         scenario = self.last.model.scenario_at(self.last.theta)
-        if self.scatter is None:
+        if self.scatter is None or scenario is None:
             return scenario
         more = Imprecision(*self.scatter.std.tolist())
         return dataclasses.replace(scenario, effects=[*scenario.effects, more])
 
 
 def close_loop(
-    model: ScenarioModel,
+    model: LogModel,
     train: Sequence[int],
     test: Sequence[int],
     huber_delta: float,
@@ -84,7 +82,6 @@ def close_loop(
         DisasmError: the log is too short to decide anything.
     """
     base = with_estimated_noise(model.of_episodes(train), workers, huber_delta)
-    assert isinstance(base, ScenarioModel)
     refuse_few_rows(base)
     library_here = candidates(base, library)
     tracer = Tracer(
@@ -107,7 +104,7 @@ def close_loop(
     return Closed(found, first, last, rounds, begin, end, errors, loose)
 
 
-def _affordable(base: ScenarioModel) -> ScenarioModel:
+def _affordable(base: LogModel) -> LogModel:
     """Returns the model of so many rows that hundreds of evaluations are affordable."""
     every = round(base.measurements.rows / _SEARCHED)
     if not base.costly or every < 2:
@@ -116,7 +113,7 @@ def _affordable(base: ScenarioModel) -> ScenarioModel:
 
 
 def _with_all_rows(
-    tracer: Tracer, base: ScenarioModel, last: Fit
+    tracer: Tracer, base: LogModel, last: Fit
 ) -> tuple[Tracer, Fit, Fit]:
     """Returns the fits without and with the effects to what was thinned for the search.
 
@@ -126,7 +123,7 @@ def _with_all_rows(
     return tracer, tracer.fit(()), tracer.fit(last.effects, last)
 
 
-def _like(base: ScenarioModel, test: ScenarioModel) -> ScenarioModel:
+def _like(base: LogModel, test: LogModel) -> LogModel:
     """Returns the rows that were kept, with the noise that the fitted ones tell."""
     noise = base.measurements.noise
     origin = base.measurements.channels[0].origin

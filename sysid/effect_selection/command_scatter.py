@@ -22,7 +22,7 @@ from sysid.effect_selection.block_regression import blocks_of
 from sysid.effect_selection.evidence import ALPHA, LEAST_SHARE
 from sysid.effect_selection.fit import Fit
 from sysid.identification.whiteness import ljung_box
-from sysid.models.twin import TwinModel
+from sysid.models.base import LogModel
 from sysid.objective import Objective, pseudo_residual
 from sysid.workers import Workers
 
@@ -139,7 +139,7 @@ def scatter(fit: Fit, workers: Workers, huber_delta: float) -> Scatter | None:
         workers: to evaluate with.
         huber: where squares end.
     """
-    if not isinstance(fit.model, TwinModel) or fit.value <= BEYOND_NOISE:
+    if not fit.model.has_commands or fit.value <= BEYOND_NOISE:
         return None
     led = np.zeros((len(fit.linearisation.residual), 3))
     for _ in range(_ROUNDS):
@@ -165,11 +165,10 @@ def scatter(fit: Fit, workers: Workers, huber_delta: float) -> Scatter | None:
 
 def _seen(fit: Fit, workers: Workers, huber_delta: float, led: Array) -> _Likelihood:
     """Returns residuals and derivatives where steps led (n, 3), as from no scatter."""
-    assert isinstance(fit.model, TwinModel)
 
-    def residual(model: TwinModel, push: Array) -> Array:
+    def residual(model: LogModel, push: Array) -> Array:
         """Returns the residuals where steps lead by a push (n, 3) further."""
-        there = model.pushed(led * _UNIT + push)
+        there = model.displaced(led * _UNIT + push)
         return Objective(there, workers, huber_delta).residuals(fit.theta)[0]
 
     ways = _PUSH * np.eye(3)[:, None] * np.ones((len(led), 1))
@@ -195,7 +194,7 @@ def _carries_over(seen: _Likelihood, blocks: NDArray[np.int64]) -> bool:
     return p < ALPHA and float(np.mean(gains > 0.0)) >= LEAST_SHARE
 
 
-def _depends(model: TwinModel, led: Array, axes: NDArray[np.bool_]) -> bool:
+def _depends(model: LogModel, led: Array, axes: NDArray[np.bool_]) -> bool:
     """Returns whether where steps led (n, 3) follows on anything: then it is no chance.
 
     On the step before, on a mean, or on what a step began with.

@@ -4,7 +4,7 @@ import numpy as np
 
 from drake_disasm.common.errors import DisasmError
 from sysid.effect_selection.fit import Fit
-from sysid.models.base import ScenarioModel
+from sysid.models.base import LogModel
 
 _LEAST_ROWS = 10
 _ROWS_EACH = 2  # for each parameter, so that some can be held out
@@ -12,7 +12,7 @@ _MOST_EXCESS = 1.0  # of the loss of a block that is not fitted
 _AT_MOST = 20  # times the log: beyond that, the estimate means nothing
 
 
-def refuse_few_rows(model: ScenarioModel) -> None:
+def refuse_few_rows(model: LogModel) -> None:
     """Refuses logs that the model's own parameters could follow at will.
 
     Raises:

@@ -11,7 +11,7 @@ from sysid.effect_selection.block_regression import BlockRegression, blocks_of
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import FEW
 from sysid.identification.linearisation import Linearisation
-from sysid.models.base import ScenarioModel
+from sysid.models.base import LogModel
 from sysid.objective import pseudo_residual
 from sysid.parameters import Scaling, nominal_values
 
@@ -34,7 +34,7 @@ class Fit:
     """
 
     effects: tuple[Candidate, ...]
-    model: ScenarioModel
+    model: LogModel
     theta: Array
     linearisation: Linearisation
     value: float

@@ -10,7 +10,7 @@ from sysid.effect_selection.candidates import extended
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.search import Tracer
 from sysid.identification.uncertainty import block_length, block_numbers
-from sysid.models.base import Channel, ScenarioModel
+from sysid.models.base import Channel, LogModel
 
 Array = NDArray[np.float64]
 
@@ -74,9 +74,7 @@ class HeldOut:
         return np.sqrt(np.quantile(drawn, [0.025, 0.975], axis=0)).T
 
 
-def held_out(
-    tracer: Tracer, first: Fit, last: Fit, test: ScenarioModel | None
-) -> HeldOut:
+def held_out(tracer: Tracer, first: Fit, last: Fit, test: LogModel | None) -> HeldOut:
     """Returns the errors of the base model and of the one with effects.
 
     Args:
@@ -109,7 +107,7 @@ def contiguous_folds(episode: NDArray[np.int64]) -> NDArray[np.int64]:
     return block_numbers(episode, length)
 
 
-def _predicted(test: ScenarioModel, fit: Fit) -> Array:
+def _predicted(test: LogModel, fit: Fit) -> Array:
     model, _ = extended(test, fit.effects, with_shapes=True)
     return model.predictions(fit.theta)
 

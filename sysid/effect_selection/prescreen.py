@@ -16,7 +16,7 @@ import numpy as np
 from sysid.effect_selection.candidates import extended
 from sysid.effect_selection.evidence import What
 from sysid.effect_selection.fit import Fit
-from sysid.models.base import ScenarioModel
+from sysid.models.base import LogModel
 from sysid.objective import Objective
 from sysid.workers import Workers
 
@@ -62,7 +62,7 @@ class _RoughFit:
         model, _ = extended(self.tracer.base, effects, with_shapes=True)
         return self.tracer.fit(effects, self.before, values=self._scanned(model))
 
-    def _scanned(self, model: ScenarioModel) -> dict[str, float]:
+    def _scanned(self, model: LogModel) -> dict[str, float]:
         """Returns the value of the one new size that helps most, if any does.
 
         Each is tried alone over its range: downhill from null ends where contact does.

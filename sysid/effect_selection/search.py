@@ -26,7 +26,7 @@ from sysid.effect_selection.prescreen import rough_fits
 from sysid.effect_selection.residual_curves import curves
 from sysid.identification.gauss_newton import GAIN, gauss_newton
 from sysid.identification.linearisation import extend
-from sysid.models.base import ScenarioModel
+from sysid.models.base import LogModel
 from sysid.objective import Objective
 from sysid.parameters import nominal_values
 from sysid.workers import Workers
@@ -102,7 +102,7 @@ class Tracer:
         folder: where fits are kept, for a search that is stopped; None keeps none.
     """
 
-    base: ScenarioModel
+    base: LogModel
     library: Sequence[Candidate]
     workers: Workers
     huber_delta: float
@@ -373,7 +373,7 @@ class Tracer:
             objective.value(linearisation.residual),
         )
 
-    def _objective(self, model: ScenarioModel) -> Objective:
+    def _objective(self, model: LogModel) -> Objective:
         surrogate = None if self.exact else model.surrogate()
         return Objective(model, self.workers, self.huber_delta, surrogate)
 

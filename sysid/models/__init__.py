@@ -1,15 +1,11 @@
 """Models that predict a log's measured channels under parameters.
 
 One interface, `LogModel`, for every kind of log: transitions and rollouts of the
-twin, static readings of a force/torque sensor, joint torques of an arm.
+twin, static readings of a force/torque sensor, joint torques of an arm, and models
+of your own.
 """
 
-from sysid.models.base import (
-    Channel,
-    LogModel,
-    Measurements,
-    PredictionError,
-    ScenarioModel,
-)
+from sysid.models.base import LogModel, PredictionError, ScenarioModel
+from sysid.models.measurements import Channel, Measurements
 
 __all__ = ["Channel", "LogModel", "Measurements", "PredictionError", "ScenarioModel"]

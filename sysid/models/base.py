@@ -1,197 +1,196 @@
-"""What every identification works on: a model that predicts a log's channels."""
+"""What identification and closing the loop work on: a model that predicts a log."""
 
 import abc
+import copy
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Self
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.logs import Episode, Log
+from drake_disasm.effects import Effect
 from drake_disasm.scenario import Scenario, with_values
+from sysid.models.effects import at_null, field_of, with_fields
+from sysid.models.measurements import Channel as Channel
+from sysid.models.measurements import Measurements
 from sysid.parameters import Parameter, by_name, by_path
 
 Array = NDArray[np.float64]
+
+#: Residual, in standard deviations, beyond which the loss of a model that simulates
+#: is linear: a stop that is hit a moment later than measured is an outlier.
+HUBER_DELTA = 3.0
 
 
 class PredictionError(Exception):
     """A model can't be evaluated at these parameters: the simulation failed."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Channel:
-    """One measured quantity.
-
-    Attributes:
-        name: such as "fx".
-        unit: SI unit.
-        noise: standard deviation of the measurement; residuals are divided by it.
-        origin: where that number is from, for the report.
-    """
-
-    name: str
-    unit: str
-    noise: float
-    origin: str
-
-
-@dataclasses.dataclass(frozen=True)
-class Measurements:
-    """What was measured, in the rows and channels that a model predicts.
-
-    Attributes:
-        values: (rows, channels).
-        channels: what the columns are.
-        episode: (rows,) number of the episode that each row is of, from 0.
-        names: of the episodes.
-    """
-
-    values: Array
-    channels: tuple[Channel, ...]
-    episode: NDArray[np.int64]
-    names: tuple[str, ...]
-
-    @classmethod
-    def of_logs(
-        cls,
-        logs: Sequence[Log],
-        channels: tuple[Channel, ...],
-        values: Callable[[Log, Episode], Array],
-    ) -> Self:
-        """Returns what logs measured, all episodes of all of them.
-
-        Args:
-            logs: in their order.
-            channels: what the columns are.
-            values: of one episode, (rows, channels).
-        """
-        episodes = [(log, episode) for log in logs for episode in log.episodes]
-        parts = [values(log, episode) for log, episode in episodes]
-        return cls(
-            np.concatenate(parts),
-            channels,
-            np.repeat(np.arange(len(parts)), [len(part) for part in parts]),
-            tuple(f"{log.folder.name}/{episode.name}" for log, episode in episodes),
-        )
-
-    @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return len(self.values)
-
-    @property
-    def noise(self) -> Array:
-        """Standard deviation of each channel (channels,)."""
-        return np.array([channel.noise for channel in self.channels])
-
-    def select(self, mask: NDArray[np.bool_]) -> Self:
-        """Returns the rows where the mask (rows,) is true, episodes numbered anew."""
-        kept, episode = np.unique(self.episode[mask], return_inverse=True)
-        return dataclasses.replace(
-            self,
-            values=self.values[mask],
-            episode=episode,
-            names=tuple(self.names[i] for i in kept),
-        )
-
-    def with_noise(self, noise: Array, origin: str) -> Self:
-        """Returns the same with other standard deviations (channels,)."""
-        channels = tuple(
-            dataclasses.replace(channel, noise=float(value), origin=origin)
-            for channel, value in zip(self.channels, noise, strict=True)
-        )
-        return dataclasses.replace(self, channels=channels)
-
-
 class LogModel(abc.ABC):
-    """Predicts a log's measured channels under parameters.
+    """Predicts the channels of a log from parameters, and from effects.
 
-    A model goes through pickle to the workers that evaluate it; what it builds
-    there, such as a diagram, it builds once and keeps out of the pickle.
+    A model of your own sets `parameters` and `measurements` and implements `predict`
+    and `select_rows`; everything else has a default. To close the loop with it, name
+    the classes of effects that `predict` applies in `effect_types`:
+
+        class Pendulum(LogModel):
+            effect_types = (JointEffect,)
+
+            def __init__(self, q, v, tau):
+                self.q, self.v = q, v
+                self.parameters = (Parameter("weight", 1.0, 0.0, 5.0, "N m"),)
+                channels = [Channel("pivot", "N m", noise=0.01)]
+                self.measurements = Measurements.of_array(tau, channels)
+
+            def predict(self, theta, rows):
+                load = theta[0] * np.sin(self.q[rows])
+                samples = JointSamples(self.q[rows], self.v[rows], 0 * load, load)
+                effects = self.effects_at(theta)
+                return (load + sum(e.torque(samples) for e in effects))[:, None]
+
+            def select_rows(self, mask):
+                return self.replace(q=self.q[mask], v=self.v[mask])
+
+    Models are immutable: what changes one returns another. A model is pickled for the
+    processes that evaluate it; what it builds there, such as a diagram, it leaves out
+    of the pickle by `__getstate__`.
 
     Attributes:
         parameters: what can be varied, in the order of theta.
-        measurements: what it is compared with.
-        affine: whether predictions are affine in theta, so that least squares
-            have one exact solution.
+        measurements: what predictions are compared with.
+        affine: whether predictions are affine in the parameters, and in the
+            amplitudes of effects: least squares then has one exact solution.
+        effect_types: base classes of the effects that `predict` applies.
+        held_out_share: share of the episodes on which closing the loop judges a
+            model instead of fitting it; 0 judges on contiguous blocks of rows in
+            turn, each predicted by a fit to all others.
+        has_commands: whether rows are commanded steps of an arm, which `displaced`
+            can move: the arm may then scatter about its commands.
     """
 
     parameters: tuple[Parameter, ...]
     measurements: Measurements
     affine: bool = False
-
-    @property
-    def costly(self) -> bool:
-        """Whether an evaluation takes seconds: a search is to ask for few rows."""
-        return False
-
-    def surrogate(self) -> Self:
-        """Returns a model that behaves alike and is faster; itself if there is none.
-
-        Its parameters are the same. Differences of its predictions serve where those
-        of this one take too long.
-        """
-        return self
-
-    @property
-    def noise_groups(self) -> tuple[str, ...]:
-        """For each channel a label; channels of one label have one unknown noise."""
-        return tuple(channel.name for channel in self.measurements.channels)
+    effect_types: ClassVar[tuple[type[Effect], ...]] = ()
+    held_out_share: ClassVar[float] = 0.0
+    has_commands: ClassVar[bool] = False
+    _effects: tuple[Effect, ...] = ()
+    _own_parameters: tuple[Parameter, ...] | None = None  # None: none was frozen
+    _frozen: Mapping[str, float] = {}
 
     @abc.abstractmethod
     def predict(self, theta: Array, rows: slice) -> Array:
-        """Returns the channels (len(rows), channels) that the model says.
+        """Returns the predicted channels (len(rows), channels), SI.
 
         Args:
-            theta: (p,) values of `parameters`.
+            theta: values of the parameters that the model was made with, in their
+                order and whether frozen or not, then those of the effects.
             rows: one of `chunks`.
 
         Raises:
             PredictionError: the simulation failed.
         """
 
-    def simulate(self, theta: Array, rows: slice) -> Array:
-        """Returns what a prediction takes long for, (len(rows), k).
+    @abc.abstractmethod
+    def select_rows(self, mask: NDArray[np.bool_]) -> Self:
+        """Returns a model whose inputs are those of some rows.
 
-        Parameters that `simulated` leaves out do not change it: many predictions
-        may share one.
+        Call `of_rows` instead, which takes care of measurements, parameters and
+        effects.
 
-        Raises:
-            PredictionError: the simulation failed.
+        Args:
+            mask: (rows,) true for the rows to take.
         """
-        return self.predict(theta, rows)
 
-    def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
-        """Returns the prediction that follows from what `simulate` gave."""
-        return simulated
-
-    def predictions(self, theta: Array) -> Array:
-        """Returns what the model says of all rows, (rows, channels), in this process.
-
-        Raises:
-            PredictionError: the simulation failed.
-        """
-        parts = [self.simulate(theta, rows) for rows in self.chunks()]
-        return self.read(theta, slice(0, self.measurements.rows), np.concatenate(parts))
+    # Effects: those that the model has, and those that it could have.
 
     @property
-    def simulated(self) -> NDArray[np.bool_]:
-        """Which parameters (p,) `simulate` depends on."""
-        return np.ones(len(self.parameters), dtype=bool)
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects at their nominal values."""
+        return self._effects
 
-    @abc.abstractmethod
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Where effects that act at a joint may act; by default at each channel."""
+        return tuple(channel.name for channel in self.measurements.channels)
+
+    def effects_at(self, theta: Array) -> tuple[Effect, ...]:
+        """Returns the effects with values of parameters (p,), as `predict` gets it."""
+        own = [p for p in self.parameters if field_of(p)]
+        values = by_name(own, theta[len(theta) - len(own) :])
+        return with_fields(self._effects, by_path(own, values))
+
+    def applicable_effects(self, library: Sequence[type[Effect]]) -> list[Effect]:
+        """Returns the effects that the model may lack, at null.
+
+        One for each place where it can act, and each combination of its shape
+        parameters' grids.
+
+        Args:
+            library: classes of effects; those not of `effect_types` are passed over,
+                and those that act on the variance alone.
+        """
+        return [
+            effect
+            for kind in library
+            if issubclass(kind, self.effect_types) and not kind.is_random
+            for effect in at_null(kind, self.joints)
+        ]
+
+    def with_effects(
+        self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
+    ) -> Self:
+        """Returns the same model with other effects.
+
+        Args:
+            effects: all of them; those that the model has come first.
+            parameters: additional ones, fields of effects: their paths are
+                `effects.0.size` and the like.
+        """
+        return self.replace(
+            _effects=tuple(effects), parameters=(*self.parameters, *parameters)
+        )
+
+    # Which parameters vary.
+
     def freeze(self, values: Mapping[str, float]) -> Self:
         """Returns the same model with some parameters fixed at values, by name."""
+        of_effects = [p for p in self.parameters if field_of(p)]
+        own = tuple(p for p in self.parameters if not field_of(p))
+        return self.replace(
+            parameters=tuple(p for p in self.parameters if p.name not in values),
+            _effects=with_fields(self._effects, by_path(of_effects, values)),
+            _own_parameters=self._own_parameters or own,
+            _frozen={**self._frozen, **values},
+        )
 
-    @abc.abstractmethod
-    def _selected(self, mask: NDArray[np.bool_]) -> Self:
+    def with_frozen(self, theta: Array) -> Array:
+        """Returns parameters (p,) with the values of frozen ones in their places.
+
+        Frozen parameters of effects have none: their values are in the effects.
+        """
+        if self._own_parameters is None:
+            return theta
+        values = {**self._frozen, **by_name(self.parameters, theta)}
+        own = [values[p.name] for p in self._own_parameters]
+        count = sum(bool(field_of(p)) for p in self.parameters)
+        return np.concatenate([own, theta[len(theta) - count :]])
+
+    def scenario_at(self, theta: Array) -> Scenario | None:
+        """Returns the scenario at parameters (p,), for a model that has one."""
+        return None
+
+    # Which rows.
+
+    def of_rows(self, mask: NDArray[np.bool_]) -> Self:
         """Returns the same model of the rows where the mask (rows,) is true."""
-
-    def chunks(self) -> list[slice]:
-        """Returns the pieces of work that one evaluation falls into."""
-        return [slice(0, self.measurements.rows)]
+        kept = ("parameters", "_effects", "_own_parameters", "_frozen")
+        return self.select_rows(mask).replace(
+            measurements=self.measurements.select(mask),
+            **{name: self.__dict__[name] for name in kept if name in self.__dict__},
+        )
 
     def of_episodes(self, episodes: Sequence[int]) -> Self:
         """Returns the same model of some of the episodes.
@@ -202,41 +201,121 @@ class LogModel(abc.ABC):
         mask = np.isin(self.measurements.episode, episodes)
         if not mask.any():
             raise DisasmError("no episode is left to fit; hold out fewer")
-        return self._selected(mask)
+        return self.of_rows(mask)
 
-    def of_rows(self, mask: NDArray[np.bool_]) -> Self:
-        """Returns the same model of the rows where the mask (rows,) is true."""
-        return self._selected(mask)
+    def thin(self, every: int) -> Self:
+        """Returns the same model of every n-th row."""
+        return self.of_rows(np.arange(self.measurements.rows) % every == 0)
 
     def with_measurements(self, measurements: Measurements) -> Self:
         """Returns the same model compared with other measurements of the same rows."""
-        return self._changed(measurements=measurements)
+        return self.replace(measurements=measurements)
 
-    def thin(self, every: int) -> Self:
-        """Returns the same model of every n-th row, where rows stand alone."""
+    # How predictions are computed, and what that costs.
+
+    @property
+    def costly(self) -> bool:
+        """Whether an evaluation takes seconds: a search is then to ask for few rows."""
+        return False
+
+    def surrogate(self) -> Self:
+        """Returns a faster model with the same parameters; itself if there is none.
+
+        Differences of its predictions serve as derivatives of this one's.
+        """
         return self
 
+    def chunks(self) -> list[slice]:
+        """Returns the rows of each piece of work that an evaluation consists of."""
+        return [slice(0, self.measurements.rows)]
+
+    @property
+    def simulated(self) -> NDArray[np.bool_]:
+        """Which parameters (p,) `simulate` depends on."""
+        return np.ones(len(self.parameters), dtype=bool)
+
+    def simulate(self, theta: Array, rows: slice) -> Array:
+        """Returns the part of a prediction that takes long, (len(rows), k).
+
+        Parameters that `simulated` leaves out do not change it: many predictions
+        may share one.
+
+        Args:
+            theta: (p,) values of `parameters`.
+            rows: one of `chunks`.
+
+        Raises:
+            PredictionError: the simulation failed.
+        """
+        return self.predict(self.with_frozen(theta), rows)
+
+    def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
+        """Returns the prediction (len(rows), channels) from what `simulate` gave."""
+        return simulated
+
+    def predictions(self, theta: Array) -> Array:
+        """Returns predictions of all rows (rows, channels), in this process.
+
+        Args:
+            theta: (p,) values of `parameters`.
+
+        Raises:
+            PredictionError: the simulation failed.
+        """
+        parts = [self.simulate(theta, rows) for rows in self.chunks()]
+        return self.read(theta, slice(0, self.measurements.rows), np.concatenate(parts))
+
+    def displaced(self, displacement: Array) -> Self:
+        """Returns the same model with each step displaced from its command.
+
+        Args:
+            displacement: (rows, 3) of the step's end, in G [m].
+
+        Raises:
+            DisasmError: the model's rows are no commanded steps.
+        """
+        raise DisasmError(
+            f"{type(self).__name__}: has no commands to displace; ask has_commands"
+        )
+
+    # How a fit weighs and describes.
+
+    @property
+    def default_huber_delta(self) -> float:
+        """Residual, in standard deviations, beyond which the loss is linear.
+
+        Infinite where the model is affine: least squares then has one exact optimum.
+        """
+        return np.inf if self.affine else HUBER_DELTA
+
+    @property
+    def noise_groups(self) -> tuple[str, ...]:
+        """For each channel a label; channels of one label have one unknown noise."""
+        return tuple(channel.name for channel in self.measurements.channels)
+
     def describe(self, theta: Array) -> dict[str, tuple[float, str]]:
-        """Returns quantities that people ask for, with units, by name; none here."""
+        """Returns derived quantities at parameters (p,): value and unit, by name."""
         return {}
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """Returns what a channel's residual might depend on, (rows,) each, by name."""
         return {}
 
-    def _changed(self, **attributes: Any) -> Self:
-        """Returns a copy with other attributes, without what it has built."""
-        changed = type(self).__new__(type(self))
-        changed.__dict__.update(dict(self.__getstate__()) | attributes)
-        return changed
+    # Copies.
+
+    def replace(self, **attributes: Any) -> Self:
+        """Returns a copy with other attributes, without what the model has built."""
+        copied = copy.copy(self)
+        copied.__dict__.update(attributes)
+        return copied
 
     def __getstate__(self) -> dict[str, Any]:
-        """Returns what goes through pickle; a model that builds leaves that out."""
+        """Returns what is pickled and copied; a model that builds leaves that out."""
         return self.__dict__
 
 
 class ScenarioModel(LogModel):
-    """A model whose parameters are numbers of a scenario.
+    """A model whose parameters are numbers of a scenario, and its effects, too.
 
     Attributes:
         scenario: at the parameters' nominal values.
@@ -244,17 +323,29 @@ class ScenarioModel(LogModel):
 
     scenario: Scenario
 
-    def freeze(self, values: Mapping[str, float]) -> Self:
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The scenario's effects."""
+        return tuple(self.scenario.effects)
+
+    def effects_at(self, theta: Array) -> tuple[Effect, ...]:
         """See LogModel."""
-        return self._changed(
-            scenario=with_values(self.scenario, by_path(self.parameters, values)),
-            parameters=tuple(p for p in self.parameters if p.name not in values),
+        return tuple(self.scenario_at(theta).effects)
+
+    def with_effects(
+        self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
+    ) -> Self:
+        """See LogModel."""
+        return self.replace(
+            scenario=dataclasses.replace(self.scenario, effects=list(effects)),
+            parameters=(*self.parameters, *parameters),
         )
 
-    def extended(self, scenario: Scenario, parameters: Sequence[Parameter]) -> Self:
-        """Returns the same model in another scenario, with more parameters of it."""
-        return self._changed(
-            scenario=scenario, parameters=(*self.parameters, *parameters)
+    def freeze(self, values: Mapping[str, float]) -> Self:
+        """See LogModel; a frozen value becomes the scenario's."""
+        return self.replace(
+            scenario=with_values(self.scenario, by_path(self.parameters, values)),
+            parameters=tuple(p for p in self.parameters if p.name not in values),
         )
 
     def scenario_at(self, theta: Array) -> Scenario:

@@ -1,33 +1,44 @@
 """An arm's joint torques from its motion: rigid bodies, of any URDF."""
 
-from collections.abc import Mapping, Sequence
-from typing import Self
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
-from drake_disasm.effects import FlangePayload, JointEffect, JointSamples
+from drake_disasm.effects import (
+    ArmEffect,
+    Effect,
+    FlangePayload,
+    JointEffect,
+    JointSamples,
+)
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
-from drake_disasm.scenario import Scenario, with_values
-from sysid.models.base import Array, Channel, Measurements, ScenarioModel
+from drake_disasm.scenario import Scenario
+from sysid.models.base import Array, LogModel
+from sysid.models.measurements import Channel, Measurements
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
-from sysid.parameters import Parameter, by_name, by_path
+from sysid.parameters import Parameter
 
 _NEEDED = ("q", "v", "vd", "tau")
 _REACH = 5.0  # times what a parameter would need to explain all torque alone
 
 
-class JointMotionModel(ScenarioModel):
+class JointMotionModel(LogModel):
     """tau = Y(q, v, vd) beta, with beta the identifiable base parameters.
 
     Of ten inertial parameters per link, many never show in joint torques, and
     others only in sums. `parameters` are the sums that do show; each is named by
-    the first of its terms, and `doc` has them all. Of a scenario, its arm effects
-    act, and their parameters come after the base parameters.
+    the first of its terms, and `doc` has them all. Parameters of arm effects come
+    after the base parameters.
     """
+
+    affine = True
+    effect_types = (ArmEffect,)
 
     def __init__(
         self,
@@ -57,8 +68,9 @@ class JointMotionModel(ScenarioModel):
         arm = ArmDynamics(urdf, header.joints)
         base = base_set(arm.random_regressor())
         parts = [arm.regressor(e["q"], e["v"], e["vd"]) for _, e in episodes]
-        self.scenario = scenario or Scenario()
-        _refuse_other_joints(self.scenario, header.joints)
+        self._scenario = scenario or Scenario()
+        self._effects = tuple(self._scenario.effects)
+        _refuse_other_joints(self._effects, header.joints)
         self._motion = {
             name: np.concatenate([e[name] for _, e in episodes])
             for name in ("q", "v", "vd")
@@ -66,9 +78,6 @@ class JointMotionModel(ScenarioModel):
         Y = np.concatenate(parts)
         self._Y, self._Y_F = Y[:, :, base.independent], Y[:, :, arm.last_link]
         self._beta = base.beta(arm.inertia)
-        self._fixed = np.zeros(len(self._beta))
-        self._free = np.arange(len(self._beta))
-        self.affine = True
         channels = tuple(Channel(j, "N m", np.nan, "estimated") for j in header.joints)
         self.measurements = Measurements.of_logs(
             logs, channels, lambda _, episode: episode["tau"]
@@ -77,45 +86,24 @@ class JointMotionModel(ScenarioModel):
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
-        beta, count = self._fixed.copy(), len(self._free)
-        beta[self._free] = theta[:count]
-        load: Array = self._Y[rows] @ beta
-        effects = self.scenario_at(theta).effects
+        load: Array = self._Y[rows] @ theta[: len(self._beta)]
+        effects = self.effects_at(theta)
         for effect in effects:
             if isinstance(effect, FlangePayload):
                 load = load + self._Y_F[rows] @ effect.inertial
         torque = load.copy()
-        joints = [channel.name for channel in self.measurements.channels]
         for effect in effects:
             if isinstance(effect, JointEffect):
-                i = joints.index(effect.joint)
+                i = self.joints.index(effect.joint)
                 motion = {name: all_[rows, i] for name, all_ in self._motion.items()}
                 samples = JointSamples(**motion, load=load[:, i])
                 torque[:, i] += effect.torque(samples)
         return torque
 
     def scenario_at(self, theta: Array) -> Scenario:
-        """See ScenarioModel; base parameters are no part of a scenario."""
-        count = len(self._free)
-        own = self.parameters[count:]
-        return with_values(self.scenario, by_path(own, by_name(own, theta[count:])))
-
-    def freeze(self, values: Mapping[str, float]) -> Self:
-        """See LogModel."""
-        base = self.parameters[: len(self._free)]
-        fixed, free = self._fixed.copy(), []
-        for number, parameter in zip(self._free, base, strict=True):
-            if parameter.name in values:
-                fixed[number] = values[parameter.name]
-            else:
-                free.append(number)
-        own = self.parameters[len(base) :]
-        return self._changed(
-            _fixed=fixed,
-            _free=np.array(free, dtype=np.int64),
-            scenario=with_values(self.scenario, by_path(own, values)),
-            parameters=tuple(p for p in self.parameters if p.name not in values),
-        )
+        """Returns a scenario with the effects; base parameters are no part of it."""
+        effects: list[Any] = list(self.effects_at(theta))
+        return dataclasses.replace(self._scenario, effects=effects, randomisation=[])
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: the joint's own motion."""
@@ -128,7 +116,7 @@ class JointMotionModel(ScenarioModel):
         Raises:
             DisasmError: there is no such base parameter.
         """
-        base = self.parameters[: len(self._free)]
+        base = [p for p in self.parameters if not p.path]
         known = [p.name for p in base]
         for name in names:
             if name not in known:
@@ -138,11 +126,6 @@ class JointMotionModel(ScenarioModel):
                 )
         rest = {p.name: p.nominal for p in base if p.name not in names}
         return self.freeze(rest)
-
-    def urdf_values(self) -> Mapping[str, float]:
-        """Returns the base parameters that the URDF's inertias amount to, by name."""
-        base = self.parameters[: len(self._free)]
-        return by_name(base, self._beta[self._free])
 
     def _base_parameters(
         self, arm: ArmDynamics, base: BaseSet
@@ -163,17 +146,17 @@ class JointMotionModel(ScenarioModel):
             for i, value in enumerate(self._beta)
         )
 
-    def _selected(self, mask: NDArray[np.bool_]) -> Self:
-        return self._changed(
+    def select_rows(self, mask: NDArray[np.bool_]) -> Self:
+        """See LogModel."""
+        return self.replace(
             _Y=self._Y[mask],
             _Y_F=self._Y_F[mask],
             _motion={name: values[mask] for name, values in self._motion.items()},
-            measurements=self.measurements.select(mask),
         )
 
 
-def _refuse_other_joints(scenario: Scenario, joints: Sequence[str]) -> None:
-    for number, effect in enumerate(scenario.effects):
+def _refuse_other_joints(effects: Sequence[Effect], joints: Sequence[str]) -> None:
+    for number, effect in enumerate(effects):
         if isinstance(effect, JointEffect) and effect.joint not in joints:
             raise DisasmError(
                 f"effects.{number}.joint: the log has no joint '{effect.joint}'; "

@@ -10,12 +10,20 @@ from pydrake.multibody.tree import UniformGravityFieldElement
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.ft_sensor import sensed
-from drake_disasm.effects import PayloadError, Sensing, SensorEffect, sensor_chain
+from drake_disasm.effects import (
+    Effect,
+    PayloadError,
+    Sensing,
+    SensorEffect,
+    SensorMemoryEffect,
+    sensor_chain,
+)
 from drake_disasm.logs import Episode, Log, rotation_matrices, sensor_wrench
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.logs.schema import WRENCH
 from drake_disasm.scenario import Scenario
-from sysid.models.base import Array, Channel, Measurements, ScenarioModel
+from sysid.models.base import Array, ScenarioModel
+from sysid.models.measurements import Channel, Measurements
 from sysid.parameters import Parameter
 
 #: Weight, first moment and bias: all that a rigid load on an ideal sensor can do.
@@ -37,6 +45,9 @@ class StaticWrenchModel(ScenarioModel):
     The effects are those of the simulated sensor, the same code. Channels are the
     reading at So in S, in whatever frame the log states it.
     """
+
+    affine = True
+    effect_types = (SensorEffect,)
 
     def __init__(
         self,
@@ -67,7 +78,6 @@ class StaticWrenchModel(ScenarioModel):
                     "name such a log",
                 )
         self.parameters, self.scenario = tuple(parameters), scenario
-        self.affine = True
         payload = _payload(scenario) if known_payload else (0.0, np.zeros(3))
         self._mass: float = payload[0]
         self._p_SoScm_S: Array = payload[1]
@@ -128,12 +138,14 @@ class StaticWrenchModel(ScenarioModel):
                     "it; name sensor effects, such as PayloadError.mass SensorBias.fx"
                 )
 
-    def _selected(self, mask: NDArray[np.bool_]) -> Self:
-        return self._changed(
-            _R_WS=self._R_WS[mask],
-            _time=self._time[mask],
-            measurements=self.measurements.select(mask),
-        )
+    def applicable_effects(self, library: Sequence[type[Effect]]) -> list[Effect]:
+        """See LogModel; without memory, of which readings at rest know nothing."""
+        at_rest = [k for k in library if not issubclass(k, SensorMemoryEffect)]
+        return super().applicable_effects(at_rest)
+
+    def select_rows(self, mask: NDArray[np.bool_]) -> Self:
+        """See LogModel."""
+        return self.replace(_R_WS=self._R_WS[mask], _time=self._time[mask])
 
 
 def _payload(scenario: Scenario) -> tuple[float, np.ndarray]:

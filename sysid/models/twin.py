@@ -12,6 +12,8 @@ from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.spatial import pose_from_vector
 from drake_disasm.effects import (
+    ContactExponent,
+    Effect,
     EnvironmentEffect,
     MotionEffect,
     SensorEffect,
@@ -27,13 +29,12 @@ from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.replay import Steps, TwinReplay
 from sysid.models.base import (
     Array,
-    Channel,
-    Measurements,
     PredictionError,
     ScenarioModel,
     even_chunks,
 )
 from sysid.models.commands import Commands, twin_coordinates
+from sysid.models.measurements import Channel, Measurements
 from sysid.models.sensor_reading import SensorReading, at_sensor
 from sysid.parameters import Parameter
 
@@ -59,6 +60,10 @@ class TwinModel(ScenarioModel):
     state, and each of its states is compared: errors add up there, so effects too
     small for one step show.
     """
+
+    effect_types = (EnvironmentEffect, MotionEffect, SensorEffect)
+    held_out_share = 0.25
+    has_commands = True
 
     def __init__(
         self,
@@ -101,7 +106,7 @@ class TwinModel(ScenarioModel):
         self._replay: TwinReplay | ImpactReplay | None = None
         self._simulated: bytes | None = None
         self._moved: tuple[str, Steps] | None = None
-        self._push: Array | None = None
+        self._displacement: Array | None = None
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
@@ -116,8 +121,9 @@ class TwinModel(ScenarioModel):
         try:
             replay = self._replay_at(theta, scenario)
             steps = self._steps_of(_mean_chain(scenario)).select(rows)
-            if self._push is not None:
-                steps = _pushed(steps, self._push[rows] / self.scenario.task.period)
+            if self._displacement is not None:
+                rate = self._displacement[rows] / self.scenario.task.period
+                steps = _faster(steps, rate)
             states = at_sensor(self._states(replay, steps), self._X_SB)
         except (RuntimeError, DisasmError, ValueError) as error:
             self._replay = self._simulated = None
@@ -153,6 +159,11 @@ class TwinModel(ScenarioModel):
         """See LogModel."""
         return not self._has_impact
 
+    def applicable_effects(self, library: Sequence[type[Effect]]) -> list[Effect]:
+        """See LogModel; IMPACT alone has an exponent."""
+        acting = [k for k in library if self._has_impact or k is not ContactExponent]
+        return super().applicable_effects(acting)
+
     def surrogate(self) -> Self:
         """See LogModel: IMPACT, where all parameters mean the same to it."""
         paths = [parameter.path for parameter in self.parameters]
@@ -160,17 +171,13 @@ class TwinModel(ScenarioModel):
         if self._has_impact or self.rollout or own:
             return self
         contact = dataclasses.replace(self.scenario.contact, model="impact")
-        return self._changed(
+        return self.replace(
             scenario=dataclasses.replace(self.scenario, contact=contact)
         )
 
-    def pushed(self, push: Array) -> Self:
-        """Returns the same model where each step leads further than commanded.
-
-        Args:
-            push: (rows, 3) by how much, in G [m].
-        """
-        return self._changed(_push=push)
+    def displaced(self, displacement: Array) -> Self:
+        """See LogModel."""
+        return self.replace(_displacement=displacement)
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: time, place, action and force at the beginning of a step."""
@@ -214,20 +221,17 @@ class TwinModel(ScenarioModel):
 
     def first(self, rows: int) -> Self:
         """Returns the same model of the first transitions alone."""
-        return self._selected(np.arange(self.measurements.rows) < rows)
+        return self.of_rows(np.arange(self.measurements.rows) < rows)
 
     def thin(self, every: int) -> Self:
         """See LogModel; a rollout keeps every n-th episode."""
         rows = np.arange(self.measurements.rows)
         of = self.measurements.episode if self.rollout else rows
-        return self._selected(of % every == 0)
+        return self.of_rows(of % every == 0)
 
-    def _selected(self, mask: NDArray[np.bool_]) -> Self:
-        return self._changed(
-            steps=self.steps.select(mask),
-            _rows=self._rows[mask],
-            measurements=self.measurements.select(mask),
-        )
+    def select_rows(self, mask: NDArray[np.bool_]) -> Self:
+        """See LogModel."""
+        return self.replace(steps=self.steps.select(mask), _rows=self._rows[mask])
 
     def _replay_at(self, theta: Array, scenario: Scenario) -> TwinReplay | ImpactReplay:
         """Returns the twin at parameters (p,); a change takes some 10 ms."""
@@ -265,7 +269,7 @@ def _mean_chain(scenario: Scenario) -> tuple[MotionEffect, ...]:
     return tuple(e for e in motion_chain(scenario.effects) if not e.is_random)
 
 
-def _pushed(steps: Steps, rate: Array) -> Steps:
+def _faster(steps: Steps, rate: Array) -> Steps:
     """Returns steps that go faster by rates (n, 3) [m/s]."""
     more = np.hstack([rate, np.zeros_like(rate)])
     return dataclasses.replace(steps, qd_rate=steps.qd_rate + more)

@@ -9,7 +9,7 @@ import numpy as np
 
 from sysid.models import Channel, LogModel, Measurements, PredictionError
 from sysid.models.base import even_chunks
-from sysid.parameters import Parameter, by_name
+from sysid.parameters import Parameter
 
 NOISE = 0.1
 
@@ -29,7 +29,8 @@ class Decay(LogModel):
         noise: float = NOISE,
     ) -> None:
         self.parameters = tuple(Parameter(n, 0.5, 0.0, 3.0) for n in names)
-        self.fixed: dict[str, float] = {}
+        self.names = tuple(names)
+        self.others: dict[str, float] = {"a": 2.0, "b": 1.5, "c": 0.3}
         self.x = np.tile(np.linspace(0.0, 3.0, rows), episodes)
         self.die_once: Path | None = None
         self.dies = False
@@ -53,8 +54,7 @@ class Decay(LogModel):
         if self.die_once and not self.die_once.exists():
             self.die_once.touch()
             os._exit(1)
-        values = {"a": 2.0, "b": 1.5, "c": 0.3, **self.fixed}
-        values |= by_name(self.parameters, theta)
+        values = self.others | dict(zip(self.names, theta, strict=True))
         if values["b"] > 2.9:
             raise PredictionError("b is too large to simulate")
         return self._curve(values, rows)[:, None]
@@ -62,11 +62,5 @@ class Decay(LogModel):
     def chunks(self):
         return even_chunks(self.measurements.rows, 16)
 
-    def _selected(self, mask) -> Self:
-        return self._changed(
-            x=self.x[mask], measurements=self.measurements.select(mask)
-        )
-
-    def freeze(self, values: Mapping[str, float]) -> Self:
-        left = tuple(p for p in self.parameters if p.name not in values)
-        return self._changed(parameters=left, fixed=self.fixed | dict(values))
+    def select_rows(self, mask) -> Self:
+        return self.replace(x=self.x[mask])

@@ -67,6 +67,8 @@ def test_an_added_effect_ends_where_the_models_own_derivatives_lead(tmp_path):
     near = tracer.fit((effect,), values={"GroovePose.ry": 0.9 * _TURN})
     fit = tracer._settled(near)
     assert fit.value < near.value
-    at_truth = Objective(model.extended(turned, ()), Workers(), HUBER)(np.zeros(0))[0]
+    at_truth = Objective(model.with_effects(turned.effects), Workers(), HUBER)(
+        np.zeros(0)
+    )[0]
     assert fit.value < at_truth
     assert fit.values["GroovePose.ry"] == pytest.approx(_TURN, rel=0.03)

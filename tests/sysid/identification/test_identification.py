@@ -92,8 +92,8 @@ def test_fewer_transitions_than_parameters(tmp_path):
 
 
 def test_a_parameter_on_its_bound_is_noted(tmp_path):
-    found = run(Decay(noise=0.1)._changed(fixed={"b": 0.2}), tmp_path / "x", test=())
-    model = Decay(("a",))._changed(fixed={"b": 0.05, "c": 1.0})
+    found = run(Decay(noise=0.1), tmp_path / "x", test=())
+    model = Decay(("a",)).replace(others={"a": 2.0, "b": 0.05, "c": 1.0})
     bound = run(model, tmp_path / "fit")
     assert any("ended on a bound" in note for note in bound.notes)
     assert any("no episode was held out" in note for note in found.notes)

@@ -59,7 +59,7 @@ def log(tmp_path: Path) -> Log:
 def test_a_payload_is_drakes_point_mass(log: Log) -> None:
     scenario = Scenario(effects=[FlangePayload(MASS, *(MASS * COM))])
     model = JointMotionModel([log], scenario=scenario).only([])
-    residual = model.predict(np.zeros(0), slice(0, 400)) - model.measurements.values
+    residual = model.predictions(np.zeros(0)) - model.measurements.values
     assert np.std(residual) == pytest.approx(NOISE, rel=0.1)
 
 

@@ -110,7 +110,7 @@ def test_recovers_the_base_parameters(urdf, tmp_path):
     settings = Settings(effort=Effort(evaluations=60, close=10), huber_delta=np.inf)
     journal = Journal(tmp_path / "fit", {}, False)
     found = identify(model, [0], [], settings, Workers(), journal, lambda *_: None)
-    truth = np.array(list(model.urdf_values().values()))
+    truth = np.array([p.nominal for p in model.parameters])
     inside = (found.interval_gn[:, 0] < truth) & (truth < found.interval_gn[:, 1])
     assert inside.mean() > 0.7
     np.testing.assert_allclose(found.theta, truth, atol=0.02)
@@ -125,7 +125,7 @@ def test_some_parameters_alone(urdf, tmp_path):
     assert [p.name for p in alone.parameters] == [name]
     theta = np.array([model.parameters[2].nominal])
     np.testing.assert_allclose(
-        alone.predict(theta, slice(0, 300)), model.measurements.values, atol=1e-9
+        alone.predictions(theta), model.measurements.values, atol=1e-9
     )
     with pytest.raises(DisasmError, match="no base parameter"):
         model.only(["upper.mass"])

@@ -1,0 +1,62 @@
+"""Effects on a model: where they may act, and their fields as parameters."""
+
+import dataclasses
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from drake_disasm.effects import Effect, JointEffect, shape_parameters
+from sysid.parameters import Parameter
+
+
+def at_null(kind: type[Effect], joints: Sequence[str]) -> list[Effect]:
+    """Returns a class of effects at null, in every place and shape.
+
+    Args:
+        kind: an effect at a joint is made for each joint, any other once.
+        joints: their names.
+    """
+    make: Callable[..., Effect] = kind
+    places = [{"joint": j} for j in joints] if issubclass(kind, JointEffect) else [{}]
+    grids = shape_parameters(kind)
+    return [
+        make(**place, **dict(zip(grids, shape, strict=True)))
+        for place in places
+        for shape in itertools.product(*grids.values())
+    ]
+
+
+def effect_parameter(
+    effects: Sequence[Effect], number: int, field: str, name: str = ""
+) -> Parameter:
+    """Returns the parameter that stands for a field of an effect.
+
+    Args:
+        effects: of a model.
+        number: of the effect, from 0.
+        field: of the effect.
+        name: of the parameter; by default its path.
+    """
+    effect: Any = effects[number]
+    path = f"effects.{number}.{field}"
+    (found,) = (f for f in dataclasses.fields(effect) if f.name == field)
+    return Parameter.of_field(
+        name or path, path, getattr(effect, field), found.metadata
+    )
+
+
+def field_of(parameter: Parameter) -> str:
+    """Returns the field of an effect that a parameter stands for; empty if of none."""
+    head, _, rest = parameter.path.partition(".")
+    return rest.partition(".")[2] if head == "effects" else ""
+
+
+def with_fields(
+    effects: Sequence[Effect], values: Mapping[str, float]
+) -> tuple[Effect, ...]:
+    """Returns effects with fields set, by their paths: `effects.0.size`."""
+    found: list[Any] = list(effects)
+    for path, value in values.items():
+        _, number, field = path.split(".")
+        found[int(number)] = dataclasses.replace(found[int(number)], **{field: value})
+    return tuple(found)

@@ -1,0 +1,134 @@
+"""What was measured: rows of channels, each with its noise, of one or more episodes."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.logs import Episode, Log
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Channel:
+    """One measured quantity.
+
+    Attributes:
+        name: such as "fx".
+        unit: SI unit.
+        noise: standard deviation of the measurement; residuals are divided by it.
+            NaN if it is not known: it is then estimated from a first fit.
+        origin: where that number is from, for the report.
+    """
+
+    name: str
+    unit: str
+    noise: float = np.nan
+    origin: str = "given"
+
+
+@dataclasses.dataclass(frozen=True)
+class Measurements:
+    """What was measured, in the rows and channels that a model predicts.
+
+    Attributes:
+        values: (rows, channels).
+        channels: what the columns are.
+        episode: (rows,) number of the episode that each row belongs to, from 0.
+        names: of the episodes.
+
+    Raises:
+        DisasmError: the shapes do not match.
+    """
+
+    values: Array
+    channels: tuple[Channel, ...]
+    episode: NDArray[np.int64]
+    names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        """Refuses arrays whose shapes do not match."""
+        if self.values.ndim != 2 or self.values.shape[1] != len(self.channels):
+            raise DisasmError(
+                f"measurements: values have the shape {self.values.shape}; give "
+                f"(rows, {len(self.channels)}), one column for each channel"
+            )
+        if self.episode.shape != self.values.shape[:1]:
+            raise DisasmError(
+                f"measurements: episode has the shape {self.episode.shape}; give one "
+                f"number for each of the {len(self.values)} rows"
+            )
+
+    @classmethod
+    def of_array(
+        cls, values: Array, channels: Sequence[Channel], name: str = "log"
+    ) -> Self:
+        """Returns one episode.
+
+        Args:
+            values: (rows, channels), or (rows,) of a single channel, SI.
+            channels: what the columns are.
+            name: of the episode.
+
+        Raises:
+            DisasmError: values and channels do not match.
+        """
+        table = np.asarray(values, dtype=float)
+        table = table[:, None] if table.ndim == 1 else table
+        episode = np.zeros(len(table), dtype=np.int64)
+        return cls(table, tuple(channels), episode, (name,))
+
+    @classmethod
+    def of_logs(
+        cls,
+        logs: Sequence[Log],
+        channels: tuple[Channel, ...],
+        values: Callable[[Log, Episode], Array],
+    ) -> Self:
+        """Returns all episodes of some logs.
+
+        Args:
+            logs: in their order.
+            channels: what the columns are.
+            values: of one episode, (rows, channels).
+        """
+        episodes = [(log, episode) for log in logs for episode in log.episodes]
+        parts = [values(log, episode) for log, episode in episodes]
+        return cls(
+            np.concatenate(parts),
+            channels,
+            np.repeat(np.arange(len(parts)), [len(part) for part in parts]),
+            tuple(f"{log.folder.name}/{episode.name}" for log, episode in episodes),
+        )
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.values)
+
+    @property
+    def noise(self) -> Array:
+        """Standard deviation of each channel (channels,)."""
+        return np.array([channel.noise for channel in self.channels])
+
+    def select(self, mask: NDArray[np.bool_]) -> Self:
+        """Returns the rows where the mask (rows,) is true, episodes renumbered."""
+        kept, episode = np.unique(self.episode[mask], return_inverse=True)
+        return dataclasses.replace(
+            self,
+            values=self.values[mask],
+            episode=episode,
+            names=tuple(self.names[i] for i in kept),
+        )
+
+    def with_noise(self, noise: Array, origin: str) -> Self:
+        """Returns the same with other standard deviations (channels,)."""
+        channels = tuple(
+            dataclasses.replace(channel, noise=float(value), origin=origin)
+            for channel, value in zip(self.channels, noise, strict=True)
+        )
+        return dataclasses.replace(self, channels=channels)
