@@ -10,11 +10,10 @@ import yaml
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
-from drake_disasm.effects import EFFECTS
+from drake_disasm.effects import Effect, registered_effects
 from drake_disasm.scenario import Scenario
 from sysid.parameters import Parameter
 
-_EFFECTS = {effect.__name__: effect for effect in EFFECTS}
 _KEYS = ("low", "high", "nominal", "scale")
 _SCALES = ("linear", "log")
 _DECADES = 1e3  # bounds that span more are searched by logarithm
@@ -94,7 +93,8 @@ def scenario_parameters(
 def _path(scenario: Scenario, name: str) -> str:
     """Returns the path of a name, adding the effect that it speaks of."""
     effect, _, field = name.partition(".")
-    if effect not in _EFFECTS:
+    kinds = _effects()
+    if effect not in kinds:
         return name
     numbers = [i for i, e in enumerate(scenario.effects) if type(e).__name__ == effect]
     if len(numbers) > 1:
@@ -103,9 +103,13 @@ def _path(scenario: Scenario, name: str) -> str:
             f"write effects.{numbers[0]}.{field}"
         )
     if not numbers:
-        scenario.effects.append(_EFFECTS[effect]())
+        scenario.effects.append(kinds[effect]())
         numbers = [len(scenario.effects) - 1]
     return f"effects.{numbers[0]}.{field}"
+
+
+def _effects() -> dict[str, type[Effect]]:
+    return {effect.__name__: effect for effect in registered_effects()}
 
 
 def _leaf(scenario: Scenario, path: str, name: str) -> tuple[float, Mapping[str, Any]]:
@@ -122,7 +126,7 @@ def _leaf(scenario: Scenario, path: str, name: str) -> tuple[float, Mapping[str,
             else {}
         )
         if part not in fields:
-            known = [*fields, *(_EFFECTS if value is scenario else [])]
+            known = [*fields, *(_effects() if value is scenario else [])]
             raise DisasmError(
                 f"parameter {name}: '{part}' does not exist; {closest(part, known)}"
             )

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from drake_disasm.effects import EFFECTS, amplitudes, shape_parameters
+from drake_disasm.effects import amplitudes, registered_effects, shape_parameters
 
 _PAGE = (Path(__file__).parents[1] / "docs" / "effects.md").read_text("utf-8")
 
@@ -13,8 +13,8 @@ def test_every_effect_is_listed_with_its_fields():
         for line in _PAGE.splitlines()
         if line.startswith("| `")
     }
-    assert sorted(rows) == sorted(effect.__name__ for effect in EFFECTS)
-    for effect in EFFECTS:
+    assert sorted(rows) == sorted(effect.__name__ for effect in registered_effects())
+    for effect in registered_effects():
         row = rows[effect.__name__]
         fields = [*amplitudes(effect), *shape_parameters(effect)]
         assert (

@@ -6,6 +6,7 @@ import os
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
+from drake_disasm.effects import import_effects
 from drake_disasm.policies import (
     SCRIPTED,
     find_policy,
@@ -18,7 +19,7 @@ from drake_disasm.systems.policy import Policy
 
 
 def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds --scenario and --set."""
+    """Adds --scenario, --set and --import."""
     parser.add_argument(
         "--scenario",
         default="removal",
@@ -34,6 +35,21 @@ def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
         dest="overrides",
         help="override one field, e.g. lock.clearance=0.0003, effects.0.ry=0.02 or "
         "'effects=[!SensorBias {fx: 0.5}]'; repeatable",
+    )
+    add_import_argument(parser)
+
+
+def add_import_argument(parser: argparse.ArgumentParser) -> None:
+    """Adds --import, which acts as soon as it is parsed, before anything is read."""
+    parser.add_argument(
+        "--import",
+        action="append",
+        default=[],
+        type=import_effects,
+        metavar="FILE.py|MODULE",
+        dest="imports",
+        help="import effects of your own (@register_effect), which scenarios and logs "
+        "may then have; repeatable",
     )
 
 

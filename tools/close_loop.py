@@ -48,6 +48,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add = parser.add_argument
     add("--log", nargs="+", required=True, metavar="DIR", help="logs of one kind")
     _add_model_arguments(add)
+    cli.add_import_argument(parser)
     cli.add_workers_argument(parser)
     add("--out", required=True, type=Path, metavar="DIR", help="a folder")
     return parser.parse_args(arguments)

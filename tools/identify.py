@@ -60,6 +60,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     _add_input_arguments(parser.add_argument)
     _add_search_arguments(parser.add_argument)
+    cli.add_import_argument(parser)
     cli.add_workers_argument(parser, "; any number gives the same bits")
     _add_judgement_arguments(parser.add_argument)
     args = parser.parse_args(arguments)

@@ -56,6 +56,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     _add_scenario_arguments(parser.add_argument)
     _add_agent_arguments(parser.add_argument)
     _add_run_arguments(parser.add_argument)
+    cli.add_import_argument(parser)
     cli.add_workers_argument(parser)
     return parser.parse_args(arguments)
 

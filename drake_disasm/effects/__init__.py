@@ -1,14 +1,9 @@
-"""Physical effects that a scenario can list. To add one: a file and a line here."""
+"""Physical effects that a scenario can list.
 
-from drake_disasm.effects.arm.asymmetric_friction import JointAsymmetricFriction
-from drake_disasm.effects.arm.coulomb_friction import JointCoulombFriction
-from drake_disasm.effects.arm.flange_payload import FlangePayload
-from drake_disasm.effects.arm.load_friction import JointLoadFriction
-from drake_disasm.effects.arm.rotor_inertia import RotorInertia
-from drake_disasm.effects.arm.stribeck_friction import JointStribeckFriction
-from drake_disasm.effects.arm.torque_gain import TorqueGain
-from drake_disasm.effects.arm.torque_offset import TorqueOffset
-from drake_disasm.effects.arm.viscous_friction import JointViscousFriction
+To add one to the library: a file, and its import below. To add one of your own from
+anywhere else: `register_effect`.
+"""
+
 from drake_disasm.effects.base import (
     AT_REST,
     ArmEffect,
@@ -22,84 +17,69 @@ from drake_disasm.effects.base import (
     Sensing,
     SensorEffect,
     SensorMemoryEffect,
-    amplitudes,
+)
+from drake_disasm.effects.chains import (
     environment_at,
     is_local,
     motion_chain,
     sensor_chain,
+)
+from drake_disasm.effects.fields import (
+    amplitude,
+    amplitudes,
+    joint_name,
+    shape_parameter,
     shape_parameters,
 )
-from drake_disasm.effects.environment.chain_pull import ChainPull
-from drake_disasm.effects.environment.contact_exponent import ContactExponent
-from drake_disasm.effects.environment.contact_stiffness import ContactStiffness
+from drake_disasm.effects.registry import (
+    find_effect,
+    import_effects,
+    register_effect,
+    registered_effects,
+)
+
+# Effects are registered, documented and tried in the order of these lines.
+# isort: off
+from drake_disasm.effects.environment.groove_pose import GroovePose
 from drake_disasm.effects.environment.groove_bend import GrooveBend
 from drake_disasm.effects.environment.groove_clearance import GrooveClearance
 from drake_disasm.effects.environment.groove_friction import GrooveFriction
-from drake_disasm.effects.environment.groove_pose import GroovePose
-from drake_disasm.effects.environment.rusty_patch import RustyPatch
-from drake_disasm.effects.environment.stribeck_friction import GrooveStribeckFriction
 from drake_disasm.effects.environment.viscous_friction import GrooveViscousFriction
-from drake_disasm.effects.motion.backlash import Backlash
+from drake_disasm.effects.environment.stribeck_friction import GrooveStribeckFriction
+from drake_disasm.effects.environment.rusty_patch import RustyPatch
+from drake_disasm.effects.environment.contact_stiffness import ContactStiffness
+from drake_disasm.effects.environment.contact_exponent import ContactExponent
+from drake_disasm.effects.environment.chain_pull import ChainPull
 from drake_disasm.effects.motion.command_gain import CommandGain
-from drake_disasm.effects.motion.compliance import Compliance
-from drake_disasm.effects.motion.imprecision import Imprecision
 from drake_disasm.effects.motion.lag import MotionLag
+from drake_disasm.effects.motion.backlash import Backlash
+from drake_disasm.effects.motion.compliance import Compliance
 from drake_disasm.effects.motion.slip import BoltSlip
-from drake_disasm.effects.sensor.base_tilt import BaseTilt
+from drake_disasm.effects.motion.imprecision import Imprecision
 from drake_disasm.effects.sensor.bias import SensorBias
-from drake_disasm.effects.sensor.cross_talk import SensorCrossTalk
 from drake_disasm.effects.sensor.drift import SensorDrift
+from drake_disasm.effects.sensor.warm_up import SensorWarmUp
 from drake_disasm.effects.sensor.gain import SensorGain
-from drake_disasm.effects.sensor.hysteresis import SensorHysteresis
+from drake_disasm.effects.sensor.cross_talk import SensorCrossTalk
 from drake_disasm.effects.sensor.lag import SensorLag
+from drake_disasm.effects.sensor.hysteresis import SensorHysteresis
+from drake_disasm.effects.sensor.saturation import SensorSaturation
 from drake_disasm.effects.sensor.mounting import SensorMounting
 from drake_disasm.effects.sensor.payload_error import PayloadError
-from drake_disasm.effects.sensor.saturation import SensorSaturation
-from drake_disasm.effects.sensor.warm_up import SensorWarmUp
-
-#: Every effect that a scenario may name, in the order of the documentation.
-EFFECTS: tuple[type[Effect], ...] = (
-    GroovePose,
-    GrooveBend,
-    GrooveClearance,
-    GrooveFriction,
-    GrooveViscousFriction,
-    GrooveStribeckFriction,
-    RustyPatch,
-    ContactStiffness,
-    ContactExponent,
-    ChainPull,
-    CommandGain,
-    MotionLag,
-    Backlash,
-    Compliance,
-    BoltSlip,
-    Imprecision,
-    SensorBias,
-    SensorDrift,
-    SensorWarmUp,
-    SensorGain,
-    SensorCrossTalk,
-    SensorLag,
-    SensorHysteresis,
-    SensorSaturation,
-    SensorMounting,
-    PayloadError,
-    BaseTilt,
-    JointViscousFriction,
-    JointCoulombFriction,
-    JointStribeckFriction,
-    JointAsymmetricFriction,
-    JointLoadFriction,
-    TorqueOffset,
-    TorqueGain,
-    RotorInertia,
-    FlangePayload,
-)
+from drake_disasm.effects.sensor.base_tilt import BaseTilt
+from drake_disasm.effects.arm.viscous_friction import JointViscousFriction
+from drake_disasm.effects.arm.coulomb_friction import JointCoulombFriction
+from drake_disasm.effects.arm.stribeck_friction import JointStribeckFriction
+from drake_disasm.effects.arm.asymmetric_friction import JointAsymmetricFriction
+from drake_disasm.effects.arm.load_friction import JointLoadFriction
+from drake_disasm.effects.arm.torque_offset import TorqueOffset
+from drake_disasm.effects.arm.torque_gain import TorqueGain
+from drake_disasm.effects.arm.rotor_inertia import RotorInertia
+from drake_disasm.effects.arm.flange_payload import FlangePayload
+# isort: on
 
 __all__ = [
     "AT_REST",
-    "EFFECTS",
     "ArmEffect",
     "Backlash",
     "BaseTilt",
@@ -147,10 +127,17 @@ __all__ = [
     "SensorWarmUp",
     "TorqueGain",
     "TorqueOffset",
+    "amplitude",
     "amplitudes",
     "environment_at",
+    "find_effect",
+    "import_effects",
     "is_local",
+    "joint_name",
     "motion_chain",
+    "register_effect",
+    "registered_effects",
     "sensor_chain",
+    "shape_parameter",
     "shape_parameters",
 ]

@@ -12,48 +12,16 @@ share the one implementation.
 
 import abc
 import dataclasses
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from drake_disasm.common.quantity import quantity
+from drake_disasm.effects.fields import amplitudes
 
 #: What an effect remembers from one step to the next: six numbers.
 Memory = np.ndarray
-
-
-def amplitude(unit: str, low: float, high: float, doc: str) -> Any:
-    """Returns a field of an effect; its default and null value is zero."""
-    return quantity(0.0, unit, doc, low=low, high=high)
-
-
-def shape_parameter(
-    default: float,
-    unit: str,
-    low: float,
-    high: float,
-    doc: str,
-    grid: tuple[float, ...],
-) -> Any:
-    """Returns a field that says how an effect looks; searches begin on its grid."""
-    return quantity(default, unit, doc, low=low, high=high, grid=grid)
-
-
-def amplitudes(effect: type["Effect"]) -> tuple[str, ...]:
-    """Returns the names of an effect's parameters that are zero at null."""
-    return tuple(f.name for f in _numbers(effect) if not f.metadata["grid"])
-
-
-def shape_parameters(effect: type["Effect"]) -> dict[str, tuple[float, ...]]:
-    """Returns the names of an effect's shape parameters, each with its grid."""
-    return {f.name: f.metadata["grid"] for f in _numbers(effect) if f.metadata["grid"]}
-
-
-def _numbers(effect: type["Effect"]) -> list[dataclasses.Field]:
-    fields = dataclasses.fields(effect)  # type: ignore[arg-type]
-    return [f for f in fields if isinstance(f.default, float)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,11 +95,20 @@ class Sensing:
         return self.g_W @ self.R_WS
 
 
+@dataclasses.dataclass
 class Effect:
-    """Base of all effects; see the module's docstring."""
+    """Base of all effects; see the module's docstring.
 
-    #: Whether it acts on the variance alone: models predict the mean.
-    is_random: bool = False
+    Attributes:
+        is_random: whether it acts on the variance alone; models predict the mean.
+        experiment: the recording that shows it apart from others, in words.
+        experiments_against: what separates it from a rival, by the rival's name; one
+            of the two need say it.
+    """
+
+    is_random: ClassVar[bool] = False
+    experiment: ClassVar[str] = ""
+    experiments_against: ClassVar[Mapping[str, str]] = {}
 
     @property
     def is_null(self) -> bool:
@@ -140,10 +117,15 @@ class Effect:
 
 
 class EnvironmentEffect(Effect, abc.ABC):
-    """Acts on the world around the bolt."""
+    """Acts on the world around the bolt.
 
-    #: Whether it depends on where the bolt is or how fast it goes.
-    is_local: bool = False
+    Attributes:
+        is_local: whether it depends on where the bolt is or how fast it goes.
+        contact_models: the scenario's `contact.model` in which it acts.
+    """
+
+    is_local: ClassVar[bool] = False
+    contact_models: ClassVar[tuple[str, ...]] = ("hydroelastic", "impact")
 
     @abc.abstractmethod
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
@@ -155,10 +137,13 @@ class MotionEffect(Effect, abc.ABC):
 
     Both are displacements from the start, (6,) position and rotation vector of B in
     G, at the boundaries of the MDP's steps; between them the arm moves evenly.
+
+    Attributes:
+        stage: where on the way from command to arm: 0 scale, 1 time, 2 gears,
+            3 compliance, 4 scatter.
     """
 
-    #: Where on the way: 0 scale, 1 time, 2 gears, 3 what yields, 4 what scatters.
-    stage: int = 0
+    stage: ClassVar[int] = 0
 
     @abc.abstractmethod
     def execute(
@@ -175,16 +160,18 @@ class MotionEffect(Effect, abc.ABC):
 
 
 class SensorEffect(Effect, abc.ABC):
-    """Acts on what the force/torque sensor reports."""
+    """Acts on what the force/torque sensor reports.
 
-    #: Where in the chain from load to reading: 0 the load itself, 1 the sensor's
-    #: place, 2 its elements, 3 its electronics, 4 its range. Whatever the order of a
-    #: scenario's list, effects act in the order of the chain.
-    stage: int = 3
+    Attributes:
+        stage: where in the chain from load to reading: 0 the load itself, 1 the
+            sensor's mounting, 2 its elements, 3 its electronics, 4 its range.
+            Effects act in this order, whatever the order of a scenario's list.
+        present_at_zeroing: whether zeroing the sensor before an episode sees it (a
+            load that always hangs there) or not (an error that comes up afterwards).
+    """
 
-    #: Whether zeroing the sensor before an episode sees the effect (a load that
-    #: always hangs there) or not (an error that comes up afterwards).
-    present_at_zeroing: bool = True
+    stage: ClassVar[int] = 3
+    present_at_zeroing: ClassVar[bool] = True
 
     @abc.abstractmethod
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
@@ -263,46 +250,3 @@ class JointEffect(ArmEffect, abc.ABC):
     @abc.abstractmethod
     def torque(self, samples: JointSamples) -> np.ndarray:
         """Returns what the measured torque has beside the rigid bodies', (n,) [N m]."""
-
-
-def motion_chain(effects: Sequence[Effect]) -> tuple[MotionEffect, ...]:
-    """Returns the effects on the motion in the order in which they act."""
-    chosen = [
-        effect
-        for effect in effects
-        if isinstance(effect, MotionEffect) and not effect.is_null
-    ]
-    return tuple(sorted(chosen, key=lambda effect: effect.stage))
-
-
-def is_local(effects: Sequence[Effect]) -> bool:
-    """Returns whether the environment depends on where the bolt is, or how fast."""
-    return any(
-        isinstance(effect, EnvironmentEffect) and effect.is_local and not effect.is_null
-        for effect in effects
-    )
-
-
-def environment_at(
-    nominal: Environment, effects: Sequence[Effect], bolt: BoltMotion = AT_REST
-) -> Environment:
-    """Returns the environment with the effects in it, in the scenario's order."""
-    for effect in effects:
-        if isinstance(effect, EnvironmentEffect) and not effect.is_null:
-            nominal = effect.apply(nominal, bolt)
-    return nominal
-
-
-def joint_name() -> Any:
-    """Returns the field that names an arm effect's joint."""
-    return quantity("", "", "name of the joint in the URDF")
-
-
-def sensor_chain(effects: Sequence[Effect]) -> tuple[SensorEffect, ...]:
-    """Returns the sensor's effects in the order in which they act."""
-    chosen = [
-        effect
-        for effect in effects
-        if isinstance(effect, SensorEffect) and not effect.is_null
-    ]
-    return tuple(sorted(chosen, key=lambda effect: effect.stage))

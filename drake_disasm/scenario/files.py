@@ -11,6 +11,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import check, closest
 from drake_disasm.common.resources import models_dir
+from drake_disasm.scenario.effect_tags import tagged
 from drake_disasm.scenario.schema import Scenario
 from drake_disasm.scenario.strict_yaml import parse
 from drake_disasm.scenario.validity import validate
@@ -56,7 +57,7 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
 
 def dump_scenario(scenario: Scenario) -> str:
     """Returns the scenario as YAML text that `load_scenario` reads back."""
-    return yaml_dump_typed(scenario, schema=Scenario)
+    return yaml_dump_typed(scenario, schema=tagged(Scenario))
 
 
 def scenario_to_mapping(scenario: Scenario) -> dict[str, Any]:

@@ -1,19 +1,9 @@
 """What a scenario may say: a plain dataclass for each part, with valid defaults."""
 
 import dataclasses
-import typing
 
 from drake_disasm.common.quantity import quantity
-from drake_disasm.effects import EFFECTS, Effect
-
-
-@dataclasses.dataclass
-class Untagged(Effect):
-    """Stands first in the union so that every effect needs its `!Name` tag."""
-
-
-#: The tagged union that `effects:` is a list of.
-AnyEffect = typing.Union[(Untagged, *EFFECTS)]  # type: ignore[valid-type]
+from drake_disasm.effects import Effect
 
 
 @dataclasses.dataclass
@@ -252,5 +242,5 @@ class Scenario:
         default_factory=ObservationConfig
     )
     imprecision: float = quantity(0.0, "m", "psi of algorithm 3.2", low=0.0, high=0.01)
-    effects: list[AnyEffect] = dataclasses.field(default_factory=list)
+    effects: list[Effect] = dataclasses.field(default_factory=list)
     randomisation: list[Range] = dataclasses.field(default_factory=list)

@@ -14,12 +14,12 @@ from pydrake.common.yaml import yaml_load_typed
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
-from drake_disasm.effects import EFFECTS
+from drake_disasm.effects import find_effect, registered_effects
+from drake_disasm.scenario.effect_tags import tagged
 from drake_disasm.scenario.schema import Range, Scenario
 
 _MODEL = "see models/scenarios/removal.yaml"
 _NUMBERS: dict[type, Callable[[str], object]] = {int: int, float: float}
-_EFFECTS = {effect.__name__: effect for effect in EFFECTS}
 
 
 class _NodeError(Exception):
@@ -47,7 +47,9 @@ def parse(text: str, defaults: Any, source: str, *, line_numbers: bool = True) -
         if root is None:
             raise DisasmError(f"{source}: is empty; {_MODEL}")
         _check_section(root, type(defaults), "")
-        return yaml_load_typed(data=text, schema=type(defaults), defaults=defaults)
+        return yaml_load_typed(
+            data=text, schema=tagged(type(defaults)), defaults=defaults
+        )
     except _NodeError as error:
         line = f"line {error.line}: " if line_numbers else ""
         raise DisasmError(f"{source}: {line}{error}") from None
@@ -121,20 +123,19 @@ def _check_effects(node: yaml.Node) -> None:
         raise _NodeError(
             node, "effects: is no list; write [] or lines of `- !Name {...}`"
         )
-    names = list(_EFFECTS)
     for number, item in enumerate(node.value):
         path, name = f"effects.{number}", item.tag.removeprefix("!")
         if not item.tag.startswith("!"):
+            names = ", ".join(effect.__name__ for effect in registered_effects())
             raise _NodeError(
                 item,
-                f"{path}: has no name; write `- !Name {{...}}`, with one of "
-                + ", ".join(names),
+                f"{path}: has no name; write `- !Name {{...}}`, with one of {names}",
             )
-        if name not in _EFFECTS:
-            raise _NodeError(
-                item, f"{path}: effect '{name}' does not exist; {closest(name, names)}"
-            )
-        _check_section(item, _EFFECTS[name], path)
+        try:
+            effect = find_effect(name)
+        except DisasmError as error:
+            raise _NodeError(item, f"{path}: {error}") from None
+        _check_section(item, effect, path)
 
 
 def _check_ranges(node: yaml.Node) -> None:

@@ -2,9 +2,9 @@
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import check
-from drake_disasm.effects import EFFECTS
+from drake_disasm.effects import find_effect
 from drake_disasm.scenario.randomisation import refuse_broken_ranges, with_values
-from drake_disasm.scenario.schema import LockConfig, Scenario, Untagged
+from drake_disasm.scenario.schema import LockConfig, Scenario
 
 
 def validate(scenario: Scenario) -> None:
@@ -31,19 +31,22 @@ def validate(scenario: Scenario) -> None:
 def _validate_one(scenario: Scenario) -> None:
     """Checks one diagram's scenario, whatever its ranges."""
     check(scenario)
-    _refuse_untagged(scenario)
+    _refuse_unregistered(scenario)
     _refuse_broken_periods(scenario)
     _refuse_impossible_lock(scenario.lock)
     _refuse_unreachable_end(scenario)
 
 
-def _refuse_untagged(scenario: Scenario) -> None:
+def _refuse_unregistered(scenario: Scenario) -> None:
     for number, effect in enumerate(scenario.effects):
-        if isinstance(effect, Untagged):
-            names = ", ".join(effect.__name__ for effect in EFFECTS)
+        try:
+            known = find_effect(type(effect).__name__)
+        except DisasmError as error:
+            raise DisasmError(f"effects.{number}: {error}") from None
+        if type(effect) is not known:
             raise DisasmError(
-                f"effects.{number}: has no name; write `- !Name {{...}}`, "
-                f"with one of {names}"
+                f"effects.{number}: {known.__name__} has been registered again since "
+                "this one was made; make it anew"
             )
 
 

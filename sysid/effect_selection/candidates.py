@@ -5,7 +5,12 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Self
 
-from drake_disasm.effects import EFFECTS, Effect, amplitudes, shape_parameters
+from drake_disasm.effects import (
+    Effect,
+    amplitudes,
+    registered_effects,
+    shape_parameters,
+)
 from sysid.models.base import LogModel
 from sysid.models.effects import effect_parameter
 from sysid.parameters import Parameter
@@ -52,9 +57,10 @@ class Candidate:
 
 
 def candidates(
-    model: LogModel, library: Sequence[type[Effect]] = EFFECTS
+    model: LogModel, library: Sequence[type[Effect]] | None = None
 ) -> list[Candidate]:
-    """Returns what of a library could act on a model's channels."""
+    """Returns what of a library, or of all that is registered, a model could carry."""
+    library = registered_effects() if library is None else library
     return [Candidate.of(effect) for effect in model.applicable_effects(library)]
 
 
@@ -104,6 +110,6 @@ def _looks(effect: Effect) -> tuple[object, ...]:
     kind = type(effect)
     return tuple(
         getattr(effect, f.name)
-        for f in dataclasses.fields(kind)  # type: ignore[arg-type]
+        for f in dataclasses.fields(kind)
         if f.name not in amplitudes(kind)
     )

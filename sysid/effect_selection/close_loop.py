@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from drake_disasm.effects import EFFECTS, Effect, Imprecision
+from drake_disasm.effects import Effect, Imprecision, registered_effects
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.command_scatter import Scatter, scatter
@@ -62,7 +62,7 @@ def close_loop(
     huber_delta: float,
     workers: Workers,
     tell: Callable[[str], None],
-    library: Sequence[type[Effect]] = EFFECTS,
+    library: Sequence[type[Effect]] | None = None,
     folder: Path | None = None,
 ) -> Closed:
     """Finds what a model lacks to explain its log.
@@ -74,7 +74,7 @@ def close_loop(
         huber: where squares end, in units of the noise.
         workers: to evaluate with.
         tell: called with a line after each step.
-        library: effects that may be named.
+        library: effects that may be named; by default all that are registered.
         folder: where fits are kept: the same search, stopped and begun again, takes
             them from there.
 
@@ -83,6 +83,7 @@ def close_loop(
     """
     base = with_estimated_noise(model.of_episodes(train), workers, huber_delta)
     refuse_few_rows(base)
+    library = registered_effects() if library is None else library
     library_here = candidates(base, library)
     tracer = Tracer(
         _affordable(base), library_here, workers, huber_delta, tell, folder=folder

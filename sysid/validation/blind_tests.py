@@ -12,13 +12,13 @@ import numpy as np
 
 from drake_disasm.common.files import write_json
 from drake_disasm.effects import (
-    EFFECTS,
     BaseTilt,
     Effect,
     EnvironmentEffect,
     MotionEffect,
     PayloadError,
     SensorEffect,
+    registered_effects,
 )
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario
@@ -103,12 +103,14 @@ def traceable() -> tuple[type[Effect], ...]:
     """Returns the effects that transitions of the twin can show."""
     acts = (EnvironmentEffect, MotionEffect, SensorEffect)
     silent = (PayloadError, BaseTilt)  # zeroing takes them off
-    return tuple(e for e in EFFECTS if issubclass(e, acts) and e not in silent)
+    return tuple(
+        e for e in registered_effects() if issubclass(e, acts) and e not in silent
+    )
 
 
 def answer(case: Case) -> Answer:
     """Returns what closing the loop says of a case's log, which states nothing."""
-    kinds = {effect.__name__: effect for effect in EFFECTS}
+    kinds = {effect.__name__: effect for effect in registered_effects()}
     random = np.random.default_rng([case.seed, len(case.effects)])
     with tempfile.TemporaryDirectory() as folder:
         effects = [
@@ -121,7 +123,7 @@ def answer(case: Case) -> Answer:
         )
         model = TwinModel([read_log(log)], nominal(), ())
         train, test = split_episodes(model.measurements.names, HELD_OUT)
-        library = [e for e in EFFECTS if e.__name__ not in case.left_out]
+        library = [e for e in registered_effects() if e.__name__ not in case.left_out]
         closed = close_loop(
             model, train, test, HUBER, Workers(), lambda _: None, library
         )

@@ -50,7 +50,7 @@ def _attempt(
     residual: Callable[[Effect], float],
 ) -> tuple[Effect, float]:
     """Returns an effect of about a wanted size, and the size that was reached."""
-    fields = {f.name: f.metadata for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    fields = {f.name: f.metadata for f in dataclasses.fields(kind)}
     names = amplitudes(kind)
     count = int(random.integers(1, min(_MOST_FIELDS, len(names)) + 1))
     unit = {}

@@ -4,11 +4,14 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import ArmEffect, amplitude
+from drake_disasm.effects.base import ArmEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 _LIGHTEST = 0.1  # kg, that has an inertia of its own
 
 
+@register_effect
 @dataclasses.dataclass
 class FlangePayload(ArmEffect):
     """A load on the arm's last link that the model of the arm does not know.

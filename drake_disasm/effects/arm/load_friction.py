@@ -4,18 +4,15 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import (
-    JointEffect,
-    JointSamples,
-    amplitude,
-    joint_name,
-    shape_parameter,
-)
+from drake_disasm.effects.base import JointEffect, JointSamples
+from drake_disasm.effects.fields import amplitude, joint_name, shape_parameter
+from drake_disasm.effects.registry import register_effect
 
 #: Below it a joint rests, for all that filtered velocities can tell.
 _CREEP = (0.005, 0.02, 0.08)
 
 
+@register_effect
 @dataclasses.dataclass
 class JointLoadFriction(JointEffect):
     """Dry friction in proportion to the torque that the gear transmits.

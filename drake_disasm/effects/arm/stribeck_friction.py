@@ -4,15 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import (
-    JointEffect,
-    JointSamples,
-    amplitude,
-    joint_name,
-    shape_parameter,
-)
+from drake_disasm.effects.base import JointEffect, JointSamples
+from drake_disasm.effects.fields import amplitude, joint_name, shape_parameter
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class JointStribeckFriction(JointEffect):
     """Friction that falls as a film of grease builds up (Stribeck).

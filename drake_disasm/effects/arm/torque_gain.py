@@ -4,9 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import JointEffect, JointSamples, amplitude, joint_name
+from drake_disasm.effects.base import JointEffect, JointSamples
+from drake_disasm.effects.fields import amplitude, joint_name
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class TorqueGain(JointEffect):
     """A share of the torque, too much.

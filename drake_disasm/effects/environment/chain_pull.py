@@ -4,14 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import (
-    BoltMotion,
-    Environment,
-    EnvironmentEffect,
-    amplitude,
-)
+from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class ChainPull(EnvironmentEffect):
     """A force on the bolt beside the contact, constant or growing with travel.

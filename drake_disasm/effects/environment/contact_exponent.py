@@ -2,14 +2,12 @@
 
 import dataclasses
 
-from drake_disasm.effects.base import (
-    BoltMotion,
-    Environment,
-    EnvironmentEffect,
-    amplitude,
-)
+from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class ContactExponent(EnvironmentEffect):
     """The normal force grows with another power of the penetration.
@@ -19,6 +17,8 @@ class ContactExponent(EnvironmentEffect):
     """
 
     change: float = amplitude("1", -1.0, 3.0, "of the exponent e")
+
+    contact_models = ("impact",)
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Changes the exponent."""

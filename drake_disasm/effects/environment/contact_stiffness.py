@@ -4,14 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import (
-    BoltMotion,
-    Environment,
-    EnvironmentEffect,
-    amplitude,
-)
+from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class ContactStiffness(EnvironmentEffect):
     """Bolt and groove yield less, or more, than their nominal materials.

@@ -6,14 +6,12 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from drake_disasm.common.spatial import rotation_from_vector
-from drake_disasm.effects.base import (
-    BoltMotion,
-    Environment,
-    EnvironmentEffect,
-    amplitude,
-)
+from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class GrooveBend(EnvironmentEffect):
     """The groove's axis is an arc instead of a line.

@@ -2,16 +2,14 @@
 
 import dataclasses
 
-from drake_disasm.effects.base import (
-    BoltMotion,
-    Environment,
-    EnvironmentEffect,
-    amplitude,
-)
+from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 _LEAST = 2e-5  # m: a bolt that is no wider than its slot
 
 
+@register_effect
 @dataclasses.dataclass
 class GrooveClearance(EnvironmentEffect):
     """The slot is wider or narrower than the model says: wear, dirt, tolerance.

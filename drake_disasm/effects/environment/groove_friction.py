@@ -2,14 +2,12 @@
 
 import dataclasses
 
-from drake_disasm.effects.base import (
-    BoltMotion,
-    Environment,
-    EnvironmentEffect,
-    amplitude,
-)
+from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class GrooveFriction(EnvironmentEffect):
     """Coulomb friction that the nominal coefficient does not account for.

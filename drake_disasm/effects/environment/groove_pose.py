@@ -6,14 +6,12 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from drake_disasm.common.spatial import rotation_from_vector
-from drake_disasm.effects.base import (
-    BoltMotion,
-    Environment,
-    EnvironmentEffect,
-    amplitude,
-)
+from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class GroovePose(EnvironmentEffect):
     """The lock was fixed turned about A, or shifted, against where we think it is.

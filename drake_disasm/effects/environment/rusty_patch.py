@@ -4,15 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import (
-    BoltMotion,
-    Environment,
-    EnvironmentEffect,
-    amplitude,
-    shape_parameter,
-)
+from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
+from drake_disasm.effects.fields import amplitude, shape_parameter
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class RustyPatch(EnvironmentEffect):
     """A patch of rust or dirt: friction that depends on the position.

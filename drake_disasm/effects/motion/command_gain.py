@@ -4,9 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Memory, MotionEffect, amplitude
+from drake_disasm.effects.base import Memory, MotionEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class CommandGain(MotionEffect):
     """A scale error of the commanded motion: wrong link lengths or gear ratios.

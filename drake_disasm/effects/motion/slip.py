@@ -4,9 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Memory, MotionEffect, amplitude
+from drake_disasm.effects.base import Memory, MotionEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class BoltSlip(MotionEffect):
     """The bolt creeps in the gripper under a force, and does not come back.

@@ -5,9 +5,12 @@ import dataclasses
 import numpy as np
 
 from drake_disasm.common.spatial import rotation_from_vector
-from drake_disasm.effects.base import Sensing, SensorEffect, amplitude
+from drake_disasm.effects.base import Sensing, SensorEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class BaseTilt(SensorEffect):
     """Gravity comes from elsewhere than the robot believes: its base is tilted.

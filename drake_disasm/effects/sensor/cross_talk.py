@@ -4,9 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, amplitude
+from drake_disasm.effects.base import Sensing, SensorEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class SensorCrossTalk(SensorEffect):
     """A channel picks up a share of others.

@@ -4,12 +4,15 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, amplitude, shape_parameter
+from drake_disasm.effects.base import Sensing, SensorEffect
+from drake_disasm.effects.fields import amplitude, shape_parameter
+from drake_disasm.effects.registry import register_effect
 
 _NEVER = 1e6  # s
 _GRID = (10.0, 30.0, 50.0, 100.0, 300.0, _NEVER)
 
 
+@register_effect
 @dataclasses.dataclass
 class SensorDrift(SensorEffect):
     """An offset that grows with the time since zeroing, or since the log began.

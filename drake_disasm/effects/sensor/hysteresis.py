@@ -4,11 +4,14 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import SensorMemoryEffect, amplitude, shape_parameter
+from drake_disasm.effects.base import SensorMemoryEffect
+from drake_disasm.effects.fields import amplitude, shape_parameter
+from drake_disasm.effects.registry import register_effect
 
 _LEVER = 0.05  # m: how a width of force and one of torque belong together
 
 
+@register_effect
 @dataclasses.dataclass
 class SensorHysteresis(SensorMemoryEffect):
     """Internal friction of the sensor's elements: a play in part of the reading.

@@ -4,9 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import SensorMemoryEffect, amplitude, shape_parameter
+from drake_disasm.effects.base import SensorMemoryEffect
+from drake_disasm.effects.fields import amplitude, shape_parameter
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class SensorLag(SensorMemoryEffect):
     """A first-order low-pass between load and reading.

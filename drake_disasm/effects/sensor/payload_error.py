@@ -4,9 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, amplitude
+from drake_disasm.effects.base import Sensing, SensorEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
 
 
+@register_effect
 @dataclasses.dataclass
 class PayloadError(SensorEffect):
     """The load on the sensor has more first moment than the tool data say.

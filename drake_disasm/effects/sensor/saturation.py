@@ -4,11 +4,14 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, amplitude, shape_parameter
+from drake_disasm.effects.base import Sensing, SensorEffect
+from drake_disasm.effects.fields import amplitude, shape_parameter
+from drake_disasm.effects.registry import register_effect
 
 _LEVER = 0.05  # m: how a range of force and one of torque belong together
 
 
+@register_effect
 @dataclasses.dataclass
 class SensorSaturation(SensorEffect):
     """Beyond a limit the reading grows less, or not at all.

@@ -4,11 +4,14 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.effects.base import Sensing, SensorEffect, amplitude, shape_parameter
+from drake_disasm.effects.base import Sensing, SensorEffect
+from drake_disasm.effects.fields import amplitude, shape_parameter
+from drake_disasm.effects.registry import register_effect
 
 _GRID = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 
 
+@register_effect
 @dataclasses.dataclass
 class SensorWarmUp(SensorEffect):
     """An offset that settles like a first-order system: strain gauges warm up.

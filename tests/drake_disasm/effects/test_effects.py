@@ -9,7 +9,6 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     AT_REST,
-    EFFECTS,
     ArmEffect,
     BoltMotion,
     ContactExponent,
@@ -40,6 +39,7 @@ from drake_disasm.effects import (
     TorqueGain,
     TorqueOffset,
     amplitudes,
+    registered_effects,
     sensor_chain,
 )
 from drake_disasm.policies import Exploring, make_policy
@@ -55,7 +55,7 @@ ENVIRONMENT = Environment(
 MOVING = BoltMotion(np.array([0.03, 0.001, -0.001]), np.array([0.02, 0.0, 0.005]))
 
 
-IN_CELL = [e for e in EFFECTS if not issubclass(e, ArmEffect)]
+IN_CELL = [e for e in registered_effects() if not issubclass(e, ArmEffect)]
 SAMPLES = JointSamples(
     q=np.zeros(3),
     v=np.array([-0.5, 0.0, 2.0]),
@@ -69,13 +69,13 @@ def _sensing(rpy: tuple[float, float, float], time: float = 1.0) -> Sensing:
     return Sensing(np.array(time), R_WS, G_W)
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", registered_effects())
 def test_is_declared_in_full(effect: type[Effect]) -> None:
     """A size is zero at null; a shape has a grid within its bounds."""
     assert "Equation:" in (effect.__doc__ or "")
     assert "Where it acts:" in (effect.__doc__ or "")
     assert amplitudes(effect)
-    for field in dataclasses.fields(effect):  # type: ignore[arg-type]
+    for field in dataclasses.fields(effect):
         data = field.metadata
         assert data["doc"]
         if field.name in amplitudes(effect):
@@ -85,7 +85,7 @@ def test_is_declared_in_full(effect: type[Effect]) -> None:
             assert data["low"] <= value <= data["high"]
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", registered_effects())
 def test_vanishes_at_null_as_a_function(effect: type[Effect]) -> None:
     null = effect()
     if isinstance(null, EnvironmentEffect):
@@ -130,7 +130,7 @@ def test_vanishes_at_null_bit_for_bit(
 
 @pytest.mark.parametrize("effect", IN_CELL)
 def test_shows_away_from_null(effect: type[Effect], without: np.ndarray) -> None:
-    fields = {f.name: f for f in dataclasses.fields(effect)}  # type: ignore[arg-type]
+    fields = {f.name: f for f in dataclasses.fields(effect)}
     sized = {name: 0.05 * fields[name].metadata["high"] for name in amplitudes(effect)}
     if effect is ContactExponent:
         with pytest.raises(DisasmError, match="ContactExponent"):

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import EFFECTS, SensorDrift, SensorGain, SensorMounting
+from drake_disasm.effects import (
+    SensorDrift,
+    SensorGain,
+    SensorMounting,
+    registered_effects,
+)
 from drake_disasm.logs import read_log
 from sysid.effect_selection.block_regression import family_p, worse_p
 from sysid.effect_selection.close_loop import close_loop
@@ -19,7 +24,7 @@ from sysid.workers import Workers
 from tests.sysid.effect_selection.blind import closed, static_log, verdict_of
 
 _BIASED = ("SensorDrift", "SensorGain", "SensorMounting")
-_LIBRARY = [e for e in EFFECTS if e.__name__ in _BIASED]
+_LIBRARY = [e for e in registered_effects() if e.__name__ in _BIASED]
 
 
 @pytest.mark.parametrize("kind", [SensorDrift, SensorMounting, SensorGain])

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from drake_disasm.effects import (
-    EFFECTS,
     CommandGain,
     GrooveFriction,
     Imprecision,
     SensorBias,
+    registered_effects,
 )
 from drake_disasm.logs import read_log
 from sysid.effect_selection.close_loop import HUBER, close_loop
@@ -51,7 +51,9 @@ def test_what_follows_on_something_is_no_scatter(effects, tmp_path):
 def test_closing_the_loop_adds_it_to_the_scenario(tmp_path):
     model = _model(tmp_path, [Imprecision(y=4e-5, z=4e-5)])
     episodes = range(len(model.measurements.names))
-    library = [e for e in EFFECTS if e in (CommandGain, SensorBias, Imprecision)]
+    library = [
+        e for e in registered_effects() if e in (CommandGain, SensorBias, Imprecision)
+    ]
     closed = close_loop(model, episodes, [], HUBER, Workers(), lambda _: None, library)
     verdict = closed.verdict
     assert (verdict.ending, verdict.names) == ("explained", ("Imprecision",))

@@ -1,0 +1,159 @@
+"""Which effects there are: the library's own and those that users add.
+
+An effect is added by the decorator `register_effect`, wherever its class is defined.
+The module that defines it has to be imported: by the program that uses it, by
+`import_effects` (`--import` on the command line), or by itself, if its package
+declares an entry point of the group `drake_disasm.effects`:
+
+    [project.entry-points."drake_disasm.effects"]
+    my_effects = "my_package.effects"
+"""
+
+import importlib
+import os
+import sys
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import TypeVar
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
+from drake_disasm.effects.base import Effect
+from drake_disasm.effects.definition import refuse_faulty
+
+_GROUP = "drake_disasm.effects"
+#: Names what `import_effects` has imported: worker processes inherit it.
+_VARIABLE = "DRAKE_DISASM_IMPORT"
+_REMEDY = (
+    "an effect of your own must be imported before it is used: import its module, "
+    "give --import FILE.py|MODULE, or declare an entry point of the group "
+    f"{_GROUP}"
+)
+
+_Kind = TypeVar("_Kind", bound=type[Effect])
+_effects: dict[str, type[Effect]] = {}
+_plugins_are_loaded = False
+
+
+def register_effect(effect: _Kind) -> _Kind:
+    """Adds an effect to YAML, simulation, identification and effect selection.
+
+    A class decorator, above `@dataclasses.dataclass`. A class that is defined once
+    more at the same place (a notebook's cell) replaces the one before.
+
+    Raises:
+        DisasmError: not a complete effect, or another one has its name.
+    """
+    refuse_faulty(effect)
+    other = _effects.get(effect.__name__)
+    if other is not None and _place(other) != _place(effect):
+        raise DisasmError(
+            f"effect {effect.__name__}: {_place(effect)} has the same name as "
+            f"{_place(other)}; rename one of them"
+        )
+    _effects[effect.__name__] = effect
+    return effect
+
+
+def registered_effects() -> tuple[type[Effect], ...]:
+    """Returns all effects: the library's in the documentation's order, then others.
+
+    Raises:
+        DisasmError: the module of an entry point can't be imported.
+    """
+    _load_plugins()
+    return tuple(_effects.values())
+
+
+def find_effect(name: str) -> type[Effect]:
+    """Returns the effect of a name.
+
+    Raises:
+        DisasmError: there is none; says how to register one.
+    """
+    _load_plugins()
+    if name not in _effects:
+        hint = closest(name, list(_effects))
+        raise DisasmError(f"effect '{name}' is not registered; {hint} ({_REMEDY})")
+    return _effects[name]
+
+
+def import_effects(name: str) -> str:
+    """Imports the module that registers effects, here and in worker processes.
+
+    Args:
+        name: of a module, or of a Python file, whose folder joins the search path.
+
+    Returns:
+        The name, so that it can be the type of a command line's argument.
+
+    Raises:
+        DisasmError: there is no such file or module, it fails, or it registers nothing.
+    """
+    path = Path(name).resolve() if name.endswith(".py") else None
+    before = set(_effects.values())
+    module = _import_file(path) if path else _import_module(name)
+    new = set(_effects.values()) - before
+    if not new and module.__name__ not in {e.__module__ for e in _effects.values()}:
+        raise DisasmError(
+            f"{name}: registers no effect; put @register_effect above the class"
+        )
+    known = _imported()
+    if (entry := str(path or name)) not in known:
+        os.environ[_VARIABLE] = os.pathsep.join([*known, entry])
+    return name
+
+
+def _place(effect: type[Effect]) -> str:
+    return f"{effect.__module__}.{effect.__qualname__}"
+
+
+def _imported() -> list[str]:
+    return [name for name in os.environ.get(_VARIABLE, "").split(os.pathsep) if name]
+
+
+def _import_file(path: Path) -> ModuleType:
+    """Imports a file by its stem, the name by which pickle finds it in a worker."""
+    if not path.is_file():
+        raise DisasmError(f"{path}: no such file; name a Python file with effects")
+    if str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
+    module = _import_module(path.stem)
+    if Path(module.__file__ or "").resolve() != path:
+        raise DisasmError(
+            f"{path}: another module has the name {path.stem} ({module.__file__}); "
+            "rename the file"
+        )
+    return module
+
+
+def _import_module(name: str, source: str = "") -> ModuleType:
+    source = source or name
+    try:
+        return importlib.import_module(name)
+    except DisasmError as error:
+        raise DisasmError(f"{source}: {error}") from None
+    except Exception as error:  # whatever a user's module does wrong
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise DisasmError(
+            f"{source}: can't be imported ({reason}); name a Python file or an "
+            "installed module that works"
+        ) from None
+
+
+def _load_plugins() -> None:
+    """Imports what entry points and the parent process name, once."""
+    global _plugins_are_loaded
+    if _plugins_are_loaded:
+        return
+    _plugins_are_loaded = True  # a plugin may ask for the effects while it is imported
+    try:
+        for name in _imported():
+            import_effects(name)
+        for point in entry_points(group=_GROUP):
+            package = point.dist.name if point.dist else "an unknown package"
+            _import_module(point.module, f"entry point {point.name} of {package}")
+    except DisasmError:
+        _plugins_are_loaded = False
+        raise

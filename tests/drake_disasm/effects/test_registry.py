@@ -1,0 +1,283 @@
+"""Effects that are defined outside the package, and what is refused as one."""
+
+import dataclasses
+import multiprocessing
+import pickle
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import (
+    EnvironmentEffect,
+    JointEffect,
+    JointSamples,
+    Sensing,
+    SensorBias,
+    SensorEffect,
+    amplitude,
+    find_effect,
+    import_effects,
+    register_effect,
+    registered_effects,
+    registry,
+    shape_parameter,
+)
+from drake_disasm.scenario import (
+    Scenario,
+    dump_scenario,
+    load_scenario,
+    scenario_from_mapping,
+    scenario_to_mapping,
+    validate,
+)
+from sysid.scenario_parameters import Request, scenario_parameters
+
+_FILE = '''
+import dataclasses
+
+import numpy as np
+
+from drake_disasm.effects import Sensing, SensorEffect, amplitude, register_effect
+
+
+@register_effect
+@dataclasses.dataclass
+class {name}(SensorEffect):
+    """The square of the reading leaks in."""
+
+    fx: float = amplitude("1/N", -0.1, 0.1, "share of the square of fx")
+
+    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+        return wrench_S
+'''
+
+
+@pytest.fixture(autouse=True)
+def _registry(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Takes out again what a test registers and imports."""
+    monkeypatch.setattr(registry, "_effects", dict(registry._effects))
+    monkeypatch.setenv("DRAKE_DISASM_IMPORT", "")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    modules = set(sys.modules)
+    yield
+    for name in set(sys.modules) - modules:
+        del sys.modules[name]
+
+
+class _Reads(SensorEffect):
+    """Not yet an effect; what tests derive from."""
+
+    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+        """Changes nothing."""
+        return wrench_S
+
+
+def _own(name: str = "Own", **fields: object) -> type[SensorEffect]:
+    """Returns a dataclass that can be registered; with other fields, maybe not."""
+    chosen = fields or {"fx": amplitude("N", -1.0, 1.0, "of the force")}
+    return dataclasses.make_dataclass(
+        name, [(n, float, field) for n, field in chosen.items()], bases=(_Reads,)
+    )
+
+
+def _file(tmp_path: Path, stem: str, text: str) -> str:
+    path = tmp_path / f"{stem}.py"
+    path.write_text(text)
+    return str(path)
+
+
+def test_a_registered_effect_comes_last_and_everywhere(tmp_path: Path) -> None:
+    own = register_effect(_own())
+    assert registered_effects()[-1] is own and find_effect("Own") is own
+    scenario = load_scenario("removal", ["effects=[!SensorBias {fy: 1}, !Own {fx: 1}]"])
+    assert scenario.effects == [SensorBias(fy=1.0), own(fx=1.0)]
+    path = tmp_path / "own.yaml"
+    path.write_text(dump_scenario(scenario))
+    assert load_scenario(str(path)) == scenario
+    assert scenario_from_mapping(scenario_to_mapping(scenario)) == scenario
+    with pytest.raises(DisasmError, match=r"effects\.0\.fx: 2 N is out of range"):
+        load_scenario("removal", ["effects=[!Own {fx: 2}]"])
+    with pytest.raises(DisasmError, match=r"unknown key 'fz' in effects\.0"):
+        load_scenario("removal", ["effects=[!Own {fz: 2}]"])
+    added, (parameter,) = scenario_parameters(Scenario(), [Request("Own.fx")])
+    assert added.effects == [own()] and parameter.high == 1.0
+
+
+def test_a_derived_effect_keeps_its_own_tag() -> None:
+    """Drake's writer takes the first type of a union that an object is of."""
+
+    @register_effect
+    @dataclasses.dataclass
+    class Derived(SensorBias):
+        """Another bias."""
+
+        square: float = amplitude("1/N", -1.0, 1.0, "more of it")
+
+    scenario = Scenario(effects=[SensorBias(fx=1.0), Derived(fx=2.0)])
+    text = dump_scenario(scenario)
+    assert "!Derived" in text and "!SensorBias" in text
+
+
+def test_a_cell_of_a_notebook_may_run_again() -> None:
+    first, second = _own(), _own(fy=amplitude("N", -1.0, 1.0, "of the force"))
+    register_effect(first)
+    register_effect(second)
+    assert registered_effects()[-1] is second and first not in registered_effects()
+    with pytest.raises(DisasmError, match="registered again since"):
+        validate(Scenario(effects=[first()]))
+
+
+def test_two_effects_of_one_name_are_refused() -> None:
+    with pytest.raises(
+        DisasmError, match=r"effect SensorBias: .*sensor\.bias"
+    ) as error:
+        register_effect(_own("SensorBias"))
+    assert "rename" in str(error.value)
+    assert find_effect("SensorBias") is SensorBias
+
+
+_GOOD = {"fx": amplitude("N", -1.0, 1.0, "of the force")}
+_FAULTY = {
+    "not an effect": dataclasses.make_dataclass("Own", [("fx", float, 0.0)]),
+    "not a dataclass": type("Own", (_own(),), {}),
+    "has no apply": dataclasses.dataclass(type("Own", (SensorEffect,), {})),
+    "has no torque": dataclasses.dataclass(type("Own", (JointEffect,), {})),
+    "has no amplitude": dataclasses.dataclass(type("Own", (_Reads,), {})),
+    "'fx' is no number with unit and bounds": _own(fx=0.0),
+    "'fy' is no number with unit": _own(**_GOOD, fy=amplitude("", -1, 1, "nothing")),
+    "'fz' is no number with unit": _own(**_GOOD, fz=amplitude("N", -1, np.inf, "far")),
+    "'k' is no number with unit": _own(**_GOOD, k=dataclasses.field(default=1)),
+    "'fx': 0 or its grid is not within": _own(fx=amplitude("N", 1.0, 2.0, "never 0")),
+    "'T': 1 or its grid is not within": _own(
+        **_GOOD, T=shape_parameter(1.0, "s", 0.1, 2.0, "time", (1.0, 3.0))
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", _FAULTY)
+def test_what_is_not_complete_is_refused_in_one_line(fault: str) -> None:
+    with pytest.raises(DisasmError) as error:
+        register_effect(_FAULTY[fault])
+    message = str(error.value)
+    assert message.startswith("effect Own: ") and fault in message, message
+    assert "\n" not in message and ";" in message  # the remedy
+
+
+def test_a_joint_effect_needs_its_joint() -> None:
+    class _Rubs(JointEffect):
+        def torque(self, samples: JointSamples) -> np.ndarray:
+            return samples.v
+
+    own = dataclasses.make_dataclass("Own", [("c", float, _GOOD["fx"])], bases=(_Rubs,))
+    with pytest.raises(DisasmError, match=r"add a field `joint: str = joint_name\(\)`"):
+        register_effect(own)
+
+
+def test_an_effect_that_is_not_registered_is_named_with_the_remedy() -> None:
+    scenario = Scenario(effects=[_own("Unheard")(fx=0.5)])
+    mapping = scenario_to_mapping(scenario)
+    for read in (
+        lambda: load_scenario("removal", ["effects=[!Unheard {fx: 1}]"]),
+        lambda: scenario_from_mapping(mapping),
+    ):
+        with pytest.raises(DisasmError) as error:
+            read()
+        message = str(error.value)
+        assert "effects.0: effect 'Unheard' is not registered" in message
+        assert "--import FILE.py|MODULE" in message and "entry point" in message
+
+
+def test_types_that_are_text_are_understood(tmp_path: Path) -> None:
+    text = "from __future__ import annotations\n" + _FILE.format(name="FromText")
+    import_effects(_file(tmp_path, "own_text", text))
+    scenario = load_scenario("removal", ["effects=[!FromText {fx: 0.05}]"])
+    assert type(scenario.effects[0]).__name__ == "FromText"
+
+
+def _in_worker(pickled: bytes, override: str) -> list[str]:
+    """Returns the names of a scenario's effects and of one that came by pickle."""
+    scenario = load_scenario("removal", [override])
+    both = [pickle.loads(pickled), *scenario.effects]
+    return [f"{type(effect).__module__}.{type(effect).__name__}" for effect in both]
+
+
+def test_a_spawned_worker_knows_what_was_imported(tmp_path: Path) -> None:
+    """By pickle, and by name alone, from a file outside any package."""
+    import_effects(_file(tmp_path, "own_spawned", _FILE.format(name="Spawned")))
+    effect = find_effect("Spawned")(fx=0.01)
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, context) as executor:
+        found = executor.submit(
+            _in_worker, pickle.dumps(effect), "effects=[!Spawned {fx: 0.05}]"
+        ).result()
+    assert found == ["own_spawned.Spawned"] * 2
+
+
+@pytest.mark.parametrize(
+    ("stem", "text", "message"),
+    [
+        ("own_empty", "", "registers no effect; put @register_effect above the class"),
+        ("own_broken", "1 / 0", r"own_broken: can't be imported \(ZeroDivisionError"),
+        ("json", "", "another module has the name json"),
+        (
+            "own_faulty",
+            "import drake_disasm.effects as e\n"
+            "e.register_effect(type('Own', (e.SensorEffect,), {}))",
+            "own_faulty: effect Own: is not a dataclass",
+        ),
+    ],
+)
+def test_a_file_that_gives_no_effect_says_why(
+    stem: str, text: str, message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(DisasmError, match=message):
+        import_effects(_file(tmp_path, stem, text))
+
+
+def test_a_missing_file_or_module_is_named() -> None:
+    with pytest.raises(DisasmError, match=r"nowhere\.py: no such file"):
+        import_effects("nowhere.py")
+    with pytest.raises(DisasmError, match=r"nowhere: can't be imported"):
+        import_effects("nowhere")
+
+
+def test_an_entry_point_is_loaded_once_when_effects_are_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As an installed distribution declares it."""
+    _file(tmp_path, "own_entry", _FILE.format(name="FromEntryPoint"))
+    folder = tmp_path / "own_entry-1.0.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: own_entry\n")
+    group = "[drake_disasm.effects]\nany = own_entry\n"
+    (folder / "entry_points.txt").write_text(group)
+    sys.path.append(str(tmp_path))
+    monkeypatch.setattr(registry, "_plugins_are_loaded", False)
+    assert find_effect("FromEntryPoint").__module__ == "own_entry"
+
+
+def test_a_broken_entry_point_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "own_gone-1.0.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: own_gone\n")
+    (folder / "entry_points.txt").write_text("[drake_disasm.effects]\nany = own_gone\n")
+    sys.path.append(str(tmp_path))
+    monkeypatch.setattr(registry, "_plugins_are_loaded", False)
+    for _ in range(2):  # the second time, too
+        with pytest.raises(
+            DisasmError, match=r"entry point any of own_gone: .*ModuleNotFoundError"
+        ):
+            registered_effects()
+
+
+def test_an_effect_acts_at_one_of_the_four_places() -> None:
+    assert issubclass(find_effect("GroovePose"), EnvironmentEffect)
+    names = [effect.__name__ for effect in registered_effects()]
+    assert names[0] == "GroovePose" and names[-1] == "FlangePayload"
