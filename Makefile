@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip install --quiet --constraint constraints.txt
 # One thread per process: parallel work is done by processes.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help simulate test test-all lint format benchmark check-install clean
+.PHONY: help simulate test test-all lint format docs benchmark check-install clean
 .DEFAULT_GOAL := help
 
 help:  ## Show this list
@@ -31,6 +31,10 @@ format: $(VENV)/.dev  ## Put the code in shape
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+docs: $(VENV)/.docs  ## Build the site: build/docs/index.html
+	$(BIN)/python -m sphinx -q -W --keep-going -j auto -d build/doctrees docs build/docs
+	@echo "build/docs/index.html"
+
 benchmark: $(VENV)/.dev  ## Measure speed (ARGS="--only cell_reset_ms ...")
 	$(BIN)/python benchmarks/benchmark.py $(ARGS)
 
@@ -44,7 +48,7 @@ check-install: $(VENV)/.dev  ## Install into an empty environment, import elsewh
 	make_station('cell', load_scenario('removal')); print('installed:', models_dir())"
 
 clean:  ## Remove what was built
-	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) build dist docs/api *.egg-info .mypy_cache .ruff_cache .pytest_cache
 
 $(BIN)/python:
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and \
@@ -57,4 +61,8 @@ $(VENV)/.run: pyproject.toml constraints.txt | $(BIN)/python
 
 $(VENV)/.dev: pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP) --editable ".[dev]"
+	@touch $@ $(VENV)/.run
+
+$(VENV)/.docs: pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) --editable ".[docs]"
 	@touch $@ $(VENV)/.run

@@ -13,7 +13,7 @@ def refusal(where: str | Path, what: str, remedy: str) -> DisasmError:
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """`did you mean 'x'? ` for the nearest known word, or nothing."""
+    """Returns "did you mean 'x'? " for the nearest known word, or an empty text."""
     names = {name.lower(): name for name in known}
     near = get_close_matches(word.lower(), list(names), n=1)
     return f"did you mean '{names[near[0]]}'? " if near else ""

@@ -1,10 +1,10 @@
 """One diagram from a scenario, and stepping it by the MDP's period.
 
-```
-policy -> imprecision -> pose target -> motion -> station -> observation
-  ^                                                               |
-  +---------------------------------------------------------------+
-```
+The loop::
+
+    policy -> imprecision -> pose target -> motion -> station -> observation
+      ^                                                               |
+      +---------------------------------------------------------------+
 """
 
 import copy

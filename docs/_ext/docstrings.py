@@ -1,0 +1,124 @@
+"""Shows what our docstrings have beyond Google's style.
+
+A system's ports stand in its docstring between `@system` and `@endsystem`, as in
+Drake; here they become a block with inputs on the left and outputs on the right. A
+dataclass whose fields are made by `quantity` gets a table of them: default, unit,
+bounds, meaning.
+"""
+
+import dataclasses
+import math
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+#: A bar outside of ``literals`` and `names`; |x| is an absolute value to us.
+_BAR = re.compile(r"(``.*?``|`[^`]*`)|\|")
+
+
+def system_block(lines: Sequence[str]) -> list[str]:
+    """Returns a docstring's lines with the `@system` block as reStructuredText.
+
+    Raises:
+        ValueError: the block is not closed, or is not YAML of name and ports.
+    """
+    stripped = [line.strip() for line in lines]
+    if "@system" not in stripped:
+        return list(lines)
+    if "@endsystem" not in stripped:
+        raise ValueError("@system without @endsystem; close the block")
+    begin, end = stripped.index("@system"), stripped.index("@endsystem")
+    block = yaml.safe_load("\n".join(lines[begin + 1 : end]))
+    return [*lines[:begin], *_port_table(block), *lines[end + 1 :]]
+
+
+def without_substitutions(lines: Sequence[str]) -> list[str]:
+    """Returns a docstring's lines with |x| as text, apart from literal blocks."""
+    escaped, literal = [], False
+    for line in lines:
+        literal = literal and (not line.strip() or line.startswith(" "))
+        escaped.append(line if literal else _BAR.sub(_escaped_bar, line))
+        literal = literal or line.endswith("::")
+    return escaped
+
+
+def _escaped_bar(match: re.Match[str]) -> str:
+    return match.group(1) or r"\|"
+
+
+def quantity_table(cls: type) -> list[str]:
+    """Returns a table of a dataclass's fields that were made by `quantity`."""
+    if not dataclasses.is_dataclass(cls):
+        return []
+    fields = [f for f in dataclasses.fields(cls) if "doc" in f.metadata]
+    if not fields:
+        return []
+    rows = [("field", "default", "unit", "bounds", "meaning")]
+    rows += [_quantity_row(field) for field in fields]
+    return ["", *_list_table(rows, "quantities"), ""]
+
+
+def _quantity_row(field: dataclasses.Field[Any]) -> tuple[str, ...]:
+    default = field.default
+    if field.default_factory is not dataclasses.MISSING:
+        default = field.default_factory()
+    metadata = field.metadata
+    bounds = (metadata.get("low", -math.inf), metadata.get("high", math.inf))
+    return (
+        f"``{field.name}``",
+        "" if default is dataclasses.MISSING else f"``{default!r}``",
+        str(metadata.get("unit", "")),
+        _words(metadata["choices"]) if metadata.get("choices") else _range(*bounds),
+        str(metadata["doc"]).replace("*", r"\*").replace("|", r"\|"),
+    )
+
+
+def _words(choices: Sequence[str]) -> str:
+    return ", ".join(f"``{word}``" for word in choices)
+
+
+def _range(low: float, high: float) -> str:
+    if math.isinf(low) and math.isinf(high):
+        return ""
+    if math.isinf(high):
+        return f"≥ {low:g}"
+    return f"≤ {high:g}" if math.isinf(low) else f"{low:g} to {high:g}"
+
+
+def _port_table(block: dict[str, Any]) -> list[str]:
+    inputs, outputs = block.get("input_ports") or [], block.get("output_ports") or []
+    names = [[f"``{name}`` →" for name in inputs], [f"→ ``{n}``" for n in outputs]]
+    cells = ["| ".join(["", *(f"{n}\n" for n in column)]) for column in names]
+    rows = [("inputs", "", "outputs"), (cells[0], f"**{block['name']}**", cells[1])]
+    return ["", *_list_table(rows, "ports"), ""]
+
+
+def _list_table(rows: Sequence[Sequence[str]], css_class: str) -> list[str]:
+    lines = [".. list-table::", f"   :class: {css_class}", "   :header-rows: 1", ""]
+    for row in rows:
+        for i, cell in enumerate(row):
+            first, *more = cell.split("\n")
+            lines.append(f"   {'*' if i == 0 else ' '} - {first}".rstrip())
+            lines += [f"       {line}".rstrip() for line in more]
+    return lines
+
+
+def _process(
+    app: "Sphinx", what: str, name: str, obj: Any, options: Any, lines: list[str]
+) -> None:
+    if getattr(obj, "__module__", "") == "typing":  # an alias has typing's docstring
+        lines.clear()
+    lines[:] = system_block(without_substitutions(lines))
+    if what == "class":
+        lines += quantity_table(obj)
+
+
+def setup(app: "Sphinx") -> dict[str, bool]:
+    """Registers the hook, ahead of napoleon's."""
+    app.connect("autodoc-process-docstring", _process, priority=400)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,99 @@
+"""Links lead somewhere, and every file, module and member that a page names exists."""
+
+import ast
+import functools
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.docs.pages import ROOT, anchors, links, literals, name_of, pages
+
+_FOLDERS = ("benchmarks", "docs", "drake_disasm", "examples", "models", "sysid")
+_PATH = re.compile(rf"(?:{'|'.join((*_FOLDERS, 'tests', 'tools'))})/[\w./*-]*")
+_DOTTED = re.compile(r"(?:drake_disasm|sysid|tests|benchmarks)(?:\.\w+)+")
+_MEMBER = re.compile(r"([A-Z]\w+)\.(\w+)(?:\(.*\))?")
+_SOURCES = [f for top in ("drake_disasm", "sysid") for f in (ROOT / top).rglob("*.py")]
+#: The page of names that are gone; its old ones must not resolve.
+_EXCEPT = {"docs/renamed.md"}
+_SCHEMA = "drake_disasm/log/1"  # of logs, no path
+
+each_page = pytest.mark.parametrize("page", pages(), ids=name_of)
+each_current_page = pytest.mark.parametrize(
+    "page", [p for p in pages() if name_of(p) not in _EXCEPT], ids=name_of
+)
+
+
+@each_page
+def test_links_lead_somewhere(page: Path) -> None:
+    for link in links(page):
+        if "://" in link:
+            continue
+        target, _, anchor = link.partition("#")
+        file = (page.parent / target).resolve() if target else page
+        assert file.exists(), f"{name_of(page)} links to {link}"
+        if anchor:
+            assert anchor in anchors(file), f"{name_of(page)} links to {link}"
+
+
+@each_current_page
+def test_named_paths_exist(page: Path) -> None:
+    for literal in literals(page):
+        for path in _PATH.findall(literal):
+            exists = path == _SCHEMA or any(ROOT.glob(path.rstrip("/.")))
+            assert exists, f"{name_of(page)}: {path}"
+
+
+@each_current_page
+def test_named_modules_and_members_exist(page: Path) -> None:
+    for literal in literals(page):
+        if _DOTTED.fullmatch(literal):
+            assert _resolves(literal), f"{name_of(page)}: {literal}"
+        elif match := _MEMBER.fullmatch(literal):
+            assert _has_member(*match.groups()), f"{name_of(page)}: {literal}"
+
+
+def _resolves(dotted: str) -> bool:
+    module, names = dotted, []
+    while module:
+        try:
+            found = importlib.import_module(module)
+        except ModuleNotFoundError:
+            module, _, name = module.rpartition(".")
+            names.insert(0, name)
+            continue
+        for name in names:
+            found = getattr(found, name, None)
+        return found is not None
+    return False
+
+
+def _has_member(cls: str, member: str) -> bool:
+    """Whether one of our classes of that name has the member; other people's pass."""
+    modules = _classes().get(cls)
+    if modules is None:
+        return True
+    found = [getattr(importlib.import_module(module), cls) for module in modules]
+    return any(
+        hasattr(c, member) or member in getattr(c, "__dataclass_fields__", ())
+        for c in found
+    )
+
+
+@functools.cache
+def _classes() -> dict[str, list[str]]:
+    classes: dict[str, list[str]] = {}
+    for file in _SOURCES:
+        module = ".".join(file.relative_to(ROOT).with_suffix("").parts)
+        for node in ast.parse(file.read_text()).body:
+            if isinstance(node, ast.ClassDef):
+                classes.setdefault(node.name, []).append(module)
+    return classes
+
+
+def test_what_does_not_exist_is_noticed() -> None:
+    assert not _resolves("drake_disasm.scenario.no_such_name")
+    assert _resolves("drake_disasm.scenario.load_scenario")
+    assert not _has_member("GroovePose", "no_such_field")
+    assert _has_member("GroovePose", "ry")

@@ -1,0 +1,85 @@
+"""The site's own hooks: port blocks, tables of quantities, links into the code."""
+
+import dataclasses
+import importlib.util
+import sys
+import types
+
+import pytest
+
+from drake_disasm.common.quantity import quantity
+from tests.docs.pages import ROOT
+
+
+def _hook(name: str) -> types.ModuleType:
+    path = ROOT / "docs" / "_ext" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(f"docs_{name}", path)
+    assert spec and spec.loader
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+docstrings, repository_links = _hook("docstrings"), _hook("repository_links")
+
+
+def test_ports_become_a_table() -> None:
+    block = "@system\nname: Sum\ninput_ports:\n- u\n- v\noutput_ports:\n- y\n@endsystem"
+    lines = docstrings.system_block(["Adds.", "", *block.splitlines(), "", "More."])
+    text = "\n".join(lines)
+    assert "@" not in text and text.startswith("Adds.") and text.endswith("More.")
+    assert "``u`` →" in text and "``v`` →" in text and "→ ``y``" in text
+    assert "**Sum**" in text
+
+
+def test_a_block_that_is_not_closed_is_refused() -> None:
+    with pytest.raises(ValueError, match="@endsystem"):
+        docstrings.system_block(["@system", "name: Sum"])
+
+
+@dataclasses.dataclass
+class _Spring:
+    stiffness: float = quantity(2.5, "N/m", "of the coil", low=0.0)
+    ends: str = quantity("flat", "", "how it ends", choices=("flat", "hook"))
+
+
+def test_quantities_become_a_table() -> None:
+    text = "\n".join(docstrings.quantity_table(_Spring))
+    assert all(t in text for t in ("``stiffness``", "``2.5``", "N/m", "≥ 0", "coil"))
+    assert "``flat``, ``hook``" in text
+    assert docstrings.quantity_table(int) == []
+
+
+def test_absolute_values_are_text_apart_from_literals() -> None:
+    lines = ["|v| and `|w|`::", "", "    a | b", "", "|u|"]
+    escaped = docstrings.without_substitutions(lines)
+    assert escaped == [r"\|v\| and `|w|`::", "", "    a | b", "", r"\|u\|"]
+
+
+@pytest.mark.parametrize(
+    "markdown, folder, page, expected",
+    [
+        ("[`mdp`](../drake_disasm/mdp.py)", "docs", "a.md", "api/drake_disasm.mdp.rst"),
+        (
+            "[s](../../sysid/models)",
+            "docs/guides",
+            "guides/a.md",
+            "../api/sysid.models.rst",
+        ),
+        ("[p](docs/physics.md#contact)", ".", "index.md", "physics.md#contact"),
+        ("[s](models/SOURCES.md)", ".", "index.md", "models-sources.md"),
+        ("[i](../README.md#the-idea)", "docs", "a.md", "index.md#the-idea"),
+        ("[h](../models/x.yaml)", "docs", "a.md", "../models/x.yaml"),
+        ("[d](https://drake.mit.edu)", "docs", "a.md", "https://drake.mit.edu"),
+    ],
+)
+def test_links_into_the_repository(
+    markdown: str, folder: str, page: str, expected: str
+) -> None:
+    assert f"({expected})" in repository_links.rewrite(markdown, folder, page)
+
+
+def test_a_link_to_a_folder_is_its_name() -> None:
+    rewritten = repository_links.rewrite("in [`models/`](models) here", ".", "index.md")
+    assert rewritten == "in `models/` here"
