@@ -1,24 +1,33 @@
-"""docs/effects.md lists the library as it is."""
+"""docs/effects.md lists the library exactly as it is."""
 
+import dataclasses
+import importlib.util
 from pathlib import Path
 
-from drake_disasm.effects import amplitudes, registered_effects, shape_parameters
+from drake_disasm.effects import GroovePose, registered_effects
+from drake_disasm.effects.documentation import documentation
 
-_PAGE = (Path(__file__).parents[1] / "docs" / "effects.md").read_text("utf-8")
+_SCRIPT = Path(__file__).parents[1] / "docs" / "effects_table.py"
 
 
-def test_every_effect_is_listed_with_its_fields():
-    rows = {
-        line.split("`")[1]: line
-        for line in _PAGE.splitlines()
-        if line.startswith("| `")
-    }
-    assert sorted(rows) == sorted(effect.__name__ for effect in registered_effects())
+def test_the_page_is_what_the_registry_generates():
+    spec = importlib.util.spec_from_file_location("effects_table", _SCRIPT)
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    remedy = "run `python docs/effects_table.py`"
+    assert script.PAGE.read_text("utf-8") == script.page(), remedy
+
+
+def test_every_effect_is_there_with_all_its_fields():
+    text = documentation(registered_effects())
     for effect in registered_effects():
-        row = rows[effect.__name__]
-        fields = [*amplitudes(effect), *shape_parameters(effect)]
-        assert (
-            all(name in row for name in fields)
-            or f"{len(fields)} such" in row
-            or (len(amplitudes(effect)) > 6)
-        )
+        _, _, entry = text.partition(f"### `{effect.__name__}`")
+        entry = entry.partition("### ")[0]
+        assert entry.count("\n| `") == len(dataclasses.fields(effect))
+        assert "```text" in entry and "Where it acts: " in entry
+        assert "Revealed by: " in entry
+
+
+def test_a_field_has_its_unit_and_bounds():
+    row = "| `ry` | amplitude | rad | -0.2 | 0.2 | rotation about the plate's normal |"
+    assert row in documentation([GroovePose])

@@ -1,17 +1,20 @@
 """What an effect is, and the places where one can act.
 
-An effect is a frozen-in-time description of one physical thing that the
-nominal model lacks. It is a dataclass, so a scenario can list it
-(`- !SensorBias {fx: 0.5}`) and identification can fit its fields: each field
-is a `parameter` with unit, bounds and a default that is its null value, at
-which the effect vanishes bit for bit; or a `shape`, which says how the effect looks
-and not how large it is, a time constant say, and matters only away from null. What
-it does is a pure function, so the simulator, identification and closing the loop
-share the one implementation.
+An effect is one physical phenomenon that the nominal model lacks. It is a dataclass,
+so that a scenario can list it (`- !SensorBias {fx: 0.5}`) and identification can fit
+its fields. A field is an `amplitude`, which is zero at null, where the effect vanishes
+bit for bit; or a `shape_parameter`, a time constant say, which says how the effect
+looks and matters only away from null. What it does is a pure function, so that the
+simulator, identification and closing the loop share one implementation.
+
+To write one: derive a dataclass from the place where it acts (EnvironmentEffect,
+MotionEffect, SensorEffect or JointEffect), give it a docstring and fields, define the
+place's method, and put `@register_effect` above it.
 """
 
 import abc
 import dataclasses
+import inspect
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -112,8 +115,14 @@ class Effect:
 
     @property
     def is_null(self) -> bool:
-        """Whether all its sizes are zero: it does nothing."""
+        """Whether all its amplitudes are zero: it does nothing."""
         return not any(getattr(self, name) for name in amplitudes(type(self)))
+
+    @classmethod
+    def description(cls) -> str:
+        """Returns what it is, in a line: the first paragraph of its docstring."""
+        paragraph = inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0]
+        return " ".join(paragraph.split())
 
 
 class EnvironmentEffect(Effect, abc.ABC):
@@ -167,11 +176,14 @@ class SensorEffect(Effect, abc.ABC):
             sensor's mounting, 2 its elements, 3 its electronics, 4 its range.
             Effects act in this order, whatever the order of a scenario's list.
         present_at_zeroing: whether zeroing the sensor before an episode sees it (a
-            load that always hangs there) or not (an error that comes up afterwards).
+            load that always hangs there) or not (an error that arises afterwards).
+        removed_by_zeroing: whether zeroing removes it altogether, as long as the sensor
+            keeps its orientation.
     """
 
     stage: ClassVar[int] = 3
     present_at_zeroing: ClassVar[bool] = True
+    removed_by_zeroing: ClassVar[bool] = False
 
     @abc.abstractmethod
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:

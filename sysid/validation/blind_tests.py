@@ -12,11 +12,9 @@ import numpy as np
 
 from drake_disasm.common.files import write_json
 from drake_disasm.effects import (
-    BaseTilt,
     Effect,
     EnvironmentEffect,
     MotionEffect,
-    PayloadError,
     SensorEffect,
     registered_effects,
 )
@@ -102,9 +100,10 @@ def nominal() -> Scenario:
 def traceable() -> tuple[type[Effect], ...]:
     """Returns the effects that transitions of the twin can show."""
     acts = (EnvironmentEffect, MotionEffect, SensorEffect)
-    silent = (PayloadError, BaseTilt)  # zeroing takes them off
     return tuple(
-        e for e in registered_effects() if issubclass(e, acts) and e not in silent
+        effect
+        for effect in registered_effects()
+        if issubclass(effect, acts) and not getattr(effect, "removed_by_zeroing", False)
     )
 
 

@@ -1,6 +1,7 @@
-"""The joint rubs otherwise forwards than backwards."""
+"""Friction of a joint that depends on the direction of motion."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 
@@ -8,14 +9,14 @@ from drake_disasm.effects.base import JointEffect, JointSamples
 from drake_disasm.effects.fields import amplitude, joint_name, shape_parameter
 from drake_disasm.effects.registry import register_effect
 
-#: Below it a joint rests, for all that filtered velocities can tell.
+#: Below it, filtered velocities can't distinguish a joint from one at rest.
 _CREEP = (0.005, 0.02, 0.08)
 
 
 @register_effect
 @dataclasses.dataclass
 class JointAsymmetricFriction(JointEffect):
-    """What friction forwards exceeds friction backwards by, half of it.
+    """Friction that differs by direction: half of forwards minus backwards.
 
     Equation: tau = c tanh(v / e)^2 + b |v|: even in v, and zero at rest.
     Where it acts: one joint of the arm, on the torque that its sensor measures.
@@ -27,6 +28,11 @@ class JointAsymmetricFriction(JointEffect):
     creep: float = shape_parameter(
         0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP
     )
+
+    experiment = "this joint both ways at the same speeds, with rests"
+    experiments_against: ClassVar = {
+        "TorqueOffset": "rests: an offset is there at rest",
+    }
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

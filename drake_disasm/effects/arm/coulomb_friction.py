@@ -1,6 +1,7 @@
-"""The joint rubs."""
+"""Dry friction of a joint."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from drake_disasm.effects.base import JointEffect, JointSamples
 from drake_disasm.effects.fields import amplitude, joint_name, shape_parameter
 from drake_disasm.effects.registry import register_effect
 
-#: Below it a joint rests, for all that filtered velocities can tell.
+#: Below it, filtered velocities can't distinguish a joint from one at rest.
 _CREEP = (0.005, 0.02, 0.08)
 
 
@@ -17,7 +18,7 @@ _CREEP = (0.005, 0.02, 0.08)
 class JointCoulombFriction(JointEffect):
     """Dry friction of constant size against the motion.
 
-    Equation: tau = c tanh(v / e), e the speed below which the joint creeps.
+    Equation: tau = c tanh(v / e), e the velocity below which the joint creeps.
     Where it acts: one joint of the arm, on the torque that its sensor measures.
     """
 
@@ -26,6 +27,12 @@ class JointCoulombFriction(JointEffect):
     creep: float = shape_parameter(
         0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP
     )
+
+    experiment = "this joint at three or more constant speeds, both ways"
+    experiments_against: ClassVar = {
+        "JointViscousFriction": "three or more constant speeds",
+        "JointLoadFriction": "the same motion with two payloads",
+    }
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

@@ -1,4 +1,4 @@
-"""The joint rubs more under load."""
+"""Friction of a joint that grows with its load."""
 
 import dataclasses
 
@@ -8,7 +8,7 @@ from drake_disasm.effects.base import JointEffect, JointSamples
 from drake_disasm.effects.fields import amplitude, joint_name, shape_parameter
 from drake_disasm.effects.registry import register_effect
 
-#: Below it a joint rests, for all that filtered velocities can tell.
+#: Below it, filtered velocities can't distinguish a joint from one at rest.
 _CREEP = (0.005, 0.02, 0.08)
 
 
@@ -22,10 +22,12 @@ class JointLoadFriction(JointEffect):
     """
 
     joint: str = joint_name()
-    coefficient: float = amplitude("1", 0.0, 1.0, "share of the load")
+    coefficient: float = amplitude("1", 0.0, 1.0, "friction per load")
     creep: float = shape_parameter(
         0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP
     )
+
+    experiment = "the same motion with two payloads"
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

@@ -1,4 +1,4 @@
-"""The motor's rotor takes torque, too."""
+"""Inertia of a joint's rotor and gear."""
 
 import dataclasses
 
@@ -12,7 +12,7 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class RotorInertia(JointEffect):
-    """Inertia of rotor and gear, as the joint feels it.
+    """Inertia of rotor and gear, reflected to the joint.
 
     Equation: tau = I_a vd: unlike a link's inertia it couples to no other joint.
     Where it acts: one joint of the arm, on the torque that its sensor measures.
@@ -20,6 +20,8 @@ class RotorInertia(JointEffect):
 
     joint: str = joint_name()
     inertia: float = amplitude("kg m^2", 0.0, 50.0, "reflected to the joint")
+
+    experiment = "fast reversals of this joint alone, the others at rest"
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

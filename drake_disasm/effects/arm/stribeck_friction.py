@@ -1,6 +1,7 @@
-"""The joint rubs more while it is slow."""
+"""Friction of a joint that is higher at low speed."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class JointStribeckFriction(JointEffect):
-    """Friction that falls as a film of grease builds up (Stribeck).
+    """Friction that falls with speed as a film of grease builds up (Stribeck).
 
     Equation: tau = c tanh(v / e) exp(-(v / v_s)^2), v_s the film's speed
     (Armstrong-Helouvry 1991).
@@ -20,13 +21,18 @@ class JointStribeckFriction(JointEffect):
     """
 
     joint: str = joint_name()
-    size: float = amplitude("N m", 0.0, 200.0, "at breakaway, beyond Coulomb's")
+    size: float = amplitude("N m", 0.0, 200.0, "at breakaway, beyond Coulomb friction")
     speed: float = shape_parameter(
-        0.1, "rad/s", 1e-3, 5.0, "of the film", (0.05, 0.15, 0.5)
+        0.1, "rad/s", 1e-3, 5.0, "v_s, at which the film carries", (0.05, 0.15, 0.5)
     )
     creep: float = shape_parameter(
         0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", (0.02,)
     )
+
+    experiment = "this joint at constant speeds below 0.1 rad/s, both ways"
+    experiments_against: ClassVar = {
+        "JointCoulombFriction": "slow ramps through zero speed",
+    }
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

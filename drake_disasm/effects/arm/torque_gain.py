@@ -1,4 +1,4 @@
-"""The torque sensor reads too much or too little."""
+"""The gain of a joint's torque sensor is off."""
 
 import dataclasses
 
@@ -12,14 +12,16 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class TorqueGain(JointEffect):
-    """A share of the torque, too much.
+    """A constant relative error of a joint's torque sensor.
 
     Equation: tau = g tau_load.
     Where it acts: one joint of the arm, on the torque that its sensor measures.
     """
 
     joint: str = joint_name()
-    share: float = amplitude("1", -0.9, 0.9, "too much")
+    share: float = amplitude("1", -0.9, 0.9, "relative error of the torque")
+
+    experiment = "the same motion with two known payloads"
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

@@ -1,4 +1,4 @@
-"""The torque sensor's zero is off."""
+"""The torque sensor of a joint has an offset."""
 
 import dataclasses
 
@@ -19,7 +19,9 @@ class TorqueOffset(JointEffect):
     """
 
     joint: str = joint_name()
-    size: float = amplitude("N m", -200.0, 200.0, "offset")
+    size: float = amplitude("N m", -200.0, 200.0, "offset of the reading")
+
+    experiment = "rests of this joint in several poses, each reached from both sides"
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

@@ -1,4 +1,4 @@
-"""The joint rubs in its grease."""
+"""Viscous friction of a joint."""
 
 import dataclasses
 
@@ -12,7 +12,7 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class JointViscousFriction(JointEffect):
-    """Friction that grows with the joint's speed.
+    """Friction in proportion to the joint's velocity.
 
     Equation: tau = b v.
     Where it acts: one joint of the arm, on the torque that its sensor measures.
@@ -20,6 +20,8 @@ class JointViscousFriction(JointEffect):
 
     joint: str = joint_name()
     coefficient: float = amplitude("N m s/rad", 0.0, 500.0, "viscous coefficient")
+
+    experiment = "this joint at three or more constant speeds, both ways"
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

@@ -1,4 +1,4 @@
-"""The contact stiffens otherwise as it is pressed."""
+"""The contact force grows with another power of the penetration."""
 
 import dataclasses
 
@@ -16,9 +16,10 @@ class ContactExponent(EnvironmentEffect):
     Where it acts: IMPACT's law; hydroelastic contact has no exponent and ignores it.
     """
 
-    change: float = amplitude("1", -1.0, 3.0, "of the exponent e")
+    change: float = amplitude("1", -1.0, 3.0, "added to the exponent e")
 
     contact_models = ("impact",)
+    experiment = "slow presses against one wall, from light to strong"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Changes the exponent."""

@@ -1,4 +1,4 @@
-"""The contact is stiffer or softer."""
+"""The contact is stiffer or softer than in the model."""
 
 import dataclasses
 
@@ -15,11 +15,13 @@ class ContactStiffness(EnvironmentEffect):
     """Bolt and groove yield less, or more, than their nominal materials.
 
     Equation: k = k_nominal exp(log_factor) for the hydroelastic moduli and for
-    IMPACT's stiffness alike.
+    IMPACT's stiffness.
     Where it acts: the contact material of the bolt, or IMPACT's law.
     """
 
     log_factor: float = amplitude("1", -5.0, 5.0, "natural logarithm of the factor")
+
+    experiment = "slow presses against one wall, up to three forces or more"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Scales the stiffness."""

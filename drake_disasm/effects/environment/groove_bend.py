@@ -17,8 +17,8 @@ class GrooveBend(EnvironmentEffect):
     """The groove's axis is an arc instead of a line.
 
     Equation: at travel x the axis is displaced by c(x) = [0, ky x^2 / 2, kz x^2 / 2]
-    and turned by its slope; the bolt meets the groove as a straight one that is
-    tangent to the arc there.
+    and rotated by its slope; the bolt meets a straight groove that is tangent to the
+    arc there.
     Where it acts: the pose of the lock in the plant, anew in each step of the MDP.
     """
 
@@ -26,6 +26,7 @@ class GrooveBend(EnvironmentEffect):
     kz: float = amplitude("1/m", -2.0, 2.0, "curvature across the groove")
 
     is_local = True
+    experiment = "slow pulls over the whole groove, both ways and along both walls"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Composes the tangent groove at the bolt onto the pose so far."""

@@ -1,4 +1,4 @@
-"""The bolt has more, or less, play in the slot."""
+"""The bolt has more, or less, clearance in the slot."""
 
 import dataclasses
 
@@ -6,20 +6,22 @@ from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
 
-_LEAST = 2e-5  # m: a bolt that is no wider than its slot
+_LEAST = 2e-5  # m, the least clearance: the bolt still fits its slot
 
 
 @register_effect
 @dataclasses.dataclass
 class GrooveClearance(EnvironmentEffect):
-    """The slot is wider or narrower than the model says: wear, dirt, tolerance.
+    """The slot is wider or narrower than in the model: wear, dirt, tolerance.
 
     Equation: clearance = max(0.02 mm, nominal + change), the slot's width minus the
     neck's diameter.
     Where it acts: the lips of the groove in the scene graph.
     """
 
-    change: float = amplitude("m", -5e-4, 1e-3, "of the clearance")
+    change: float = amplitude("m", -5e-4, 1e-3, "added to the clearance")
+
+    experiment = "small steps sideways from wall to wall, at several depths"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Changes the clearance."""

@@ -1,6 +1,7 @@
-"""The groove rubs more, or less, than the model says."""
+"""The groove has more, or less, friction than in the model."""
 
 import dataclasses
+from typing import ClassVar
 
 from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
 from drake_disasm.effects.fields import amplitude
@@ -18,6 +19,13 @@ class GrooveFriction(EnvironmentEffect):
     """
 
     coefficient: float = amplitude("1", -1.0, 1.0, "added to the nominal mu")
+
+    experiment = "pulls both ways against one wall under two normal forces"
+    experiments_against: ClassVar = {
+        "GroovePose": (
+            "the same pull both ways: friction changes its sign, geometry does not"
+        ),
+    }
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds the coefficient, never below a frictionless groove."""

@@ -1,4 +1,4 @@
-"""The groove is turned or shifted."""
+"""The groove is rotated or offset."""
 
 import dataclasses
 
@@ -14,23 +14,25 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class GroovePose(EnvironmentEffect):
-    """The lock was fixed turned about A, or shifted, against where we think it is.
+    """The lock is mounted rotated about A, or offset, from its nominal pose.
 
     Equation: X_GnG = (Exp([rx, ry, rz]), [x, y, z]) with Gn the nominal groove
     frame (origin at A, x along the groove, y out of the plate) and G the true
-    one. The thesis's turned fixture (3.3.1.1) is ry.
+    one. The rotated fixture of the thesis (3.3.1.1) is ry.
     Where it acts: the pose of the lock in the plant. An episode begins with the
-    bolt in the groove however it is shifted: beyond the play, arm and gripper give
-    way and press it against the walls. The bounds of the shifts are those within
-    which it still finds the slot.
+    bolt in the groove whatever the offset: beyond the clearance, arm and gripper
+    yield and press it against the walls. The bounds of the offsets are those within
+    which the bolt still finds the slot.
     """
 
-    rx: float = amplitude("rad", -0.2, 0.2, "turned about the groove's axis")
-    ry: float = amplitude("rad", -0.2, 0.2, "turned about the plate's normal")
-    rz: float = amplitude("rad", -0.2, 0.2, "tilted: the far end goes up")
-    x: float = amplitude("m", -0.01, 0.003, "shifted along the groove")
-    y: float = amplitude("m", -0.001, 0.001, "shifted out of the plate")
-    z: float = amplitude("m", -0.002, 0.002, "shifted across the groove")
+    rx: float = amplitude("rad", -0.2, 0.2, "rotation about the groove's axis")
+    ry: float = amplitude("rad", -0.2, 0.2, "rotation about the plate's normal")
+    rz: float = amplitude("rad", -0.2, 0.2, "tilt: the far end goes up")
+    x: float = amplitude("m", -0.01, 0.003, "offset along the groove")
+    y: float = amplitude("m", -0.001, 0.001, "offset out of the plate")
+    z: float = amplitude("m", -0.002, 0.002, "offset across the groove")
+
+    experiment = "pulls in both directions, the bolt turned by a known angle between"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Composes the true groove frame onto the pose so far."""

@@ -1,4 +1,4 @@
-"""The groove rubs more at one place."""
+"""The groove has more friction at one place."""
 
 import dataclasses
 
@@ -35,9 +35,10 @@ class RustyPatch(EnvironmentEffect):
     )
 
     is_local = True
+    experiment = "slow pulls over the whole groove, both ways, under one normal force"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
-        """Adds what there is at this place."""
+        """Adds the friction at this place."""
         away = (bolt.p[0] - self.position) / self.width
         added = self.coefficient * np.exp(-(away**2))
         friction = max(0.0, float(environment.friction + added))

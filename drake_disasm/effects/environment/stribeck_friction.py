@@ -1,4 +1,4 @@
-"""The groove rubs more at low speed."""
+"""The groove has more friction at low speed."""
 
 import dataclasses
 
@@ -14,17 +14,18 @@ from drake_disasm.effects.registry import register_effect
 class GrooveStribeckFriction(EnvironmentEffect):
     """Friction that is higher at low speed (Stribeck 1902).
 
-    Equation: mu += a exp(-(|v| / v_s)^2), v the velocity at which the bolt is to move
-    in this step; mu stays at or above zero.
+    Equation: mu += a exp(-(|v| / v_s)^2), v the velocity commanded for this
+    step; mu stays at or above zero.
     Where it acts: the contact material of the groove and of the bolt.
     """
 
     coefficient: float = amplitude("1", -1.0, 1.0, "a, added at rest")
     velocity: float = shape_parameter(
-        0.01, "m/s", 1e-4, 1.0, "v_s, at which it has mostly gone", (0.005, 0.015)
+        0.01, "m/s", 1e-4, 1.0, "v_s, at which most of it is gone", (0.005, 0.015)
     )
 
     is_local = True
+    experiment = "pulls under one normal force, from very slow to fast"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds what is left at this speed."""

@@ -12,15 +12,16 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class GrooveViscousFriction(EnvironmentEffect):
-    """A drag that grows with the speed, whatever presses: grease.
+    """A drag that grows with speed, whatever the normal force: grease.
 
-    Equation: f = -c v, v the velocity at which the bolt is to move in this step.
+    Equation: f = -c v, v the velocity commanded for this step.
     Where it acts: a force on the bolt at Bo.
     """
 
-    coefficient: float = amplitude("N s/m", 0.0, 1000.0, "c")
+    coefficient: float = amplitude("N s/m", 0.0, 1000.0, "c, the drag per velocity")
 
     is_local = True
+    experiment = "pulls under one normal force at three or more speeds"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds the drag."""

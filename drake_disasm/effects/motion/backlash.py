@@ -1,6 +1,7 @@
 """Lost motion: a gear has play."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class Backlash(MotionEffect):
-    """Play between command and motion: nothing moves until it is taken up.
+    """Play between command and motion: nothing moves until the play is taken up.
 
     Equation: the play operator, d_k = min(max(d_(k-1), c_k - b/2), c_k + b/2) with c
     the command and b = [x, y, z, u, v, w] the play, which begins centred.
@@ -28,6 +29,10 @@ class Backlash(MotionEffect):
     w: float = amplitude("rad", 0.0, 0.05, "play about z_G")
 
     stage = 2
+    experiment = "reversals after long and short steps, in free space and under load"
+    experiments_against: ClassVar = {
+        "Compliance": "the same reversals under two loads: backlash does not grow",
+    }
 
     def execute(
         self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float

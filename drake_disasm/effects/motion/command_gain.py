@@ -1,4 +1,4 @@
-"""The arm goes further, or less far, than it is told."""
+"""The arm moves further, or less far, than commanded."""
 
 import dataclasses
 
@@ -19,12 +19,14 @@ class CommandGain(MotionEffect):
     Where it acts: on the commanded pose, before inverse kinematics.
     """
 
-    x: float = amplitude("1", -0.5, 0.5, "more displacement along x_G")
-    y: float = amplitude("1", -0.5, 0.5, "more displacement along y_G")
-    z: float = amplitude("1", -0.5, 0.5, "more displacement along z_G")
-    u: float = amplitude("1", -0.5, 0.5, "more rotation about x_G")
-    v: float = amplitude("1", -0.5, 0.5, "more rotation about y_G")
-    w: float = amplitude("1", -0.5, 0.5, "more rotation about z_G")
+    x: float = amplitude("1", -0.5, 0.5, "relative error of the displacement along x_G")
+    y: float = amplitude("1", -0.5, 0.5, "relative error of the displacement along y_G")
+    z: float = amplitude("1", -0.5, 0.5, "relative error of the displacement along z_G")
+    u: float = amplitude("1", -0.5, 0.5, "relative error of the rotation about x_G")
+    v: float = amplitude("1", -0.5, 0.5, "relative error of the rotation about y_G")
+    w: float = amplitude("1", -0.5, 0.5, "relative error of the rotation about z_G")
+
+    experiment = "steps of several lengths in free space"
 
     def execute(
         self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float

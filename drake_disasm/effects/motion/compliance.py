@@ -1,4 +1,4 @@
-"""Arm, gripper or sensor yield more than the model's springs."""
+"""Arm, gripper or sensor yield more than in the model."""
 
 import dataclasses
 
@@ -12,23 +12,24 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class Compliance(MotionEffect):
-    """Arm, gripper and sensor give way to a force, and come back.
+    """Arm, gripper and sensor yield to a force, and return.
 
     Equation: d_executed = d_commanded + C F with C = diag(x, y, z, u, v, w) and F the
     measured wrench on the bolt at Bo in G at the beginning of the step: slow motion,
-    in which the yielding part is in balance. It comes on top of the springs of the
-    station, in series with them.
+    in which the compliance is in equilibrium. It is in series with the springs of
+    the station.
     Where it acts: on the commanded pose, before inverse kinematics.
     """
 
-    x: float = amplitude("m/N", 0.0, 4e-5, "along x_G")
-    y: float = amplitude("m/N", 0.0, 4e-5, "along y_G")
-    z: float = amplitude("m/N", 0.0, 4e-5, "along z_G")
-    u: float = amplitude("rad/(N m)", 0.0, 1.5e-3, "about x_G")
-    v: float = amplitude("rad/(N m)", 0.0, 1.5e-3, "about y_G")
-    w: float = amplitude("rad/(N m)", 0.0, 4e-4, "about z_G")
+    x: float = amplitude("m/N", 0.0, 4e-5, "compliance along x_G")
+    y: float = amplitude("m/N", 0.0, 4e-5, "compliance along y_G")
+    z: float = amplitude("m/N", 0.0, 4e-5, "compliance along z_G")
+    u: float = amplitude("rad/(N m)", 0.0, 1.5e-3, "compliance about x_G")
+    v: float = amplitude("rad/(N m)", 0.0, 1.5e-3, "compliance about y_G")
+    w: float = amplitude("rad/(N m)", 0.0, 4e-4, "compliance about z_G")
 
     stage = 3
+    experiment = "the same steps under two loads"
 
     def execute(
         self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float

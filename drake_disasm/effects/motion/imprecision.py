@@ -1,4 +1,4 @@
-"""The arm is less precise than declared."""
+"""The arm is less precise than the scenario says."""
 
 import dataclasses
 
@@ -12,16 +12,16 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class Imprecision(MotionEffect):
-    """Where a command leads scatters: an effect on the variance, not on the mean.
+    """The executed pose scatters about the commanded one: variance, not mean.
 
-    Equation: d_k = c_k + [x, y, z] n_k, with n_k ~ N(0, 1) anew at each step; rotations
-    pass. A scenario's `imprecision` (algorithm 3.2) scatters the *action*, of which
-    the log tells; this scatters about the command, and nobody tells.
-    Where it acts: on the commanded pose, behind all other effects on the motion.
+    Equation: d_k = c_k + [x, y, z] n_k, with n_k ~ N(0, 1) drawn at each step;
+    rotations are exact. A scenario's `imprecision` (algorithm 3.2) scatters the
+    *action*, which the log records; this scatters about the command, unrecorded.
+    Where it acts: on the commanded pose, after all other effects on the motion.
 
-    n_k is a pseudo-random function of the command and of how many came before, so
-    that the effect has no state of its own: the same run again scatters alike, and
-    any other differently.
+    n_k is a pseudo-random function of the command and of the number of commands
+    before it, so that the effect has no generator of its own: the same run repeats
+    its scatter, any other run has another.
     """
 
     x: float = amplitude("m", 0.0, 0.002, "standard deviation along x_G")
@@ -30,6 +30,7 @@ class Imprecision(MotionEffect):
 
     stage = 4
     is_random = True
+    experiment = "the same steps many times over in free space: how far they scatter"
 
     def execute(
         self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float

@@ -14,15 +14,16 @@ from drake_disasm.effects.registry import register_effect
 class MotionLag(MotionEffect):
     """A dead time between command and motion.
 
-    Equation: d_executed(t) = d_commanded(t - delay), the command moving evenly within
-    a step; delays beyond one step of the MDP count as one step. For slow motion a
-    first-order lag of that time constant looks the same.
+    Equation: d_executed(t) = d_commanded(t - delay), the command at constant velocity
+    within a step; delays beyond one step of the MDP count as one step. For slow
+    motion a first-order lag of that time constant looks the same.
     Where it acts: on the commanded pose, before inverse kinematics.
     """
 
     delay: float = amplitude("s", 0.0, 0.1, "of the motion behind its command")
 
     stage = 1
+    experiment = "fast and slow steps over the same path in free space"
 
     def execute(
         self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float

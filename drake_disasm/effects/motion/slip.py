@@ -12,7 +12,7 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class BoltSlip(MotionEffect):
-    """The bolt creeps in the gripper under a force, and does not come back.
+    """The bolt creeps in the gripper under a force, and does not return.
 
     Equation: d_executed = d_commanded + s, ds/dt = C F with C = diag(x, y, z) and F the
     measured force on the bolt in G: a viscous grip. Positions are the bolt's, as an
@@ -25,6 +25,7 @@ class BoltSlip(MotionEffect):
     z: float = amplitude("m/(N s)", 0.0, 1e-3, "creep along z_G")
 
     stage = 3
+    experiment = "a strong pull and back: slip stays, compliance returns"
 
     def execute(
         self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float

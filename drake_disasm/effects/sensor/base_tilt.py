@@ -13,7 +13,7 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class BaseTilt(SensorEffect):
-    """Gravity comes from elsewhere than the robot believes: its base is tilted.
+    """The robot's base is tilted: gravity has another direction than assumed.
 
     Equation: g_W = Exp([rx, ry, 0]) g; what hangs on the sensor, m at c, loads it with
     f = R_SW (g_W - g) m more, and c x f. A groove that is tilted along with the base
@@ -21,10 +21,12 @@ class BaseTilt(SensorEffect):
     Where it acts: the weight of the payload, before the sensor.
     """
 
-    rx: float = amplitude("rad", -0.2, 0.2, "tilted about x_W")
-    ry: float = amplitude("rad", -0.2, 0.2, "tilted about y_W")
+    rx: float = amplitude("rad", -0.2, 0.2, "tilt about x_W")
+    ry: float = amplitude("rad", -0.2, 0.2, "tilt about y_W")
 
     stage = -1
+    removed_by_zeroing = True
+    experiment = "the same orientations of the sensor with the arm's base turned"
 
     def circumstances(self, sensing: Sensing) -> Sensing:
         """Returns the circumstances under the true gravity."""

@@ -1,4 +1,4 @@
-"""The sensor reads a constant too much."""
+"""The sensor has an offset."""
 
 import dataclasses
 
@@ -12,7 +12,7 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class SensorBias(SensorEffect):
-    """An offset, constant in the sensor's frame, that came up after zeroing.
+    """An offset, constant in the sensor's frame, that arose after zeroing.
 
     Equation: F_read = F + b with b = [fx, fy, fz, tx, ty, tz] in S.
     Where it acts: the reading of the force/torque sensor. Zeroing does not see
@@ -27,6 +27,9 @@ class SensorBias(SensorEffect):
     tz: float = amplitude("N m", -5.0, 5.0, "torque offset about z_S")
 
     present_at_zeroing = False
+    experiment = (
+        "readings in six or more orientations, which turn the weight but not an offset"
+    )
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
         """Adds the offset."""

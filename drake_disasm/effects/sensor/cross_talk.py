@@ -1,6 +1,7 @@
-"""The sensor's channels leak into each other."""
+"""The sensor's channels are coupled."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class SensorCrossTalk(SensorEffect):
-    """A channel picks up a share of others.
+    """A channel responds to the loads of other channels.
 
     Equation: F_read = (1 + C) F with C a 6x6 matrix in S, zero on its diagonal (that
     is SensorGain); `fx_ty` is its element in the row of fx and the column of ty.
@@ -51,6 +52,13 @@ class SensorCrossTalk(SensorEffect):
     tz_ty: float = amplitude("1", -0.5, 0.5, "what tz picks up of ty")
 
     stage = 2
+    experiment = "a known weight along one axis of the sensor at a time"
+    experiments_against: ClassVar = {
+        "SensorMounting": (
+            "a known weight along one axis at a time: rotated axes mix channels "
+            "antisymmetrically"
+        ),
+    }
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
         """Mixes the channels."""

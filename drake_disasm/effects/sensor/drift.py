@@ -1,6 +1,7 @@
-"""The sensor's zero wanders evenly."""
+"""The sensor's zero drifts."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,7 +16,7 @@ _GRID = (10.0, 30.0, 50.0, 100.0, 300.0, _NEVER)
 @register_effect
 @dataclasses.dataclass
 class SensorDrift(SensorEffect):
-    """An offset that grows with the time since zeroing, or since the log began.
+    """An offset that grows with time since zeroing, or since the log began.
 
     Equation: F_read = F + d min(t, T) with d = [fx, fy, fz, tx, ty, tz] in S, t in
     seconds. (Readings that only have an order count one second each.) With the
@@ -30,13 +31,17 @@ class SensorDrift(SensorEffect):
     ty: float = amplitude("N m/s", -0.5, 0.5, "drift of the torque about y_S")
     tz: float = amplitude("N m/s", -0.5, 0.5, "drift of the torque about z_S")
     duration: float = shape_parameter(
-        _NEVER, "s", 1.0, _NEVER, "T, when it ends", _GRID
+        _NEVER, "s", 1.0, _NEVER, "T, at which it ends", _GRID
     )
 
     present_at_zeroing = False
+    experiment = "the first pose again at the end, and a rest of some minutes"
+    experiments_against: ClassVar = {
+        "SensorWarmUp": "a longer rest: a warm-up ends, a drift goes on",
+    }
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
-        """Adds the offset of this moment."""
+        """Adds the offset at this time."""
         elapsed = np.minimum(sensing.time, self.duration)
         rate = [self.fx, self.fy, self.fz, self.tx, self.ty, self.tz]
         return wrench_S + np.multiply.outer(elapsed, rate)

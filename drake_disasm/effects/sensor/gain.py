@@ -1,6 +1,7 @@
-"""The sensor reads too much or too little."""
+"""The sensor's gains are off."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,22 +13,29 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class SensorGain(SensorEffect):
-    """Each channel reads a constant share too much.
+    """Each channel has a constant relative error.
 
     Equation: F_read = (1 + g) F, channel by channel, g = [fx, fy, fz, tx, ty, tz].
     Where it acts: the force/torque sensor's calibration; zeroing sees it.
     """
 
-    fx: float = amplitude("1", -0.5, 0.5, "share too much of the force along x_S")
-    fy: float = amplitude("1", -0.5, 0.5, "share too much of the force along y_S")
-    fz: float = amplitude("1", -0.5, 0.5, "share too much of the force along z_S")
-    tx: float = amplitude("1", -0.5, 0.5, "share too much of the torque about x_S")
-    ty: float = amplitude("1", -0.5, 0.5, "share too much of the torque about y_S")
-    tz: float = amplitude("1", -0.5, 0.5, "share too much of the torque about z_S")
+    fx: float = amplitude("1", -0.5, 0.5, "relative error of the force along x_S")
+    fy: float = amplitude("1", -0.5, 0.5, "relative error of the force along y_S")
+    fz: float = amplitude("1", -0.5, 0.5, "relative error of the force along z_S")
+    tx: float = amplitude("1", -0.5, 0.5, "relative error of the torque about x_S")
+    ty: float = amplitude("1", -0.5, 0.5, "relative error of the torque about y_S")
+    tz: float = amplitude("1", -0.5, 0.5, "relative error of the torque about z_S")
 
     stage = 2
+    experiment = "known weights of several sizes, along each axis of the sensor"
+    experiments_against: ClassVar = {
+        "PayloadError": (
+            "the same poses with a second, known weight: an error of the payload "
+            "stays, one of the gain grows"
+        ),
+    }
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
-        """Stretches the channels."""
+        """Scales the channels."""
         gain = np.array([self.fx, self.fy, self.fz, self.tx, self.ty, self.tz])
         return wrench_S + gain * wrench_S

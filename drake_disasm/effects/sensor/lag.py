@@ -14,16 +14,18 @@ from drake_disasm.effects.registry import register_effect
 class SensorLag(SensorMemoryEffect):
     """A first-order low-pass between load and reading.
 
-    Equation: F_read = F + a (f - F), df/dt = (F - f) / T; a = 1 is the filter alone,
-    less is a reading that the filter has a share in. Between samples the load
-    is taken to hold.
+    Equation: F_read = F + a (f - F), df/dt = (F - f) / T; with a = 1
+    the whole reading is filtered. The load is held constant between samples.
     Where it acts: the filter of the sensor's electronics.
     """
 
-    share: float = amplitude("1", 0.0, 1.0, "a, that goes through the filter")
-    time_constant: float = shape_parameter(0.1, "s", 0.005, 5.0, "T", (0.05, 0.15, 0.5))
+    share: float = amplitude("1", 0.0, 1.0, "a, share of the reading that is filtered")
+    time_constant: float = shape_parameter(
+        0.1, "s", 0.005, 5.0, "T, of the filter", (0.05, 0.15, 0.5)
+    )
 
     stage = 3
+    experiment = "fast motion and slow motion over the same path"
 
     def begin(self, wrench_S: np.ndarray) -> np.ndarray:
         """Returns the settled filter."""

@@ -1,6 +1,7 @@
-"""The sensor is mounted turned."""
+"""The sensor is mounted rotated."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,20 +14,30 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class SensorMounting(SensorEffect):
-    """The sensor is turned about its origin against where the model has it.
+    """The sensor is mounted rotated about its origin from its nominal orientation.
 
     Equation: F_read = R^T F for force and torque, R = Exp([rx, ry, rz]) the sensor's
     true orientation in S.
     Where it acts: between flange and sensor; zeroing sees it.
     """
 
-    rx: float = amplitude("rad", -0.5, 0.5, "turned about x_S")
-    ry: float = amplitude("rad", -0.5, 0.5, "turned about y_S")
-    rz: float = amplitude("rad", -0.5, 0.5, "turned about z_S")
+    rx: float = amplitude("rad", -0.5, 0.5, "rotation about x_S")
+    ry: float = amplitude("rad", -0.5, 0.5, "rotation about y_S")
+    rz: float = amplitude("rad", -0.5, 0.5, "rotation about z_S")
 
     stage = 1
+    experiment = (
+        "the same poses with two known weights, gravity along each axis of the sensor "
+        "in turn"
+    )
+    experiments_against: ClassVar = {
+        "BaseTilt": (
+            "the arm's base, or its first joint, rotated: a tilt is fixed to the "
+            "world, the mounting to the sensor"
+        ),
+    }
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
-        """Expresses the wrench in the turned axes."""
+        """Expresses the wrench in the true axes."""
         R = rotation_from_vector(np.array([self.rx, self.ry, self.rz])).matrix()
         return np.concatenate([wrench_S[..., :3] @ R, wrench_S[..., 3:] @ R], axis=-1)

@@ -12,7 +12,7 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class PayloadError(SensorEffect):
-    """The load on the sensor has more first moment than the tool data say.
+    """The payload has another mass or first moment than the tool data say.
 
     Equation: f_S += R_SW g m, tau_S += c x (R_SW g), where m is the missing mass
     and c = [cx, cy, cz] the missing first mass moment m p_SoScm in S. (With the
@@ -23,15 +23,17 @@ class PayloadError(SensorEffect):
     motion, where inertial forces are negligible. Zeroing sees it.
     """
 
-    mass: float = amplitude("kg", -10.0, 10.0, "mass that the tool data lack")
-    cx: float = amplitude("kg m", -2.0, 2.0, "first moment lacking, along x_S")
-    cy: float = amplitude("kg m", -2.0, 2.0, "first moment lacking, along y_S")
-    cz: float = amplitude("kg m", -2.0, 2.0, "first moment lacking, along z_S")
+    mass: float = amplitude("kg", -10.0, 10.0, "mass missing in the tool data")
+    cx: float = amplitude("kg m", -2.0, 2.0, "first moment missing, along x_S")
+    cy: float = amplitude("kg m", -2.0, 2.0, "first moment missing, along y_S")
+    cz: float = amplitude("kg m", -2.0, 2.0, "first moment missing, along z_S")
 
     stage = 0
+    removed_by_zeroing = True
+    experiment = "six or more orientations, with and without the tool"
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
-        """Adds the weight of what was not accounted for."""
+        """Adds the weight that the tool data lack."""
         g_S = sensing.g_S
         torque = np.cross([self.cx, self.cy, self.cz], g_S)
         return wrench_S + np.concatenate([self.mass * g_S, torque], axis=-1)

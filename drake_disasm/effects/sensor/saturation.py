@@ -8,7 +8,7 @@ from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
 
-_LEVER = 0.05  # m: how a range of force and one of torque belong together
+_LEVER = 0.05  # m, by which a range of force becomes one of torque
 
 
 @register_effect
@@ -21,13 +21,16 @@ class SensorSaturation(SensorEffect):
     Where it acts: the range of the sensor's electronics.
     """
 
-    share: float = amplitude("1", 0.0, 1.0, "a, of what exceeds the limit, is lost")
-    limit: float = shape_parameter(10.0, "N", 0.1, 1000.0, "L", (3.0, 6.0, 12.0))
+    share: float = amplitude("1", 0.0, 1.0, "a, share lost of what exceeds the limit")
+    limit: float = shape_parameter(
+        10.0, "N", 0.1, 1000.0, "L, of the range", (3.0, 6.0, 12.0)
+    )
 
     stage = 4
+    experiment = "loads near the end of the range, along each axis"
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
-        """Takes off what is lost."""
+        """Removes what is lost beyond the limit."""
         limit = self.limit * np.array([1.0, 1.0, 1.0, _LEVER, _LEVER, _LEVER])
         held = np.minimum(np.maximum(wrench_S, -limit), limit)
         return wrench_S - self.share * (wrench_S - held)

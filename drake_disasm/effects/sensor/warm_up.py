@@ -1,4 +1,4 @@
-"""The sensor's zero settles while it warms up."""
+"""The sensor's zero settles as it warms up."""
 
 import dataclasses
 
@@ -28,12 +28,15 @@ class SensorWarmUp(SensorEffect):
     tx: float = amplitude("N m", -5.0, 5.0, "final offset of the torque about x_S")
     ty: float = amplitude("N m", -5.0, 5.0, "final offset of the torque about y_S")
     tz: float = amplitude("N m", -5.0, 5.0, "final offset of the torque about z_S")
-    time_constant: float = shape_parameter(30.0, "s", 0.1, 1e4, "T", _GRID)
+    time_constant: float = shape_parameter(
+        30.0, "s", 0.1, 1e4, "T, of the settling", _GRID
+    )
 
     present_at_zeroing = False
+    experiment = "a rest from switching on until the reading stays, pose unchanged"
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
-        """Adds the offset of this moment."""
+        """Adds the offset at this time."""
         final = [self.fx, self.fy, self.fz, self.tx, self.ty, self.tz]
         settled = -np.expm1(-sensing.time / self.time_constant)
         return wrench_S + np.multiply.outer(settled, final)
