@@ -10,8 +10,8 @@ import yaml
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
-from drake_disasm.effects import Effect, registered_effects
 from drake_disasm.scenario import Scenario
+from drake_disasm.scenario.names import find_number, resolve
 from sysid.parameters import Parameter
 
 _KEYS = ("low", "high", "nominal", "scale")
@@ -24,8 +24,8 @@ class Request:
     """What a user asks of one parameter; None leaves the scenario's own.
 
     Attributes:
-        name: `section.field`, `section.list.0`, `effects.0.field`, or `Effect.field`,
-            which adds the effect at its null value if the scenario has none.
+        name: as `drake_disasm.scenario.names` says; `Effect.field` adds the effect at
+            null if the scenario has none.
         low, high: bounds.
         nominal: where the search begins.
         scale: "linear" or "log".
@@ -81,70 +81,15 @@ def scenario_parameters(
     Raises:
         DisasmError: there is no such number, or its bounds can't be.
     """
-    scenario = dataclasses.replace(scenario, effects=list(scenario.effects))
     found = []
     for request in requests:
-        path = _path(scenario, request.name)
-        value, metadata = _leaf(scenario, path, request.name)
-        found.append(_parameter(path, value, metadata, request))
+        try:
+            scenario, path = resolve(scenario, request.name)
+            field = find_number(scenario, path, request.name)
+        except DisasmError as error:
+            raise DisasmError(f"parameter {error}") from None
+        found.append(_parameter(path, field.value, field.metadata, request))
     return scenario, tuple(found)
-
-
-def _path(scenario: Scenario, name: str) -> str:
-    """Returns the path of a name, adding the effect that it speaks of."""
-    effect, _, field = name.partition(".")
-    kinds = _effects()
-    if effect not in kinds:
-        return name
-    numbers = [i for i, e in enumerate(scenario.effects) if type(e).__name__ == effect]
-    if len(numbers) > 1:
-        raise DisasmError(
-            f"parameter {name}: the scenario lists {effect} {len(numbers)} times; "
-            f"write effects.{numbers[0]}.{field}"
-        )
-    if not numbers:
-        scenario.effects.append(kinds[effect]())
-        numbers = [len(scenario.effects) - 1]
-    return f"effects.{numbers[0]}.{field}"
-
-
-def _effects() -> dict[str, type[Effect]]:
-    return {effect.__name__: effect for effect in registered_effects()}
-
-
-def _leaf(scenario: Scenario, path: str, name: str) -> tuple[float, Mapping[str, Any]]:
-    """Returns the value at a path and what its field says of it."""
-    value: Any = scenario
-    metadata: Mapping[str, Any] = {}
-    for part in path.split("."):
-        if isinstance(value, list):
-            value = _item(value, part, name)
-            continue
-        fields = (
-            {f.name: f for f in dataclasses.fields(value)}
-            if dataclasses.is_dataclass(value)
-            else {}
-        )
-        if part not in fields:
-            known = [*fields, *(_effects() if value is scenario else [])]
-            raise DisasmError(
-                f"parameter {name}: '{part}' does not exist; {closest(part, known)}"
-            )
-        metadata, value = fields[part].metadata, getattr(value, part)
-    if not isinstance(value, float) or not math.isfinite(metadata.get("low", math.inf)):
-        raise DisasmError(
-            f"parameter {name}: is no number that can vary; name one such as "
-            "contact.friction, twin.stiffness.0 or GroovePose.ry"
-        )
-    return value, metadata
-
-
-def _item(values: list[Any], part: str, name: str) -> Any:
-    if part.isdecimal() and int(part) < len(values):
-        return values[int(part)]
-    raise DisasmError(
-        f"parameter {name}: there is no number {part} of {len(values)}; count from 0"
-    )
 
 
 def _parameter(

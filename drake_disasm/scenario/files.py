@@ -1,5 +1,6 @@
 """Scenarios from files and command lines, and back to text."""
 
+import copy
 import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import check, closest
 from drake_disasm.common.resources import models_dir
 from drake_disasm.scenario.effect_tags import tagged
+from drake_disasm.scenario.names import find_field, resolve
 from drake_disasm.scenario.schema import Scenario
 from drake_disasm.scenario.strict_yaml import parse
 from drake_disasm.scenario.validity import validate
@@ -115,25 +117,32 @@ def _override(scenario: Scenario, override: str) -> Scenario:
     key, separator, value = override.partition("=")
     if not separator or not key:
         raise DisasmError(f"--set {override}: write it as key=value")
-    keys = key.strip().split(".")
-    if keys[0] == "effects" and len(keys) > 1:
-        return _override_effect(scenario, keys[1:], value, override)
-    text = value
-    for part in reversed(keys):
-        text = f"{{{part}: {text}}}"
-    return parse(text, scenario, f"--set {override}", line_numbers=False)
+    source = f"--set {override}"
+    try:
+        scenario, path = resolve(copy.deepcopy(scenario), key.strip())
+    except DisasmError as error:
+        raise DisasmError(f"{source}: {error}") from None
+    _set_text(scenario, path, value, source)
+    return scenario
 
 
-def _override_effect(
-    scenario: Scenario, keys: list[str], value: str, override: str
-) -> Scenario:
-    source, effects = f"--set {override}", list(scenario.effects)
-    number = int(keys[0]) if keys[0].isdecimal() else len(effects)
-    if len(keys) != 2 or number >= len(effects):
-        raise DisasmError(
-            f"{source}: the scenario lists {len(effects)} effects; "
-            "write effects.NUMBER.parameter=value, counting from 0"
+def _set_text(scenario: Scenario, path: str, text: str, source: str) -> None:
+    """Changes what a path of a scenario has to what YAML text says."""
+    parent, _, word = path.rpartition(".")
+    field = find_field(scenario, path)
+    if isinstance(field.key, int) and dataclasses.is_dataclass(field.value):
+        found = parse(text, field.value, source, path=path, line_numbers=False)
+        field.set(found)
+    elif isinstance(field.key, int):
+        words = [repr(value) for value in field.owner]
+        words[field.key] = text
+        _set_text(scenario, parent, f"[{', '.join(words)}]", source)
+    else:
+        found = parse(
+            f"{{{word}: {text}}}",
+            field.owner,
+            source,
+            path=parent,
+            line_numbers=False,
         )
-    text = f"{{{keys[1]}: {value}}}"
-    effects[number] = parse(text, effects[number], source, line_numbers=False)
-    return dataclasses.replace(scenario, effects=effects)
+        field.set(getattr(found, word))

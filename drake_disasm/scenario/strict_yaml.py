@@ -6,17 +6,17 @@ which key, in which line, and what to write instead.
 
 import dataclasses
 import typing
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import yaml
 from pydrake.common.yaml import yaml_load_typed
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.quantity import closest
 from drake_disasm.effects import find_effect, registered_effects
 from drake_disasm.scenario.effect_tags import tagged
-from drake_disasm.scenario.schema import Range, Scenario
+from drake_disasm.scenario.names import remedy
+from drake_disasm.scenario.schema import Range
 
 _MODEL = "see models/scenarios/removal.yaml"
 _NUMBERS: dict[type, Callable[[str], object]] = {int: int, float: float}
@@ -30,13 +30,21 @@ class _NodeError(Exception):
         self.line = node.start_mark.line + 1
 
 
-def parse(text: str, defaults: Any, source: str, *, line_numbers: bool = True) -> Any:
+def parse(
+    text: str,
+    defaults: Any,
+    source: str,
+    *,
+    path: str = "",
+    line_numbers: bool = True,
+) -> Any:
     """Returns `defaults`, a dataclass, overlaid with YAML text.
 
     Args:
         text: a YAML mapping.
         defaults: what holds where the text is silent.
         source: where the text is from, for messages.
+        path: where the dataclass stands in a scenario, for messages.
         line_numbers: whether lines mean something to whoever wrote the text.
 
     Raises:
@@ -46,7 +54,7 @@ def parse(text: str, defaults: Any, source: str, *, line_numbers: bool = True) -
         root = yaml.compose(text)
         if root is None:
             raise DisasmError(f"{source}: is empty; {_MODEL}")
-        _check_section(root, type(defaults), "")
+        _check_section(root, type(defaults), path)
         return yaml_load_typed(
             data=text, schema=tagged(type(defaults)), defaults=defaults
         )
@@ -153,20 +161,9 @@ def _unknown(name: str, schema: type, path: str) -> str:
     """Returns the message for a key that does not belong here."""
     if not name:
         return f"{path or 'a key'}: a key must be a word; {_MODEL}"
-    elsewhere = [known for known in _all_paths(Scenario) if known.endswith(f".{name}")]
-    if elsewhere:
-        remedy = f"it belongs to {' or '.join(p.rpartition('.')[0] for p in elsewhere)}"
-    else:
-        remedy = closest(name, [field.name for field in dataclasses.fields(schema)])
+    fields = [field.name for field in dataclasses.fields(schema)]
     place = f" in {path}" if path else ""
-    return f"unknown key '{name}'{place}; {remedy}"
-
-
-def _all_paths(schema: type, path: str = "") -> Iterator[str]:
-    for field in dataclasses.fields(schema):
-        yield _join(path, field.name)
-        if isinstance(field.type, type) and dataclasses.is_dataclass(field.type):
-            yield from _all_paths(field.type, _join(path, field.name))
+    return f"unknown key '{name}'{place}; {remedy(name, fields)}"
 
 
 def _join(path: str, name: str) -> str:

@@ -1,0 +1,138 @@
+"""Names of fields: the same ones work, and the same are refused, everywhere."""
+
+import pytest
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import (
+    GrooveFriction,
+    GroovePose,
+    JointCoulombFriction,
+    RustyPatch,
+)
+from drake_disasm.scenario import Scenario, load_scenario, validate, with_values
+from drake_disasm.scenario.names import find_field, resolve
+from drake_disasm.scenario.schema import Range
+from sysid.scenario_parameters import Request, scenario_parameters
+
+#: Names with the paths that they stand for in removal_turned, which lists a GroovePose.
+NAMES = {
+    "lock.clearance": "lock.clearance",
+    "task.reward.w_f": "task.reward.w_f",
+    "imprecision": "imprecision",
+    "twin.stiffness.2": "twin.stiffness.2",
+    "effects.0.ry": "effects.0.ry",
+    "GroovePose.ry": "effects.0.ry",
+    "GrooveFriction.coefficient": "effects.1.coefficient",
+    "JointCoulombFriction.iiwa_joint_4.size": "effects.1.size",
+}
+#: Names that lead nowhere, with what the message says.
+UNKNOWN = {
+    "lock.clearence": "did you mean 'clearance'?",
+    "clearance": "it belongs to lock",
+    "lok.clearance": "did you mean 'lock'?",
+    "GroovePse.ry": "did you mean 'GroovePose'?",
+    "GroovePose.rw": "known: rx, ry, rz",
+    "GroovePose": "'' does not exist",
+    "effects.1.ry": "the scenario lists 1 effects, counted from 0",
+    "twin.stiffness.6": "there is no number 6 of 6; count from 0",
+    "lock.clearance.x": "'x' is not part of a number or word",
+    "JointCoulombFriction.size": "write JointCoulombFriction.JOINT.size",
+}
+
+
+def _by_set(name: str, value: float) -> Scenario:
+    return load_scenario("removal_turned", [f"{name}={value}"])
+
+
+def _by_values(name: str, value: float) -> Scenario:
+    return with_values(load_scenario("removal_turned"), {name: value})
+
+
+def _by_range(name: str, value: float) -> Scenario:
+    scenario = load_scenario("removal_turned")
+    scenario.randomisation = [Range(name, value, value)]
+    validate(scenario)
+    return with_values(scenario, {name: value})
+
+
+def _by_parameter(name: str, value: float) -> Scenario:
+    scenario = load_scenario("removal_turned")
+    scenario, (parameter,) = scenario_parameters(scenario, [Request(name)])
+    return with_values(scenario, {parameter.path: value})
+
+
+WAYS = (_by_set, _by_values, _by_range, _by_parameter)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_leads_to_the_same_field_by_all_ways(name: str) -> None:
+    scenario, path = resolve(load_scenario("removal_turned"), name)
+    assert path == NAMES[name]
+    field = find_field(scenario, path)
+    assert field.metadata["unit"] and field.can_vary
+    value = (field.metadata["low"] + 3.0 * field.metadata["high"]) / 4.0
+    found = [way(name, value) for way in WAYS]
+    assert find_field(found[0], path).value == value != field.value
+    assert found == found[:1] * len(WAYS)
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("name", UNKNOWN)
+def test_an_unknown_name_is_refused_by_all_ways(name: str, way) -> None:
+    with pytest.raises(DisasmError) as error:
+        way(name, 0.001)
+    message = str(error.value)
+    assert f"{name}: " in message and UNKNOWN[name] in message, message
+    assert "\n" not in message
+
+
+def test_a_name_adds_its_effect_at_null() -> None:
+    removal = load_scenario("removal")
+    scenario = load_scenario("removal", ["GroovePose.ry=0.02", "GroovePose.z=1e-4"])
+    assert scenario.effects == [GroovePose(ry=0.02, z=1e-4)] and removal.effects == []
+    turned = "RustyPatch.position=0.02"
+    assert load_scenario("removal", [turned]).effects == [RustyPatch(position=0.02)]
+    assert resolve(removal, "GroovePose.ry")[0].effects == [GroovePose()]
+    assert removal.effects == []
+
+
+def test_joints_tell_effects_of_a_class_apart() -> None:
+    scenario = load_scenario(
+        "removal",
+        ["JointCoulombFriction.iiwa_joint_4.size=3",
+         "JointCoulombFriction.iiwa_joint_2.size=2",
+         "JointCoulombFriction.iiwa_joint_4.creep=0.05"],
+    )  # fmt: skip
+    assert scenario.effects == [
+        JointCoulombFriction("iiwa_joint_4", 3.0, 0.05),
+        JointCoulombFriction("iiwa_joint_2", 2.0),
+    ]
+    with pytest.raises(DisasmError, match=r"2 times; write effects\.0\.size"):
+        resolve(scenario, "JointCoulombFriction.size")
+
+
+def test_an_effect_that_is_listed_twice_needs_its_number() -> None:
+    scenario = Scenario(effects=[GrooveFriction(0.1), GrooveFriction(0.2)])
+    with pytest.raises(DisasmError, match=r"2 times; write effects\.0\.coefficient"):
+        resolve(scenario, "GrooveFriction.coefficient")
+    assert resolve(scenario, "effects.1.coefficient")[1] == "effects.1.coefficient"
+
+
+def test_a_range_is_given_twice_by_two_names() -> None:
+    scenario = load_scenario("removal_turned")
+    scenario.randomisation = [
+        Range("effects.0.ry", 0.0, 0.01),
+        Range("GroovePose.ry", 0.0, 0.01),
+    ]
+    with pytest.raises(DisasmError, match=r"given twice \(as effects\.0\.ry\)"):
+        validate(scenario)
+
+
+def test_sections_effects_and_words_can_be_set_as_well() -> None:
+    scenario = load_scenario(
+        "removal_turned",
+        ["effects.0={ry: 0.01, z: 1e-3}", "gripper.hold=weld", "twin.stiffness.1=2e4"],
+    )
+    assert scenario.effects == [GroovePose(ry=0.01, z=1e-3)]
+    assert scenario.gripper.hold == "weld"
+    assert scenario.twin.stiffness[:3] == [16.6e3, 2e4, 13.4e3]
