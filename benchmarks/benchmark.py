@@ -48,7 +48,8 @@ from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import TwinStation
 from drake_disasm.stations.hardware_config import load_hardware_config
 from drake_disasm.stations.simulated import copy_state
-from drake_disasm.task.simulation import TaskSimulation, add_motion
+from drake_disasm.task.diagram import add_motion
+from drake_disasm.task.simulation import TaskSimulation
 
 _REPEATS = 5
 _CLOSING_AIM_S = 300.0
@@ -142,7 +143,9 @@ def _commanded_rates(simulation: TaskSimulation) -> list[np.ndarray]:
     rates, outcome = [], Outcome.RUNNING
     while outcome is Outcome.RUNNING:
         outcome = simulation.step().outcome
-        rates.append(simulation.evaluate(simulation.pose_target, "velocity").copy())
+        rates.append(
+            simulation.evaluate(simulation.systems.pose_target, "velocity").copy()
+        )
     return rates
 
 

@@ -106,9 +106,7 @@ def run(config: Path, minutes: float, views: Sequence[MeshcatView] = ()) -> Ages
     steps = round(600 * minutes)
     scenario = load_scenario("removal", [f"task.steps={steps + 1}"])
     with HardwareStation(scenario, load_hardware_config(config)) as station:
-        simulation = TaskSimulation(
-            scenario, "cell", Shuttle(), views, make=lambda _: station
-        )
+        simulation = TaskSimulation(scenario, lambda _: station, Shuttle(), views)
         simulation.set_target_realtime_rate(1.0)
         simulation.reset(0)
         ages = Ages(station)

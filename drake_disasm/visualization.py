@@ -1,4 +1,4 @@
-"""Watching a TaskSimulation in Meshcat, live and as a page that plays offline."""
+"""Watching the task in Meshcat, live and as a page that plays offline."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -27,7 +27,7 @@ from drake_disasm.common.files import make_folder, write_text
 from drake_disasm.common.spatial import pose_from_vector
 from drake_disasm.stations.base import Station
 from drake_disasm.stations.measured_cell import MEASURED_PORTS, MeasuredCell
-from drake_disasm.task.simulation import TaskSimulation
+from drake_disasm.task.diagram import TaskSystems
 
 _FRAME_PERIOD = 1.0 / 32.0  # s
 _NEWTONS_PER_METRE = 150.0  # of the wrench arrow's length
@@ -55,8 +55,9 @@ def start_meshcat(host: str = "localhost") -> Meshcat:
 class MeshcatView:
     """Shows robot, lock, contact forces, the wrench on the bolt and its path.
 
-    An observer of a TaskSimulation. Of a station without a simulated plant it shows
-    what is measured, and no contact.
+    Connect it to the task's systems before their diagram is built, or give it to a
+    TaskSimulation as an observer. A station without a simulated plant is shown as it
+    is measured, without contact forces.
 
     Args:
         meshcat: the server.
@@ -69,9 +70,9 @@ class MeshcatView:
     ) -> None:
         self.meshcat, self._record, self._close_up = meshcat, record, close_up
 
-    def connect(self, builder: DiagramBuilder, simulation: TaskSimulation) -> None:
+    def connect(self, builder: DiagramBuilder, systems: TaskSystems) -> None:
         """Adds Drake's visualisers and the wrench's."""
-        station = simulation.station
+        station = systems.station
         if station.HasOutputPort("query_object"):
             query = station.GetOutputPort("query_object")
             self._add_contact(builder, station.GetOutputPort("contact_results"), query)
@@ -81,10 +82,9 @@ class MeshcatView:
         self.wrench = builder.AddNamedSystem(
             "wrench_visualizer", WrenchVisualizer(self.meshcat, station.X_WG)
         )
-        processor = simulation.processor
         for port in ("observation", "X_GB"):
             builder.Connect(
-                processor.GetOutputPort(port), self.wrench.GetInputPort(port)
+                systems.processor.GetOutputPort(port), self.wrench.GetInputPort(port)
             )
         _look_at(self.meshcat, station.X_WG, self._close_up)
 

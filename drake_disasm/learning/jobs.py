@@ -19,8 +19,7 @@ from drake_disasm.learning.warm_start import start_checkpoint, start_hash
 from drake_disasm.logs import LogWriter, flat_columns, read_logs
 from drake_disasm.logs.transitions import observations
 from drake_disasm.mdp import Outcome
-from drake_disasm.task.episode import EpisodeRecorder
-from drake_disasm.task.recording import transitions_header
+from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 
 
 @dataclasses.dataclass(frozen=True)

@@ -25,7 +25,8 @@ from drake_disasm.learning.policy import trained_policy
 from drake_disasm.learning.training import Purpose, Training, seed_for
 from drake_disasm.mdp import REWARD_TERMS, Outcome
 from drake_disasm.policies import save_policy
-from drake_disasm.task.episode import EpisodeRecorder, EpisodeSummary
+from drake_disasm.task.episode import EpisodeSummary
+from drake_disasm.task.recording import EpisodeRecorder
 
 _PATIENCE = 10.0  # s that a killed run's workers have to notice
 

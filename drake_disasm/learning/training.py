@@ -29,7 +29,8 @@ from drake_disasm.learning.replay import Replay
 from drake_disasm.mdp import Outcome, action_bounds
 from drake_disasm.policies import ActionMap, Network, make_policy
 from drake_disasm.scenario import Scenario
-from drake_disasm.task.episode import EpisodeRecorder, EpisodeSummary
+from drake_disasm.task.episode import EpisodeSummary
+from drake_disasm.task.recording import EpisodeRecorder
 
 
 class Purpose(enum.IntEnum):

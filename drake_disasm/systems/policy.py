@@ -46,13 +46,53 @@ class PolicySystem(LeafSystem):
         return EventStatus.Succeeded()
 
 
+class ActionHold(LeafSystem):
+    """Samples an action at the MDP's period, checks it and holds it.
+
+    For a policy that is a System of its own; a policy's own discrete updates at the
+    same time come after the sample.
+
+    @system
+    name: ActionHold
+    input_ports:
+    - action
+    output_ports:
+    - action_held
+    @endsystem
+
+    Args:
+        period: of the MDP [s].
+        bounds: (6,) actions are clipped to [-bounds, bounds].
+    """
+
+    def __init__(self, period: float, bounds: np.ndarray) -> None:
+        super().__init__()
+        self._bounds = bounds
+        self._action = self.DeclareVectorInputPort("action", 6)
+        self._held = self.DeclareDiscreteState(6)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, POLICY_DELAY, self._update)
+        self.DeclareStateOutputPort("action_held", self._held)
+
+    def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
+        state.set_value(self._held, checked(self._action.Eval(context), self._bounds))
+        return EventStatus.Succeeded()
+
+
 def ask(policy: Policy, observation: np.ndarray, bounds: np.ndarray) -> np.ndarray:
     """Returns the policy's action (6,), clipped to its bounds.
 
     Raises:
         DisasmError: it is not six finite numbers.
     """
-    action = np.asarray(policy(observation), dtype=float)
+    return checked(np.asarray(policy(observation), dtype=float), bounds)
+
+
+def checked(action: np.ndarray, bounds: np.ndarray) -> np.ndarray:
+    """Returns a policy's action (6,), clipped to its bounds.
+
+    Raises:
+        DisasmError: it is not six finite numbers.
+    """
     if action.shape != (6,):
         raise DisasmError(
             f"the policy returned shape {action.shape}; return 6 numbers "

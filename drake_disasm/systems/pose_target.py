@@ -54,16 +54,25 @@ class PoseTarget(LeafSystem):
         coordinates: the station's coordinates.
         start: (n,) coordinates at which an episode starts.
         period: of the MDP [s].
+        effects: that act by default, in the order of the chain.
+
+    Raises:
+        DisasmError: there are more effects than it can remember.
     """
 
     def __init__(
-        self, coordinates: Coordinates, start: np.ndarray, period: float
+        self,
+        coordinates: Coordinates,
+        start: np.ndarray,
+        period: float,
+        effects: Sequence[MotionEffect] = (),
     ) -> None:
         super().__init__()
+        _refuse_too_many(effects)
         self._coordinates, self._period = coordinates, period
         self._action = self.DeclareVectorInputPort("action", 6)
         self._observation = self.DeclareVectorInputPort("observation", 12)
-        self._effects = self.DeclareAbstractParameter(Value[object](()))
+        self._effects = self.DeclareAbstractParameter(Value[object](tuple(effects)))
         self._memory = self.DeclareDiscreteState(6 * MOST_MOTION_EFFECTS)
         pose = pose_to_vector(coordinates.pose(start))
         self._from = self.DeclareDiscreteState(start)
@@ -105,11 +114,7 @@ class PoseTarget(LeafSystem):
         Raises:
             DisasmError: there are more than it can remember.
         """
-        if len(effects) > MOST_MOTION_EFFECTS:
-            raise DisasmError(
-                f"effects: {len(effects)} act on the motion, {MOST_MOTION_EFFECTS} "
-                "at most can; take some out"
-            )
+        _refuse_too_many(effects)
         parameter = context.get_mutable_abstract_parameter(self._effects)
         parameter.set_value(tuple(effects))
 
@@ -138,6 +143,14 @@ class PoseTarget(LeafSystem):
             - context.get_discrete_state(self._from).value()
         )
         output.SetFromVector(way / self._period)
+
+
+def _refuse_too_many(effects: Sequence[MotionEffect]) -> None:
+    if len(effects) > MOST_MOTION_EFFECTS:
+        raise DisasmError(
+            f"effects: {len(effects)} act on the motion, {MOST_MOTION_EFFECTS} "
+            "at most can; take some out"
+        )
 
 
 def through_motion(

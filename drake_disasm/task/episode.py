@@ -1,11 +1,10 @@
-"""Episodes: running one, recording its rows, summing it up."""
+"""Episodes: running one, and summing it up."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Protocol
 
-import numpy as np
-
+from drake_disasm.common.progress import Progress, ProgressUpdate
 from drake_disasm.effects import Effect
 from drake_disasm.mdp import REWARD_TERMS, BoltState, Outcome
 from drake_disasm.task.simulation import StepResult, TaskSimulation
@@ -60,74 +59,21 @@ class EpisodeSummary:
         self.outcome = result.outcome
 
 
-class EpisodeRecorder:
-    """Collects an episode's rows in the layout of a `transitions` log.
-
-    Row k holds what was measured at the start of step k and the action taken
-    from it; the last row is what was measured at the end, with no action.
-    """
-
-    def __init__(self, simulation: TaskSimulation) -> None:
-        self._simulation = simulation
-        self._rows: list[dict[str, Any]] = []
+class Recorder(Protocol):
+    """What records the rows of an episode; see `recording.EpisodeRecorder`."""
 
     def measure(self) -> None:
-        """Opens a row with what is measured now."""
-        simulation, station = self._simulation, self._simulation.station
-        self._rows.append(
-            {
-                "time": np.float64(simulation.time),
-                "X_GB_measured": simulation.evaluate(simulation.processor, "X_GB"),
-                "X_GB_commanded": simulation.evaluate(
-                    simulation.pose_target, "X_GB_commanded"
-                ),
-                "wrench": simulation.observation()[6:],
-                "ft_sensor": simulation.evaluate(station, "ft_sensor.wrench"),
-                "q": simulation.joint_positions(),
-                "action": np.zeros(6),
-                "action_executed": np.zeros(6),
-                "terminated": np.False_,
-                "truncated": np.False_,
-            }
-            | {
-                f"extra.{parameter}": np.float64(value)
-                for parameter, value in simulation.drawn.items()
-            }
-        )
+        """Records what is measured at the start of the episode."""
 
     def acted(self, result: StepResult) -> None:
-        """Completes the newest row with the step just done, and opens the next."""
-        row = self._rows[-1]
-        row["action"] = self._simulation.action()
-        row["action_executed"] = self._simulation.evaluate(
-            self._simulation.pose_target, "action_executed"
-        )
-        for name, value in result.reward_terms.items():
-            row[f"reward.{name}"] = np.float64(value)
-        self.measure()
-        self._rows[-1]["terminated"] = np.bool_(result.outcome.terminated)
-        self._rows[-1]["truncated"] = np.bool_(result.outcome.truncated)
-
-    @property
-    def steps(self) -> int:
-        """Whole steps recorded."""
-        return max(0, len(self._rows) - 1)
-
-    def columns(self) -> dict[str, np.ndarray]:
-        """Returns the quantities, each (T + 1,) or (T + 1, n)."""
-        names = self._rows[0].keys()
-        zero = np.float64(0.0)
-        return {
-            name: np.stack([row.get(name, zero) for row in self._rows])
-            for name in names
-        }
+        """Records a step and what is measured after it."""
 
 
 def run_episode(
     simulation: TaskSimulation,
     seed: int,
-    recorder: EpisodeRecorder | None = None,
-    on_step: Callable[[EpisodeSummary], None] | None = None,
+    recorder: Recorder | None = None,
+    progress: Progress | None = None,
     effects: Sequence[Effect] | None = None,
 ) -> EpisodeSummary:
     """Runs one episode of a simulation that has a policy.
@@ -136,7 +82,7 @@ def run_episode(
         simulation: its diagram holds the policy.
         seed: of the episode.
         recorder: gets every row, if given; up to an error, too.
-        on_step: called with the summary so far after each step.
+        progress: updated after each step; its value is the reward so far.
         effects: instead of the scenario's.
 
     Raises:
@@ -151,10 +97,20 @@ def run_episode(
         summary.add(result)
         if recorder:
             recorder.acted(result)
-        if on_step:
-            on_step(summary)
+        if progress:
+            progress(_progress(summary, simulation.scenario.task.steps))
     summary.bolt_is_out = simulation.bolt_is_out()
     return summary
+
+
+def _progress(summary: EpisodeSummary, steps: int) -> ProgressUpdate:
+    return ProgressUpdate(
+        f"seed {summary.seed}",
+        summary.steps,
+        steps,
+        f"max_F={summary.max_force:.1f} N",
+        summary.reward,
+    )
 
 
 _HEADER = (

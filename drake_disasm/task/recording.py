@@ -1,36 +1,102 @@
-"""Logs of simulated episodes: their header, and recording a number of them."""
+"""Recording episodes in the layout of a log, and whole logs of them."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from drake_disasm.logs.columns import flat_columns
 from drake_disasm.logs.header import LogHeader
 from drake_disasm.logs.reader import Log, read_log
 from drake_disasm.logs.writer import LogWriter
 from drake_disasm.scenario import Scenario, scenario_to_mapping
-from drake_disasm.task.episode import EpisodeRecorder, run_episode
-from drake_disasm.task.simulation import TaskSimulation
+from drake_disasm.task.episode import run_episode
+from drake_disasm.task.simulation import StepResult, TaskSimulation
 
 _JOINTS = tuple(f"iiwa_joint_{i}" for i in range(1, 8))
 
 
+class EpisodeRecorder:
+    """Collects an episode's rows in the layout of a `transitions` log.
+
+    Row k holds what was measured at the start of step k and the action taken
+    from it; the last row is what was measured at the end, with no action.
+    """
+
+    def __init__(self, simulation: TaskSimulation) -> None:
+        self._simulation = simulation
+        self._rows: list[dict[str, Any]] = []
+
+    def measure(self) -> None:
+        """Opens a row with what is measured now."""
+        simulation, systems = self._simulation, self._simulation.systems
+        self._rows.append(
+            {
+                "time": np.float64(simulation.time),
+                "X_GB_measured": simulation.evaluate(systems.processor, "X_GB"),
+                "X_GB_commanded": simulation.evaluate(
+                    systems.pose_target, "X_GB_commanded"
+                ),
+                "wrench": simulation.observation()[6:],
+                "ft_sensor": simulation.evaluate(systems.station, "ft_sensor.wrench"),
+                "q": simulation.joint_positions(),
+                "action": np.zeros(6),
+                "action_executed": np.zeros(6),
+                "terminated": np.False_,
+                "truncated": np.False_,
+            }
+            | {
+                f"extra.{parameter}": np.float64(value)
+                for parameter, value in simulation.drawn.items()
+            }
+        )
+
+    def acted(self, result: StepResult) -> None:
+        """Completes the newest row with the step just done, and opens the next."""
+        row = self._rows[-1]
+        row["action"] = self._simulation.action()
+        row["action_executed"] = self._simulation.evaluate(
+            self._simulation.systems.pose_target, "action_executed"
+        )
+        for name, value in result.reward_terms.items():
+            row[f"reward.{name}"] = np.float64(value)
+        self.measure()
+        self._rows[-1]["terminated"] = np.bool_(result.outcome.terminated)
+        self._rows[-1]["truncated"] = np.bool_(result.outcome.truncated)
+
+    @property
+    def steps(self) -> int:
+        """Whole steps recorded."""
+        return max(0, len(self._rows) - 1)
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Returns the quantities, each (T + 1,) or (T + 1, n)."""
+        names = self._rows[0].keys()
+        zero = np.float64(0.0)
+        return {
+            name: np.stack([row.get(name, zero) for row in self._rows])
+            for name in names
+        }
+
+
 def transitions_header(
-    scenario: Scenario, model: str, provenance: Mapping[str, Any]
+    scenario: Scenario, station: str, provenance: Mapping[str, Any]
 ) -> LogHeader:
-    """Returns the header of a log of simulated transitions.
+    """Returns the header of a log of transitions that a station has measured.
 
     Args:
         scenario: that the log states.
-        model: "cell", which has joints, or "twin".
-        provenance: where the log is from, beside its being simulated.
+        station: "cell" or "hardware", which have joints, or "twin".
+        provenance: where the log is from, beside its station.
     """
+    simulated = {"simulated": station != "hardware", "station": station}
     return LogHeader(
         kind="transitions",
         task=scenario.name,
-        provenance={**provenance, "simulated": True, "model": model},
+        provenance={**provenance, **simulated},
         period=scenario.task.period,
-        joints=_JOINTS if model == "cell" else (),
+        joints=() if station == "twin" else _JOINTS,
         scenario=scenario_to_mapping(scenario),
     )
 
@@ -46,7 +112,7 @@ def record_transitions(
         transitions: to record.
         seed: of the first episode; the next ones count on.
     """
-    header = transitions_header(simulation.scenario, simulation.model, {})
+    header = transitions_header(simulation.scenario, simulation.station_name, {})
     with LogWriter(folder, header) as writer:
         while transitions > 0:
             recorder = EpisodeRecorder(simulation)

@@ -26,7 +26,7 @@ from drake_disasm.effects import BoltMotion
 from drake_disasm.impact import ImpactConditions
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations import TwinStation
-from drake_disasm.task.simulation import add_motion, make_processor
+from drake_disasm.task.diagram import add_motion, add_observation
 
 #: Coordinates, their rates and the commanded ones, each (6,).
 _State = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -70,12 +70,12 @@ class Steps:
 class TwinReplay:
     """Simulates measured steps of the task, each from a state that is given.
 
-    It is `TaskSimulation` without policy, reward and imprecision, and without
+    It is the task's diagram without policy, reward and imprecision, and without
     sensor noise: what a noise-free sensor would read. Of the scenario's effects, those
     on the environment act, and those on the sensor that have no memory; effects on
     the motion are to be in the steps' commands. Motion is Drake's own; Python is
-    called once a step, at its end. `become` changes the parameters in place, so that
-    one diagram serves a whole identification.
+    called once a step, at its end. `reconfigure` changes the parameters in place, so
+    that one diagram serves a whole identification.
 
     The coordinates are the twin's: x, y, z [m], yaw, pitch, roll [rad] of B in Gn
     (`BoltCoordinates`).
@@ -202,7 +202,7 @@ class ReplayDiagram:
         return self.station.time_step
 
     def can_reconfigure(self, scenario: Scenario) -> bool:
-        """Returns whether `become` can take a scenario's parameters."""
+        """Returns whether `reconfigure` can take a scenario's parameters."""
         return self.station.can_reconfigure(noise_free(scenario))
 
     def reconfigure(self, scenario: Scenario) -> None:
@@ -287,18 +287,7 @@ class ReplayDiagram:
         self.station = builder.AddNamedSystem("station", TwinStation(scenario))
         self._source = builder.AddNamedSystem("rate", ConstantVectorSource(np.zeros(6)))
         self._motion = add_motion(builder, self._source.get_output_port(), self.station)
-        self.processor = builder.AddNamedSystem(
-            "observation_processor",
-            make_processor(self.station, scenario.observation.variant),
-        )
-        builder.Connect(
-            self.station.GetOutputPort("bolt.position_measured"),
-            self.processor.GetInputPort("position_measured"),
-        )
-        builder.Connect(
-            self.station.GetOutputPort("ft_sensor.wrench"),
-            self.processor.GetInputPort("wrench"),
-        )
+        self.processor = add_observation(builder, self.station)
         self._simulator = Simulator(builder.Build())
         self._clean: Context = self._simulator.get_context().Clone()
         self._observation = self.processor.GetOutputPort("observation")

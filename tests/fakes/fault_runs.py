@@ -71,9 +71,7 @@ def in_lockstep(
         with HardwareStation(
             scenario, cell.config(), clock=cell.clock, wait=wait, lcm=lcm
         ) as station:
-            simulation = TaskSimulation(
-                scenario, "cell", policy, views, make=lambda _: station
-            )
+            simulation = TaskSimulation(scenario, lambda _: station, policy, views)
             read = station.devices["ft_sensor"].read
             simulation.simulator.set_monitor(in_step(cell, read))
             yield simulation, station, cell

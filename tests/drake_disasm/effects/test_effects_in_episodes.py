@@ -46,7 +46,7 @@ def _turned(
     simulation.step(TURN)
     for _ in range(5):
         result = simulation.step(np.zeros(6))
-    vector = simulation.evaluate(simulation.processor, "X_GB")
+    vector = simulation.evaluate(simulation.systems.processor, "X_GB")
     return result.observation[6:], pose_from_vector(vector)
 
 

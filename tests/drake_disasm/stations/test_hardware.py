@@ -18,7 +18,8 @@ from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation
 from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.stations.hardware_config import HardwareConfig
-from drake_disasm.task.episode import EpisodeRecorder, run_episode
+from drake_disasm.task.episode import run_episode
+from drake_disasm.task.recording import EpisodeRecorder
 from drake_disasm.task.simulation import TaskSimulation
 from tests.fakes.fault_runs import in_lockstep
 

@@ -56,7 +56,7 @@ def test_imprecision_in_the_diagram_has_deviation_psi() -> None:
         for _ in range(5):
             simulation.step(np.zeros(6))
             executed.append(
-                simulation.evaluate(simulation.pose_target, "action_executed")
+                simulation.evaluate(simulation.systems.pose_target, "action_executed")
             )
     spread = np.array(executed)[:, :3].std(axis=0)
     np.testing.assert_allclose(spread, psi, rtol=0.15)  # 300 samples: 3.7 sigma

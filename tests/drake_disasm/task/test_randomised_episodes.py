@@ -5,7 +5,8 @@ import pytest
 
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import Scenario, load_scenario, with_values
-from drake_disasm.task.episode import EpisodeRecorder, run_episode
+from drake_disasm.task.episode import run_episode
+from drake_disasm.task.recording import EpisodeRecorder
 from drake_disasm.task.simulation import TaskSimulation
 
 

@@ -10,7 +10,8 @@ from drake_disasm.effects import GroovePose, SensorBias
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
-from drake_disasm.task.episode import EpisodeRecorder, run_episode, summary_table
+from drake_disasm.task.episode import run_episode, summary_table
+from drake_disasm.task.recording import EpisodeRecorder
 from drake_disasm.task.simulation import TaskSimulation
 
 TURNED = [GroovePose(ry=0.03)]
@@ -37,7 +38,7 @@ def test_same_seed_same_bits_after_other_episodes(simulation: TaskSimulation) ->
 
 def test_a_rebuilt_diagram_gives_the_same_bits(simulation: TaskSimulation) -> None:
     again = TaskSimulation(
-        simulation.scenario, simulation.model, make_policy("straight")
+        simulation.scenario, simulation.station_name, make_policy("straight")
     )
     np.testing.assert_array_equal(_observations(again, 3), _observations(simulation, 3))
 
@@ -48,7 +49,7 @@ def test_another_seed_differs(simulation: TaskSimulation) -> None:
 
 
 def test_actions_from_outside_equal_a_policys(simulation: TaskSimulation) -> None:
-    open_loop = TaskSimulation(simulation.scenario, simulation.model)
+    open_loop = TaskSimulation(simulation.scenario, simulation.station_name)
     open_loop.reset(3, TURNED)
     action = make_policy("straight")(np.zeros(12))
     stepped = [open_loop.step(action).observation for _ in range(12)]
