@@ -3,6 +3,8 @@
 import argparse
 import importlib
 import os
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
@@ -15,6 +17,7 @@ from drake_disasm.policies import (
     shipped_policies,
 )
 from drake_disasm.scenario import Scenario, shipped_scenarios
+from drake_disasm.stations import STATIONS
 from drake_disasm.systems.policy import Policy
 
 
@@ -51,6 +54,91 @@ def add_import_argument(parser: argparse.ArgumentParser) -> None:
         help="import effects of your own (@register_effect), which scenarios and logs "
         "may then have; repeatable",
     )
+
+
+def add_station_argument(
+    add: Callable[..., Any], default: str, text: str, hardware: bool = False
+) -> None:
+    """Adds --station, and the refusal of --model, its name of old.
+
+    Args:
+        add: a parser's `add_argument`.
+        default: the station's name.
+        text: what the help says of it.
+        hardware: whether the program can run the real station, too.
+    """
+    add(
+        "--station",
+        default=default,
+        metavar="|".join(STATIONS),
+        action=_StationAction if hardware else _SimulatedStationAction,
+        help=f"{text} (default: {default})",
+    )
+    add("--model", action=_ModelAction, help=argparse.SUPPRESS)
+
+
+class _StationAction(argparse.Action):
+    """Takes the name of a station, and refuses any other."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: str | Sequence[Any] | None,
+        option_string: str | None = None,
+    ) -> None:
+        """Stores the name.
+
+        Raises:
+            DisasmError: there is no such station.
+        """
+        if values not in STATIONS:
+            raise DisasmError(
+                f"--station {values}: does not exist; "
+                f"{closest(str(values), list(STATIONS))}"
+            )
+        setattr(namespace, self.dest, values)
+
+
+class _SimulatedStationAction(_StationAction):
+    """Takes the name of a simulated station, and refuses any other."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: str | Sequence[Any] | None,
+        option_string: str | None = None,
+    ) -> None:
+        """Stores the name.
+
+        Raises:
+            DisasmError: there is no such station, or it is not a simulated one.
+        """
+        super().__call__(parser, namespace, values, option_string)
+        if values == "hardware":
+            raise DisasmError(
+                "--station hardware: this program simulates; use cell or twin, or run "
+                "a policy on the devices by tools/simulate.py --station hardware"
+            )
+
+
+class _ModelAction(argparse.Action):
+    """Refuses the name that --station had."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: str | Sequence[Any] | None,
+        option_string: str | None = None,
+    ) -> None:
+        """Refuses it.
+
+        Raises:
+            DisasmError: always; names the new option.
+        """
+        raise DisasmError(f"--model {values}: is --station {values} now")
 
 
 def add_workers_argument(parser: argparse.ArgumentParser, more: str = "") -> None:

@@ -23,13 +23,12 @@ from drake_disasm.common.executors import run_jobs
 from drake_disasm.common.files import make_folder, write_json
 from drake_disasm.learning.evaluation import Evaluation, evaluate, summed_up
 from drake_disasm.scenario import load_scenario
-from drake_disasm.stations import MODELS
 from drake_disasm.task.simulation import TaskSimulation
 
 _EXAMPLES = """examples:
-  python tools/evaluate.py --policy admittance straight --model cell --episodes 10
+  python tools/evaluate.py --policy admittance straight --station cell --episodes 10
   python tools/evaluate.py --policy out/sliding/seed_000/policy.npz \\
-      --scenario sliding --model twin --sweep imprecision=0,0.0001,0.0003,0.0005
+      --scenario sliding --station twin --sweep imprecision=0,0.0001,0.0003,0.0005
   python tools/evaluate.py --policy removal_randomised admittance \\
       --scenario removal_turned --sweep effects.0.ry=-0.0698,-0.0349,0,0.0349,0.0698
   python tools/evaluate.py --policy admittance --set 'effects=[!SensorBias {fx: 2}]'
@@ -45,7 +44,7 @@ class Row:
         setting: what the sweep sets, as key=value; or nothing.
         scenario: name or file.
         overrides: all of them.
-        model: "cell" or "twin".
+        station: "cell" or "twin".
         seeds: of the episodes.
     """
 
@@ -53,7 +52,7 @@ class Row:
     setting: str
     scenario: str
     overrides: tuple[str, ...]
-    model: str
+    station: str
     seeds: range
 
 
@@ -74,12 +73,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         metavar="NAME",
         help="scripted or shipped names, .npz files, or module:callable",
     )
-    add(
-        "--model",
-        default="cell",
-        choices=sorted(MODELS),
-        help="(default: cell)",
-    )
+    cli.add_station_argument(add, "cell", "what the policies act on")
     add(
         "--psi",
         type=float,
@@ -145,7 +139,7 @@ def _rows(args: argparse.Namespace) -> Iterator[Row]:
                 setting,
                 args.scenario,
                 (*overrides, *([setting] if setting else [])),
-                args.model,
+                args.station,
                 range(args.seed, args.seed + args.episodes),
             )
 
@@ -163,7 +157,7 @@ def _run(row: Row, report: Callable[[Any], None]) -> Evaluation:
     """Returns one row's figures, in whatever process."""
     scenario = load_scenario(row.scenario, row.overrides)
     policy = cli.named_policy(row.policy, scenario)
-    simulation = TaskSimulation(scenario, row.model, policy)
+    simulation = TaskSimulation(scenario, row.station, policy)
     return summed_up(evaluate(simulation, row.seeds, on_episode=lambda _: report(1)))
 
 
@@ -192,7 +186,7 @@ def _name(row: Row) -> str:
 
 def _write_json(path: Path, found: dict[Row, Evaluation], origin: dict) -> None:
     rows = [
-        {"policy": row.policy, "setting": row.setting, "model": row.model}
+        {"policy": row.policy, "setting": row.setting, "station": row.station}
         | dataclasses.asdict(figures)
         for row, figures in found.items()
     ]

@@ -34,7 +34,7 @@ from sysid.workers import Workers
 
 _THESIS_CYCLES = 10
 _EXAMPLES = """examples:
-  python tools/simulate.py --model cell --policy admittance --explore 0.15 \\
+  python tools/simulate.py --station cell --policy admittance --explore 0.15 \\
       --episodes 11 --no-meshcat --scenario removal --hidden removal_turned \\
       --record out/log
   python tools/identify.py --log out/log --out out/fit \\

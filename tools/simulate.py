@@ -13,7 +13,6 @@ from pathlib import Path
 
 import cli
 import hardware
-from tqdm import tqdm
 
 from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
@@ -21,14 +20,9 @@ from drake_disasm.common.files import make_folder
 from drake_disasm.logs import LogWriter, flat_columns
 from drake_disasm.policies import Exploring
 from drake_disasm.scenario import Scenario, load_scenario
-from drake_disasm.stations import MODELS, Station
-from drake_disasm.task.episode import (
-    EpisodeRecorder,
-    EpisodeSummary,
-    run_episode,
-    summary_table,
-)
-from drake_disasm.task.recording import transitions_header
+from drake_disasm.stations import Station
+from drake_disasm.task.episode import EpisodeSummary, run_episode, summary_table
+from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 from drake_disasm.task.simulation import TaskSimulation
 from drake_disasm.visualization import MeasuredView, MeshcatView, start_meshcat
 
@@ -36,7 +30,7 @@ _MM = 1e-3
 _EXAMPLES = """examples:
   python tools/simulate.py                              the default, in Meshcat
   python tools/simulate.py --policy straight --scenario removal_turned
-  python tools/simulate.py --model twin --no-meshcat --episodes 10 --record out/log
+  python tools/simulate.py --station twin --no-meshcat --episodes 10 --record out/log
   python tools/simulate.py --set lock.clearance=0.0002 --set contact.friction=0.3
   python tools/simulate.py --html out/removal.html      a page that plays offline
   python tools/simulate.py --no-meshcat --episodes 100 --record out/log --resume
@@ -72,11 +66,12 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
         "models/policies, or an .npz file), or module:callable from (12,) to (6,) "
         "(default: removal_randomised, the shipped one)",
     )
-    add(
-        "--model",
-        default="cell",
-        choices=sorted(MODELS),
-        help="the whole cell, or the twin: bolt and groove alone (default: cell)",
+    cli.add_station_argument(
+        add,
+        "cell",
+        "the simulated cell; its twin, which is bolt and groove alone; or the "
+        "hardware, which are the devices of --hardware-config",
+        hardware=True,
     )
     add(
         "--episodes",
@@ -94,13 +89,6 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
 
 
 def _add_hardware_arguments(add: Callable[..., object]) -> None:
-    add(
-        "--station",
-        default="simulated",
-        choices=["simulated", "hardware"],
-        help="what obeys: the simulated plant, or the devices of --hardware-config "
-        "(default: simulated)",
-    )
     add(
         "--hardware-config",
         type=Path,
@@ -177,7 +165,7 @@ def main(arguments: Sequence[str]) -> int:
     if args.html:
         make_folder(args.html.parent)
     view = _open_view(args)
-    simulation = TaskSimulation(real, args.model, policy, [view] if view else [])
+    simulation = TaskSimulation(real, args.station, policy, [view] if view else [])
     simulation.set_target_realtime_rate(_rate(args))
     summaries: list[EpisodeSummary] = []
     try:
@@ -204,7 +192,7 @@ def _on_hardware(
             policy = Exploring(policy, args.explore * _MM, seed)
         view = _open_view(args)
         views = [view] if view else []
-        simulation = TaskSimulation(scenario, "cell", policy, views, lambda _: station)
+        simulation = TaskSimulation(scenario, lambda _: station, policy, views)
         simulation.set_target_realtime_rate(1.0)
         print("waiting for the devices", flush=True)
         try:
@@ -225,13 +213,13 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
         raise DisasmError(f"--explore {args.explore:g}: give millimetres, 0 or more")
     if args.resume and not args.record:
         raise DisasmError("--resume: say which log by --record DIR")
-    if args.station == "simulated":
+    if args.station != "hardware":
         for name in ("hardware_config", "dry_run"):
             if getattr(args, name):
                 option = name.replace("_", "-")
                 raise DisasmError(f"--{option}: is for --station hardware")
         return
-    fixed = {"model": "cell", "episodes": 1, "realtime_rate": None, "hidden": None}
+    fixed = {"episodes": 1, "realtime_rate": None, "hidden": None}
     for name, only in fixed.items():
         if getattr(args, name) != only:
             option = name.replace("_", "-")
@@ -253,10 +241,9 @@ def _run_one(
     recorder = EpisodeRecorder(simulation) if writer else None
     if view:
         view.begin_episode()
-    steps = simulation.scenario.task.steps
-    with tqdm(total=steps, desc=f"seed {seed}", unit="step", leave=False) as bar:
+    with program.ProgressBar("step") as progress:
         try:
-            summary = run_episode(simulation, seed, recorder, lambda s: _show(bar, s))
+            summary = run_episode(simulation, seed, recorder, progress)
         except DisasmError:
             _keep(writer, recorder)
             raise
@@ -264,13 +251,6 @@ def _run_one(
         view.end_episode()
     _keep(writer, recorder)
     return summary
-
-
-def _show(bar: tqdm, summary: EpisodeSummary) -> None:
-    program.stop_if_interrupted()
-    force = f"{summary.max_force:.1f} N"
-    bar.set_postfix(reward=f"{summary.reward:.1f}", max_F=force, refresh=False)
-    bar.update()
 
 
 def _keep(writer: LogWriter | None, recorder: EpisodeRecorder | None) -> None:
@@ -284,14 +264,10 @@ def _keep(writer: LogWriter | None, recorder: EpisodeRecorder | None) -> None:
 def _open_log(
     args: argparse.Namespace, arguments: Sequence[str], scenario: Scenario
 ) -> LogWriter:
-    origin = {
-        "station": args.station,
-        "policy": args.policy,
-        "explore_mm": args.explore,
-    }
+    origin = {"policy": args.policy, "explore_mm": args.explore}
     provenance = program.provenance("simulate", arguments, args.seed) | origin
     provenance["hidden"] = bool(args.hidden)
-    header = transitions_header(scenario, args.model, provenance)
+    header = transitions_header(scenario, args.station, provenance)
     return LogWriter(args.record, header, resume=args.resume)
 
 

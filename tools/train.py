@@ -31,7 +31,6 @@ from drake_disasm.learning.jobs import seed_jobs, train_seeds
 from drake_disasm.learning.warm_start import check_start
 from drake_disasm.logs import read_logs
 from drake_disasm.scenario import load_scenario
-from drake_disasm.stations import MODELS
 
 _EXAMPLES = """examples:
   python tools/train.py --out out/first --episodes 30          a first look
@@ -42,7 +41,7 @@ _EXAMPLES = """examples:
       --hyper layer_norm=true 'hidden=[64, 64]'
   python tools/train.py --from-logs out/sliding/seed_*/log --scenario sliding \\
       --preset chapter3 --out out/offline                      without acting
-  python tools/train.py --model cell --start-from out/turned --scenario \\
+  python tools/train.py --station cell --start-from out/turned --scenario \\
       removal_turned --hyper demonstrations=0.5 --out out/in_the_cell    twin to cell
   python tools/train.py ... --out out/sliding --resume         go on after Ctrl-C
 """
@@ -65,11 +64,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _add_task_arguments(add: Callable[..., object]) -> None:
-    add(
-        "--model",
-        default="twin",
-        choices=sorted(MODELS),
-        help="what it learns on: the twin is six times faster (default: twin)",
+    cli.add_station_argument(
+        add, "twin", "what it learns on: the twin is six times faster"
     )
     add(
         "--psi",
@@ -188,7 +184,7 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
         changes.append(f"episodes={args.episodes}")
     return Experiment(
         scenario=load_scenario(args.scenario, overrides),
-        model=args.model,
+        station=args.station,
         preset=args.preset,
         config=override(preset(args.preset, args.agent), changes),
         compiled=not args.eager,

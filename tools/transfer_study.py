@@ -30,7 +30,6 @@ from drake_disasm.learning.hyperparameters import (
 from drake_disasm.learning.jobs import seed_jobs, train_seeds
 from drake_disasm.learning.warm_start import check_start
 from drake_disasm.scenario import load_scenario
-from drake_disasm.stations import MODELS
 from drake_disasm.studies.transfer import (
     Deployment,
     TransferStudy,
@@ -68,12 +67,7 @@ def _add_scenario_arguments(add: Callable[..., object]) -> None:
         ("stand-in", "what stands for the robot"),
     ):
         add(f"--{name}", required=True, metavar="NAME|FILE", help=text)
-    add(
-        "--model",
-        default="cell",
-        choices=sorted(MODELS),
-        help="what simulates the stand-in (default: cell)",
-    )
+    cli.add_station_argument(add, "cell", "what simulates the stand-in")
 
 
 def _add_agent_arguments(add: Callable[..., object]) -> None:
@@ -145,7 +139,7 @@ def _study(args: argparse.Namespace, arguments: Sequence[str]) -> TransferStudy:
     changes = [*args.hyper, f"episodes={args.episodes}"]
     common = Experiment(
         scenario=before,
-        model="twin",
+        station="twin",
         preset=args.preset,
         config=override(preset(args.preset, args.agent), changes),
         compiled=not args.eager,
@@ -156,7 +150,7 @@ def _study(args: argparse.Namespace, arguments: Sequence[str]) -> TransferStudy:
         before=before,
         after=load_scenario(args.after),
         stand_in=load_scenario(args.stand_in),
-        model=args.model,
+        station=args.station,
         common=common,
         episodes=args.stand_in_episodes,
         rehearsal=args.rehearsal,

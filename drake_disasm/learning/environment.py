@@ -2,7 +2,7 @@
 
 import gymnasium
 import drake_disasm.learning.environment
-env = gymnasium.make("drake_disasm/Removal-v0", model="cell")
+env = gymnasium.make("drake_disasm/Removal-v0", station="cell")
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ from drake_disasm.task.simulation import StepResult, TaskSimulation
 
 
 class DisassemblyEnv(gymnasium.Env[np.ndarray, np.ndarray]):
-    """Slide the bolt along the groove, over any model of it.
+    """Slide the bolt along the groove, in the cell or on its twin.
 
     Observation: the state s (12,) of `mdp.STATE_NAMES` [m, rad, N, N m].
     Action: the movement a (6,) of `mdp.ACTION_NAMES` [m, rad], within the task's
@@ -38,17 +38,17 @@ class DisassemblyEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     Args:
         scenario: an object, a shipped name, or a file.
-        model: "twin" or "cell".
+        station: "twin" or "cell".
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012, gymnasium's own declaration
 
     def __init__(
-        self, scenario: Scenario | str | Path = "removal", model: str = "twin"
+        self, scenario: Scenario | str | Path = "removal", station: str = "twin"
     ) -> None:
         if not isinstance(scenario, Scenario):
             scenario = load_scenario(str(scenario))
-        self.simulation = TaskSimulation(scenario, model)
+        self.simulation = TaskSimulation(scenario, station)
         unlimited = np.full(12, np.inf, dtype=np.float32)
         self.observation_space = gymnasium.spaces.Box(-unlimited, unlimited)
         bounds = self.simulation.bounds.astype(np.float32)

@@ -69,10 +69,10 @@ def evaluate(
 
 
 def validate_policy(
-    policy: Policy, scenario: Scenario, model: str, seeds: Sequence[int]
+    policy: Policy, scenario: Scenario, station: str, seeds: Sequence[int]
 ) -> "Evaluation":
     """Returns how a policy does in a diagram of its own, away from any training."""
-    return summed_up(evaluate(TaskSimulation(scenario, model, policy), seeds))
+    return summed_up(evaluate(TaskSimulation(scenario, station, policy), seeds))
 
 
 def summed_up(summaries: Sequence[EpisodeSummary]) -> Evaluation:

@@ -28,20 +28,20 @@ class Experiment:
     """What all seeds have in common.
 
     Attributes:
-        scenario, model, config, compiled, threads: as in TrainingSpec.
-        preset: name of what the hyper-parameters began with.
+        scenario, station, config, compiled, threads: as in TrainingSpec.
+        preset: name of the hyper-parameters that `config` started from.
         validation: greedy episodes after each training.
         logs: folders to learn from without acting, with the hash of what is in
             them; empty to act.
         updates: gradient updates on those; 0 for one per transition.
         demonstrations: folders of logs to mix into each batch, and hashes.
-        start: folder of a training whose agents, seed by seed, these go on from
-            (see transfer.py); empty to begin anew.
+        start: folder of a training whose agents, seed by seed, these continue from
+            (see warm_start.py); empty to start anew.
         provenance: command, date, versions, commit.
     """
 
     scenario: Scenario
-    model: str
+    station: str
     preset: str
     config: Hyperparameters
     compiled: bool = True
@@ -56,7 +56,7 @@ class Experiment:
     def spec(self, seed: int) -> TrainingSpec:
         """Returns one seed's training."""
         return TrainingSpec(
-            self.scenario, self.model, self.config, seed, self.compiled, self.threads
+            self.scenario, self.station, self.config, seed, self.compiled, self.threads
         )
 
     def to_mapping(self) -> dict[str, Any]:
@@ -88,7 +88,7 @@ def open_experiment(experiment: Experiment, folder: Path, resume: bool) -> Exper
         raise DisasmError(
             f"{folder}: holds a training already; add --resume, or name a new folder"
         )
-    found = read_json(path)
+    found = _with_station(read_json(path))
     for key in wanted:
         if key != "provenance" and found.get(key) != wanted[key]:
             raise DisasmError(
@@ -96,6 +96,13 @@ def open_experiment(experiment: Experiment, folder: Path, resume: bool) -> Exper
                 "resume with the same, or name a new folder"
             )
     return dataclasses.replace(experiment, provenance=found["provenance"])
+
+
+def _with_station(found: dict[str, Any]) -> dict[str, Any]:
+    """Returns a training's plain data; once the station was called "model" in it."""
+    if "model" in found:
+        found["station"] = found.pop("model")
+    return found
 
 
 def _difference(found: dict[str, Any], wanted: dict[str, Any], key: str) -> str:

@@ -84,7 +84,7 @@ class _Log:
         experiment = job.experiment
         header = transitions_header(
             experiment.scenario,
-            experiment.model,
+            experiment.station,
             experiment.provenance | {"seed": job.seed},
         )
         self._writer = LogWriter(job.folder / "log", header, resume=True)

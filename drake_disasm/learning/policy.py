@@ -16,7 +16,7 @@ from drake_disasm.policies import (
 
 
 def trained_policy(training: Training, provenance: dict[str, Any]) -> LearnedPolicy:
-    """Returns the greedy policy that a training has come to.
+    """Returns the greedy policy of a training.
 
     Args:
         training: at any episode.
@@ -33,7 +33,7 @@ def trained_policy(training: Training, provenance: dict[str, Any]) -> LearnedPol
             preset=provenance.get("preset", ""),
             hyperparameters=dataclasses.asdict(spec.config),
             scenario_hash=scenario_hash(spec.scenario),
-            model=spec.model,
+            station=spec.station,
             state_names=STATE_NAMES,
             action_names=ACTION_NAMES,
             observation_variant=spec.scenario.observation.variant,

@@ -128,7 +128,7 @@ def finish(
     spec = training.spec
     seeds = [seed_for(spec.seed, Purpose.VALIDATION, i) for i in range(validation)]
     policy = trained_policy(training, provenance)
-    figures = validate_policy(policy, spec.scenario, spec.model, seeds)
+    figures = validate_policy(policy, spec.scenario, spec.station, seeds)
     evaluation = dataclasses.asdict(figures)
     description = dataclasses.replace(policy.description, evaluation=evaluation)
     policy = dataclasses.replace(policy, description=description)

@@ -55,7 +55,7 @@ class TrainingSpec:
 
     Attributes:
         scenario: the task.
-        model: "twin" or "cell".
+        station: "twin" or "cell".
         config: hyper-parameters.
         seed: of everything.
         compiled: whether updates run compiled.
@@ -63,7 +63,7 @@ class TrainingSpec:
     """
 
     scenario: Scenario
-    model: str
+    station: str
     config: Hyperparameters
     seed: int
     compiled: bool = True
@@ -99,7 +99,7 @@ class Training:
                 f"demonstrations: {config.demonstrations:g} of each batch are to come "
                 "from logs; name some by --demonstrations DIR"
             )
-        self.env = DisassemblyEnv(spec.scenario, spec.model)
+        self.env = DisassemblyEnv(spec.scenario, spec.station)
         self.agent = Agent(
             config, seed_for(spec.seed, Purpose.PARAMETERS), spec.compiled
         )

@@ -35,6 +35,9 @@ from drake_disasm.scenario import Scenario, scenario_to_mapping
 
 FORMAT = "drake_disasm/policy/1"
 
+#: What the format calls fields of PolicyDescription that have another name.
+_ENTRIES = {"station": "model"}
+
 
 def scenario_hash(scenario: Scenario) -> str:
     """Returns the SHA-256 of everything that a scenario says."""
@@ -54,7 +57,7 @@ def save_policy(path: Path, policy: LearnedPolicy) -> None:
             system refuses to write.
     """
     arrays, base = _arrays(policy), policy.action_map.base
-    description = dataclasses.asdict(policy.description)
+    description = _entries(policy.description)
     try:
         _check(arrays)
         _description(description)
@@ -176,13 +179,22 @@ def _check_shapes(arrays: Arrays, layers: int) -> None:
             )
 
 
+def _entries(description: PolicyDescription) -> dict[str, Any]:
+    """Returns a description as the format has it."""
+    return {
+        _ENTRIES.get(name, name): value
+        for name, value in dataclasses.asdict(description).items()
+    }
+
+
 def _description(values: Any) -> PolicyDescription:
-    default = dataclasses.asdict(PolicyDescription())
+    default = _entries(PolicyDescription())
     if not isinstance(values, dict) or values.keys() != default.keys():
         raise DisasmError(f"has a description with other entries; {AGAIN}")
-    return PolicyDescription(
-        **{name: _like(default[name], values[name], name) for name in default}
-    )
+    read = {name: _like(default[name], values[name], name) for name in default}
+    for name, entry in _ENTRIES.items():
+        read[name] = read.pop(entry)
+    return PolicyDescription(**read)
 
 
 def _like(example: Any, value: Any, name: str) -> Any:

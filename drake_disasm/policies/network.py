@@ -113,10 +113,10 @@ class PolicyDescription:
 
     Attributes:
         agent: "ddpg", "td3" or "sac".
-        preset: name of what the hyper-parameters began with.
+        preset: name of the hyper-parameters that it started from.
         hyperparameters: all of them.
         scenario_hash: of the scenario that it was trained on.
-        model: "twin" or "cell".
+        station: "twin" or "cell", on which it was trained.
         state_names, action_names: what goes in and out, in order.
         observation_variant: of the scenario that it was trained on.
         period: of the MDP [s].
@@ -129,7 +129,7 @@ class PolicyDescription:
     preset: str = ""
     hyperparameters: dict[str, Any] = dataclasses.field(default_factory=dict)
     scenario_hash: str = ""
-    model: str = ""
+    station: str = ""
     state_names: tuple[str, ...] = STATE_NAMES
     action_names: tuple[str, ...] = ACTION_NAMES
     observation_variant: str = "exact"

@@ -6,7 +6,10 @@ from drake_disasm.stations.cell import CellStation
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.stations.twin import TwinStation
 
-#: What `--model` may name.
+#: What `--station` may name.
+STATIONS = ("cell", "twin", "hardware")
+
+#: Those of them that are simulated.
 MODELS: dict[str, type[SimulatedStation]] = {"cell": CellStation, "twin": TwinStation}
 
 
@@ -17,6 +20,7 @@ def make_station(model: str, scenario: Scenario) -> SimulatedStation:
 
 __all__ = [
     "MODELS",
+    "STATIONS",
     "CellStation",
     "InitialState",
     "SimulatedStation",

@@ -133,7 +133,7 @@ def refuse_twins_contact(scenario: Scenario) -> None:
     if scenario.contact.model != "hydroelastic":
         raise DisasmError(
             f"contact.model: '{scenario.contact.model}' is of the twin alone; "
-            "use hydroelastic for the cell, or --model twin"
+            "use hydroelastic for the cell, or --station twin"
         )
 
 

@@ -194,7 +194,7 @@ class SimulatedStation(Station):
         if effects:
             raise DisasmError(
                 f"{type(effects[0]).__name__}: acts on the arm, and this station has "
-                "none; take it out of effects, or use --model cell"
+                "none; take it out of effects, or use --station cell"
             )
 
     def _change_environment(self, context: Context, environment: Environment) -> None:

@@ -61,8 +61,8 @@ class TransferStudy:
     Attributes:
         before, after: scenarios of the twin, before and after closing the loop.
         stand_in: scenario of what stands for the robot.
-        model: "cell" or "twin", of the stand-in.
-        common: everything else of the trainings; its scenario and model are unused.
+        station: "cell" or "twin", of the stand-in.
+        common: everything else of the trainings; its scenario and station are unused.
         episodes: of each training in the stand-in.
         rehearsal: share of each batch there that comes from what the agent remembers
             of its twin; without it a new memory is so narrow that the agent unlearns.
@@ -72,7 +72,7 @@ class TransferStudy:
     before: Scenario
     after: Scenario
     stand_in: Scenario
-    model: str
+    station: str
     common: Experiment
     episodes: int
     rehearsal: float
@@ -82,7 +82,7 @@ class TransferStudy:
         """Returns each training by its folder, in an order in which they can run."""
         twins = {"twin_before": self.before, "twin_after": self.after}
         trained = {
-            name: dataclasses.replace(self.common, scenario=scenario, model="twin")
+            name: dataclasses.replace(self.common, scenario=scenario, station="twin")
             for name, scenario in twins.items()
         }
         return trained | {b.folder: self._in_stand_in(b) for b in BRANCHES}
@@ -96,7 +96,7 @@ class TransferStudy:
         return dataclasses.replace(
             self.common,
             scenario=self.stand_in,
-            model=self.model,
+            station=self.station,
             config=config,
             start=str(self.folder / branch.start) if branch.start else "",
         )
@@ -130,7 +130,7 @@ def deploy(job: Deployment, report: Callable[[Any], None]) -> None:
     trained = Path(job.experiment.start) / job.folder.name / "policy.npz"
     policy, scenario = load_policy(trained), job.experiment.scenario
     policy.check_fits(scenario)
-    simulation = TaskSimulation(scenario, job.experiment.model, policy)
+    simulation = TaskSimulation(scenario, job.experiment.station, policy)
     count = range(job.experiment.validation)
     seeds = [seed_for(job.seed, Purpose.VALIDATION, i) for i in count]
     figures = summed_up(evaluate(simulation, seeds, on_episode=lambda _: report(1)))

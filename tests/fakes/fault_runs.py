@@ -9,10 +9,10 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from pydrake.lcm import DrakeLcm
 
 from drake_disasm.fakes import hex_box, robotiq_gripper
-from drake_disasm.fakes.cell import IIWA_FAULTS, FakeCell, arrival, in_step
+from drake_disasm.fakes.cell import IIWA_FAULTS, FakeCell
+from drake_disasm.fakes.lockstep import fake_hardware
 from drake_disasm.policies import make_policy
 from drake_disasm.safety import Mode
 from drake_disasm.scenario import Scenario, load_scenario
@@ -61,20 +61,10 @@ def in_lockstep(
     views: Sequence[MeshcatView] = (),
 ) -> Iterator[tuple[TaskSimulation, HardwareStation, FakeCell]]:
     """Yields a diagram on the hardware station, with a fake cell in step with it."""
-    lcm = DrakeLcm("memq://")
-    with FakeCell(scenario, lcm, seed) as cell:
-
-        def wait(_: float) -> None:
-            """Lets a period pass while the station waits."""
-            cell.advance(arrival(station.devices["ft_sensor"].read))
-
-        with HardwareStation(
-            scenario, cell.config(), clock=cell.clock, wait=wait, lcm=lcm
-        ) as station:
-            simulation = TaskSimulation(scenario, lambda _: station, policy, views)
-            read = station.devices["ft_sensor"].read
-            simulation.simulator.set_monitor(in_step(cell, read))
-            yield simulation, station, cell
+    with fake_hardware(scenario, seed) as fake:
+        simulation = TaskSimulation(scenario, lambda _: fake.station, policy, views)
+        fake.attach(simulation.simulator)
+        yield simulation, fake.station, fake.cell
 
 
 def run_fault(device: str, fault: str) -> FaultRun:

@@ -9,7 +9,7 @@ import pytest
 
 from tests.tools.programs import ROOT
 
-SHORT = ["--model=twin", "--episodes=2", "--set", "task.steps=8"]
+SHORT = ["--station=twin", "--episodes=2", "--set", "task.steps=8"]
 
 
 def _evaluate(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:

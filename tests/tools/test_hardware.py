@@ -29,7 +29,8 @@ _LCM = f"udpm://239.255.76.67:{_PORT}?ttl=0"
         (("--station", "hardware", "--episodes", "2"), "--episodes"),
         (("--station", "hardware", "--dry-run", "--html", "x.html"), "--html"),
         (("--station", "hardware", "--dry-run", "--record", "x"), "--record"),
-        (("--station", "hardware", "--model", "twin"), "--model"),
+        (("--station", "simulated"), "--station simulated: does not exist; known: "),
+        (("--model", "twin"), "--model twin: is --station twin now"),
     ],
 )
 def test_refuses_what_hardware_cannot_do(arguments: tuple[str], words: str) -> None:

@@ -44,7 +44,7 @@ def transitions(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "- !GrooveFriction {coefficient: 0.1}\n- !GroovePose {ry: 0.02}\n"
     )
     done = run(
-        "--model", "twin", "--no-meshcat", "--policy", "admittance", "--explore", 0.15,
+        "--station", "twin", "--no-meshcat", "--policy", "admittance", "--explore", 0.15,
         "--episodes", 3, "--hidden", hidden, "--set", "task.steps=14",
         "--set", "contact.model=impact",  # an evaluation takes a fourteenth
         "--record", folder / "log", name="simulate",
@@ -98,7 +98,7 @@ def test_a_twin_from_the_command_line_and_back_into_simulate(
     assert found["GroovePose.ry"]["value"] == pytest.approx(0.02, rel=0.05)
     scenario = out / "scenario.yaml"
     again = run(
-        "--no-meshcat", "--model", "twin", "--scenario", scenario, name="simulate"
+        "--no-meshcat", "--station", "twin", "--scenario", scenario, name="simulate"
     )
     assert again.returncode == 0, again.stderr
 

@@ -21,7 +21,7 @@ from drake_disasm.policies import (
 from drake_disasm.scenario import load_scenario, scenario_from_mapping
 from tests.tools.programs import ROOT, Runner
 
-TWIN = ("--model", "twin")
+TWIN = ("--station", "twin")
 
 
 def test_default_run_takes_the_bolt_out(simulate: Runner) -> None:

@@ -93,7 +93,7 @@ def test_a_log_holds_what_was_chosen_not_what_was_executed(tmp_path: Path) -> No
 
 
 def test_the_cell_can_be_trained_on(tmp_path: Path) -> None:
-    _finished(tmp_path / "out", "--episodes=1", "--model=cell", "--validation=1")
+    _finished(tmp_path / "out", "--episodes=1", "--station=cell", "--validation=1")
     log = read_log(tmp_path / "out/seed_000/log")
     assert log.header.joints and log.episodes[0]["q"].shape[1] == 7
 

@@ -57,7 +57,7 @@ def study(
 ) -> tuple[Path, str]:
     """Returns the folder of a finished study in the twin, and what it printed."""
     out = tmp_path_factory.mktemp("study") / "out"
-    run = _run(_command(scenarios, out, "--model=twin"))
+    run = _run(_command(scenarios, out, "--station=twin"))
     assert run.returncode == 0, run.stderr
     return out, run.stdout
 
@@ -108,8 +108,8 @@ def test_resuming_a_finished_study_changes_nothing(
 ) -> None:
     out, printed = study
     before = (out / "from_after/seed_001/policy.npz").read_bytes()
-    assert _run(_command(scenarios, out, "--model=twin")).returncode == 2
-    again = _run(_command(scenarios, out, "--model=twin", "--resume"))
+    assert _run(_command(scenarios, out, "--station=twin")).returncode == 2
+    again = _run(_command(scenarios, out, "--station=twin", "--resume"))
     assert again.returncode == 0 and again.stdout == printed
     assert (out / "from_after/seed_001/policy.npz").read_bytes() == before
 
@@ -118,7 +118,7 @@ def test_an_interrupted_study_goes_on_to_the_same_result(
     study: tuple[Path, str], scenarios: dict[str, Path], tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    command = _command(scenarios, out, "--model=twin")
+    command = _command(scenarios, out, "--station=twin")
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + 120.0
     while not (out / "untrained/seed_000/log/episode_0001.parquet").exists():

@@ -29,16 +29,16 @@ def _push(env: DisassemblyEnv) -> tuple[bool, bool, dict, int]:
     raise AssertionError("the episode does not end")
 
 
-@pytest.mark.parametrize("model", ["twin", "cell"])
-def test_gymnasium_approves(model: str) -> None:
+@pytest.mark.parametrize("station", ["twin", "cell"])
+def test_gymnasium_approves(station: str) -> None:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*infinity.*")
-        check_env(DisassemblyEnv("removal", model))
+        check_env(DisassemblyEnv("removal", station))
 
 
 @pytest.mark.parametrize("name", IDS)
 def test_every_id_makes_its_scenario(name: str) -> None:
-    env = gymnasium.make(name, model="twin")
+    env = gymnasium.make(name, station="twin")
     assert isinstance(env.unwrapped, DisassemblyEnv)
     assert env.unwrapped.simulation.scenario.name == IDS[name]
     assert env.spec is not None and env.spec.max_episode_steps is None

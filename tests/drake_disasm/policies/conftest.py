@@ -42,7 +42,7 @@ def policy() -> LearnedPolicy:
             preset="best",
             hyperparameters={"hidden": [7, 5], "batch": 64},
             scenario_hash="0" * 64,
-            model="twin",
+            station="twin",
             provenance={"seed": 3, "command": "python tools/train.py"},
             evaluation={"performance": 12.5},
         ),

@@ -26,7 +26,7 @@ def _study(folder: Path) -> TransferStudy:
 
 def test_each_part_trains_where_it_should(tmp_path: Path) -> None:
     parts = _study(tmp_path).experiments()
-    where = {name: (e.scenario.name, e.model) for name, e in parts.items()}
+    where = {name: (e.scenario.name, e.station) for name, e in parts.items()}
     assert where == {
         "twin_before": ("A", "twin"),
         "twin_after": ("B", "twin"),

@@ -1,0 +1,51 @@
+"""The hardware station and a fake cell in step with it, in one process."""
+
+import contextlib
+import dataclasses
+from collections.abc import Iterator
+
+from pydrake.lcm import DrakeLcm
+from pydrake.systems.analysis import Simulator
+
+from drake_disasm.fakes.cell import FakeCell, arrival, in_step
+from drake_disasm.scenario import Scenario
+from drake_disasm.stations.hardware import HardwareStation
+
+
+@dataclasses.dataclass(frozen=True)
+class FakeHardware:
+    """A hardware station, and the played devices that it talks to.
+
+    Attributes:
+        station: talks to the devices by their own protocols.
+        cell: plays them; a simulated cell stands behind it.
+    """
+
+    station: HardwareStation
+    cell: FakeCell
+
+    def attach(self, simulator: Simulator) -> None:
+        """Advances the fake cell whenever the station's diagram is advanced."""
+        read = self.station.devices["ft_sensor"].read
+        simulator.set_monitor(in_step(self.cell, read))
+
+
+@contextlib.contextmanager
+def fake_hardware(scenario: Scenario, seed: int = 0) -> Iterator[FakeHardware]:
+    """Yields a hardware station with fake devices, in virtual time.
+
+    Args:
+        scenario: of the task; effects in it are refused, as by any hardware station.
+        seed: of the fake sensor's noise.
+    """
+    lcm = DrakeLcm("memq://")
+    with FakeCell(scenario, lcm, seed) as cell:
+
+        def wait(_: float) -> None:
+            """Lets a period pass while the station waits."""
+            cell.advance(arrival(station.devices["ft_sensor"].read))
+
+        with HardwareStation(
+            scenario, cell.config(), clock=cell.clock, wait=wait, lcm=lcm
+        ) as station:
+            yield FakeHardware(station, cell)

@@ -1,0 +1,43 @@
+"""Every example runs to its end, prints what it teaches, and is short."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+
+#: What each of them must have printed.
+PRINTED = {
+    "own_diagram": ["watch at http://", "0.20", "the bolt is held at A"],
+    "own_policy": ["twin        12", "cell        12"],
+    "gymnasium_sb3": ["trained for 20 steps", "outcome: ", "progress"],
+    "hardware_station": ["step  x [mm]", "iiwa: READY", "ft_sensor: READY"],
+}
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.timeout(120)
+def test_example_runs_and_prints(example: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, str(example)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=110,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert example.stem in PRINTED, "say here what this example has to print"
+    for words in PRINTED[example.stem]:
+        assert words in done.stdout, done.stdout
+    assert "nan" not in done.stdout.lower().replace("nanometre", "")
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_example_is_short_and_explains_itself(example: Path) -> None:
+    text = example.read_text()
+    assert len(text.splitlines()) < 60
+    assert text.startswith('"""') and f"python examples/{example.name}" in text
