@@ -44,7 +44,8 @@ def transitions(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "- !GrooveFriction {coefficient: 0.1}\n- !GroovePose {ry: 0.02}\n"
     )
     done = run(
-        "--station", "twin", "--no-meshcat", "--policy", "admittance", "--explore", 0.15,
+        "--station", "twin", "--no-meshcat", "--policy", "admittance",
+        "--explore", 0.15,
         "--episodes", 3, "--hidden", hidden, "--set", "task.steps=14",
         "--set", "contact.model=impact",  # an evaluation takes a fourteenth
         "--record", folder / "log", name="simulate",

@@ -313,3 +313,14 @@ def test_scenario_hash_is_of_content() -> None:
     assert len(removal) == 64
     for override in ("lock.clearance=0.0003", "effects=[!SensorBias {fx: 0.5}]"):
         assert removal != scenario_hash(load_scenario("removal", [override]))
+
+
+def test_a_shipped_policy_is_written_as_it_was(tmp_path: Path) -> None:
+    """The format's entries keep their names, whatever the fields are called."""
+    for name in shipped_policies():
+        path = find_policy(name)
+        assert path is not None
+        shipped = load_policy(path)
+        save_policy(tmp_path / "again.npz", shipped)
+        assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
+        assert shipped.description.station in ("cell", "twin")
