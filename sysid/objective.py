@@ -1,16 +1,17 @@
-"""How far a model is from a log: eq. 4.8, weighted by the channels' noise."""
+"""The error between a model and a log: eq. 4.8, weighted by the channels' noise."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.common.errors import DisasmError
 from sysid.models.base import Array, LogModel
 from sysid.parameters import Scaling, nominal_values
 from sysid.workers import Workers
 
-#: What every weighted residual counts as where the simulation failed: a million
-#: times the noise, worse than any fit, and finite. Others are held below it.
+#: Weighted residual where the simulation failed: a million times the noise, worse than
+#: any fit, and finite. All others are clipped to it.
 FAILED_RESIDUAL = 1e6
 
 
@@ -18,24 +19,25 @@ class Objective:
     """f(theta) = sqrt(mean (r / sigma)^2), the rms residual in units of the noise.
 
     It is eq. 4.8's (1/n) ||s'_real - s'_sim||_2 with each channel divided by its
-    standard deviation, times a constant, sqrt(n / channels): it orders parameters
-    alike, does not depend on the size of the log, and 1 means "as good as the
-    sensors". A theta at which the simulation fails counts as FAILED_RESIDUAL in
+    standard deviation, times a constant, sqrt(n / channels): it ranks parameters
+    in the same order, does not depend on the size of the log, and 1 means "as good as
+    the sensors". A theta at which the simulation fails counts as FAILED_RESIDUAL in
     every channel of every row.
 
-    With a finite `huber`, a residual beyond that many standard deviations counts
-    linearly instead of squared (Huber 1964): a transition in which the bolt runs into
-    the stop misses by fifty times the noise over a millisecond's difference, and a
-    handful of those would otherwise outvote all others.
+    With a finite `huber_delta`, the loss is linear beyond that many standard deviations
+    (Huber 1964): a transition in which the bolt runs into the stop is off by fifty
+    times the noise over a millisecond's difference, and a handful of those would
+    otherwise outweigh all others.
 
     Attributes:
         model: predicts.
-        huber: where squares end; infinity has them everywhere, as eq. 4.8 does.
+        huber_delta: residual, in standard deviations, beyond which the loss is linear;
+            infinite for least squares, as in eq. 4.8.
         scaling: between parameters and the unit box.
         evaluations: parameter sets simulated so far.
         failures: those at which the simulation failed, each with the reason.
-        differences: the objective whose differences serve as derivatives; this one,
-            or one of a model that is alike and faster.
+        differences: the objective whose differences serve as derivatives: this one,
+            or that of a surrogate.
     """
 
     def __init__(
@@ -49,9 +51,10 @@ class Objective:
 
         Args:
             model: predicts.
-            workers: do it.
-            huber: where squares end.
-            alike: a faster model with the same parameters, for derivatives.
+            workers: evaluate it.
+            huber_delta: residual, in standard deviations, beyond which the loss is
+                linear.
+            surrogate: a faster model with the same parameters, for derivatives.
         """
         self.model, self.huber_delta = model, huber_delta
         self.scaling = Scaling(model.parameters)
@@ -73,8 +76,11 @@ class Objective:
     def residuals(self, thetas: Array) -> list[Array]:
         """Returns the weighted residuals (rows, channels) of each of (b, p) sets.
 
-        The sum over rows is the caller's, in their order, so that no value depends
-        on how many workers shared the work.
+        The caller sums over rows, in their order, so that no value depends on how
+        many workers shared the work.
+
+        Raises:
+            DisasmError: predictions do not have the shape of the measurements.
         """
         thetas = np.atleast_2d(thetas)
         chunks = self.model.chunks()
@@ -93,7 +99,7 @@ class Objective:
         ]
 
     def predictions(self, theta: Array) -> Array:
-        """Returns what the model says at (p,), in SI units, (rows, channels)."""
+        """Returns the predictions at (p,), SI, (rows, channels)."""
         return self.predicted(self.residuals(theta)[0])
 
     def predicted(self, residual: Array) -> Array:
@@ -103,7 +109,7 @@ class Objective:
 
     @property
     def start(self) -> Array:
-        """Where a fit begins: the nominal values (p,) in the unit box."""
+        """The nominal values (p,) in the unit box, where a fit begins."""
         return self.scaling.to_unit(nominal_values(self.model.parameters))
 
     def _weighted(self, theta: Array, parts: Sequence[Array | str]) -> Array:
@@ -116,12 +122,18 @@ class Objective:
             simulated.append(part)
         whole = slice(0, measured.rows)
         predicted = self.model.read(theta, whole, np.concatenate(simulated))
+        if predicted.shape != measured.values.shape:
+            raise DisasmError(
+                f"{type(self.model).__name__}.predict: returns the shape "
+                f"{predicted.shape} for all rows, the measurements have "
+                f"{measured.values.shape}; return (rows, channels)"
+            )
         residual = (predicted - measured.values) / measured.noise
         return np.clip(residual, -FAILED_RESIDUAL, FAILED_RESIDUAL)
 
 
 def pseudo_residual(residual: Array, huber_delta: float) -> Array:
-    """Returns residuals whose squares are Huber's loss, signs kept."""
+    """Returns residuals whose squares are Huber's loss, with their signs."""
     size = np.abs(residual)
     if huber_delta == np.inf:
         return residual
@@ -130,7 +142,7 @@ def pseudo_residual(residual: Array, huber_delta: float) -> Array:
 
 
 def huber_weights(residual: Array, huber_delta: float) -> Array:
-    """Returns the weight of each residual in a least-squares step, 1 within `huber`."""
+    """Returns the weight of each residual in a least-squares step, 1 within delta."""
     return np.minimum(1.0, huber_delta / np.maximum(np.abs(residual), 1e-300))
 
 

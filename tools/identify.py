@@ -1,8 +1,8 @@
-"""Finds the parameters of a model from a measured log, and how sure they are.
+"""Finds the parameters of a model from a measured log, and how certain they are.
 
-The log says what is fitted: transitions of the task by the digital twin, readings of
-a force/torque sensor at rest by payload and bias, joint torques of an arm by its
-rigid-body dynamics. Two searches, the Bees Algorithm and NLopt, check each other.
+The kind of log decides what is fitted: the digital twin to transitions of the task,
+payload and bias to static readings of a force/torque sensor, rigid-body dynamics to
+joint torques of an arm. Two searches, the Bees Algorithm and NLopt, check each other.
 Writes the identified scenario, `result.json`, and a report that opens offline.
 """
 
@@ -12,20 +12,24 @@ from pathlib import Path
 
 import cli
 import numpy as np
-from tqdm import tqdm
 
 from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_json, write_text
 from drake_disasm.logs import Log, read_logs
 from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
-from sysid.identification.identify import Settings, identify
-from sysid.identification.journal import Journal
-from sysid.identification.output import summary, to_mapping
-from sysid.identification.result import Identified
-from sysid.identification.search import METHODS, Effort
+from sysid.identification import (
+    Identification,
+    Journal,
+    SearchSettings,
+    Settings,
+    identify,
+    summary,
+)
+from sysid.identification.identify import HELD_OUT_SHARE
+from sysid.identification.output import to_mapping
+from sysid.identification.settings import METHODS
 from sysid.identification.split import split_episodes
-from sysid.models import LogModel
 from sysid.models.from_logs import OBJECTIVES, ModelChoice, model_of
 from sysid.optimise import BeesSettings
 from sysid.report import report_page
@@ -74,7 +78,7 @@ def _add_input_arguments(add: Callable[..., object]) -> None:
     add(
         "--scenario",
         metavar="NAME|FILE",
-        help="what the model begins with (default: what the log states)",
+        help="nominal scenario of the model (default: the one stated in the log)",
     )
     add(
         "--set",
@@ -95,8 +99,8 @@ def _add_input_arguments(add: Callable[..., object]) -> None:
     add(
         "--objective",
         choices=[name for names in OBJECTIVES.values() for name in names],
-        help="what is compared: for transitions each step from its measured state "
-        "(default), or whole episodes by rollout",
+        help="what is compared: for transitions, each step simulated from its measured "
+        "state (default), or whole episodes by rollout",
     )
     add("--urdf", metavar="FILE", help="the arm of a joint_motion log")
     add(
@@ -122,10 +126,15 @@ def _add_search_arguments(add: Callable[..., object]) -> None:
         "--preset",
         choices=["default", "thesis"],
         default="default",
-        help="thesis: table 4.2's colony on the raw box and the whole log, without "
-        "Gauss-Newton and with plain squares",
+        help="thesis: table 4.2's colony in the parameters' box and on the whole log, "
+        "without Gauss-Newton and with least squares",
     )
-    add("--cycles", type=cli.positive, metavar="N", help="of the bees")
+    add(
+        "--cycles",
+        type=cli.positive,
+        metavar="N",
+        help="of the Bees Algorithm, instead of --budget",
+    )
     add(
         "--budget",
         type=cli.positive,
@@ -135,14 +144,14 @@ def _add_search_arguments(add: Callable[..., object]) -> None:
     add(
         "--surrogate",
         action="store_true",
-        help="a Gaussian process proposes points in place of scouts",
+        help="a Gaussian process proposes points in place of the bees' scouts",
     )
     add("--seed", type=int, default=0, help="of the searches (default: 0)")
     add(
         "--fine",
         action="store_true",
-        help="take every transition in the twin's own time step: twice the time, for "
-        "logs of a twin with that step",
+        help="simulate transitions in the twin's own time step throughout: takes twice "
+        "as long, for logs of a twin with that step",
     )
 
 
@@ -150,31 +159,32 @@ def _add_judgement_arguments(add: Callable[..., object]) -> None:
     add(
         "--held-out",
         nargs="+",
-        default=["0.25"],
+        default=[str(HELD_OUT_SHARE)],
         metavar="SHARE|NAME",
-        help="episodes that are not fitted but predicted: a share, or names of logs or "
-        "log/episode_0001 (default: 0.25)",
+        help="episodes that judge the fit instead of being fitted: a share, or names "
+        f"of logs or log/episode_0001 (default: {HELD_OUT_SHARE})",
     )
     add(
         "--huber",
         type=float,
         metavar="K",
-        help="residuals beyond K standard deviations count linearly; inf for plain "
-        "squares as in eq. 4.8 (default: 3 for the twin, inf for readings at rest and "
-        "joint torques)",
+        help="the loss is linear for residuals beyond K standard deviations; inf for "
+        "least squares as in eq. 4.8 (default: 3 for transitions, inf for static "
+        "readings and joint torques)",
     )
     add(
         "--unidentifiable",
         choices=["stop", "freeze"],
         default="stop",
-        help="what to do with parameters that this log can't tell (default: stop)",
+        help="what to do with parameters that this log does not determine (default: "
+        "stop)",
     )
     add(
         "--profile",
         nargs="+",
         default=[],
         metavar="NAME",
-        help="profile likelihood of some parameters, too (seven fits each)",
+        help="parameters whose profile likelihood is computed, too (seven fits each)",
     )
 
 
@@ -184,12 +194,12 @@ def main(arguments: Sequence[str]) -> int:
     logs = read_logs(args.log)
     model = model_of(logs, _choice(args))
     train, test = split_episodes(model.measurements.names, _held_out(args))
+    settings = _settings(args)
     origin = program.provenance("identify", arguments, args.seed) | _data(logs)
     journal = Journal(args.out, _identity(args, logs), args.resume)
-    with Workers(args.workers) as workers, _Bars() as bars:
-        settings = _settings(args, model)
-        found = identify(model, train, test, settings, workers, journal, bars)
-    _write(args.out, found, model, origin)
+    with program.ProgressBar("evaluation") as bar, Workers(args.workers) as workers:
+        found = identify(model, train, test, settings, workers, journal, bar)
+    _write(args.out, found, origin)
     print(summary(found))
     print(f"report: {args.out / 'report.html'}")
     return 0
@@ -200,31 +210,27 @@ def _choice(args: argparse.Namespace) -> ModelChoice:
     if args.scenario:
         scenario = load_scenario(args.scenario, args.overrides)
     elif args.overrides:
-        raise DisasmError("--set: say of which --scenario")
+        raise DisasmError("--set: needs the --scenario that it changes; give it")
     requests = tuple(read_requests(args.parameters)) if args.parameters else ()
     return ModelChoice(
         args.objective, scenario, requests, args.urdf, not args.fine, tuple(args.noise)
     )
 
 
-def _settings(args: argparse.Namespace, model: LogModel) -> Settings:
+def _settings(args: argparse.Namespace) -> Settings:
     thesis = args.preset == "thesis"
-    effort = Effort(
+    search = SearchSettings(
         evaluations=args.budget or 400,
         cycles=args.cycles,
-        close=0 if thesis else 40,
+        local_evaluations=0 if thesis else 40,
         bees=BeesSettings.thesis() if thesis else BeesSettings(),
         seed=args.seed,
         propose=_surrogate() if args.surrogate else None,
     )
-    # Where the model is affine, plain squares have one exact optimum.
-    usual = np.inf if thesis or model.affine else 3.0
-    huber_delta = usual if args.huber is None else args.huber
-    if not huber_delta > 0.0:
-        raise DisasmError("--huber: give a number above zero, or inf")
+    huber_delta = np.inf if thesis and args.huber is None else args.huber
     methods = METHODS if args.method == "both" else (args.method,)
     return Settings(
-        methods, effort, huber_delta, args.unidentifiable, tuple(args.profile)
+        methods, search, huber_delta, args.unidentifiable, tuple(args.profile)
     )
 
 
@@ -267,45 +273,10 @@ def _identity(args: argparse.Namespace, logs: Sequence[Log]) -> dict[str, object
     return {**kept, "data": [log.data_hash for log in logs]}
 
 
-class _Bars:
-    """A progress bar for the part of the search that runs, with its best value."""
-
-    def __init__(self) -> None:
-        self._name = ""
-        self._bar: tqdm | None = None
-
-    def __call__(self, name: str, done: int, total: int, best: float) -> None:
-        """Shows where a part stands."""
-        program.stop_if_interrupted()
-        if name != self._name:
-            self._close()
-            self._name = name
-            self._bar = tqdm(total=total or None, desc=name, unit="eval", leave=False)
-        assert self._bar is not None
-        if np.isfinite(best):
-            self._bar.set_postfix(best=f"{best:.4g}", refresh=not total)
-        self._bar.update(done - self._bar.n)
-
-    def __enter__(self) -> "_Bars":
-        """Returns the bars."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Takes the last one away."""
-        self._close()
-
-    def _close(self) -> None:
-        if self._bar is not None:
-            self._bar.close()
-
-
-def _write(
-    folder: Path, found: Identified, model: LogModel, origin: dict[str, object]
-) -> None:
+def _write(folder: Path, found: Identification, origin: dict[str, object]) -> None:
     mapping = to_mapping(found) | {"provenance": origin}
-    fitted = model.freeze(found.frozen)
-    if scenario := fitted.scenario_at(found.theta):
-        write_text(folder / "scenario.yaml", dump_scenario(scenario))
+    if found.scenario:
+        write_text(folder / "scenario.yaml", dump_scenario(found.scenario))
     write_json(folder / "result.json", mapping)
     write_text(folder / "report.html", report_page(found, origin))
 

@@ -24,7 +24,7 @@ from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fit_cache import remembered
 from sysid.effect_selection.prescreen import rough_fits
 from sysid.effect_selection.residual_curves import curves
-from sysid.identification.gauss_newton import GAIN, gauss_newton
+from sysid.identification.gauss_newton import MIN_GAIN, gauss_newton
 from sysid.identification.linearisation import extend
 from sysid.models.base import LogModel
 from sysid.objective import Objective
@@ -356,12 +356,14 @@ class Tracer:
             linearisation = dataclasses.replace(
                 start.linearisation, u=u, jacobian=jacobian
             )
-        most, pays = (_FEW_ITERATIONS, _PAYS) if model.costly else (_ITERATIONS, GAIN)
+        most, pays = (
+            (_FEW_ITERATIONS, _PAYS) if model.costly else (_ITERATIONS, MIN_GAIN)
+        )
         linearisation = remembered(
             None if model.affine else self.folder,
             (model, self.huber_delta, self.exact, u, linearisation),
             lambda: gauss_newton(
-                objective, u, most, start=linearisation, central=False, pays=pays
+                objective, u, most, start=linearisation, central=False, min_gain=pays
             ),
         )
         found = objective.scaling.from_unit(linearisation.u)

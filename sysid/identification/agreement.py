@@ -1,4 +1,4 @@
-"""A verdict on two searches: did they find the same, and what it means if not."""
+"""Do two searches agree, and what it means if they do not."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,22 +7,23 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from sysid import confidence
 from sysid.identification.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """Whether two methods agree.
+class Agreement:
+    """Whether two methods found the same optimum.
 
     Attributes:
         agree: in the objective and in the parameters.
-        objective_gap: difference of the objective over that which marks the edge
-            of the joint 95 % confidence region; below 1 they are as good.
+        objective_gap: difference of the objectives over that at the edge of the joint
+            95 % confidence region; below 1 they are equally good.
         parameter_gap: (p,) differences in standard deviations.
-        distance: Mahalanobis distance over that of the region's edge; below 1 they
-            are within it.
+        distance: Mahalanobis distance over that of the region's edge; below 1 each is
+            within the region of the other.
         text: what it means.
     """
 
@@ -33,30 +34,30 @@ class Verdict:
     text: str
 
 
-def verdict(
+def compare_methods(
     names: tuple[str, str],
     points: tuple[Array, Array],
     values: tuple[float, float],
     residuals: int,
     spread: Uncertainty,
     parameters: Sequence[str],
-) -> Verdict:
+) -> Agreement:
     """Compares two optima.
 
     The region is that of the likelihood: n (f1^2 - f2^2) / f2^2 <= chi2(0.95, p),
-    stretched by how much wider the bootstrap is than the curvature says, for
-    residuals that are not independent or not alike.
+    stretched by how much wider the bootstrap's region is than the curvature's, for
+    residuals that are not independent or not identically distributed.
 
     Args:
         names: of the methods.
         points: (p,) each, in the unit box.
         values: of the objective.
         residuals: how many numbers the objective is the rms of.
-        spread: at the better one.
+        spread: uncertainty at the better one.
         parameters: their names.
     """
     size = len(points[0])
-    edge = float(chi2.ppf(0.95, size))
+    edge = float(chi2.ppf(confidence.LEVEL, size))
     C = spread.bootstrap_covariance
     stretch = max(1.0, float(np.trace(C @ np.linalg.pinv(spread.curvature))) / size)
     low, high = sorted(values)
@@ -66,23 +67,22 @@ def verdict(
     distance = float(np.sqrt(squared / edge))
     sigma = np.sqrt(np.maximum(np.diagonal(C), 1e-300))
     same_value, same_point = gap <= 1.0, distance <= 1.0
-    worse = names[int(values[1] > values[0])]
     if not same_value:
-        text = _stuck(names, worse, values)
+        text = _text_of_stuck(names, values)
     elif not same_point:
-        text = _elsewhere(names, parameters, difference / sigma)
+        text = _text_of_ambiguity(names, parameters, difference / sigma)
     else:
         text = (
             f"{names[0]} and {names[1]} agree: the same objective ({values[0]:.4f} and "
             f"{values[1]:.4f}) and the same parameters within their uncertainty."
         )
-    return Verdict(
+    return Agreement(
         same_value and same_point, float(gap), difference / sigma, distance, text
     )
 
 
-def _stuck(names: tuple[str, str], worse: str, values: tuple[float, float]) -> str:
-    better = names[1] if worse == names[0] else names[0]
+def _text_of_stuck(names: tuple[str, str], values: tuple[float, float]) -> str:
+    worse, better = names if values[0] >= values[1] else names[::-1]
     return (
         f"{worse} is stuck: it ended at {max(values):.4f}, {better} at "
         f"{min(values):.4f}, which is more than noise explains. Take {better}'s "
@@ -90,13 +90,15 @@ def _stuck(names: tuple[str, str], worse: str, values: tuple[float, float]) -> s
     )
 
 
-def _elsewhere(names: tuple[str, str], parameters: Sequence[str], gap: Array) -> str:
-    """Says what differs, the most first."""
+def _text_of_ambiguity(
+    names: tuple[str, str], parameters: Sequence[str], gap: Array
+) -> str:
+    """Returns which parameters differ, the most first, and what to do."""
     order = [i for i in np.argsort(-np.abs(gap)) if abs(gap[i]) > 2.0][:3]
     listed = ", ".join(f"{parameters[i]} by {abs(gap[i]):.0f}" for i in order)
     return (
         f"{names[0]} and {names[1]} reach the same objective with different parameters "
-        f"(in standard deviations: {listed or 'all together'}): the log fixes these "
-        "less closely than the intervals say. Take the distance between the two as "
-        "the uncertainty, freeze one, or record motions that tell them apart."
+        f"(in standard deviations: {listed or 'all together'}): the log determines "
+        "these less precisely than the intervals say. Take the distance between the "
+        "two as the uncertainty, freeze one, or record motions that separate them."
     )

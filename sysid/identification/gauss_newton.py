@@ -1,4 +1,4 @@
-"""Downhill from a point: Levenberg and Marquardt within the box."""
+"""Gauss-Newton within the box, damped as by Levenberg and Marquardt."""
 
 from collections.abc import Callable
 
@@ -16,8 +16,8 @@ from sysid.objective import Objective
 Array = NDArray[np.float64]
 
 _DAMPING = (0.0, 1e-3, 1e-2, 1e-1, 1.0, 10.0)  # all tried at once, as one batch
-#: Of the objective, below which another iteration does not pay.
-GAIN = 1e-3
+#: Share of the objective that an iteration has to gain for another one to follow.
+MIN_GAIN = 1e-3
 
 
 def gauss_newton(
@@ -27,24 +27,24 @@ def gauss_newton(
     callback: Callable[[float], None] | None = None,
     start: Linearisation | None = None,
     central: bool = True,
-    pays: float = GAIN,
+    min_gain: float = MIN_GAIN,
 ) -> Linearisation:
-    """Returns the linearisation where Gauss-Newton steps from u lead to.
+    """Returns the linearisation at the point to which Gauss-Newton steps lead from u.
 
     Each step is SciPy's bounded linear least squares, weighted by Huber's weights
     and damped as by Levenberg and Marquardt; of six dampings, evaluated at once, the
-    best is taken. Not a search: it finds the bottom of the valley that it starts
-    in, and how wide that is.
+    best is taken. It finds the local optimum, and how sharp that is.
 
     Args:
         objective: to minimise.
         u: (p,) where to begin, in the unit box.
         iterations: at most.
-        callback: called with the value after each.
+        callback: called with the value before each.
         start: the linearisation at u, if it is known.
         central: whether differences are central, or one-sided at half the price; then
             damping is tried only where the full step does not help.
-        pays: the share of the objective that an iteration is to gain for another.
+        min_gain: share of the objective that an iteration has to gain for another one
+            to follow.
     """
     linearisation = linearise(objective, u, central=central) if start is None else start
     for _ in range(iterations if len(u) else 0):
@@ -59,7 +59,7 @@ def gauss_newton(
         linearisation = linearise(
             objective, point, fitting_steps(linearisation), central, residual
         )
-        if reached > (1.0 - pays) * value:
+        if reached > (1.0 - min_gain) * value:
             break
     return linearisation
 

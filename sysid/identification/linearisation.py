@@ -26,7 +26,7 @@ class Linearisation:
         residual: (rows, channels) in units of the noise.
         jacobian: (rows, channels, p) per range of the parameter.
         weights: (rows, channels) Huber's, 1 for all but outliers.
-        huber: where squares end, in units of the noise.
+        huber_delta: residual, in standard deviations, beyond which the loss is linear.
     """
 
     u: Array
@@ -67,8 +67,7 @@ def linearise(
         u: where.
         steps: (p,) of the differences, in the unit box.
         central: central differences, 2 p + 1 evaluations, one-sided at a bound; or
-            all one-sided, p + 1 evaluations, of what the objective has for
-            differences.
+            all one-sided, p + 1 evaluations, of the objective's `differences`.
         residual: (rows, channels) there, if it is known; saves an evaluation of
             one-sided differences.
     """
@@ -96,7 +95,7 @@ def extend(
     """Returns a linearisation with more parameters, one evaluation for each.
 
     Args:
-        here: of the first parameters, at this point.
+        linearisation: with the first parameters, at this point.
         objective: of all parameters, with the same residuals there.
         u: (p,) the point.
         steps: (k,) of the one-sided differences by the new ones, away from the bound
@@ -132,11 +131,11 @@ def _at(objective: Objective, u: Array, residual: Array | None) -> Linearisation
 
 
 def fitting_steps(linearisation: Linearisation) -> Array:
-    """Returns steps (p,) that the log can just notice, for the next linearisation.
+    """Returns steps (p,) that just show in the residuals, for the next linearisation.
 
-    A parameter that the log fixes to a millionth of its range needs a far smaller
-    step than one that it hardly fixes. Far from the optimum, where residuals are
-    large, contact comes and goes along a step, and a longer one sees past that.
+    A parameter that the log determines to a millionth of its range needs a far smaller
+    step than one that it hardly determines. Far from the optimum, where residuals are
+    large, contact is made and lost along a step; a longer step averages over that.
     """
     level = np.sqrt(np.mean(linearisation.weights * linearisation.residual**2))
     J, w = linearisation.jacobian, linearisation.weights

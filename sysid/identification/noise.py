@@ -1,4 +1,4 @@
-"""The noise of channels that nobody stated: from the residual of a first fit."""
+"""Noise that is not stated, estimated from the residual of a first fit."""
 
 from collections.abc import Sequence
 
@@ -17,9 +17,9 @@ def with_estimated_noise(
 ) -> LogModel:
     """Returns the model with each unknown noise taken from a fit's residual.
 
-    Weighted least squares as usual for arms: all channels of one unit count alike in
-    a first fit, and then each by its own residual there. (Done again and again, the
-    channel that happens to fit best would outvote the rest.) What the model lacks
+    Weighted least squares as usual for arms: all channels of one unit have the same
+    weight in a first fit, and then each that of its own residual there. (Iterated, the
+    channel that happens to fit best would outweigh the others.) What the model lacks
     counts as noise here, so the objective ends near 1 by construction and says
     nothing about the model; look at the residual's whiteness instead.
     """

@@ -4,11 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from sysid.identification.result import Comparison, Identified, MethodResult
+from sysid.identification.result import Comparison, Identification, MethodResult
 
 
-def to_mapping(found: Identified) -> dict[str, Any]:
+def to_mapping(found: Identification) -> dict[str, Any]:
     """Returns everything that a program may want of a result."""
+    names = found.sensitivity_after.names
     return {
         "parameters": _parameters(found),
         "frozen": found.frozen,
@@ -18,27 +19,27 @@ def to_mapping(found: Identified) -> dict[str, Any]:
         },
         "objective": _objective(found),
         "channels": _channels(found),
-        "correlation": found.spread.correlation.tolist(),
+        "correlation": found.uncertainty.correlation.tolist(),
         "identifiability": [
-            {"combination": c.text(found.after.names), "interval_95": c.interval}
-            for c in found.after.combinations
+            {"combination": c.text(names), "interval_95": c.interval}
+            for c in found.sensitivity_after.combinations
         ],
-        "best_method": found.best,
+        "best_method": found.best_method,
         "methods": {name: _method(found, m) for name, m in found.methods.items()},
-        "verdict": _verdict(found),
+        "verdict": _agreement(found),
         "profiles": [
             {"parameter": p.name, "values": p.theta.tolist(),
              "objective": p.values.tolist(), "edge_95": p.edge}
             for p in found.profiles
         ],
-        "block_rows": found.spread.block,
+        "block_rows": found.uncertainty.block,
         "evaluations": found.evaluations,
         "failed_simulations": found.failures,
         "notes": found.notes,
     }  # fmt: skip
 
 
-def summary(found: Identified) -> str:
+def summary(found: Identification) -> str:
     """Returns the result as a table for a terminal."""
     width = max(len(p.name) for p in found.parameters)
     head = f"{'parameter':{width}} {'start':>11} {'identified':>11}  95 % interval"
@@ -57,9 +58,9 @@ def summary(found: Identified) -> str:
     lines.append(_fit_line("fitted rows", found.fitted))
     if found.held_out:
         lines.append(_fit_line("held-out rows", found.held_out))
-    lines.append(f"a perfect model would reach {found.floor:.3f}")
-    if found.verdict:
-        lines.append(found.verdict.text)
+    lines.append(f"a perfect model would reach {found.noise_floor:.3f}")
+    if found.agreement:
+        lines.append(found.agreement.text)
     return "\n".join(lines + [f"note: {note}" for note in found.notes])
 
 
@@ -70,7 +71,7 @@ def _fit_line(label: str, comparison: Comparison) -> str:
     )
 
 
-def _parameters(found: Identified) -> dict[str, Any]:
+def _parameters(found: Identification) -> dict[str, Any]:
     return {
         p.name: {
             "value": float(found.theta[i]),
@@ -79,19 +80,19 @@ def _parameters(found: Identified) -> dict[str, Any]:
             "bounds": [p.low, p.high],
             "log_scale": p.log_scale,
             "meaning": p.doc,
-            "interval_95_gauss_newton": found.interval_gn[i].tolist(),
+            "interval_95_gauss_newton": found.interval_gauss_newton[i].tolist(),
             "interval_95_bootstrap": found.interval_bootstrap[i].tolist(),
-            "effect_over_range": float(found.after.effect[i]),
+            "effect_over_range": float(found.sensitivity_after.effect[i]),
         }
         for i, p in enumerate(found.parameters)
     }
 
 
-def _objective(found: Identified) -> dict[str, Any]:
+def _objective(found: Identification) -> dict[str, Any]:
     units = [channel.unit for channel in found.channels]
     rows = {"fitted": found.fitted, "held_out": found.held_out}
     return {
-        "noise_floor": found.floor,
+        "noise_floor": found.noise_floor,
         **{
             name: {
                 "rows": len(c.measured),
@@ -107,7 +108,7 @@ def _objective(found: Identified) -> dict[str, Any]:
     }
 
 
-def _channels(found: Identified) -> dict[str, Any]:
+def _channels(found: Identification) -> dict[str, Any]:
     fitted, held = found.fitted, found.held_out
     table = {
         "rms_before": fitted.rms(fitted.before),
@@ -129,25 +130,25 @@ def _channels(found: Identified) -> dict[str, Any]:
     }
 
 
-def _method(found: Identified, method: MethodResult) -> dict[str, Any]:
+def _method(found: Identification, method: MethodResult) -> dict[str, Any]:
     scaling = {p.name: p for p in found.parameters}
     return {
         "objective": method.value,
         "unit_box": dict(zip(scaling, method.u.tolist(), strict=True)),
         "parts": {
-            part.name: {
-                "rows": part.rows,
-                "evaluations": part.trace.evaluations,
-                "stopped": part.trace.stopped,
-                "best_so_far": part.trace.best_so_far().tolist(),
+            stage.name: {
+                "rows": stage.rows,
+                "evaluations": stage.trace.evaluations,
+                "stopped": stage.trace.stopped,
+                "best_so_far": stage.trace.best_so_far().tolist(),
             }
-            for part in method.parts
+            for stage in method.stages
         },
     }
 
 
-def _verdict(found: Identified) -> dict[str, Any] | None:
-    v = found.verdict
+def _agreement(found: Identification) -> dict[str, Any] | None:
+    v = found.agreement
     if v is None:
         return None
     return {

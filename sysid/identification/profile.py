@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from sysid import confidence
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.objective import Objective
 from sysid.workers import Workers
@@ -38,7 +39,7 @@ def profile(
     name: str,
     half_width: float,
     points: int = 7,
-    callback: Callable[[int], None] | None = None,
+    callback: Callable[[int, int], None] | None = None,
 ) -> Profile:
     """Returns the profile of a parameter about an optimum.
 
@@ -47,9 +48,9 @@ def profile(
         workers: to evaluate with.
         u: (p,) the optimum in the unit box.
         name: of the parameter.
-        half_width: how far to go to each side, in the unit box.
+        half_width: of the interval of values, in the unit box.
         points: how many values.
-        callback: called with the number of points that are done.
+        callback: called with the number of points that are done, and of all.
     """
     model = objective.model
     number = [p.name for p in model.parameters].index(name)
@@ -64,10 +65,10 @@ def profile(
         rest = Objective(model.freeze({name: theta}), workers, objective.huber_delta)
         values.append(_fitted(rest, np.delete(there, number)))
         if callback:
-            callback(i + 1)
+            callback(i + 1, points)
     thetas = u + (held[:, None] - u[number]) * np.eye(len(u))[number]
     size = model.measurements.values.size
-    edge = best * np.sqrt(1.0 + chi2.ppf(0.95, 1) / size)
+    edge = best * np.sqrt(1.0 + chi2.ppf(confidence.LEVEL, 1) / size)
     return Profile(
         name,
         objective.scaling.from_unit(thetas)[:, number],

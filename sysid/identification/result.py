@@ -1,24 +1,27 @@
 """What an identification found."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.identification.agreement import Verdict
+from drake_disasm.scenario import Scenario
+from sysid.identification.agreement import Agreement
 from sysid.identification.profile import Profile
 from sysid.identification.sensitivity import Sensitivity
 from sysid.identification.uncertainty import Uncertainty
-from sysid.models.base import Channel
+from sysid.models.base import LogModel
+from sysid.models.measurements import Channel
 from sysid.optimise.trace import Trace
-from sysid.parameters import Parameter
+from sysid.parameters import Parameter, Scaling, by_name
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class SearchPart:
-    """One part of a method's search.
+class SearchStage:
+    """One stage of a method's search.
 
     Attributes:
         name: such as "bees, global".
@@ -37,20 +40,20 @@ class MethodResult:
 
     Attributes:
         name: "bees" or "nlopt".
-        parts: of the search, in order.
+        stages: of the search, in order.
         u: (p,) its optimum in the unit box.
         value: of the objective on all fitted rows.
     """
 
     name: str
-    parts: tuple[SearchPart, ...]
+    stages: tuple[SearchStage, ...]
     u: Array
     value: float
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One set of rows, before and after the fit.
+    """Measurements and predictions of some rows, before and after the fit.
 
     Attributes:
         measured, before, after: (rows, channels), SI.
@@ -77,7 +80,9 @@ class Comparison:
         error = np.linalg.norm(predicted - self.measured, axis=0)
         return error / np.maximum(norm, 1e-300)
 
-    def relative_errors(self, predicted: Array, units: list[str]) -> dict[str, float]:
+    def relative_errors(
+        self, predicted: Array, units: Sequence[str]
+    ) -> dict[str, float]:
         """Returns the same over all channels of each unit."""
         found = {}
         for unit in dict.fromkeys(units):
@@ -89,50 +94,85 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Identified:
-    """The whole result; all arrays of p are over `parameters`.
+class Identification:
+    """What was identified, and how reliable it is.
+
+    All arrays of p are over `parameters`; the unit box [0, 1]^p is theirs, scaled.
 
     Attributes:
-        parameters: that were fitted.
-        frozen: those that were not, by choice, and their values.
-        channels: with the noise that weighted them.
-        start, theta: (p,) values before and after.
-        u: (p,) the result in the unit box.
-        interval_gn, interval_bootstrap: (p, 2) 95 % intervals.
-        spread: in the unit box.
-        before, after: what the log can say, at the start and at the result.
-        methods: by name.
-        best: name of the one whose values are taken.
-        verdict: of two methods.
-        profiles: those that were asked for.
-        fitted, held_out: predictions before and after; None without held-out rows.
+        model: of the whole log, with what was frozen and with estimated noise.
+        frozen: values of parameters that were not fitted because the log does not
+            determine them, by name.
+        start, theta: (p,) values before and after, SI.
+        u: (p,) theta in the unit box.
+        uncertainty: of the estimate, in the unit box.
+        sensitivity_before, sensitivity_after: what the log determines, by the
+            derivatives at the start and at the result.
+        methods: where each method ended, by name.
+        best_method: name of the one whose values are taken.
+        agreement: of the two methods; None where one ran.
+        profiles: profile likelihoods that were asked for.
+        fitted, held_out: measured and predicted rows; None if none were held out.
         whiteness: (channels,) p-values of Ljung-Box on the fitted rows.
-        floor: value of the objective for a perfect model.
+        noise_floor: value of the objective for a perfect model.
         derived: quantities computed from theta: value, unit, 95 % interval.
         evaluations, failures: parameter sets simulated, and those that failed.
-        notes: what a reader should know.
+        notes: warnings for the reader.
     """
 
-    parameters: tuple[Parameter, ...]
+    model: LogModel
     frozen: dict[str, float]
-    channels: tuple[Channel, ...]
     start: Array
     theta: Array
     u: Array
-    interval_gn: Array
-    interval_bootstrap: Array
-    spread: Uncertainty
-    before: Sensitivity
-    after: Sensitivity
+    uncertainty: Uncertainty
+    sensitivity_before: Sensitivity
+    sensitivity_after: Sensitivity
     methods: dict[str, MethodResult]
-    best: str
-    verdict: Verdict | None
+    best_method: str
+    agreement: Agreement | None
     profiles: tuple[Profile, ...]
     fitted: Comparison
     held_out: Comparison | None
     whiteness: Array
-    floor: float
+    noise_floor: float
     derived: dict[str, tuple[float, str, tuple[float, float]]]
     evaluations: int
     failures: int
     notes: list[str] = field(default_factory=list)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The parameters that were fitted."""
+        return self.model.parameters
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The channels, with the noise that weighted them."""
+        return self.model.measurements.channels
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The identified values by the parameters' names, SI."""
+        return dict(by_name(self.parameters, self.theta))
+
+    @property
+    def scenario(self) -> Scenario | None:
+        """The identified scenario; None if the model has none."""
+        return self.model.scenario_at(self.theta)
+
+    @property
+    def interval_gauss_newton(self) -> Array:
+        """95 % intervals (p, 2), SI, that assume white residuals."""
+        return self._interval(self.uncertainty.gauss_newton)
+
+    @property
+    def interval_bootstrap(self) -> Array:
+        """95 % intervals (p, 2), SI, right for residuals that are correlated."""
+        return self._interval(self.uncertainty.bootstrap)
+
+    def _interval(self, relative: Array) -> Array:
+        """Returns intervals (p, 2) about u, in the unit box, as ones of parameters."""
+        ends = np.clip(self.u[:, None] + relative, 0.0, 1.0)
+        scaling = Scaling(self.parameters)
+        return np.column_stack([scaling.from_unit(side) for side in ends.T])

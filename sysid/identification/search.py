@@ -1,72 +1,39 @@
-"""One method's way to the optimum: globally on few rows, then closely on all.
+"""One method's way to the optimum: globally on few rows, then locally on all.
 
-The measured optimum of a five-parameter fit is a valley a ten-thousandth of the box
-wide. A global search finds the region of it, and needs no more than some sixty rows
-for that, at a tenth of the time. A descent follows, on more and more rows, and gives
-coordinates in which the valley is round, where the method searches again, on all rows.
+The optimum of a five-parameter fit, measured, is a valley a ten-thousandth of the box
+wide. A global search finds its region, for which some sixty rows suffice, at a tenth of
+the time. Gauss-Newton descends from there on more and more rows, and its covariance
+gives coordinates in which the valley is round: the method searches there again, on all
+rows.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.identification.journal import Journal
 from sysid.identification.linearisation import Linearisation
-from sysid.identification.result import MethodResult, SearchPart
+from sysid.identification.result import MethodResult, SearchStage
+from sysid.identification.settings import POLISH_SHARE, SearchSettings
 from sysid.objective import Objective
-from sysid.optimise.bees import BeesAlgorithm, BeesSettings, Propose, Stop
+from sysid.optimise.bees import BeesAlgorithm, Stop
 from sysid.optimise.coordinates import BatchFunction, Box, Whitened
 from sysid.optimise.nlopt_search import nlopt_search
 from sysid.optimise.trace import Trace
 
 Array = NDArray[np.float64]
 
-METHODS = ("bees", "nlopt")
-
-_POLISH = 0.25  # part of a search that SBPLX gets at its end
-_STARTS = 6  # of descents: the lowest point found need not lie in the right valley
-_HALVING = ((2, 3), (1, 15))  # so many of them go on after so many iterations
+_STARTS = 6  # of descents: the best point found need not lie in the right valley
+_HALVING = ((2, 3), (1, 15))  # (how many go on, after how many iterations)
 _ITERATIONS = 10  # of a descent on more rows
 _LAST_ITERATIONS = 4  # on all of them
-_APART = 0.25  # of the box, between them
-_WHITENED_STEP = 0.05  # SBPLX's first step over the box of z
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How hard a method tries.
-
-    Attributes:
-        evaluations: of the global search, polish included.
-        cycles: of the bees, instead; NLopt then gets as many evaluations.
-        close: evaluations of the close search on all rows; 0 leaves it and
-            Gauss-Newton out, and searches globally on all rows (the thesis's way).
-        bees: the colony.
-        seed: of the searches.
-        propose: a surrogate's proposals in place of scouts, for the bees.
-    """
-
-    evaluations: int = 400
-    cycles: int | None = None
-    close: int = 40
-    bees: BeesSettings = field(default_factory=BeesSettings)
-    seed: int = 0
-    propose: Propose | None = None
-
-    @property
-    def budget(self) -> int:
-        """Evaluations of the global search, whatever limits it."""
-        if self.cycles is None:
-            return self.evaluations
-        bees = self.bees.initial + (self.cycles) * self.bees.per_cycle
-        return int(np.ceil(bees / (1.0 - _POLISH)))
-
-
-#: Called after each batch: part, evaluations done, evaluations in all, best value.
-News = Callable[[str, int, int, float], None]
+_MIN_DISTANCE = 0.25  # of the box, between starts
+_GLOBAL_STEP = 0.1  # of the box, SBPLX's first
+_WHITENED_STEP = 0.05  # of the box of z, SBPLX's first
 
 
 @dataclass(frozen=True)
@@ -85,96 +52,96 @@ class _Valley:
 
 
 class Search:
-    """Runs one method; each part's evaluations go through the journal."""
+    """Runs one method; a journal keeps what each stage evaluates."""
 
     def __init__(
         self,
         method: str,
-        ladder: Sequence[Objective],
-        effort: Effort,
-        journal: Journal,
-        news: News,
+        objectives: Sequence[Objective],
+        settings: SearchSettings | None = None,
+        journal: Journal | None = None,
+        progress: Progress = ignore_progress,
     ) -> None:
         """Prepares a search.
 
         Args:
             method: one of METHODS.
-            ladder: the objective on few rows, on more, and last on all of them.
-            effort: how hard to try.
-            journal: keeps what was evaluated.
-            news: called while it works.
+            objectives: the objective on few rows, on more, and last on all of them.
+            settings: how to search.
+            journal: keeps what was evaluated, to resume; None keeps nothing.
+            progress: called while it works.
         """
-        self._method, self._full, self._effort = method, ladder[-1], effort
-        self._ladder = tuple(ladder) if effort.close else (ladder[-1],)
-        self._journal, self._news = journal, news
+        self._settings = settings or SearchSettings()
+        self._method, self._full = method, objectives[-1]
+        self._objectives = (
+            tuple(objectives) if self._settings.local_evaluations else (self._full,)
+        )
+        self._journal, self._progress = journal, progress
 
     def run(self) -> MethodResult:
         """Returns where the method ends."""
-        part = self._part("global", self._ladder[0])
-        if not self._effort.close:
-            best = part.trace.best, part.trace.best_value
-            return MethodResult(self._method, (part,), *best)
-        valley = self._descended(_starts(part.trace))
-        close = self._close(valley)
+        stage = self._global(self._objectives[0])
+        if not self._settings.local_evaluations:
+            best = stage.trace.best, stage.trace.best_value
+            return MethodResult(self._method, (stage,), *best)
+        valley = self._descended(_starts(stage.trace))
+        local = self._local(valley)
         u, value = valley.u, valley.value
-        if close.trace.best_value < value:
-            u, value = close.trace.best, close.trace.best_value
-        return MethodResult(self._method, (part, close), u, value)
+        if local.trace.best_value < value:
+            u, value = local.trace.best, local.trace.best_value
+        return MethodResult(self._method, (stage, local), u, value)
 
-    def _part(self, name: str, objective: Objective) -> SearchPart:
+    def _global(self, objective: Objective) -> SearchStage:
         """Searches the unit box."""
         box = Box.unit(len(self._full.model.parameters))
-        label = f"{self._method}, {name}"
+        label = f"{self._method}, global"
         function = self._function(label, objective)
-        trace = self._searched(label, function, box, self._effort.budget, 0.1)
-        return SearchPart(label, objective.model.measurements.rows, trace)
+        budget = self._settings.budget
+        trace = self._searched(label, function, box, budget, _GLOBAL_STEP)
+        return SearchStage(label, objective.model.measurements.rows, trace)
 
     def _descended(self, starts: list[Array]) -> _Valley:
-        """Goes down from several points on few rows, from the lowest end on more."""
-        name = f"{self._method}, descent"
-        kept = self._journal.stage(name)
+        """Descends from several points on few rows, from the lowest end on more."""
+        label = f"{self._method}, descent"
+        kept = self._journal.stage(label) if self._journal else None
         if kept is not None:
             u, value, factor = kept
             return _Valley(np.array(u), value, np.array(factor))
+        valley = self._descend(starts, _Counter(label, self._progress))
+        if self._journal:
+            kept = [valley.u.tolist(), valley.value, valley.factor.tolist()]
+            self._journal.finish(label, kept)
+        return valley
 
-        def tell(value: float) -> None:
-            """Passes the news on."""
-            self._news(name, 0, 0, value)
-
-        first, *others = self._ladder
+    def _descend(self, starts: list[Array], report: Callable[[float], None]) -> _Valley:
+        first, *others = self._objectives
         for count, iterations in _HALVING:
-            valleys = [gauss_newton(first, u, iterations, tell) for u in starts]
-            valleys.sort(key=lambda linearisation: first.value(linearisation.residual))
-            starts = [linearisation.u for linearisation in valleys[:count]]
-        linearisation = valleys[0]
+            ends = [gauss_newton(first, u, iterations, report) for u in starts]
+            ends.sort(key=lambda linearisation: first.value(linearisation.residual))
+            starts = [linearisation.u for linearisation in ends[:count]]
+        linearisation = ends[0]
         for objective in others:
             last = objective is self._full
             iterations = _LAST_ITERATIONS if last else _ITERATIONS
-            linearisation = gauss_newton(objective, linearisation.u, iterations, tell)
-        valley = _Valley(
-            linearisation.u,
-            self._full.value(linearisation.residual),
-            _factor(linearisation),
-        )
-        self._journal.finish(
-            name, [valley.u.tolist(), valley.value, valley.factor.tolist()]
-        )
-        return valley
+            linearisation = gauss_newton(objective, linearisation.u, iterations, report)
+        value = self._full.value(linearisation.residual)
+        return _Valley(linearisation.u, value, _factor(linearisation))
 
-    def _close(self, valley: _Valley) -> SearchPart:
+    def _local(self, valley: _Valley) -> SearchStage:
         """Searches on all rows in coordinates whitened by the linearisation."""
-        label = f"{self._method}, close"
+        label = f"{self._method}, local"
         box = Box.unit(len(valley.u))
         scale = max(valley.value, 1e-9)
         white = Whitened(valley.u, scale * valley.factor, box)
         function = white.wrap(self._function(label, self._full))
         centre = np.zeros((1, len(valley.u)))
+        budget = self._settings.local_evaluations
         found = self._searched(
-            label, function, white.box, self._effort.close, _WHITENED_STEP, centre
+            label, function, white.box, budget, _WHITENED_STEP, centre
         )
         points = [white.to_x(z) for z in found.points]
         trace = Trace(points, found.values, found.cycle_ends, found.stopped)
-        return SearchPart(label, self._full.model.measurements.rows, trace)
+        return SearchStage(label, self._full.model.measurements.rows, trace)
 
     def _searched(
         self,
@@ -188,23 +155,26 @@ class Search:
         """Spends a budget: the method, then SBPLX from its best.
 
         Args:
-            label: of this part.
+            label: of this stage.
             function: to minimise.
             box: to search.
             budget: evaluations.
             step: SBPLX's first, over the box.
             start: (1, p) a point that is known to be good.
         """
-        polish = int(_POLISH * budget)
+        polish = int(POLISH_SHARE * budget)
 
-        def tell(trace: Trace) -> None:
-            """Passes the news on."""
-            self._news(label, trace.evaluations, budget, trace.best_value)
+        def report(trace: Trace) -> None:
+            """Passes on how far the stage is."""
+            done, value = trace.evaluations, trace.best_value
+            self._progress(ProgressUpdate(label, done, budget, value=value))
 
-        trace = self._explored(function, box, budget - polish, start, tell)
+        trace = self._explored(function, box, budget - polish, start, report)
         left = budget - trace.evaluations
         best = trace.best if trace.evaluations else None
-        return nlopt_search(function, box, "LN_SBPLX", left, best, 0, step, trace, tell)
+        return nlopt_search(
+            function, box, "LN_SBPLX", left, best, 0, step, trace, report
+        )
 
     def _explored(
         self,
@@ -212,23 +182,41 @@ class Search:
         box: Box,
         budget: int,
         start: Array | None,
-        tell: Callable[[Trace], None],
+        report: Callable[[Trace], None],
     ) -> Trace:
-        effort = self._effort
+        """Returns what the method itself evaluates."""
+        settings = self._settings
         if self._method == "nlopt":
             first = None if start is None else start[0]
+            seed = settings.seed
             return nlopt_search(
-                function, box, "GN_CRS2_LM", budget, first, effort.seed, callback=tell
+                function, box, "GN_CRS2_LM", budget, first, seed, callback=report
             )
-        bees = BeesAlgorithm(box, effort.bees, effort.seed, effort.propose, start)
+        bees = BeesAlgorithm(box, settings.bees, settings.seed, settings.propose, start)
         stop = Stop(evaluations=budget)
-        return bees.run(function, stop=stop, callback=lambda b: tell(b.trace))
+        return bees.run(function, stop=stop, callback=lambda b: report(b.trace))
 
     def _function(self, label: str, objective: Objective) -> BatchFunction:
+        """Returns the objective over the unit box, through the journal."""
         scaling = objective.scaling
-        return self._journal.remembered(
-            label, lambda u: objective(scaling.from_unit(u))
-        )
+
+        def function(u: Array) -> Array:
+            """Returns the values (b,) of points (b, p) of the unit box."""
+            return objective(scaling.from_unit(u))
+
+        return self._journal.remembered(label, function) if self._journal else function
+
+
+class _Counter:
+    """Reports the iterations of a stage."""
+
+    def __init__(self, stage: str, progress: Progress) -> None:
+        self._stage, self._progress, self._done = stage, progress, 0
+
+    def __call__(self, value: float) -> None:
+        """Reports one more, and its value."""
+        self._done += 1
+        self._progress(ProgressUpdate(self._stage, self._done, value=value))
 
 
 def _starts(trace: Trace) -> list[Array]:
@@ -236,7 +224,7 @@ def _starts(trace: Trace) -> list[Array]:
     chosen: list[Array] = []
     for i in np.argsort(trace.values, kind="stable"):
         point = trace.points[i]
-        if all(np.abs(point - other).max() > _APART for other in chosen):
+        if all(np.abs(point - other).max() > _MIN_DISTANCE for other in chosen):
             chosen.append(point)
         if len(chosen) == _STARTS:
             break
@@ -244,7 +232,7 @@ def _starts(trace: Trace) -> list[Array]:
 
 
 def _factor(linearisation: Linearisation) -> Array:
-    """Returns L with L L^T the covariance, no direction wider than half the box."""
+    """Returns L with L L^T the covariance; no standard deviation above 0.1."""
     values, vectors = np.linalg.eigh(linearisation.information)
     width = 1.0 / np.sqrt(np.maximum(values, 1e-300))
     factor: Array = vectors * np.minimum(width, 0.1)

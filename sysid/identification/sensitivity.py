@@ -1,4 +1,4 @@
-"""Before a fit: does every parameter reach the model, and can this log fix it?"""
+"""Does every parameter affect the predictions, and does this log determine it?"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid import confidence
 from sysid.identification.linearisation import (
     FIRST_STEP,
     WIDE_STEP,
@@ -17,14 +18,14 @@ from sysid.parameters import Parameter
 
 Array = NDArray[np.float64]
 
-#: A combination that the log fixes no better than to this part of its range, with 95 %
-#: confidence and a perfect model, is one that the log does not fix.
+#: Half width of the 95 % interval, over the parameters' range, beyond which the log
+#: does not determine a combination even for a perfect model.
 LOOSE = 0.5
 
 _PROBES = (0.05, 0.5, 0.95)  # of the range, where a parameter without slope is tried
 _NAMED = 0.3  # least share of a parameter in a combination that is named
 _WEAK = 0.02  # rms change over a step, in units of the noise, to look at a wider one
-_SILENT = 1e-9  # rms change, in units of the noise, that is none
+_SILENT = 1e-9  # rms change, in units of the noise, that counts as none
 
 
 @dataclass(frozen=True)
@@ -41,11 +42,11 @@ class Combination:
 
     @property
     def loose(self) -> bool:
-        """Whether the log does not fix it."""
+        """Whether the log does not determine it."""
         return self.interval > LOOSE
 
     def text(self, names: Sequence[str]) -> str:
-        """Returns it in words: the parameters that have a share in it, signed."""
+        """Returns its largest weights, signed, with the parameters' names."""
         order = np.argsort(-np.abs(self.weights))
         sign = np.sign(self.weights[order[0]])
         parts = [
@@ -58,14 +59,15 @@ class Combination:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What a log can say about parameters, at one point.
+    """What a log says about parameters, by the derivatives at one point.
 
     Attributes:
         names: of the parameters.
         effect: (p,) rms change of the residuals over a parameter's range, in units
             of the noise, by the slope at the point.
         silent: names of those that change nothing anywhere in their range.
-        combinations: orthogonal directions, the best fixed first, without the silent.
+        combinations: orthogonal directions, the best determined first, without the
+            silent parameters.
     """
 
     names: tuple[str, ...]
@@ -75,19 +77,19 @@ class Sensitivity:
 
     @property
     def loose(self) -> tuple[Combination, ...]:
-        """The combinations that the log does not fix."""
+        """The combinations that the log does not determine."""
         return tuple(c for c in self.combinations if c.loose)
 
     @property
     def complaints(self) -> list[str]:
-        """Returns a line for each thing that the log can't tell."""
+        """Returns a line for each parameter or combination that is not determined."""
         lines = [
             f"{name}: has no effect on this log's channels anywhere within its bounds"
             for name in self.silent
         ]
         names = self.names
         return lines + [
-            f"{c.text(names)}: this log fixes the combination only to "
+            f"{c.text(names)}: this log determines the combination only to "
             f"+-{100 * c.interval:.0f} % of its range"
             for c in self.loose
         ]
@@ -103,7 +105,7 @@ class Sensitivity:
 
 
 def sensitivity(objective: Objective, u: Array) -> Sensitivity:
-    """Returns what the log can say at a point (p,) of the unit box."""
+    """Returns what the log says about parameters at a point (p,) of the unit box."""
     linearisation = linearise(objective, u)
     weak = linearisation.effect * 2.0 * FIRST_STEP < _WEAK
     if weak.any():
@@ -119,7 +121,7 @@ def of_linearisation(
     parameters: Sequence[Parameter],
     silent: Sequence[str] = (),
 ) -> Sensitivity:
-    """Returns what derivatives that are there already say."""
+    """Returns the same from derivatives that are known already."""
     names = tuple(p.name for p in parameters)
     active = np.array([name not in silent for name in names])
     return Sensitivity(
@@ -140,7 +142,9 @@ def _combinations(
     for size, row in zip(s, Vt, strict=True):
         weights = np.zeros(len(active))
         weights[active] = row
-        combinations.append(Combination(weights, float(1.96 / max(size, 1e-300))))
+        combinations.append(
+            Combination(weights, float(confidence.Z / max(size, 1e-300)))
+        )
     return tuple(combinations)
 
 

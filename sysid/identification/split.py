@@ -1,4 +1,4 @@
-"""Which episodes are fitted, and which are kept to judge the fit."""
+"""Which episodes are fitted, and which are held out to judge the fit."""
 
 from collections.abc import Sequence
 

@@ -1,16 +1,16 @@
-"""How sure the values are: two intervals, one of which asks for no whiteness."""
+"""How certain an estimate is: intervals for white and for correlated residuals."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid import confidence
 from sysid.identification.linearisation import Linearisation
 
 Array = NDArray[np.float64]
 
 _DRAWS = 2000
-_Z95 = 1.959963984540054
 _SMALL = 1e-2  # of the largest channel's power
 
 
@@ -19,11 +19,11 @@ class Uncertainty:
     """Spread of an estimate, in the unit box.
 
     Attributes:
-        covariance: (p, p) by Gauss-Newton: right if residuals are white, however
-            large they are in each channel.
-        curvature: (p, p) what the objective's curvature alone says: right if all
-            channels are alike, too.
-        draws: (b, p) block bootstrap of the estimate: right if residuals further
+        covariance: (p, p) by Gauss-Newton: valid if residuals are white, whatever
+            their size in each channel.
+        curvature: (p, p) by the objective's curvature alone: valid if residuals of
+            all channels have the same variance, too.
+        draws: (b, p) block bootstrap of the estimate: valid if residuals further
             apart than a block are independent.
         block: length of a block in rows.
     """
@@ -36,13 +36,13 @@ class Uncertainty:
     @property
     def gauss_newton(self) -> Array:
         """95 % intervals (p, 2) by the covariance, relative to the estimate."""
-        half = _Z95 * np.sqrt(np.diagonal(self.covariance))
+        half = confidence.Z * np.sqrt(np.diagonal(self.covariance))
         return np.column_stack([-half, half])
 
     @property
     def bootstrap(self) -> Array:
         """95 % intervals (p, 2) by the bootstrap, relative to the estimate."""
-        return np.quantile(self.draws, [0.025, 0.975], axis=0).T
+        return np.quantile(self.draws, confidence.QUANTILES, axis=0).T
 
     @property
     def bootstrap_covariance(self) -> Array:
@@ -60,14 +60,14 @@ class Uncertainty:
 def uncertainty(
     linearisation: Linearisation, episode: NDArray[np.int64], seed: int = 0
 ) -> Uncertainty:
-    """Returns the spread of the estimate at which residuals were linearised.
+    """Returns the uncertainty of the estimate at which residuals were linearised.
 
     The bootstrap draws blocks of rows with replacement, and takes one weighted
     Gauss-Newton step for each draw: no simulation is needed. A block is twice as
     long as residuals stay correlated.
 
     Args:
-        here: at the estimate.
+        linearisation: at the estimate.
         episode: (rows,) of each row; a block never spans two.
         seed: of the draws.
     """
@@ -86,8 +86,8 @@ def block_length(residual: Array, episode: NDArray[np.int64]) -> int:
     """Returns twice the rows over which residuals (rows, channels) are correlated.
 
     The longest over channels of the integrated autocorrelation time, summed until
-    it first falls below 0.05; at most a tenth of the rows. A channel that is fitted
-    far better than the others moves no estimate, and does not count.
+    it first falls below 0.05; at most a tenth of the rows. A channel with far less
+    power than the others has no weight in the estimate, and does not count.
     """
     limit = max(1, len(residual) // 10)
     longest = 1.0
@@ -127,7 +127,7 @@ def _white(linearisation: Linearisation, inverse: Array) -> Array:
     """Returns the covariance (p, p) of an estimate from white residuals.
 
     H^-1 (sum_c s_c^2 J_c^T J_c) H^-1 with H = J^T W J and s_c^2 = mean (w r)^2 of
-    channel c (Huber 1981, 7.6); s^2 H^-1 where all channels are alike.
+    channel c (Huber 1981, 7.6); s^2 H^-1 where all channels have the same power.
     """
     J, w, r = linearisation.jacobian, linearisation.weights, linearisation.residual
     dof = max(1, r.size - len(linearisation.u))

@@ -1,4 +1,4 @@
-"""Does a residual look like noise? The Ljung-Box test, per channel."""
+"""The Ljung-Box test: is a residual white noise?"""
 
 import numpy as np
 from numpy.typing import NDArray

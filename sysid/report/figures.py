@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from sysid.identification.profile import Profile
-from sysid.identification.result import Comparison, Identified, MethodResult
-from sysid.models.base import Channel
+from sysid.identification.result import Comparison, Identification, MethodResult
+from sysid.identification.sensitivity import LOOSE
+from sysid.models.measurements import Channel
 
 Array = NDArray[np.float64]
 
@@ -73,13 +74,13 @@ def residual_figure(comparison: Comparison, channels: Sequence[Channel]) -> Figu
 
 def trace_figure(methods: Sequence[MethodResult], floor: float) -> Figure:
     """Returns best value against evaluations, as the thesis's figure 4.6."""
-    names = [part.name.split(", ")[1] for part in methods[0].parts]
+    names = [stage.name.split(", ")[1] for stage in methods[0].stages]
     figure = Figure(figsize=(4.4 * len(names), 3.2), layout="constrained")
     for number, ax in enumerate(np.atleast_1d(figure.subplots(1, len(names)))):
         for method in methods:
             _draw_trace(ax, method, number)
         ax.axhline(floor, color=_MEASURED, lw=0.8, ls="--", label="perfect model")
-        rows = methods[0].parts[number].rows
+        rows = methods[0].stages[number].rows
         ax.set_title(f"{names[number]} search, {rows} rows", fontsize=9)
         ax.set_yscale("log")
         ax.set_xlabel("evaluations", fontsize=9)
@@ -88,13 +89,13 @@ def trace_figure(methods: Sequence[MethodResult], floor: float) -> Figure:
     return figure
 
 
-def correlation_figure(found: Identified) -> Figure:
+def correlation_figure(found: Identification) -> Figure:
     """Returns the correlation of the estimates as a coloured matrix."""
     names = [p.name for p in found.parameters]
     size = min(3.0 + 0.45 * len(names), 12.0)
     figure = Figure(figsize=(size + 1.0, size), layout="constrained")
     ax = figure.subplots()
-    C = found.spread.correlation
+    C = found.uncertainty.correlation
     image = ax.imshow(C, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
     figure.colorbar(image, ax=ax, shrink=0.7)
     ax.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
@@ -107,21 +108,21 @@ def correlation_figure(found: Identified) -> Figure:
     return figure
 
 
-def identifiability_figure(found: Identified) -> Figure:
-    """Returns how closely the log fixes each orthogonal combination."""
+def identifiability_figure(found: Identification) -> Figure:
+    """Returns how precisely the log determines each orthogonal combination."""
     figure = Figure(figsize=(6.5, 2.6), layout="constrained")
     ax = figure.subplots()
     for label, sensed, colour in (
-        ("at the start", found.before, _BEFORE),
-        ("at the result", found.after, _AFTER),
+        ("at the start", found.sensitivity_before, _BEFORE),
+        ("at the result", found.sensitivity_after, _AFTER),
     ):
         widths = [c.interval for c in sensed.combinations]
         ax.plot(
             range(1, len(widths) + 1), widths, "o-", ms=4, color=colour, label=label
         )
-    ax.axhline(0.5, color=_MEASURED, ls="--", lw=0.8, label="not fixed above")
+    ax.axhline(LOOSE, color=_MEASURED, ls="--", lw=0.8, label="not determined above")
     ax.set_yscale("log")
-    ax.set_xlabel("combination, the best fixed first", fontsize=9)
+    ax.set_xlabel("combination, the best determined first", fontsize=9)
     ax.set_ylabel("95 % half width / range", fontsize=9)
     ax.legend(fontsize=8)
     return figure
@@ -140,7 +141,7 @@ def profile_figure(profiles: Sequence[Profile]) -> Figure:
 
 
 def _draw_trace(ax: Axes, method: MethodResult, number: int) -> None:
-    trace = method.parts[number].trace
+    trace = method.stages[number].trace
     evaluations = np.arange(1, trace.evaluations + 1)
     colour = _COLOURS.get(method.name)
     ax.step(

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from sysid.identification.output import to_mapping
-from sysid.identification.result import Identified
+from sysid.identification.result import Identification
 from sysid.report import figures
 from sysid.report.templates import render
 
 
-def report_page(found: Identified, origin: Mapping[str, Any]) -> str:
+def report_page(found: Identification, origin: Mapping[str, Any]) -> str:
     """Returns the report of a result as one HTML page that needs nothing else.
 
     Args:
@@ -27,12 +27,12 @@ def report_page(found: Identified, origin: Mapping[str, Any]) -> str:
     )
 
 
-def _pictures(found: Identified, shown: Any) -> dict[str, str]:
+def _pictures(found: Identification, shown: Any) -> dict[str, str]:
     methods = list(found.methods.values())
     drawn = {
         "fit": figures.fit_figure(shown, found.channels),
         "residual": figures.residual_figure(shown, found.channels),
-        "traces": figures.trace_figure(methods, found.floor),
+        "traces": figures.trace_figure(methods, found.noise_floor),
         "correlation": figures.correlation_figure(found),
         "identifiability": figures.identifiability_figure(found),
     }
@@ -41,12 +41,12 @@ def _pictures(found: Identified, shown: Any) -> dict[str, str]:
     return {name: figures.as_data_url(figure) for name, figure in drawn.items()}
 
 
-def _conclusion(found: Identified) -> str:
+def _conclusion(found: Identification) -> str:
     """Returns one sentence on whether the model explains the log."""
     judged, where = found.fitted, "fitted"
     if found.held_out:
         judged, where = found.held_out, "held-out"
-    ratio = judged.value_after / found.floor
+    ratio = judged.value_after / found.noise_floor
     if any(channel.origin == "first fit" for channel in found.channels):
         coloured = int((found.whiteness < 0.05).sum())
         return (

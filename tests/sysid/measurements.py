@@ -27,9 +27,9 @@ from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
 from sysid.identification.gauss_newton import gauss_newton
-from sysid.identification.journal import Journal
 from sysid.identification.result import MethodResult
-from sysid.identification.search import Effort, Search
+from sysid.identification.search import Search
+from sysid.identification.settings import SearchSettings
 from sysid.identification.uncertainty import uncertainty
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
@@ -248,14 +248,13 @@ def _thesis_run(job: tuple) -> dict:
     folder, setting, method, seed = job
     transitions, cycles, colony = THESIS_SETTINGS[setting]
     objective = Objective(THESIS.fitted(read_log(folder), transitions), Workers())
-    effort = Effort(cycles=cycles, close=0, bees=colony, seed=seed)
-    with tempfile.TemporaryDirectory() as scratch:
-        journal = Journal(Path(scratch), {}, False)
-        search = Search(method, [objective], effort, journal, lambda *_: None)
-        found: MethodResult = search.run()
+    settings = SearchSettings(
+        cycles=cycles, local_evaluations=0, bees=colony, seed=seed
+    )
+    found: MethodResult = Search(method, [objective], settings).run()
     theta = objective.scaling.from_unit(found.u).tolist()
     print(*job[1:], f"{found.value:.2f}", np.round(theta, 3), flush=True)
-    return {"values": found.parts[0].trace.values, "theta": theta}
+    return {"values": found.stages[0].trace.values, "theta": theta}
 
 
 def draw_thesis(figure: Path) -> None:

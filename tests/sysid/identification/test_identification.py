@@ -4,25 +4,24 @@ import numpy as np
 import pytest
 
 from drake_disasm.common.errors import DisasmError
-from sysid.identification.identify import Settings, identify, noise_floor
-from sysid.identification.journal import Journal
+from sysid.identification import Journal, SearchSettings, Settings, identify
+from sysid.identification.assessment import noise_floor
 from sysid.identification.output import summary, to_mapping
-from sysid.identification.search import Effort
 from sysid.identification.sensitivity import sensitivity
 from sysid.objective import Objective
 from sysid.report import report_page
 from sysid.workers import Workers
 from tests.sysid.toys import Decay
 
-EFFORT = Effort(evaluations=120, close=40)
+SEARCH = SearchSettings(evaluations=120, local_evaluations=40)
 TRUTH = {"a": 2.0, "b": 1.5, "c": 0.3}
 
 
-def run(model, folder, settings=None, test=(3,), resume=False, news=lambda *_: None):
+def run(model, folder, settings=None, test=(3,), resume=False, progress=None):
     journal = Journal(folder, {"seed": 0}, resume)
-    settings = settings or Settings(effort=EFFORT)
+    settings = settings or Settings(search=SEARCH)
     train = [i for i in range(4) if i not in test]
-    return identify(model, train, test, settings, Workers(), journal, news)
+    return identify(model, train, test, settings, Workers(), journal, progress)
 
 
 def test_finds_the_truth_and_both_methods_agree(tmp_path):
@@ -31,7 +30,7 @@ def test_finds_the_truth_and_both_methods_agree(tmp_path):
         low, high = found.interval_bootstrap[i]
         assert low < found.theta[i] < high
         assert abs(found.theta[i] - TRUTH[p.name]) < 2 * (high - low)
-    assert found.verdict.agree, found.verdict.text
+    assert found.agreement.agree, found.agreement.text
     assert found.fitted.value_after == pytest.approx(1.0, abs=0.1)
     assert found.held_out.value_after == pytest.approx(1.0, abs=0.15)
     assert found.held_out.value_before > 3.0
@@ -41,13 +40,15 @@ def test_finds_the_truth_and_both_methods_agree(tmp_path):
 
 def test_intervals_cover_the_truth_as_often_as_they_say(tmp_path):
     """95 % of 3 x 60 intervals, give or take; single method to be quick."""
-    settings = Settings(("nlopt",), Effort(evaluations=60, close=10))
+    settings = Settings(
+        ("nlopt",), SearchSettings(evaluations=60, local_evaluations=10)
+    )
     inside = {"gn": [], "bootstrap": []}
     for seed in range(60):
         found = run(Decay(seed=seed, rows=40), tmp_path / str(seed), settings)
         truth = np.array([TRUTH[p.name] for p in found.parameters])
         for name, interval in (
-            ("gn", found.interval_gn), ("bootstrap", found.interval_bootstrap)
+            ("gn", found.interval_gauss_newton), ("bootstrap", found.interval_bootstrap)
         ):  # fmt: skip
             inside[name] += list((interval[:, 0] < truth) & (truth < interval[:, 1]))
     for name, hits in inside.items():
@@ -61,7 +62,7 @@ def test_a_parameter_without_effect_stops_the_fit_by_name(tmp_path):
 
 
 def test_or_is_frozen_by_choice(tmp_path):
-    settings = Settings(effort=EFFORT, unidentifiable="freeze")
+    settings = Settings(search=SEARCH, unidentifiable="freeze")
     found = run(Decay(("a", "idle", "c")), tmp_path / "fit", settings)
     assert [p.name for p in found.parameters] == ["a", "c"]
     assert found.frozen == {"idle": 0.5}
@@ -81,7 +82,7 @@ def test_a_combination_that_the_log_cannot_fix_is_named(tmp_path):
 
 
 def test_nothing_left_to_fit_is_said(tmp_path):
-    settings = Settings(effort=EFFORT, unidentifiable="freeze")
+    settings = Settings(search=SEARCH, unidentifiable="freeze")
     with pytest.raises(DisasmError, match="nothing is left"):
         run(Decay(("idle",)), tmp_path / "fit", settings)
 
@@ -102,20 +103,20 @@ def test_a_parameter_on_its_bound_is_noted(tmp_path):
 def test_an_interrupted_identification_goes_on_to_the_same_bits(tmp_path):
     whole = run(Decay(), tmp_path / "whole")
 
-    def interrupt(name, done, total, best):
-        if name == "nlopt, global" and done >= 30:
+    def interrupt(update):
+        if update.stage == "nlopt, global" and update.done >= 30:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(Decay(), tmp_path / "fit", news=interrupt)
+        run(Decay(), tmp_path / "fit", progress=interrupt)
     with pytest.raises(DisasmError, match="--resume"):
         run(Decay(), tmp_path / "fit")
     again = run(Decay(), tmp_path / "fit", resume=True)
     assert again.theta.tobytes() == whole.theta.tobytes()
     assert again.interval_bootstrap.tobytes() == whole.interval_bootstrap.tobytes()
     for name, method in whole.methods.items():
-        for part, other in zip(method.parts, again.methods[name].parts, strict=True):
-            assert part.trace.values == other.trace.values
+        for stage, other in zip(method.stages, again.methods[name].stages, strict=True):
+            assert stage.trace.values == other.trace.values
     assert again.evaluations < whole.evaluations
 
 
@@ -142,17 +143,18 @@ def test_refuses_to_go_on_with_another_identification(tmp_path):
 def test_the_thesis_search_counts_as_the_thesis_does(tmp_path):
     from sysid.optimise import BeesSettings
 
-    effort = Effort(cycles=10, close=0, bees=BeesSettings.thesis())
-    settings = Settings(effort=effort, huber_delta=np.inf)
+    colony = BeesSettings.thesis()
+    search = SearchSettings(cycles=10, local_evaluations=0, bees=colony)
+    settings = Settings(search=search, huber_delta=np.inf)
     found = run(Decay(), tmp_path / "fit", settings)
-    (part,) = found.methods["bees"].parts
-    assert part.trace.cycle_ends[:11] == list(range(6, 67, 6))  # then SBPLX
-    budgets = {m.parts[0].trace.evaluations for m in found.methods.values()}
+    (stage,) = found.methods["bees"].stages
+    assert stage.trace.cycle_ends[:11] == list(range(6, 67, 6))  # then SBPLX
+    budgets = {m.stages[0].trace.evaluations for m in found.methods.values()}
     assert max(budgets) - min(budgets) <= 6
 
 
 def test_a_profile_has_its_minimum_at_the_estimate(tmp_path):
-    settings = Settings(effort=EFFORT, profiles=("b",))
+    settings = Settings(search=SEARCH, profiles=("b",))
     (curve,) = run(Decay(), tmp_path / "fit", settings).profiles
     assert curve.name == "b"
     lowest = int(np.argmin(curve.values))
@@ -171,7 +173,7 @@ def test_the_floor_is_that_of_gaussian_noise():
 
 
 def test_the_report_needs_nothing_else_and_says_it_all(tmp_path):
-    settings = Settings(effort=EFFORT, profiles=("c",))
+    settings = Settings(search=SEARCH, profiles=("c",))
     found = run(Decay(), tmp_path / "fit", settings)
     page = report_page(found, {"command": "test", "data": "abc"})
     assert "http" not in page.replace("http-equiv", "")

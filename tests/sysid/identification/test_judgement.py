@@ -5,7 +5,7 @@ import pytest
 from statsmodels.stats.diagnostic import acorr_ljungbox
 
 from drake_disasm.common.errors import DisasmError
-from sysid.identification.agreement import verdict
+from sysid.identification.agreement import compare_methods
 from sysid.identification.linearisation import Linearisation
 from sysid.identification.split import split_episodes
 from sysid.identification.uncertainty import (
@@ -25,7 +25,7 @@ SPREAD = Uncertainty(
 
 
 def judge(points, values):
-    return verdict(("bees", "nlopt"), points, values, 1000, SPREAD, ("a", "b"))
+    return compare_methods(("bees", "nlopt"), points, values, 1000, SPREAD, ("a", "b"))
 
 
 def test_agreement():
@@ -43,7 +43,7 @@ def test_one_that_is_stuck_is_named():
 def test_same_value_elsewhere_is_not_identifiable():
     found = judge((np.array([0.5, 0.5]), np.array([0.7, 0.495])), (1.0, 1.0))
     assert not found.agree and found.objective_gap < 1 < found.distance
-    assert "less closely" in found.text and "a by 20)" in found.text
+    assert "less precisely" in found.text and "a by 20)" in found.text
 
 
 def test_the_edge_is_that_of_the_likelihood_region():

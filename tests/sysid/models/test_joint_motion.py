@@ -8,9 +8,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import JointViscousFriction
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.scenario import Scenario
-from sysid.identification.identify import Settings, identify
-from sysid.identification.journal import Journal
-from sysid.identification.search import Effort
+from sysid.identification import Journal, SearchSettings, Settings, identify
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.regressor import ArmDynamics, base_set, body_regressor
@@ -107,15 +105,19 @@ def test_the_base_set_predicts_all_that_the_full_one_does(urdf):
 
 def test_recovers_the_base_parameters(urdf, tmp_path):
     model = JointMotionModel([motion_log(tmp_path / "log", urdf, noise=0.01)])
-    settings = Settings(effort=Effort(evaluations=60, close=10), huber_delta=np.inf)
+    settings = Settings(
+        search=SearchSettings(evaluations=60, local_evaluations=10), huber_delta=np.inf
+    )
     journal = Journal(tmp_path / "fit", {}, False)
-    found = identify(model, [0], [], settings, Workers(), journal, lambda *_: None)
+    found = identify(model, [0], [], settings, Workers(), journal)
     truth = np.array([p.nominal for p in model.parameters])
-    inside = (found.interval_gn[:, 0] < truth) & (truth < found.interval_gn[:, 1])
+    inside = (found.interval_gauss_newton[:, 0] < truth) & (
+        truth < found.interval_gauss_newton[:, 1]
+    )
     assert inside.mean() > 0.7
     np.testing.assert_allclose(found.theta, truth, atol=0.02)
     np.testing.assert_allclose([c.noise for c in found.channels], 0.01, rtol=0.2)
-    assert found.verdict.agree
+    assert found.agreement.agree
 
 
 def test_some_parameters_alone(urdf, tmp_path):

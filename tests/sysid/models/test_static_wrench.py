@@ -6,10 +6,8 @@ from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.logs import read_log, write_static_wrench
 from drake_disasm.scenario import Scenario, load_scenario
-from sysid.identification.identify import Settings, identify
-from sysid.identification.journal import Journal
+from sysid.identification import Journal, SearchSettings, Settings, identify
 from sysid.identification.noise import with_estimated_noise
-from sysid.identification.search import Effort
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.static_wrench import DEFAULT_PARAMETERS, StaticWrenchModel
 from sysid.scenario_parameters import Request, scenario_parameters
@@ -17,7 +15,9 @@ from sysid.workers import Workers
 from tests.sysid.real_data import write_static
 
 TRUTH = np.array([1.1, 0.01, -0.02, 0.06, 1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
-SETTINGS = Settings(effort=Effort(evaluations=60, close=10), huber_delta=np.inf)
+SETTINGS = Settings(
+    search=SearchSettings(evaluations=60, local_evaluations=10), huber_delta=np.inf
+)
 EQUAL = ("PayloadError.mass", "PayloadError.cz", *DEFAULT_PARAMETERS[4:])
 
 
@@ -40,7 +40,7 @@ def make(log, names=DEFAULT_PARAMETERS, scenario=None, known=False):
 
 def fit(model, folder):
     journal = Journal(folder, {}, False)
-    return identify(model, [0], [], SETTINGS, Workers(), journal, lambda *_: None)
+    return identify(model, [0], [], SETTINGS, Workers(), journal)
 
 
 def test_predicts_weight_moment_and_bias_in_closed_form(tmp_path):
@@ -53,7 +53,7 @@ def test_predicts_weight_moment_and_bias_in_closed_form(tmp_path):
 def test_recovers_ten_parameters(tmp_path):
     found = fit(make(synthetic(tmp_path / "log", noise=0.01)), tmp_path / "fit")
     np.testing.assert_allclose(found.theta, TRUTH, atol=0.02)
-    assert found.verdict.agree
+    assert found.agreement.agree
     weight, unit, (low, high) = found.derived["weight"]
     assert unit == "N" and low < weight < high
     assert weight == pytest.approx(1.1 * 9.81, rel=2e-3)
