@@ -1,57 +1,207 @@
-"""Jobs in one process, in several, and with workers that die."""
+"""Jobs in this process, in several, in threads, and with workers that die."""
 
 import os
-from collections.abc import Callable
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from drake_disasm.common import executors
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.executors import run_jobs
+from drake_disasm.common.executors import WorkerPool, import_in_workers
+from drake_disasm.common.progress import Progress, ProgressUpdate
 
 
-def _square(job: int, report: Callable[[Any], None]) -> int:
-    report(job)
+def _square(job: int, progress: Progress) -> int:
+    for done in range(1, job + 1):
+        progress(ProgressUpdate("squaring", done, 3, value=float(job)))
     return job * job
 
 
-def _dies_once(job: Path, report: Callable[[Any], None]) -> str:
+def _dies_once(job: Path) -> str:
     if not job.exists():
         job.touch()
         os._exit(9)
     return job.name
 
 
-def _dies(job: int, report: Callable[[Any], None]) -> None:
+def _dies_once_reporting(job: Path, progress: Progress) -> str:
+    return _dies_once(job)
+
+
+def _dies(job: int) -> None:
     os._exit(9)
 
 
-def _refuses(job: int, report: Callable[[Any], None]) -> None:
+def _refuses(job: int, progress: Progress) -> None:
     raise DisasmError(f"job {job} is bad; give another")
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_results_and_news_come_through(workers: int) -> None:
-    news: list[int] = []
-    results = dict(run_jobs(_square, [1, 2, 3], workers, news.append))
+def _reports_until_stopped(job: Path, progress: Progress) -> None:
+    """Reports for a minute; leaves a file where it is stopped."""
+    for done in range(1, 6000):
+        try:
+            progress(ProgressUpdate("waiting", done))
+        except KeyboardInterrupt:
+            job.touch()
+            raise
+        time.sleep(0.01)
+
+
+@contextmanager
+def _pool(kind: str, **options: object) -> Iterator[WorkerPool]:
+    """Yields a pool of one kind."""
+    with ThreadPoolExecutor(2) as threads:
+        chosen = {
+            "here": {},
+            "processes": {"count": 2, "process_per_job": True},
+            "threads": {"executor": threads},
+            "network": {"executor": threads, "host": "localhost"},
+        }[kind]
+        with WorkerPool(**chosen, **options) as pool:  # type: ignore[arg-type]
+            yield pool
+
+
+KINDS = ["here", "processes", "threads", "network"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_results_and_progress_come_through(kind: str) -> None:
+    seen: list[ProgressUpdate] = []
+    with _pool(kind, progress=seen.append) as pool:
+        results = dict(pool.run(_square, [1, 2, 3]))
     assert results == {1: 1, 2: 4, 3: 9}
-    assert sorted(news) == [1, 2, 3]
+    assert len(seen) == 1 + 2 + 3
+    assert seen[-1] == ProgressUpdate("squaring", 1 + 2 + 3, 9, value=2.0)
 
 
-def test_what_a_dead_worker_left_is_begun_again(tmp_path: Path) -> None:
+def test_map_keeps_the_order_and_counts() -> None:
+    seen: list[ProgressUpdate] = []
+    with WorkerPool(2, progress=seen.append, stage="squaring") as pool:
+        assert pool.map(abs, [-1, 2, -3]) == [1, 2, 3]
+        assert pool.map(abs, [-4]) == [4]
+    assert seen == [ProgressUpdate("squaring", done) for done in (1, 2, 3, 4)]
+
+
+@pytest.mark.parametrize("reports", [False, True])
+def test_what_a_dead_worker_left_is_done_again(tmp_path: Path, reports: bool) -> None:
     jobs = [tmp_path / "a", tmp_path / "b"]
     jobs[1].touch()
-    results = dict(run_jobs(_dies_once, jobs, 2, lambda _: None))
-    assert results == {jobs[0]: "a", jobs[1]: "b"}
+    with WorkerPool(2) as pool:
+        if reports:
+            assert dict(pool.run(_dies_once_reporting, jobs)) == {
+                jobs[0]: "a",
+                jobs[1]: "b",
+            }
+        else:
+            assert pool.map(_dies_once, jobs) == ["a", "b"]
+        assert pool.notes == ["a worker process died; its work was done again"]
 
 
-def test_workers_that_die_twice_are_an_error() -> None:
-    with pytest.raises(DisasmError, match="died twice over 1"):
-        list(run_jobs(_dies, [1, 2], 2, lambda _: None))
+def test_workers_that_die_again_and_again_are_an_error() -> None:
+    match = r"died 3 times over the same work .* fewer --workers"
+    with WorkerPool(2) as pool, pytest.raises(DisasmError, match=match):
+        pool.map(_dies, [1])
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_what_a_job_raises_is_raised(workers: int) -> None:
-    with pytest.raises(DisasmError, match="is bad; give another"):
-        list(run_jobs(_refuses, [1, 2], workers, lambda _: None))
+class KilledWorker(Exception):  # noqa: N818
+    """Stands for Dask's exception of that name."""
+
+
+@pytest.mark.parametrize("error", [BrokenExecutor, KilledWorker])
+def test_a_given_executor_that_lost_its_workers_is_an_error(
+    error: type[Exception],
+) -> None:
+    def fail(job: int) -> None:
+        raise error("gone")
+
+    with _pool("threads") as pool, pytest.raises(DisasmError, match="lost its workers"):
+        pool.map(fail, [1])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_a_job_raises_is_raised(kind: str) -> None:
+    with (
+        _pool(kind) as pool,
+        pytest.raises(DisasmError, match="is bad; give another"),
+    ):
+        list(pool.run(_refuses, [1, 2]))
+
+
+@pytest.mark.parametrize("kind", ["processes", "threads"])
+def test_ctrl_c_stops_running_jobs_at_their_next_update(
+    tmp_path: Path, kind: str
+) -> None:
+    jobs = [tmp_path / name for name in "abcd"]
+
+    def press(update: ProgressUpdate) -> None:
+        """Presses Ctrl-C once both workers run."""
+        if update.done > 20:
+            raise KeyboardInterrupt
+
+    with _pool(kind, progress=press) as pool, pytest.raises(KeyboardInterrupt):
+        list(pool.run(_reports_until_stopped, jobs))
+    # All have ended by now; those that had not begun never did.
+    assert 1 <= len(list(tmp_path.iterdir())) <= 2
+
+
+_KILLED = """
+import os, sys, time
+from drake_disasm.common.executors import WorkerPool
+
+def work(seconds):
+    print(os.getpid(), flush=True)
+    time.sleep(seconds)
+
+if __name__ == "__main__":
+    with WorkerPool(2) as pool:
+        pool.map(work, [600, 600])
+"""
+
+
+def test_workers_end_with_a_killed_parent(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(_KILLED)
+    parent = subprocess.Popen(
+        [sys.executable, script], stdout=subprocess.PIPE, text=True
+    )
+    assert parent.stdout
+    workers = {parent.stdout.readline() for _ in range(2)}
+    assert len(workers) == 2
+    parent.send_signal(signal.SIGKILL)
+    parent.wait()
+    assert parent.stdout.read() == ""  # ends once nobody holds it any more
+
+
+def _is_imported(module: str) -> bool:
+    return module in sys.modules
+
+
+def test_workers_import_what_they_are_told_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "registers_something.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(executors, "_modules", {})
+    with WorkerPool(2) as pool:
+        assert pool.map(_is_imported, ["registers_something"]) == [False]
+        import_in_workers("registers_something")
+        assert pool.map(_is_imported, ["registers_something"]) == [True]
+        import_in_workers("is_nowhere")
+        with pytest.raises(DisasmError, match=r"cannot import .* PYTHONPATH"):
+            pool.map(_is_imported, ["is_nowhere"])
+
+
+def test_a_host_that_is_not_here_is_an_error() -> None:
+    with (
+        ThreadPoolExecutor(1) as threads,
+        WorkerPool(executor=threads, host="192.0.2.1") as pool,
+        pytest.raises(DisasmError, match=r"192\.0\.2\.1: cannot listen"),
+    ):
+        list(pool.run(_square, [1]))
