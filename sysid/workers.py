@@ -1,59 +1,47 @@
-"""Work in parallel through any executor; a pool whose workers die is made anew."""
+"""Models evaluated in parallel."""
 
 import hashlib
-import multiprocessing
-import os
 import pickle
-import signal
 import threading
-from collections.abc import Callable, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
-from types import TracebackType
-from typing import Self, TypeVar
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
 
 import numpy as np
 
-from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.executors import WorkerPool
+from drake_disasm.common.progress import Progress, ignore_progress
 from sysid.models.base import Array, LogModel, PredictionError
-
-_ATTEMPTS = 3
-
-Job = TypeVar("Job")
-Result = TypeVar("Result")
 
 #: What a worker has built, by thread: a diagram serves one thread.
 _mine = threading.local()
 
 
-class Workers:
-    """Evaluates models on an executor's workers, kept alive between evaluations.
+class Workers(WorkerPool):
+    """Workers that evaluate models, and keep what they built for it.
 
-    Any `concurrent.futures.Executor` will do, Dask's on a cluster too. A model
-    travels with its work, pickled once, and each worker keeps what it built of the
+    A model travels with its work, pickled once. Each worker keeps its copies of the
     last ones, so that a diagram is built once per worker, and again where a worker
     was replaced.
-
-    Attributes:
-        notes: what a report should say, such as workers that died.
     """
 
     def __init__(
         self,
         count: int = 1,
-        make: Callable[[], Executor] | None = None,
-        beat: Callable[[], object] | None = None,
+        *,
+        executor: Executor | None = None,
+        progress: Progress = ignore_progress,
     ) -> None:
         """Starts nothing yet.
 
         Args:
-            count: processes; 1 works in this one.
-            make: makes the executor, instead of a spawned pool of `count` processes.
-            beat: called in this process after each piece of work; may raise to stop.
+            count: processes; with 1 the work is done in this process.
+            executor: does the work instead; whoever made it shuts it down.
+            progress: called in this process after each simulation; may raise to stop.
         """
-        self._beat = beat
-        self._make = make or (None if count == 1 else lambda: _spawned(count))
-        self._executor: Executor | None = None
-        self.notes: list[str] = []
+        super().__init__(
+            count, executor=executor, progress=progress, stage="simulating"
+        )
 
     def simulate(
         self, model: LogModel, work: Sequence[tuple[Array, slice]]
@@ -67,101 +55,33 @@ class Workers:
         Raises:
             DisasmError: workers died again and again.
         """
-        if self._make is None or model.affine:  # a product of matrices: not worth it
-            return [self._done(_outcome(model, theta, rows)) for theta, rows in work]
+        if self.in_this_process or model.affine:  # a product of matrices: not worth it
+            return [self.counted(_outcome(model, theta, rows)) for theta, rows in work]
         payload = pickle.dumps(model)
         key = hashlib.sha256(payload).hexdigest()
-        return self._tenaciously(
-            lambda executor: [
-                executor.submit(_simulate, key, payload, theta, rows)
-                for theta, rows in work
-            ]
-        )
-
-    def map(
-        self, function: Callable[[Job], Result], jobs: Sequence[Job]
-    ) -> list[Result]:
-        """Returns what a function makes of each job, in their order.
-
-        Args:
-            function: of a module, so that it can be sent to a process.
-            jobs: each sent to a worker.
-
-        Raises:
-            DisasmError: workers died again and again.
-        """
-        if self._make is None:
-            return [self._done(function(job)) for job in jobs]
-        return self._tenaciously(
-            lambda executor: [executor.submit(function, job) for job in jobs]
-        )
-
-    def close(self) -> None:
-        """Ends the workers; the next work starts new ones."""
-        if self._executor:
-            self._executor.shutdown(wait=False, cancel_futures=True)
-        self._executor = None
-
-    def _done(self, result: Result) -> Result:
-        if self._beat:
-            self._beat()
-        return result
-
-    def _tenaciously(
-        self, submit: Callable[[Executor], list[Future[Result]]]
-    ) -> list[Result]:
-        """Returns the results of what is submitted, again if workers die over it."""
-        assert self._make is not None
-        for _ in range(_ATTEMPTS):
-            try:
-                if self._executor is None:
-                    self._executor = self._make()
-                futures = submit(self._executor)
-                return [self._done(future.result()) for future in futures]
-            except BrokenExecutor:
-                self.notes.append("a worker process died; its work was done again")
-                self.close()
-        raise DisasmError(
-            f"worker processes died {_ATTEMPTS} times over the same work (out of "
-            "memory?); give fewer --workers, then resume"
-        )
-
-    def __enter__(self) -> Self:
-        """Returns the workers."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Ends the workers."""
-        self.close()
+        return self.map(_simulate, [_Piece(key, payload, *piece) for piece in work])
 
 
-def _spawned(count: int) -> Executor:
-    """Returns a pool of fresh interpreters: Drake's threads do not survive a fork."""
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(count, context, _begin_worker)
+@dataclass(frozen=True)
+class _Piece:
+    """A model's simulation of some rows, as it is sent to a worker.
+
+    Attributes:
+        key: the payload's hash.
+        payload: the model, pickled.
+        theta: parameters (p,).
+        rows: of its log.
+    """
+
+    key: str
+    payload: bytes
+    theta: Array
+    rows: slice
 
 
-def _begin_worker() -> None:
-    """Leaves Ctrl-C to the parent, and the world with it, should it be killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_leave_with_parent, daemon=True).start()
-
-
-def _leave_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
-
-
-def _simulate(key: str, payload: bytes, theta: Array, rows: slice) -> Array | str:
+def _simulate(piece: _Piece) -> Array | str:
     """Returns what this worker's copy of a model simulates."""
-    return _outcome(_model(key, payload), theta, rows)
+    return _outcome(_model(piece.key, piece.payload), piece.theta, piece.rows)
 
 
 def _outcome(model: LogModel, theta: Array, rows: slice) -> Array | str:

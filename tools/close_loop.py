@@ -100,8 +100,8 @@ def main(arguments: Sequence[str]) -> int:
     origin = program.provenance("close_loop", arguments, 0)
     fits = args.out / "fits"
     with (
-        tqdm(unit=" runs", desc="simulating", leave=False) as bar,
-        Workers(args.workers, beat=lambda: _beat(bar)) as workers,
+        program.ProgressBar(unit="runs") as bar,
+        Workers(args.workers, progress=bar) as workers,
     ):
         closed = close_loop(
             model, train, test, huber_delta, workers, tqdm.write, folder=fits
@@ -122,12 +122,6 @@ def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
         fixed=True,
     )
     return model_of(logs, choice)
-
-
-def _beat(bar: tqdm) -> None:
-    """Shows that work goes on; stops it where Ctrl-C was pressed."""
-    program.stop_if_interrupted()
-    bar.update()
 
 
 def _write(folder: Path, closed: Closed, origin: dict[str, object]) -> None:

@@ -8,19 +8,18 @@ The same seeds give the same episodes. It touches no training.
 import argparse
 import dataclasses
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import cli
-from tqdm import tqdm
 
 from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.executors import run_jobs
+from drake_disasm.common.executors import WorkerPool
 from drake_disasm.common.files import make_folder, write_json
+from drake_disasm.common.progress import Progress
 from drake_disasm.learning.evaluation import Evaluation, evaluate, summed_up
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
@@ -104,10 +103,12 @@ def main(arguments: Sequence[str]) -> int:
     for row in rows:  # whatever is wrong is said before anything runs
         cli.named_policy(row.policy, load_scenario(row.scenario, row.overrides))
     found: dict[Row, Evaluation] = {}
-    total = len(rows) * args.episodes
     try:
-        with tqdm(total=total, unit="episode", leave=False) as bar:
-            found.update(run_jobs(_run, rows, args.workers, _shown(bar)))
+        with (
+            program.ProgressBar(unit="episode") as bar,
+            WorkerPool(args.workers, process_per_job=True, progress=bar) as pool,
+        ):
+            found.update(pool.run(_run, rows))
     finally:
         ordered = {row: found[row] for row in rows if row in found}
         if ordered:
@@ -117,15 +118,6 @@ def main(arguments: Sequence[str]) -> int:
             args.json, ordered, program.provenance("evaluate", arguments, args.seed)
         )
     return 0
-
-
-def _shown(bar: tqdm) -> Callable[[Any], None]:
-    def show(_: Any) -> None:
-        """Moves the bar by one episode."""
-        program.stop_if_interrupted()
-        bar.update()
-
-    return show
 
 
 def _rows(args: argparse.Namespace) -> Iterator[Row]:
@@ -153,12 +145,12 @@ def _settings(sweep: str | None) -> list[str]:
     return [f"{key}={value}" for value in values.split(",")]
 
 
-def _run(row: Row, report: Callable[[Any], None]) -> Evaluation:
+def _run(row: Row, progress: Progress) -> Evaluation:
     """Returns one row's figures, in whatever process."""
     scenario = load_scenario(row.scenario, row.overrides)
     policy = cli.named_policy(row.policy, scenario)
     simulation = TaskSimulation(scenario, row.station, policy)
-    return summed_up(evaluate(simulation, row.seeds, on_episode=lambda _: report(1)))
+    return summed_up(evaluate(simulation, row.seeds, progress=progress))
 
 
 def table(found: dict[Row, Evaluation]) -> str:

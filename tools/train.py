@@ -168,7 +168,9 @@ def main(arguments: Sequence[str]) -> int:
     experiment = open_experiment(experiment, args.out, args.resume)
     jobs = seed_jobs(experiment, seeds, args.out)
     try:
-        train_seeds(jobs, args.workers)
+        unit = "round" if experiment.logs else "episode"
+        with program.ProgressBar(unit, keep=True) as bar:
+            train_seeds(jobs, args.workers, bar)
     finally:
         print(write_summary(args.out))
     print(f"all of it: {args.out}")

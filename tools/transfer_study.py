@@ -8,18 +8,18 @@ study that was interrupted goes on with --resume.
 """
 
 import argparse
+import dataclasses
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # processes work in parallel, not threads
 
 import cli
-from tqdm import tqdm
 
 from drake_disasm.common import program
-from drake_disasm.common.executors import run_jobs
+from drake_disasm.common.executors import WorkerPool
+from drake_disasm.common.progress import Progress
 from drake_disasm.learning.experiment import Experiment, open_experiment
 from drake_disasm.learning.hyperparameters import (
     ALGORITHMS,
@@ -171,22 +171,22 @@ def _train(
         check_start(experiment, seeds)
     experiment = open_experiment(experiment, folder, resume)
     jobs = seed_jobs(experiment, seeds, folder)
-    if experiment.start:
-        _deploy([Deployment(experiment, j.seed, j.folder) for j in jobs], workers, name)
-    train_seeds(jobs, workers, name)
+    with program.ProgressBar(unit="episode", keep=True) as bar:
+        if experiment.start:
+            deployed = [Deployment(experiment, job.seed, job.folder) for job in jobs]
+            _deploy(deployed, workers, _titled(bar, f"{name}, before learning on"))
+        train_seeds(jobs, workers, _titled(bar, name))
 
 
-def _deploy(jobs: Sequence[Deployment], workers: int, title: str) -> None:
-    total = sum(job.experiment.validation for job in jobs)
-
-    def show(_: Any) -> None:
-        """Moves the bar by one episode."""
-        program.stop_if_interrupted()
-        bar.update()
-
-    with tqdm(total=total, unit="episode", desc=f"{title}, as it is") as bar:
-        for _ in run_jobs(deploy, jobs, workers, show):
+def _deploy(jobs: Sequence[Deployment], workers: int, progress: Progress) -> None:
+    with WorkerPool(workers, process_per_job=True, progress=progress) as pool:
+        for _ in pool.run(deploy, jobs):
             pass
+
+
+def _titled(progress: Progress, title: str) -> Progress:
+    """Returns what shows progress under another title."""
+    return lambda update: progress(dataclasses.replace(update, stage=title))
 
 
 if __name__ == "__main__":

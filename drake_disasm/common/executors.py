@@ -106,9 +106,9 @@ class WorkerPool:
             DisasmError: workers died again and again, or the function raised it.
         """
         if self.in_this_process:
-            return [self._count_one(function(job)) for job in jobs]
+            return [self.counted(function(job)) for job in jobs]
         found = {
-            index: self._count_one(result)
+            index: self.counted(result)
             for index, result in self._completed(function, jobs)
         }
         return [found[index] for index in range(len(jobs))]
@@ -140,10 +140,12 @@ class WorkerPool:
     def close(self) -> None:
         """Ends its own workers; the next work starts new ones."""
         if self._own:
-            self._own.shutdown(wait=False, cancel_futures=True)
+            # Not waiting for a pool that replaces its processes fails in its thread.
+            self._own.shutdown(wait=self._process_per_job, cancel_futures=True)
         self._own = None
 
-    def _count_one(self, result: Result) -> Result:
+    def counted(self, result: Result) -> Result:
+        """Returns a result, and reports that one more job is done."""
         self._done += 1
         self._progress(ProgressUpdate(self._stage, self._done))
         return result

@@ -1,10 +1,11 @@
 """Deterministic validation of a policy (thesis 3.3.3.2)."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.effects import Effect
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.mdp import Outcome
@@ -50,7 +51,7 @@ def evaluate(
     simulation: TaskSimulation,
     seeds: Sequence[int],
     effects: Sequence[Effect] | None = None,
-    on_episode: Callable[[EpisodeSummary], None] | None = None,
+    progress: Progress = ignore_progress,
 ) -> list[EpisodeSummary]:
     """Runs episodes of a simulation that has a policy.
 
@@ -58,13 +59,12 @@ def evaluate(
         simulation: its diagram holds the policy.
         seeds: one per episode; the same seeds give the same episodes.
         effects: instead of the scenario's.
-        on_episode: called after each.
+        progress: called after each episode.
     """
     summaries = []
     for seed in seeds:
         summaries.append(run_episode(simulation, seed, effects=effects))
-        if on_episode:
-            on_episode(summaries[-1])
+        progress(ProgressUpdate("evaluating", len(summaries), len(seeds)))
     return summaries
 
 

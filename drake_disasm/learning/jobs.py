@@ -1,24 +1,21 @@
 """Trains the seeds of an experiment, each in whatever process it runs."""
 
 import dataclasses
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
-from drake_disasm.common import program
-from drake_disasm.common.executors import run_jobs
+from drake_disasm.common.executors import WorkerPool
+from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.learning.checkpoint import load_memory
 from drake_disasm.learning.dataset import remember
 from drake_disasm.learning.experiment import Experiment
 from drake_disasm.learning.replay import Replay
-from drake_disasm.learning.run import News, learn_offline, run_training
+from drake_disasm.learning.run import learn_offline, run_training
 from drake_disasm.learning.training import Training, action_map
 from drake_disasm.learning.warm_start import start_checkpoint, start_hash
 from drake_disasm.logs import LogWriter, flat_columns, read_logs
 from drake_disasm.logs.transitions import observations
-from drake_disasm.mdp import Outcome
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 
 
@@ -44,37 +41,19 @@ def seed_jobs(
     return [SeedJob(experiment, s, folder / f"seed_{s:03d}") for s in seeds]
 
 
-def train_seeds(jobs: Sequence[SeedJob], workers: int, title: str = "") -> None:
-    """Trains all of them, with a progress bar of this title."""
-    total = sum(job.experiment.config.episodes for job in jobs)
-    unit = "round" if jobs[0].experiment.logs else "episode"
-    with tqdm(total=total, unit=unit, desc=title or None) as bar:
-        for _ in run_jobs(train_seed, jobs, workers, _Progress(bar)):
+def train_seeds(
+    jobs: Sequence[SeedJob], workers: int = 1, progress: Progress = ignore_progress
+) -> None:
+    """Trains all of them, each in a process of its own if there are several workers.
+
+    Args:
+        jobs: one for each seed.
+        workers: processes.
+        progress: gets episodes done, mean reward, and success of the latest.
+    """
+    with WorkerPool(workers, process_per_job=True, progress=progress) as pool:
+        for _ in pool.run(train_seed, jobs):
             pass
-
-
-class _Progress:
-    """A bar over all seeds' episodes, with the latest rewards and successes."""
-
-    def __init__(self, bar: tqdm) -> None:
-        self._bar = bar
-        self._done: dict[int, int] = {}
-        self._rewards: list[float] = []
-        self._successes: list[bool] = []
-
-    def __call__(self, news: News) -> None:
-        program.stop_if_interrupted()
-        self._done[news.seed] = news.number
-        if news.summary is not None:
-            self._rewards.append(news.summary.reward)
-            self._successes.append(news.summary.outcome is Outcome.SUCCESS)
-            recent = self._successes[-20:]
-            self._bar.set_postfix(
-                reward=f"{sum(self._rewards[-20:]) / len(recent):.1f}",
-                success=f"{sum(recent)}/{len(recent)}",
-                refresh=False,
-            )
-        self._bar.update(sum(self._done.values()) - self._bar.n)
 
 
 class _Log:
@@ -95,12 +74,13 @@ class _Log:
             self._writer.write_episode(flat_columns("transitions", recorder.columns()))
 
 
-def train_seed(job: SeedJob, report: Callable[[News | None], None]) -> dict[str, Any]:
+def train_seed(job: SeedJob, progress: Progress) -> dict[str, Any]:
     """Trains one seed to its end and returns its result."""
     experiment = job.experiment
     finished = job.folder / "result.json"
     if finished.exists():
-        report(News(job.seed, experiment.config.episodes, None))
+        episodes = experiment.config.episodes
+        progress(ProgressUpdate("training", episodes, episodes))
         return {}
     provenance = experiment.provenance | {
         "seed": job.seed,
@@ -115,7 +95,7 @@ def train_seed(job: SeedJob, report: Callable[[News | None], None]) -> dict[str,
         provenance["start"] = {
             experiment.start: start_hash(experiment.start, job.seed),
         }
-    end = (provenance, experiment.validation, report)
+    end = (provenance, experiment.validation, progress)
     if dataset:
         updates = experiment.updates or dataset.size
         return learn_offline(training, job.folder, updates, *end)

@@ -14,12 +14,13 @@ import dataclasses
 import fcntl
 import io
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Protocol
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, write_json, write_text
+from drake_disasm.common.progress import Progress, ProgressUpdate
 from drake_disasm.learning.evaluation import summed_up, validate_policy
 from drake_disasm.learning.policy import trained_policy
 from drake_disasm.learning.training import Purpose, Training, seed_for
@@ -28,6 +29,7 @@ from drake_disasm.policies import save_policy
 from drake_disasm.task.episode import EpisodeSummary
 from drake_disasm.task.recording import EpisodeRecorder
 
+_SHOWN = 20  # latest episodes over which progress is averaged
 _PATIENCE = 10.0  # s that a killed run's workers have to notice
 
 
@@ -38,28 +40,13 @@ class EpisodeLog(Protocol):
         """Writes episode `number`, if it is not there yet."""
 
 
-@dataclasses.dataclass(frozen=True)
-class News:
-    """What a training tells after each episode.
-
-    Attributes:
-        seed: of the training.
-        number: episodes done.
-        summary: of the newest; None where there is none.
-    """
-
-    seed: int
-    number: int
-    summary: EpisodeSummary | None
-
-
 def run_training(
     training: Training,
     folder: Path,
     log: EpisodeLog,
     provenance: dict[str, Any],
     validation: int,
-    report: Callable[[News | None], None],
+    progress: Progress,
 ) -> dict[str, Any]:
     """Trains to the end, from the folder's checkpoint if there is one.
 
@@ -69,7 +56,7 @@ def run_training(
         log: takes each episode before its checkpoint is written.
         provenance: where the policy is from.
         validation: greedy episodes at the end.
-        report: gets news after each episode; may raise to stop.
+        progress: called after each episode.
 
     Returns:
         What `result.json` says.
@@ -83,11 +70,24 @@ def run_training(
         if checkpoint.exists():
             training.restore(checkpoint)
         while len(training.summaries) < training.spec.config.episodes:
-            summary, recorder = training.run_episode()
+            _, recorder = training.run_episode()
             log.write(len(training.summaries) - 1, recorder)
             training.save(checkpoint)
-            report(News(training.spec.seed, len(training.summaries), summary))
+            progress(_update(training))
         return finish(training, folder, provenance, validation)
+
+
+def _update(training: Training) -> ProgressUpdate:
+    """Returns how far an online training is, and how its latest episodes went."""
+    latest = training.summaries[-_SHOWN:]
+    won = sum(s.outcome is Outcome.SUCCESS for s in latest)
+    return ProgressUpdate(
+        "training",
+        len(training.summaries),
+        training.spec.config.episodes,
+        f"success {won}/{len(latest)}",
+        sum(s.reward for s in latest) / len(latest),
+    )
 
 
 def learn_offline(
@@ -96,14 +96,14 @@ def learn_offline(
     updates: int,
     provenance: dict[str, Any],
     validation: int,
-    report: Callable[[News | None], None],
+    progress: Progress,
 ) -> dict[str, Any]:
     """Learns from what the training's memory holds, without acting (thesis 3.4.2).
 
     Args:
         training: fresh, with its dataset.
         updates: gradient updates to do, in as many rounds as there would be episodes.
-        folder, provenance, validation, report: as in `run_training`.
+        folder, provenance, validation, progress: as in `run_training`.
     """
     make_folder(folder)
     parts = training.spec.config.episodes
@@ -117,7 +117,7 @@ def learn_offline(
             )
             training.run_round(next_ - done)
             training.save(checkpoint)
-            report(News(training.spec.seed, training.rounds, None))
+            progress(ProgressUpdate("training", training.rounds, parts))
         return finish(training, folder, provenance, validation)
 
 

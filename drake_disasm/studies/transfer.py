@@ -13,13 +13,14 @@ folder/
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from drake_disasm.common.files import write_json
+from drake_disasm.common.progress import Progress
 from drake_disasm.learning.evaluation import evaluate, summed_up
 from drake_disasm.learning.experiment import Experiment, read_json
 from drake_disasm.learning.learning_curve import plot_learning_curves
@@ -117,12 +118,12 @@ class Deployment:
     folder: Path
 
 
-def deploy(job: Deployment, report: Callable[[Any], None]) -> None:
+def deploy(job: Deployment, progress: Progress) -> None:
     """Writes how the policy does before it learns on, unless that is known.
 
     Args:
         job: what to do.
-        report: called after each episode; may raise to stop.
+        progress: called after each episode.
     """
     path = job.folder / "deployed.json"
     if path.exists():
@@ -133,7 +134,7 @@ def deploy(job: Deployment, report: Callable[[Any], None]) -> None:
     simulation = TaskSimulation(scenario, job.experiment.station, policy)
     count = range(job.experiment.validation)
     seeds = [seed_for(job.seed, Purpose.VALIDATION, i) for i in count]
-    figures = summed_up(evaluate(simulation, seeds, on_episode=lambda _: report(1)))
+    figures = summed_up(evaluate(simulation, seeds, progress=progress))
     job.folder.mkdir(parents=True, exist_ok=True)
     write_json(path, dataclasses.asdict(figures))
 
