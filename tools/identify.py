@@ -198,7 +198,15 @@ def main(arguments: Sequence[str]) -> int:
     origin = program.provenance("identify", arguments, args.seed) | _data(logs)
     journal = Journal(args.out, _identity(args, logs), args.resume)
     with program.ProgressBar("evaluation") as bar, Workers(args.workers) as workers:
-        found = identify(model, train, test, settings, workers, journal, bar)
+        found = identify(
+            model,
+            train=train,
+            test=test,
+            settings=settings,
+            workers=workers,
+            journal=journal,
+            progress=bar,
+        )
     _write(args.out, found, origin)
     print(summary(found))
     print(f"report: {args.out / 'report.html'}")

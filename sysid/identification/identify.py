@@ -12,7 +12,7 @@ from sysid.identification.result import Identification
 from sysid.identification.search import Search
 from sysid.identification.sensitivity import Sensitivity, sensitivity
 from sysid.identification.settings import Settings
-from sysid.identification.split import split_episodes
+from sysid.identification.split import train_and_test
 from sysid.models.base import LogModel
 from sysid.objective import Objective
 from sysid.workers import Workers
@@ -25,6 +25,7 @@ _THIN_ROWS = (64, 220)  # that a global search and a first descent simulate
 
 def identify(
     model: LogModel,
+    *,
     train: Sequence[int] | None = None,
     test: Sequence[int] | None = None,
     settings: Settings | None = None,
@@ -39,12 +40,11 @@ def identify(
 
     Args:
         model: of the whole log.
-        train: numbers of the episodes to fit; by default those that are not in
-            `test`.
-        test: numbers of the episodes to judge by, may be empty; by default those not
-            in `train`, and without either a quarter of them.
-        settings: what to choose.
-        workers: to evaluate with; by default this process.
+        train, test: numbers of the episodes to fit, and to judge the fit by, the
+            latter perhaps empty. One that is left out is all that the other leaves;
+            without both, a quarter of the episodes judges.
+        settings: methods, how they search, and the loss.
+        workers: evaluate the model; by default this process.
         journal: keeps what was evaluated, to resume; by default nothing is kept.
         progress: called while it works.
 
@@ -55,7 +55,8 @@ def identify(
     settings, workers = settings or Settings(), workers or Workers()
     progress = progress or ignore_progress
     huber_delta = settings.huber_delta_of(model)
-    train, test = _split(model, train, test)
+    names = model.measurements.names
+    train, test = train_and_test(names, train, test, HELD_OUT_SHARE)
     model = with_estimated_noise(model, workers, huber_delta)
     fitted = model.of_episodes(train)
     _refuse_small_logs(fitted)
@@ -95,19 +96,6 @@ def thinned(model: LogModel) -> list[LogModel]:
     if model.affine:
         return [model]
     return [model.thin(every) for every in steps if every >= 2] + [model]
-
-
-def _split(
-    model: LogModel, train: Sequence[int] | None, test: Sequence[int] | None
-) -> tuple[list[int], list[int]]:
-    """Returns the episodes to fit and those to judge by."""
-    if train is None and test is None:
-        return split_episodes(model.measurements.names, HELD_OUT_SHARE)
-    numbers = range(len(model.measurements.names))
-    if train is None:
-        return [i for i in numbers if i not in (test or ())], list(test or ())
-    others = [i for i in numbers if i not in train]
-    return list(train), others if test is None else list(test)
 
 
 def _refuse_small_logs(model: LogModel) -> None:

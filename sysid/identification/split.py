@@ -8,6 +8,32 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 
 
+def train_and_test(
+    names: Sequence[str],
+    train: Sequence[int] | None,
+    test: Sequence[int] | None,
+    share: float,
+) -> tuple[list[int], list[int]]:
+    """Returns the numbers of the episodes to fit and of those held out.
+
+    Args:
+        names: of all episodes.
+        train, test: what is asked for; one that is None is all that the other leaves.
+        share: of the episodes that is held out if both are None.
+
+    Raises:
+        DisasmError: nothing is left to fit.
+    """
+    if train is None and test is None:
+        return split_episodes(names, share)
+    numbers = range(len(names))
+    if train is None:
+        train = [i for i in numbers if i not in (test or ())]
+    if test is None:
+        test = [i for i in numbers if i not in train]
+    return list(train), list(test)
+
+
 def split_episodes(
     names: Sequence[str], held_out: Sequence[str] | float
 ) -> tuple[list[int], list[int]]:

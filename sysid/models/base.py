@@ -47,8 +47,7 @@ class LogModel(abc.ABC):
             def predict(self, theta, rows):
                 load = theta[0] * np.sin(self.q[rows])
                 samples = JointSamples(self.q[rows], self.v[rows], 0 * load, load)
-                effects = self.effects_at(theta)
-                return (load + sum(e.torque(samples) for e in effects))[:, None]
+                return load + sum(e.torque(samples) for e in self.effects_at(theta))
 
             def select_rows(self, mask):
                 return self.replace(q=self.q[mask], v=self.v[mask])
@@ -83,6 +82,8 @@ class LogModel(abc.ABC):
     @abc.abstractmethod
     def predict(self, theta: Array, rows: slice) -> Array:
         """Returns the predicted channels (len(rows), channels), SI.
+
+        Of a single channel, (len(rows),) will do.
 
         Args:
             theta: values of the parameters that the model was made with, in their
@@ -247,7 +248,8 @@ class LogModel(abc.ABC):
         Raises:
             PredictionError: the simulation failed.
         """
-        return self.predict(self.with_frozen(theta), rows)
+        predicted = np.asarray(self.predict(self.with_frozen(theta), rows))
+        return predicted[:, None] if predicted.ndim == 1 else predicted
 
     def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
         """Returns the prediction (len(rows), channels) from what `simulate` gave."""

@@ -20,8 +20,9 @@ TRUTH = {"a": 2.0, "b": 1.5, "c": 0.3}
 def run(model, folder, settings=None, test=(3,), resume=False, progress=None):
     journal = Journal(folder, {"seed": 0}, resume)
     settings = settings or Settings(search=SEARCH)
-    train = [i for i in range(4) if i not in test]
-    return identify(model, train, test, settings, Workers(), journal, progress)
+    return identify(
+        model, test=test, settings=settings, journal=journal, progress=progress
+    )
 
 
 def test_finds_the_truth_and_both_methods_agree(tmp_path):

@@ -8,11 +8,10 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import JointViscousFriction
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.scenario import Scenario
-from sysid.identification import Journal, SearchSettings, Settings, identify
+from sysid.identification import SearchSettings, Settings, identify
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.regressor import ArmDynamics, base_set, body_regressor
-from sysid.workers import Workers
 from tests.sysid.real_data import write_arm, write_motion
 
 LINK = """<link name="{0}"><inertial><origin xyz="{1}"/><mass value="{2}"/>
@@ -108,8 +107,7 @@ def test_recovers_the_base_parameters(urdf, tmp_path):
     settings = Settings(
         search=SearchSettings(evaluations=60, local_evaluations=10), huber_delta=np.inf
     )
-    journal = Journal(tmp_path / "fit", {}, False)
-    found = identify(model, [0], [], settings, Workers(), journal)
+    found = identify(model, settings=settings)
     truth = np.array([p.nominal for p in model.parameters])
     inside = (found.interval_gauss_newton[:, 0] < truth) & (
         truth < found.interval_gauss_newton[:, 1]

@@ -6,7 +6,7 @@ from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.logs import read_log, write_static_wrench
 from drake_disasm.scenario import Scenario, load_scenario
-from sysid.identification import Journal, SearchSettings, Settings, identify
+from sysid.identification import SearchSettings, Settings, identify
 from sysid.identification.noise import with_estimated_noise
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.static_wrench import DEFAULT_PARAMETERS, StaticWrenchModel
@@ -38,9 +38,8 @@ def make(log, names=DEFAULT_PARAMETERS, scenario=None, known=False):
     return StaticWrenchModel([log], scenario, parameters, known)
 
 
-def fit(model, folder):
-    journal = Journal(folder, {}, False)
-    return identify(model, [0], [], SETTINGS, Workers(), journal)
+def fit(model):
+    return identify(model, train=[0], settings=SETTINGS)
 
 
 def test_predicts_weight_moment_and_bias_in_closed_form(tmp_path):
@@ -51,7 +50,7 @@ def test_predicts_weight_moment_and_bias_in_closed_form(tmp_path):
 
 
 def test_recovers_ten_parameters(tmp_path):
-    found = fit(make(synthetic(tmp_path / "log", noise=0.01)), tmp_path / "fit")
+    found = fit(make(synthetic(tmp_path / "log", noise=0.01)))
     np.testing.assert_allclose(found.theta, TRUTH, atol=0.02)
     assert found.agreement.agree
     weight, unit, (low, high) = found.derived["weight"]
@@ -96,9 +95,7 @@ def test_the_published_values_of_seven_real_readings(tmp_path):
     torque bias (-0.15658, -0.07939, 0.12979) N m; their model has the centre of
     mass on the sensor's axis.
     """
-    found = fit(
-        make(read_log(write_static(7, tmp_path / "log")), EQUAL), tmp_path / "f"
-    )
+    found = fit(make(read_log(write_static(7, tmp_path / "log")), EQUAL))
     assert found.derived["weight"][0] == pytest.approx(10.80391, abs=1e-5)
     np.testing.assert_allclose(
         found.theta[2:5], [-2.13583, -2.76399, -13.07675], atol=1e-5
@@ -110,6 +107,6 @@ def test_the_published_values_of_seven_real_readings(tmp_path):
 
 
 def test_a_hundred_real_readings_do_not_leave_noise(tmp_path):
-    found = fit(make(read_log(write_static(100, tmp_path / "log"))), tmp_path / "fit")
+    found = fit(make(read_log(write_static(100, tmp_path / "log"))))
     assert found.derived["weight"][0] == pytest.approx(12.15, abs=0.01)
     assert (found.whiteness < 0.01).sum() >= 4
