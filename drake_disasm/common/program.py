@@ -47,14 +47,19 @@ def run(main: Callable[[Sequence[str]], int]) -> None:
     """Calls a program's main and exits; bad input is one line and status 2."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _interrupt)
+    sys.exit(status(main, sys.argv[1:]))
+
+
+def status(main: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> int:
+    """Returns the exit status of a program's main; errors are told on stderr."""
     try:
-        sys.exit(main(sys.argv[1:]))
+        return main(arguments)
     except DisasmError as error:
         print(f"error: {error}", file=sys.stderr)
-        sys.exit(EXIT_BAD_INPUT)
+        return EXIT_BAD_INPUT
     except KeyboardInterrupt:
         print("interrupted; what was finished is kept", file=sys.stderr)
-        sys.exit(EXIT_INTERRUPTED)
+        return EXIT_INTERRUPTED
 
 
 class ProgressBar:

@@ -3,22 +3,15 @@
 import json
 import math
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from tests.tools.programs import ROOT
+from tests.tools.programs import run_program
 
 
 def _benchmark(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, str(ROOT / "benchmarks/benchmark.py"), *arguments],
-        capture_output=True,
-        text=True,
-        timeout=280,
-        check=False,
-    )
+    return run_program("benchmark", *arguments)
 
 
 def test_only_and_json(tmp_path: Path) -> None:

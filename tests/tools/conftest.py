@@ -6,14 +6,26 @@ from pathlib import Path
 
 import pytest
 
-from tests.tools.programs import ROOT, Runner
+from tests.tools.programs import ROOT, Runner, run_program
 
 
 @pytest.fixture
-def simulate(tmp_path: Path) -> Runner:
-    """Runs tools/simulate.py without a page, from another folder."""
+def simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Runner:
+    """Runs tools/simulate.py without a page, from another folder, in this process."""
+    monkeypatch.syspath_prepend(tmp_path)  # PYTHONPATH=.
+    monkeypatch.delitem(sys.modules, "mine", raising=False)  # another test's policy
 
-    def run(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return run_program("simulate", "--no-meshcat", *arguments, cwd=tmp_path)
+
+    return run
+
+
+@pytest.fixture
+def simulate_apart(tmp_path: Path) -> Runner:
+    """Runs tools/simulate.py in an interpreter and an environment of its own."""
+
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, str(ROOT / "tools/simulate.py"), "--no-meshcat"]
         return subprocess.run(
             [*command, *arguments],

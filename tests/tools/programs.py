@@ -1,12 +1,19 @@
 """Running the programs: where they are, to their end, and up to Ctrl-C."""
 
+import contextlib
+import importlib
+import io
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+
+import matplotlib.pyplot as plt
+
+from drake_disasm.common import program
 
 ROOT = Path(__file__).parents[2]
 Runner = Callable[..., subprocess.CompletedProcess[str]]
@@ -17,10 +24,51 @@ def command(name: str, *arguments: object) -> list[str]:
     return [sys.executable, str(ROOT / f"tools/{name}.py"), *map(str, arguments)]
 
 
-def run_program(name: str, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """Runs a program to its end."""
+def run_program(
+    name: str, *arguments: object, cwd: Path | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Runs a program's main to its end, in this process.
+
+    As the program itself would be run, less the seconds that a fresh interpreter takes
+    to import Drake and PyTorch; `start_program` pays them.
+    """
+    words = [str(argument) for argument in arguments]
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        contextlib.chdir(cwd or Path.cwd()),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        code = _status(_main_of(name), words)
+    plt.close("all")
+    return subprocess.CompletedProcess(words, code, out.getvalue(), err.getvalue())
+
+
+def _status(main: Callable[[Sequence[str]], int], words: Sequence[str]) -> int:
+    """Returns the exit status; argparse exits by itself."""
+    try:
+        return program.status(main, words)
+    except SystemExit as leaving:
+        return leaving.code if isinstance(leaving.code, int) else 1
+
+
+def _main_of(name: str) -> Callable[[Sequence[str]], int]:
+    """Returns a program's main; pytest has tools/ on its path."""
+    main: Callable[[Sequence[str]], int] = importlib.import_module(name).main
+    return main
+
+
+def start_program(
+    name: str, *arguments: object, cwd: Path | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Runs a program to its end as a user does: in an interpreter of its own."""
     return subprocess.run(
-        command(name, *arguments), capture_output=True, text=True, timeout=280
+        command(name, *arguments),
+        capture_output=True,
+        text=True,
+        timeout=280,
+        cwd=cwd,
+        check=False,
     )
 
 

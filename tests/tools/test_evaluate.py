@@ -2,25 +2,17 @@
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from tests.tools.programs import ROOT
+from tests.tools.programs import run_program
 
 SHORT = ["--station=twin", "--episodes=2", "--set", "task.steps=8"]
 
 
 def _evaluate(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, str(ROOT / "tools/evaluate.py"), *arguments],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        cwd=folder,
-    )
+    return run_program("evaluate", *arguments, cwd=folder)
 
 
 def test_policies_and_settings_make_the_lines(tmp_path: Path) -> None:

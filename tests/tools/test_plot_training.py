@@ -1,24 +1,16 @@
 """tools/plot_training.py."""
 
 import subprocess
-import sys
 from pathlib import Path
 
 from drake_disasm.learning.run import write_episodes
 from drake_disasm.mdp import Outcome
 from drake_disasm.task.episode import EpisodeSummary
-from tests.tools.programs import ROOT
+from tests.tools.programs import run_program
 
 
 def _plot(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, str(ROOT / "tools/plot_training.py"), *arguments],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        cwd=folder,
-    )
+    return run_program("plot_training", *arguments, cwd=folder)
 
 
 def test_several_trainings_become_one_figure(tmp_path: Path) -> None:

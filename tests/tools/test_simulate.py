@@ -24,8 +24,8 @@ from tests.tools.programs import ROOT, Runner
 TWIN = ("--station", "twin")
 
 
-def test_default_run_takes_the_bolt_out(simulate: Runner) -> None:
-    done = simulate()
+def test_default_run_takes_the_bolt_out(simulate_apart: Runner) -> None:
+    done = simulate_apart()
     assert done.returncode == 0, done.stderr
     assert "success (the bolt is out)" in done.stdout
     assert "1 of 1 episodes succeeded" in done.stdout

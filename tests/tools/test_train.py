@@ -17,7 +17,7 @@ from drake_disasm.learning.hyperparameters import preset
 from drake_disasm.logs import read_log
 from drake_disasm.policies import load_policy
 from drake_disasm.scenario import load_scenario
-from tests.tools.programs import ROOT
+from tests.tools.programs import ROOT, run_program
 
 #: A training of seconds: short episodes, a small network, nothing compiled.
 SMALL = [
@@ -32,14 +32,7 @@ def _command(out: Path, *arguments: str) -> list[str]:
 
 
 def _train(out: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        _command(out, *arguments),
-        capture_output=True,
-        text=True,
-        timeout=200,
-        check=False,
-        cwd=out.parent,
-    )
+    return run_program("train", *SMALL, "--out", out, *arguments, cwd=out.parent)
 
 
 def _finished(out: Path, *arguments: str) -> subprocess.CompletedProcess[str]:

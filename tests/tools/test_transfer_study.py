@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ import pytest
 from drake_disasm.logs import read_log
 from drake_disasm.mdp import REWARD_TERMS
 from drake_disasm.policies import load_policy
-from tests.tools.programs import ROOT
+from tests.tools.programs import command, run_program
 
 _SMALL = [
     "--preset=chapter3", "--eager", "--validation=2", "--workers=1",
@@ -39,16 +38,13 @@ def scenarios(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {name: folder / f"{name}.yaml" for name in texts}
 
 
-def _command(scenarios: dict[str, Path], out: Path, *more: str) -> list[str]:
+def _arguments(scenarios: dict[str, Path], out: Path, *more: str) -> list[str]:
     named = [f"--{name}={path}" for name, path in scenarios.items()]
-    program = str(ROOT / "tools/transfer_study.py")
-    return [sys.executable, program, *named, *_SMALL, "--out", str(out), *more]
+    return [*named, *_SMALL, "--out", str(out), *more]
 
 
-def _run(command: list[str]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        command, capture_output=True, text=True, timeout=250, check=False
-    )
+def _run(arguments: list[str]) -> subprocess.CompletedProcess[str]:
+    return run_program("transfer_study", *arguments)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +53,7 @@ def study(
 ) -> tuple[Path, str]:
     """Returns the folder of a finished study in the twin, and what it printed."""
     out = tmp_path_factory.mktemp("study") / "out"
-    run = _run(_command(scenarios, out, "--station=twin"))
+    run = _run(_arguments(scenarios, out, "--station=twin"))
     assert run.returncode == 0, run.stderr
     return out, run.stdout
 
@@ -108,8 +104,8 @@ def test_resuming_a_finished_study_changes_nothing(
 ) -> None:
     out, printed = study
     before = (out / "from_after/seed_001/policy.npz").read_bytes()
-    assert _run(_command(scenarios, out, "--station=twin")).returncode == 2
-    again = _run(_command(scenarios, out, "--station=twin", "--resume"))
+    assert _run(_arguments(scenarios, out, "--station=twin")).returncode == 2
+    again = _run(_arguments(scenarios, out, "--station=twin", "--resume"))
     assert again.returncode == 0 and again.stdout == printed
     assert (out / "from_after/seed_001/policy.npz").read_bytes() == before
 
@@ -118,8 +114,10 @@ def test_an_interrupted_study_goes_on_to_the_same_result(
     study: tuple[Path, str], scenarios: dict[str, Path], tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    command = _command(scenarios, out, "--station=twin")
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    arguments = _arguments(scenarios, out, "--station=twin")
+    process = subprocess.Popen(
+        command("transfer_study", *arguments), stderr=subprocess.PIPE, text=True
+    )
     until = time.monotonic() + 120.0
     while not (out / "untrained/seed_000/log/episode_0001.parquet").exists():
         assert time.monotonic() < until and process.poll() is None
@@ -127,7 +125,7 @@ def test_an_interrupted_study_goes_on_to_the_same_result(
     os.kill(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130 and "Traceback" not in errors
-    run = _run([*command, "--resume"])
+    run = _run([*arguments, "--resume"])
     assert run.returncode == 0, run.stderr
     assert _branches(out) == _branches(study[0])
 
@@ -136,6 +134,6 @@ def test_a_scenario_that_is_missing_is_one_line(
     scenarios: dict[str, Path], tmp_path: Path
 ) -> None:
     bad = scenarios | {"after": tmp_path / "nowhere.yaml"}
-    run = _run(_command(bad, tmp_path / "out"))
+    run = _run(_arguments(bad, tmp_path / "out"))
     assert run.returncode == 2 and "nowhere.yaml" in run.stderr
     assert not (tmp_path / "out").exists()
