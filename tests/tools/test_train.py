@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 
 from drake_disasm.learning.hyperparameters import preset
@@ -175,12 +176,12 @@ def test_a_pool_whose_parent_dies_stops_by_itself(tmp_path: Path) -> None:
         _command(out, "--episodes=5000", "--seeds=2"), stderr=subprocess.DEVNULL
     )
     _wait_for(out / "seed_001/log/episode_0001.parquet")
+    workers = psutil.Process(process.pid).children(recursive=True)
+    assert len(workers) >= 2
     process.kill()
     process.wait()
-    time.sleep(1.0)
-    before = _episodes(out)
-    time.sleep(1.0)
-    assert _episodes(out) == before
+    _, alive = psutil.wait_procs(workers, timeout=60)
+    assert not alive
 
 
 def test_learning_from_logs_alone(undisturbed: Path, tmp_path: Path) -> None:

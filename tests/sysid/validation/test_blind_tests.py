@@ -38,7 +38,9 @@ class _Here(Executor):
         return future
 
 
-@pytest.mark.parametrize("name", ["CommandGain", "GrooveFriction"])
+@pytest.mark.parametrize(
+    "name", ["GrooveFriction", pytest.param("CommandGain", marks=pytest.mark.slow)]
+)
 def test_an_effect_at_twice_the_noise_gets_its_name(name):
     found = answer(Case((name,), 2.0, 0))
     assert found.named_first and found.ending == "explained"
