@@ -47,6 +47,24 @@ def without_substitutions(lines: Sequence[str]) -> list[str]:
     return escaped
 
 
+def literal_blocks(lines: Sequence[str]) -> list[str]:
+    """Returns a docstring's lines with what is indented after "...:" as code.
+
+    Between the two stands an empty line; the sections of Google's style have none.
+    """
+    marked = list(lines)
+    for i in range(len(lines) - 2):
+        line, blank, code = lines[i : i + 3]
+        indented = _indent(code) >= _indent(line) + 4
+        if line.endswith(":") and not line.endswith("::") and not blank.strip():
+            marked[i] = line + ":" * indented
+    return marked
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip()) if line.strip() else 0
+
+
 def _escaped_bar(match: re.Match[str]) -> str:
     return match.group(1) or r"\|"
 
@@ -113,7 +131,7 @@ def _process(
 ) -> None:
     if getattr(obj, "__module__", "") == "typing":  # an alias has typing's docstring
         lines.clear()
-    lines[:] = system_block(without_substitutions(lines))
+    lines[:] = system_block(without_substitutions(literal_blocks(lines)))
     if what == "class":
         lines += quantity_table(obj)
 

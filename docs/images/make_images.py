@@ -1,11 +1,14 @@
-"""Takes the README's pictures: Meshcat in the middle of an episode, in Chromium.
+"""Takes the README's picture: Meshcat in the middle of an episode, in Chromium.
 
 Run `python docs/images/make_images.py` with Debian's chromium installed.
 """
 
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+
+from PIL import Image
 
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
@@ -13,6 +16,7 @@ from drake_disasm.task.simulation import TaskSimulation
 from drake_disasm.visualization import MeshcatView, start_meshcat
 
 _STEPS = 45
+_BAR, _GAP = 24, 12  # pixels
 _FLAGS = (
     "--headless --no-sandbox --disable-quic --no-first-run --disable-sync "
     "--disable-background-networking --disable-component-update "
@@ -22,9 +26,22 @@ _FLAGS = (
 
 
 def main() -> None:
-    """Writes cell.png and lock.png beside this file."""
-    for name, close_up in (("cell", False), ("lock", True)):
-        _take(Path(__file__).with_name(f"{name}.png"), close_up)
+    """Writes cell.png, lock.png and both in overview.png, beside this file."""
+    files = [Path(__file__).with_name(f"{name}.png") for name in ("cell", "lock")]
+    for file, close_up in zip(files, (False, True), strict=True):
+        _take(file, close_up)
+    _side_by_side(files, Path(__file__).with_name("overview.png"))
+
+
+def _side_by_side(files: Sequence[Path], to: Path) -> None:
+    """Joins pictures without the bar of Meshcat's controls at their top."""
+    pictures = [Image.open(file).convert("RGB") for file in files]
+    width, height = pictures[0].size
+    left, right = (p.crop((0, _BAR, width, height)) for p in pictures)
+    joined = Image.new("RGB", (2 * width + _GAP, height - _BAR), "white")
+    joined.paste(left, (0, 0))
+    joined.paste(right, (width + _GAP, 0))
+    joined.save(to, optimize=True)
 
 
 def _take(file: Path, close_up: bool) -> None:

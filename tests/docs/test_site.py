@@ -57,6 +57,12 @@ def test_absolute_values_are_text_apart_from_literals() -> None:
     assert escaped == [r"\|v\| and `|w|`::", "", "    a | b", "", r"\|u\|"]
 
 
+def test_what_is_indented_after_a_colon_is_code() -> None:
+    lines = ["So:", "", "    x = |v|", "", "Args:", "    x: of it.", "Not:", "", "so."]
+    text = docstrings.literal_blocks(lines)
+    assert text == ["So::", *lines[1:]]
+
+
 @pytest.mark.parametrize(
     "markdown, folder, page, expected",
     [
