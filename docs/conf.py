@@ -37,6 +37,7 @@ lexers["csv"] = TextLexer()
 # API reference, from docstrings in Google's style. `name` in a docstring links to
 # what it names, where that is documented.
 default_role = "py:obj"
+suppress_warnings = ["ref.python"]  # `effects` may be an attribute of several classes
 # Autosummary writes a page per module, and leaves those of modules that are gone.
 for page in (DOCS / "api").glob("*.rst"):
     module = ROOT / page.stem.replace(".", "/")
