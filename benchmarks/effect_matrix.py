@@ -16,8 +16,7 @@ from drake_disasm.common.files import make_folder, write_figure, write_text
 from drake_disasm.effects import GroovePose
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
-from sysid.effect_selection.close_loop import HELD_OUT, HUBER, close_loop
-from sysid.identification.split import split_episodes
+from sysid.effect_selection.close_loop import close_loop
 from sysid.models.twin import TwinModel
 from sysid.validation.blind_tests import (
     Answer,
@@ -122,7 +121,6 @@ def closing_time(transitions: int, workers: int, contact: str) -> float:
     with _turned_log(transitions, scenario) as log:
         start = time.perf_counter()
         model = TwinModel([read_log(log)], scenario, ()).first(transitions)
-        train, test = split_episodes(model.measurements.names, HELD_OUT)
         with Workers(workers) as pool:
-            close_loop(model, train, test, HUBER, pool, lambda _: None)
+            close_loop(model, workers=pool)
         return time.perf_counter() - start

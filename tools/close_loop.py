@@ -1,11 +1,11 @@
 """Finds which physical effect a model lacks to explain a measured log, and adds it.
 
-The log says what is modelled: transitions of the cell or the twin, readings of a
-force/torque sensor at rest, or joint torques of an arm. The model is fitted; what is
-left is tested against every effect of the library on data that were not fitted; those
-that pass are added one by one. Prints what was missing, its parameters, and the error
-before and after. Writes the scenario with the effects in it, `result.json`, and a
-report that opens offline. After Ctrl-C the same command goes on where it was.
+The kind of log decides what is modelled: transitions of the cell or the twin, readings
+of a force/torque sensor at rest, or joint torques of an arm. The model is fitted; every
+effect of the library is tested on what it explains of data that were not fitted; those
+that pass are added one by one. Prints what is missing, its parameters, and the error
+before and after. Writes the scenario with the effects, `result.json`, and a report
+that opens offline. After Ctrl-C the same command resumes.
 """
 
 import argparse
@@ -14,14 +14,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cli
-from tqdm import tqdm
 
 from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, write_json, write_text
 from drake_disasm.logs import Log, read_logs
 from drake_disasm.scenario import dump_scenario, load_scenario
-from sysid.effect_selection.close_loop import Closed, close_loop
+from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.effect_selection.output import to_mapping
 from sysid.identification.split import split_episodes
 from sysid.models import LogModel
@@ -58,7 +57,7 @@ def _add_model_arguments(add: Callable[..., object]) -> None:
     add(
         "--scenario",
         metavar="NAME|FILE",
-        help="what the model begins with (default: what the log states)",
+        help="the nominal model (default: the scenario that the log states)",
     )
     add("--urdf", metavar="FILE", help="the arm of a joint_motion log")
     add(
@@ -66,49 +65,53 @@ def _add_model_arguments(add: Callable[..., object]) -> None:
         nargs="+",
         default=[],
         metavar="NAME",
-        help="logs or episodes that are not fitted but judged (default: a quarter of "
-        "the episodes of transitions; else contiguous blocks in turn)",
+        help="logs or episodes to judge by instead of fitting them (default: a quarter "
+        "of the episodes of transitions; else contiguous blocks in turn)",
     )
     add(
         "--parameters",
         nargs="+",
         default=[],
         metavar="NAME|FILE",
-        help="numbers of the scenario that are fitted again along with the effects, as "
-        "tools/identify.py names them (default: none for transitions, else the "
-        "model's own)",
+        help="parameters of the scenario that are fitted together with the effects, as "
+        "named by tools/identify.py (default: none for transitions, else the model's "
+        "own)",
     )
     add(
         "--huber",
         type=float,
         metavar="K",
-        help="residuals beyond K standard deviations count linearly; inf for plain "
-        "squares (default: 3 for transitions, else inf)",
+        help="residual, in standard deviations, beyond which the loss is linear; inf "
+        "for least squares (default: 3 for transitions, else inf)",
     )
 
 
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
-    logs = read_logs(args.log)
-    model = _model(args, logs)
-    names = model.measurements.names
-    train, test = split_episodes(names, args.held_out or model.held_out_share)
-    huber_delta = model.default_huber_delta if args.huber is None else args.huber
-    if not huber_delta > 0.0:
+    if args.huber is not None and not args.huber > 0.0:
         raise DisasmError("--huber: give a number above zero, or inf")
+    model = _model(args, read_logs(args.log))
+    share = model.held_out_share
+    train, test = split_episodes(model.measurements.names, args.held_out or share)
     origin = program.provenance("close_loop", arguments, 0)
     fits = args.out / "fits"
     with (
-        program.ProgressBar(unit="runs") as bar,
-        Workers(args.workers, progress=bar) as workers,
+        program.ProgressBar(unit="run") as progress,
+        Workers(args.workers, progress=progress) as workers,
     ):
         closed = close_loop(
-            model, train, test, huber_delta, workers, tqdm.write, folder=fits
+            model,
+            train=train,
+            test=test,
+            huber_delta=args.huber,
+            workers=workers,
+            progress=progress,
+            folder=fits,
         )
     _write(args.out, closed, origin)
     shutil.rmtree(fits, ignore_errors=True)
-    print(closed.verdict.text)
+    print(closed.text)
     print(f"report: {args.out / 'report.html'}")
     return 0
 
@@ -124,9 +127,9 @@ def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
     return model_of(logs, choice)
 
 
-def _write(folder: Path, closed: Closed, origin: dict[str, object]) -> None:
+def _write(folder: Path, closed: ClosedLoop, origin: dict[str, object]) -> None:
     make_folder(folder)
-    if closed.scenario:
+    if closed.scenario is not None:
         write_text(folder / "scenario.yaml", dump_scenario(closed.scenario))
     write_json(folder / "result.json", to_mapping(closed) | {"provenance": origin})
     write_text(folder / "report.html", closing_page(closed, origin))

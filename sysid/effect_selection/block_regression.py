@@ -1,9 +1,9 @@
-"""Residuals, and what would explain them, block by block.
+"""Linear regression of residuals on candidate effects, by blocks of rows.
 
 Near a fit, residuals are linear in the parameters, those of candidate effects
-included: r(phi) = r + A phi. All that is asked of a candidate (does it show, what does
-it explain of data that it was not fitted to) follows from the normal equations of each
-block of rows, so that hundreds of candidates need no simulation beyond A.
+included: r(phi) = r + A phi. What a candidate explains of rows that it was not fitted
+to follows from the normal equations of each block of rows, so that hundreds of
+candidates need no simulation beyond A.
 """
 
 import dataclasses
@@ -12,8 +12,8 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata, wilcoxon
 
+from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
 from sysid.identification.linearisation import Linearisation
 from sysid.identification.uncertainty import block_length, block_numbers
 from sysid.objective import huber_weights, pseudo_residual
@@ -21,24 +21,17 @@ from sysid.objective import huber_weights, pseudo_residual
 Array = NDArray[np.float64]
 Columns = NDArray[np.int64]
 
+# Numerical guards, not thresholds.
 _RIDGE = 1e-10  # of the diagonal, against columns that depend on each other
-_DRAWS = 4000
-_LEAST_BLOCKS = 8
-_NEW = 1e-3  # share of a column that the base can't do
-_MOST_BLOCKS = 40
-_SAME = 1e-6  # of a block's gain, that is no difference
-_AT_BOUND = 1e-9  # of a parameter's range
-_REWEIGHTED = 3  # times, where squares end
-_FAR = 10.0  # times where squares end: a row that is missed by more has no say
-_MOST_ROWS = 0.95  # of the rows, whose leverage none may exceed
+_AT_BOUND = 1e-9  # of a parameter's range: rounding of a point on the bound
 
 
 @dataclass(frozen=True)
 class BlockRegression:
     """Residuals and P columns that may explain them, by blocks of rows.
 
-    Only the normal equations of what is asked for are ever made: of hundreds of
-    columns, a candidate has a few.
+    Normal equations are made only of the columns that are asked for: of hundreds, a
+    candidate has a few.
 
     Attributes:
         A: (n, P) columns, each of rms 1; block by block.
@@ -46,8 +39,9 @@ class BlockRegression:
         begins: (B,) where each block begins.
         scale: (P,) what columns were divided by.
         side: (P,) 1 or -1 where a parameter can go up or down only, else 0.
-        channels: of each row.
-        huber: where squares end.
+        channels: number of channels of each row.
+        huber_delta: residual, in standard deviations, beyond which the loss is linear.
+        settings: how rows are weighted.
     """
 
     A: Array
@@ -57,6 +51,7 @@ class BlockRegression:
     side: Array
     channels: int
     huber_delta: float
+    settings: SelectionSettings = DEFAULT_SETTINGS
 
     @classmethod
     def of(
@@ -64,13 +59,15 @@ class BlockRegression:
         linearisation: Linearisation,
         blocks: NDArray[np.int64],
         extra: Array | None = None,
+        settings: SelectionSettings = DEFAULT_SETTINGS,
     ) -> Self:
-        """Returns the study of a linearisation.
+        """Returns the regression of a linearisation.
 
         Args:
-            here: at the fit, with the candidates at null.
+            linearisation: at the fit, with the candidates at null.
             blocks: (rows,) number of each row's block.
-            extra: (rows, channels, k) further columns, of empirical dependences.
+            extra: (rows, channels, k) further columns, of dependence curves.
+            settings: how rows are weighted.
         """
         if extra is None:
             extra = np.zeros((*linearisation.residual.shape, 0))
@@ -90,26 +87,29 @@ class BlockRegression:
             np.append(side, np.zeros(extra.shape[2])),
             channels,
             linearisation.huber_delta,
+            settings,
         )
 
     @property
-    def energy(self) -> Array:
-        """Loss of each block (B,): squares, and less beyond `huber`."""
+    def block_losses(self) -> Array:
+        """Loss of each block (B,) as it is: squares, Huber's beyond `huber_delta`."""
         return self._loss(self.r)
 
-    def moved(self, change: Array) -> "BlockRegression":
-        """Returns the study of residuals elsewhere, a change (P,) of u away."""
+    def shifted(self, change: Array) -> "BlockRegression":
+        """Returns the regression of the residuals at u + change (P,)."""
         return dataclasses.replace(self, r=self.r + self.A @ (change * self.scale))
 
-    def apart(self, mine: NDArray[np.bool_], size: int) -> "BlockRegression":
-        """Returns the study with parameters once more, acting in some blocks alone.
+    def with_own_parameters(
+        self, blocks: NDArray[np.bool_], size: int
+    ) -> "BlockRegression":
+        """Returns the regression with a second copy of parameters for some blocks.
 
         Args:
-            mine: (B,) which blocks.
-            size: number of the parameters, the first ones.
+            blocks: (B,) those that the copies act in.
+            size: number of the parameters that are copied, the first ones.
         """
         lengths = np.diff(self.begins, append=len(self.r))
-        acts = np.repeat(mine, lengths)[:, None]
+        acts = np.repeat(blocks, lengths)[:, None]
         return dataclasses.replace(
             self,
             A=np.hstack([self.A, self.A[:, :size] * acts]),
@@ -118,11 +118,11 @@ class BlockRegression:
         )
 
     def project_out(self, base: Columns) -> "BlockRegression":
-        """Returns the study of all columns with some projected out, fitted to all rows.
+        """Returns the regression with some columns projected out, fitted to all rows.
 
-        What a candidate adds is then judged apart from how well the base carries over:
-        a base of many parameters that a block fixes alone would drown it. Columns
-        that the base can do are zero.
+        What a candidate adds is then judged apart from how well the base generalises:
+        a base of many parameters, each fixed by a single block, would hide it. Columns
+        that the base spans become zero.
         """
         if not len(base):
             return self
@@ -133,62 +133,68 @@ class BlockRegression:
         phi = -_solve(H, (weighted.T @ self.r)[None])[0]
         projected = self.A - own @ K
         left, size = (np.einsum("np,np->p", A, A) for A in (projected, self.A))
-        projected *= left > _NEW**2 * size
+        projected *= left > self.settings.min_new_column**2 * size
         return dataclasses.replace(self, A=projected, r=self.r + own @ phi)
 
-    def losses(self, columns: Columns) -> Array:
-        """Returns what each block costs, (B,), if columns are fitted to all others.
+    def held_out_losses(self, columns: Columns) -> Array:
+        """Returns the loss of each block (B,) with columns fitted to all others.
 
-        Contact makes and breaks: at a few rows a derivative is of no use, and huge. So
-        a fit begins with and without the rows of the most extreme columns, rows that it
-        misses by far lose their say, and the better of the two counts.
+        Contact makes and breaks: at a few rows a derivative is huge and meaningless. So
+        columns are fitted with and without limited leverage of such rows, outliers of
+        the fit lose their influence, and the better of the two fits counts.
         """
-        a = self.A[:, self._possible(columns)]
-        starts = [np.ones(len(self.r))]
+        a = self.A[:, self._feasible(columns)]
+        priors = [np.ones(len(self.r))]
         if np.isfinite(self.huber_delta) and a.shape[1]:
-            starts.append(self._calm(a))
-        found = [self._left_out(a, w) for w in starts]
+            priors.append(self._leverage_weights(a))
+        found = [self._cross_validated(a, w) for w in priors]
         return min(found, key=np.sum)
 
-    def _left_out(self, a: Array, calm: Array) -> Array:
-        """Returns what each block costs, (B,), if columns (n, k) fit all others.
+    def _cross_validated(self, a: Array, prior: Array) -> Array:
+        """Returns the loss of each block (B,) with columns (n, k) fitted to all others.
 
         Args:
             a: columns.
-            calm: (n,) weights to begin with.
+            prior: (n,) weights of rows, times which Huber's are taken.
         """
-        w = calm * self._weights(self.r)
-        for _ in range(_REWEIGHTED if np.isfinite(self.huber_delta) else 0):
+        w = prior * self._weights(self.r)
+        steps = self.settings.reweighting_steps
+        for _ in range(steps if np.isfinite(self.huber_delta) else 0):
             phi = -_solve((a.T @ (w[:, None] * a))[None], (a.T @ (w * self.r))[None])
-            w = calm * self._weights(self.r + a @ phi[0])
-        H, g = self._parts(a, w)
+            w = prior * self._weights(self.r + a @ phi[0])
+        H, g = self._normal_equations(a, w)
         others = -_solve(H.sum(axis=0) - H, g.sum(axis=0) - g)
         lengths = np.diff(self.begins, append=len(self.r))
         change = np.einsum("nk,nk->n", a, np.repeat(others, lengths, axis=0))
         return self._loss(self.r + change)
 
-    def _calm(self, a: Array) -> Array:
+    def _leverage_weights(self, a: Array) -> Array:
         """Returns weights (n,) that give no row more leverage than most have."""
         size = np.abs(a).max(axis=1).reshape(-1, self.channels).max(axis=1)
-        most = np.quantile(size, _MOST_ROWS)
+        most = np.quantile(size, self.settings.leverage_quantile)
         weight = np.minimum(1.0, most / np.maximum(size, 1e-300)) ** 2
         return np.repeat(weight, self.channels)
 
     def _weights(self, r: Array) -> Array:
-        """Returns the weights (n,) of residuals: Huber's, and less far beyond."""
+        """Returns the weights (n,) of residuals: Huber's, and less for outliers."""
         if not np.isfinite(self.huber_delta):
             return np.ones(len(r))
-        far = np.minimum(1.0, _FAR * self.huber_delta / np.maximum(np.abs(r), 1e-300))
-        return huber_weights(r, self.huber_delta) * far**2
+        limit = self.settings.outlier_deltas * self.huber_delta
+        outlier = np.minimum(1.0, limit / np.maximum(np.abs(r), 1e-300))
+        return huber_weights(r, self.huber_delta) * outlier**2
 
     def _loss(self, r: Array) -> Array:
         """Returns the loss of each block (B,) of residuals (n,)."""
         squares = pseudo_residual(r, self.huber_delta) ** 2
         return np.asarray(np.add.reduceat(squares, self.begins))
 
-    def spread(self) -> Array:
-        """Returns the standard deviation (P,) of all parameters, fitted together."""
-        parts_H, parts_g = self._parts(self.A, self._weights(self.r))
+    def standard_errors(self) -> Array:
+        """Returns the standard error (P,) of each parameter, all fitted together.
+
+        A sandwich estimate from the blocks' gradients: right for any correlation within
+        a block (Huber 1967).
+        """
+        parts_H, parts_g = self._normal_equations(self.A, self._weights(self.r))
         H = parts_H.sum(axis=0)
         size = np.sqrt(np.diagonal(H))
         size = np.where(size > 0.0, size, 1.0)
@@ -196,7 +202,7 @@ class BlockRegression:
         gradient = np.linalg.pinv(H, hermitian=True) @ (parts_g / size).T
         return np.asarray(np.linalg.norm(gradient, axis=1) / size / self.scale)
 
-    def _parts(self, a: Array, w: Array) -> tuple[Array, Array]:
+    def _normal_equations(self, a: Array, w: Array) -> tuple[Array, Array]:
         """Returns the normal equations of columns (n, k), (B, k, k) and (B, k)."""
         weighted = w[:, None] * a
         ends = [*self.begins[1:], len(self.r)]
@@ -204,7 +210,7 @@ class BlockRegression:
         H = np.array([a[block].T @ weighted[block] for block in blocks])
         return H, np.array([weighted[block].T @ self.r[block] for block in blocks])
 
-    def _possible(self, columns: Columns) -> Columns:
+    def _feasible(self, columns: Columns) -> Columns:
         """Returns the columns without those that a bound keeps from helping."""
         if not self.side[columns].any():
             return columns
@@ -220,52 +226,27 @@ class BlockRegression:
         return columns
 
 
-def family_p(gains: Array, seed: int = 0) -> Array:
-    """Returns for each candidate the family-wise p-value that it explains nothing.
-
-    Wilcoxon's signed ranks of what blocks gain by it when they are predicted from all
-    others, and the highest over all candidates with the blocks' signs flipped
-    together: whatever correlation there is within a block or between candidates, and
-    whatever single block dominates. The price of a candidate's parameters is in its
-    gains.
+def blocks_of(
+    linearisation: Linearisation,
+    episode: NDArray[np.int64],
+    settings: SelectionSettings = DEFAULT_SETTINGS,
+) -> NDArray[np.int64]:
+    """Returns the block (rows,) of each row: longer than residuals stay correlated.
 
     Args:
-        gains: (B, k), of each block by each candidate.
-        seed: of the signs.
+        linearisation: its residuals.
+        episode: (rows,) of each row; a block never spans two.
+        settings: how many blocks there may be.
     """
-    ranks = np.sign(gains) * rankdata(np.abs(gains), axis=0)
-    unit = ranks / np.maximum(np.linalg.norm(ranks, axis=0), 1e-300)
-    signs = np.random.default_rng(seed).choice([-1.0, 1.0], (_DRAWS, len(gains)))
-    highest = (signs @ unit).max(axis=1, initial=0.0)
-    above = (highest[:, None] >= unit.sum(axis=0) - 1e-12).sum(axis=0)
-    p: Array = (1.0 + above) / (1.0 + _DRAWS)
-    return p
-
-
-def blocks_of(
-    linearisation: Linearisation, episode: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """Returns the block (rows,) of each row: longer than residuals stay correlated."""
     rows = len(episode)
     length = block_length(linearisation.residual, episode)
-    length = max(length, rows // _MOST_BLOCKS)
-    return block_numbers(episode, int(min(length, max(1, rows // _LEAST_BLOCKS))))
-
-
-def worse_p(gains: Array, best: Array) -> float:
-    """Returns the p-value that gains (B,) are no less than the best's, block by block.
-
-    Wilcoxon's signed ranks of the differences: two candidates that explain the same
-    blocks by as much can't be told apart, whatever their totals.
-    """
-    difference = best - gains
-    if not np.abs(difference).max(initial=0.0) > _SAME * np.abs(best).max(initial=0.0):
-        return 1.0
-    return float(wilcoxon(difference, alternative="greater").pvalue)
+    length = max(length, rows // settings.max_blocks)
+    longest = max(1, rows // settings.min_blocks)
+    return block_numbers(episode, int(min(length, longest)))
 
 
 def _solve(H: Array, g: Array) -> Array:
-    """Returns H^-1 g of a batch, a little ridge against dependent columns."""
+    """Returns H^-1 g of a batch, with a tiny ridge against dependent columns."""
     size = H.shape[-1]
     diagonal = np.diagonal(H, axis1=1, axis2=2)
     ridge = _RIDGE * diagonal + 1e-300

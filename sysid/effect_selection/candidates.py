@@ -23,7 +23,7 @@ class Candidate:
     Attributes:
         name: of the effect, with its joint if it has one.
         effect: at null.
-        fields: its sizes that are free.
+        fields: names of its amplitudes that are fitted.
     """
 
     name: str
@@ -32,18 +32,18 @@ class Candidate:
 
     @classmethod
     def of(cls, effect: Effect) -> Self:
-        """Returns the candidate of an effect with all its sizes free."""
+        """Returns the candidate of an effect with all its amplitudes free."""
         kind, joint = type(effect), getattr(effect, "joint", "")
         name = f"{kind.__name__}.{joint}" if joint else kind.__name__
         return cls(name, effect, amplitudes(kind))
 
     def only(self, fields: Sequence[str]) -> Self:
-        """Returns the same with fewer sizes free."""
+        """Returns the same with fewer amplitudes free."""
         return dataclasses.replace(self, fields=tuple(fields))
 
     @property
     def text(self) -> str:
-        """The name with the shape."""
+        """The name with the values of the shape parameters."""
         shape = ", ".join(f"{name}={value:g}" for name, value in self.shape.items())
         return f"{self.name}[{shape}]" if shape else self.name
 
@@ -56,10 +56,33 @@ class Candidate:
         }
 
 
+def is_joint_group(effects: Sequence[Candidate]) -> bool:
+    """Returns whether effects are one kind at several joints: more than a pair."""
+    return len(effects) > 2
+
+
+def joint_groups(library: Sequence[Candidate]) -> list[tuple[Candidate, ...]]:
+    """Returns the same kind of effect at all joints at once, kind by kind.
+
+    An arm that lacks friction at one joint lacks it at the others, and one alone would
+    take up what the others lack through the rigid bodies in between.
+    """
+    groups: dict[str, list[Candidate]] = {}
+    for candidate in library:
+        groups.setdefault(kind_text(candidate), []).append(candidate)
+    return [tuple(group) for group in groups.values() if len(group) > 1]
+
+
+def kind_text(candidate: Candidate) -> str:
+    """Returns the effect with its shape parameters, without its joint."""
+    kind = type(candidate.effect).__name__
+    return candidate.text.replace(candidate.name, kind)
+
+
 def candidates(
     model: LogModel, library: Sequence[type[Effect]] | None = None
 ) -> list[Candidate]:
-    """Returns what of a library, or of all that is registered, a model could carry."""
+    """Returns the effects of a library, or all registered ones, a model may lack."""
     library = registered_effects() if library is None else library
     return [Candidate.of(effect) for effect in model.applicable_effects(library)]
 
@@ -67,16 +90,15 @@ def candidates(
 def extended(
     model: LogModel, chosen: Sequence[Candidate], with_shapes: bool = False
 ) -> tuple[LogModel, list[range]]:
-    """Returns a model with candidates among its effects, and their sizes as parameters.
+    """Returns a model with candidates, their amplitudes as parameters.
 
-    And which of its parameters are new, candidate by candidate.
-
-    An effect that the model has already gets the parameters that were not free.
+    And which of its parameters are new, candidate by candidate. Of an effect that the
+    model has already, those amplitudes become parameters that are not yet.
 
     Args:
         model: to extend.
         chosen: candidates.
-        with_shapes: whether their shapes are parameters, too.
+        with_shapes: whether shape parameters are fitted, too.
     """
     effects = list(copy.deepcopy(model.effects))
     taken = {parameter.path for parameter in model.parameters}
@@ -99,14 +121,14 @@ def _place(effects: list[Effect], candidate: Candidate) -> int:
     """Returns a candidate's place among effects, to which it is added if need be."""
     wanted = candidate.effect
     for number, effect in enumerate(effects):
-        if type(effect) is type(wanted) and _looks(effect) == _looks(wanted):
+        if type(effect) is type(wanted) and _identity(effect) == _identity(wanted):
             return number
     effects.append(copy.deepcopy(wanted))
     return len(effects) - 1
 
 
-def _looks(effect: Effect) -> tuple[object, ...]:
-    """Returns what tells effects of a kind apart, whatever their sizes."""
+def _identity(effect: Effect) -> tuple[object, ...]:
+    """Returns what distinguishes effects of a kind, whatever their amplitudes."""
     kind = type(effect)
     return tuple(
         getattr(effect, f.name)

@@ -1,55 +1,70 @@
 """From a model of a log to the effect that the model lacks."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.effects import Effect, Imprecision, registered_effects
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.candidates import candidates
-from sysid.effect_selection.command_scatter import Scatter, scatter
+from sysid.effect_selection.command_scatter import (
+    CommandScatter,
+    fit_command_scatter,
+)
+from sysid.effect_selection.contradictions import contradictions
 from sysid.effect_selection.data_sufficiency import refuse_few_rows, refuse_short_logs
 from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.held_out import HeldOut, held_out
-from sysid.effect_selection.search import Round, Survey, Tracer
-from sysid.effect_selection.verdict import Verdict, verdict
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.held_out import HeldOut, held_out_errors
+from sysid.effect_selection.refit_search import RefitSearch
+from sysid.effect_selection.search import ForwardSearch, LinearSearch, SelectionRound
+from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
+from sysid.effect_selection.survey import Survey
+from sysid.effect_selection.verdict import Verdict, judge
+from sysid.effect_selection.verdict_text import verdict_text
 from sysid.identification.noise import with_estimated_noise
+from sysid.identification.split import split_episodes
 from sysid.models.base import LogModel
 from sysid.workers import Workers
 
-#: As models of transitions have them; ask the model instead.
-HELD_OUT, HUBER = 0.25, 3.0
-_SEARCHED = 250  # rows, of a model whose evaluation takes seconds
-
 
 @dataclass(frozen=True)
-class Closed:
+class ClosedLoop:
     """What closing the loop found.
 
     Attributes:
-        verdict: the answer.
+        verdict: what is missing, with its ties and the values of its parameters.
+        errors: measured and predicted held-out rows, without and with the effects.
         first, last: the model fitted without and with the effects.
         rounds: how the effects were chosen.
-        begin, end: what spoke for each candidate before the first and after the last.
-        errors: before and after, on rows that were not fitted.
+        begin, end: evidence for each candidate at the first and at the last fit.
         scatter: about the commands, if the arm has that.
     """
 
     verdict: Verdict
+    errors: HeldOut
     first: Fit
     last: Fit
-    rounds: tuple[Round, ...]
+    rounds: tuple[SelectionRound, ...]
     begin: Survey
     end: Survey
-    errors: HeldOut
-    scatter: Scatter | None
+    scatter: CommandScatter | None
+
+    @property
+    def text(self) -> str:
+        """The verdict in three lines: what is missing, its parameters, the errors."""
+        most = self.last.settings.max_listed
+        return verdict_text(self.verdict, self.errors, most)
 
     @property
     def scenario(self) -> Scenario | None:
-        """What was identified, with the effects that were found; None without one."""
+        """The identified scenario with the effects; None if the model has none."""
         scenario = self.last.model.scenario_at(self.last.theta)
-        if self.scatter is None or scenario is None:
+        if scenario is None or self.scatter is None:
             return scenario
         more = Imprecision(*self.scatter.std.tolist())
         return dataclasses.replace(scenario, effects=[*scenario.effects, more])
@@ -57,75 +72,105 @@ class Closed:
 
 def close_loop(
     model: LogModel,
-    train: Sequence[int],
-    test: Sequence[int],
-    huber_delta: float,
-    workers: Workers,
-    tell: Callable[[str], None],
+    *,
+    train: Sequence[int] | None = None,
+    test: Sequence[int] | None = None,
+    huber_delta: float | None = None,
+    settings: SelectionSettings = DEFAULT_SETTINGS,
     library: Sequence[type[Effect]] | None = None,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
     folder: Path | None = None,
-) -> Closed:
+) -> ClosedLoop:
     """Finds what a model lacks to explain its log.
+
+    The model is fitted, every effect of the library that could act on it is judged by
+    what it explains of rows that it was not fitted to, and those that are confirmed
+    are added one by one. Prints nothing.
 
     Args:
         model: of the whole log, with the parameters that are identified anyway.
-        train, test: numbers of its episodes; `test` may be empty: contiguous blocks
-            are then held out in turn.
-        huber: where squares end, in units of the noise.
-        workers: to evaluate with.
-        tell: called with a line after each step.
-        library: effects that may be named; by default all that are registered.
-        folder: where fits are kept: the same search, stopped and begun again, takes
-            them from there.
+        train, test: numbers of the episodes that are fitted and held out; one that is
+            left out is all that the other leaves, both are the model's default. An
+            empty `test` holds out contiguous blocks in turn.
+        huber_delta: residual, in standard deviations, beyond which the loss is linear;
+            the model's default if left out, infinity for least squares.
+        settings: thresholds.
+        library: effects that may be named; all registered ones if left out.
+        workers: evaluate; this process if left out.
+        progress: gets a line after each step; may raise to stop.
+        folder: of a cache of fits: the same call, stopped and made again, resumes.
 
     Raises:
         DisasmError: the log is too short to decide anything.
     """
+    if huber_delta is None:
+        huber_delta = model.default_huber_delta
+    train, test = _split(model, train, test)
+    workers, progress = workers or Workers(), progress or ignore_progress
     base = with_estimated_noise(model.of_episodes(train), workers, huber_delta)
-    refuse_few_rows(base)
+    refuse_few_rows(base, settings)
     library = registered_effects() if library is None else library
-    library_here = candidates(base, library)
-    tracer = Tracer(
-        _affordable(base), library_here, workers, huber_delta, tell, folder=folder
+    applicable = candidates(base, library)
+    fitter = Fitter(
+        _affordable(base, settings), workers, huber_delta, settings, folder=folder
     )
-    tell("the model as it is")
-    first = tracer.fit(())
-    tell(f"objective {first.value:.4g}; asking {len(library_here)} candidates")
-    begin = tracer.survey(first)
-    last, end = tracer.forward(first, begin)
-    if tracer.base is not base:
-        tell("once more with all rows")
-        tracer, first, last = _with_all_rows(tracer, base, last)
+    kind = LinearSearch if base.affine else RefitSearch
+    search = kind(fitter, applicable, progress)
+    first, last, begin, end = _searched(search)
+    if fitter.base is not base:
+        _report(progress, "fitting all rows")
+        fitter = fitter.with_base(base).with_exact_derivatives()
+        first, last = fitter.fit(()), fitter.fit(last.effects, last)
     refuse_short_logs(last)
-    kept = _like(base, model.of_episodes(test)) if test else None
-    errors = held_out(tracer, first, last, kept)
-    loose = scatter(last, workers, huber_delta) if Imprecision in library else None
-    found = verdict(tracer, first, last, end, errors, loose)
-    rounds = tuple(tracer.rounds)
-    return Closed(found, first, last, rounds, begin, end, errors, loose)
+    held_out = _with_noise_of(base, model.of_episodes(test)) if test else None
+    errors = held_out_errors(fitter, first, last, held_out)
+    may_scatter = Imprecision in library
+    scatter = fit_command_scatter(fitter, last) if may_scatter else None
+    rounds = tuple(search.rounds)
+    against = contradictions(last, end.linearised, len(base.parameters))
+    verdict = judge(first, last, end, rounds, against, scatter)
+    return ClosedLoop(verdict, errors, first, last, rounds, begin, end, scatter)
 
 
-def _affordable(base: LogModel) -> LogModel:
+def _searched(search: ForwardSearch) -> tuple[Fit, Fit, Survey, Survey]:
+    """Returns the fits without and with effects, and the surveys at both."""
+    _report(search.progress, "fitting the model as it is")
+    first = search.fitter.fit(())
+    count = len(search.library)
+    line = f"objective {first.objective:.4g}; testing {count} candidates"
+    _report(search.progress, line, first.objective)
+    begin = search.survey(first)
+    last, end = search.run(first, begin)
+    return first, last, begin, end
+
+
+def _report(progress: Progress, text: str, value: float = np.nan) -> None:
+    progress(ProgressUpdate(ForwardSearch.stage, message=text, value=value))
+
+
+def _split(
+    model: LogModel, train: Sequence[int] | None, test: Sequence[int] | None
+) -> tuple[Sequence[int], Sequence[int]]:
+    """Returns the episodes to fit and to hold out; see `close_loop`."""
+    names = model.measurements.names
+    if train is None and test is None:
+        return split_episodes(names, model.held_out_share)
+    if train is None:
+        train = [i for i in range(len(names)) if i not in (test or ())]
+    if test is None:
+        test = [i for i in range(len(names)) if i not in train]
+    return train, test
+
+
+def _affordable(base: LogModel, settings: SelectionSettings) -> LogModel:
     """Returns the model of so many rows that hundreds of evaluations are affordable."""
-    every = round(base.measurements.rows / _SEARCHED)
-    if not base.costly or every < 2:
-        return base
-    return base.thin(every)
+    every = round(base.measurements.rows / settings.costly_search_rows)
+    return base.thin(every) if base.costly and every >= 2 else base
 
 
-def _with_all_rows(
-    tracer: Tracer, base: LogModel, last: Fit
-) -> tuple[Tracer, Fit, Fit]:
-    """Returns the fits without and with the effects to what was thinned for the search.
-
-    The last has the model's own derivatives; and the tracer that fits so.
-    """
-    tracer = dataclasses.replace(tracer, base=base, exact=True)
-    return tracer, tracer.fit(()), tracer.fit(last.effects, last)
-
-
-def _like(base: LogModel, test: LogModel) -> LogModel:
-    """Returns the rows that were kept, with the noise that the fitted ones tell."""
+def _with_noise_of(base: LogModel, held_out: LogModel) -> LogModel:
+    """Returns held-out rows with the noise as estimated on the training rows."""
     noise = base.measurements.noise
     origin = base.measurements.channels[0].origin
-    return test.with_measurements(test.measurements.with_noise(noise, origin))
+    return held_out.with_measurements(held_out.measurements.with_noise(noise, origin))

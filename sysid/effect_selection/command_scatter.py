@@ -1,13 +1,13 @@
 """Does the arm scatter about its commands? An effect on the variance, not the mean.
 
 No prediction gets better by it: residuals are larger than the noise, and that is all.
-What tells it from an effect that the library lacks: all channels scatter as if each
-step had led elsewhere by itself, and where it led depends on nothing.
+It differs from an effect that the library lacks in that all channels scatter as if each
+step had ended elsewhere at random, and where it ended depends on nothing.
 
-In step k the residual is r_k = J_k d_k + n_k, with d_k ~ N(0, S) where the command
-truly led, J_k the derivatives of the prediction by that, and n_k the known noise. S is
-fitted by maximum likelihood (a random-effects model, Laird and Ware 1982), and J_k
-taken anew where each step likely led, since contact is anything but linear.
+In step k the residual is r_k = J_k d_k + n_k, with d_k ~ N(0, S) the displacement of
+the step's end, J_k the derivatives of the prediction by that, and n_k the known noise.
+S is fitted by maximum likelihood (a random-effects model, Laird and Ware 1982), and J_k
+taken anew at the likeliest displacements, since contact is anything but linear.
 """
 
 import dataclasses
@@ -16,66 +16,61 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.stats import pearsonr, ttest_1samp, wilcoxon
+from scipy.stats import pearsonr, ttest_1samp
 
-from sysid.effect_selection.block_regression import blocks_of
-from sysid.effect_selection.evidence import ALPHA, LEAST_SHARE
+from sysid.confidence import Z
 from sysid.effect_selection.fit import Fit
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.settings import SelectionSettings
+from sysid.effect_selection.significance import greater_p
 from sysid.identification.whiteness import ljung_box
 from sysid.models.base import LogModel
 from sysid.objective import Objective, pseudo_residual
-from sysid.workers import Workers
 
 Array = NDArray[np.float64]
 
-#: Objective beyond which there is more than noise, where the noise is known.
-BEYOND_NOISE = 1.2
-_PUSH = 2e-5  # m, of the derivatives
-_ROUNDS = 4
-_MISSED = 0.02  # of the rows, beyond an edge that a derivative doesn't see
-_FOLDS = 8
-_UNIT = 1e-4  # m, near the optimum
-_LEAST = 1e-3  # of the unit: none
-_DEPENDS = 0.01  # family-wise, that where a step led depends on something
-_Z95 = 1.959963984540054
+# Steps of the likelihood's second differences, not thresholds.
+_CURVATURE_STEP = 0.05  # of a standard deviation
+_LEAST_SIZE = 0.1  # of scatter_scale: the least size that the step is taken of
 
 
 @dataclass(frozen=True)
-class Scatter:
+class CommandScatter:
     """How an arm scatters about its commands.
 
     Attributes:
         std: (3,) along the axes of G [m].
-        interval: (3, 2) 95 %, by the likelihood's curvature.
+        interval: (3, 2) 95 %, by the likelihood's curvature [m].
         gain: share of the loss that it accounts for.
-        value: of the objective when it is accounted for, without the few rows in which
-            contact came or went.
+        objective: with it accounted for, without the few rows in which contact came or
+            went.
     """
 
     std: Array
     interval: Array
     gain: float
-    value: float
+    objective: float
 
 
 @dataclass(frozen=True)
 class _Likelihood:
-    """Residuals r (n, c) of steps as commanded, and J (n, c, 3) by where they led.
+    """Residuals r (n, c) of steps as commanded, and J (n, c, 3) by displacements.
 
-    In units of the noise, and of `_UNIT`.
+    In units of the noise, and of `scatter_scale`.
     """
 
     r: Array
     J: Array
     huber_delta: float
+    settings: SelectionSettings
 
     def rows(self, std: Array) -> tuple[Array, Array]:
         """Returns twice the negative log likelihood (n,), and the squares (n,) in it.
 
-        Squares end at `huber`, row by row.
+        A row's rms residual is bent as by Huber's loss.
         """
-        M, b, led = self._posterior(std)
-        taken = np.einsum("ni,ni->n", b, led)
+        M, b, mean = self._posterior(std)
+        taken = np.einsum("ni,ni->n", b, mean)
         squares = np.einsum("nc,nc->n", self.r, self.r) - taken
         channels = self.r.shape[1]
         level = np.sqrt(np.maximum(squares, 0.0) / channels)
@@ -83,46 +78,43 @@ class _Likelihood:
         return bent + np.linalg.slogdet(M)[1], bent
 
     def best(self) -> Array:
-        """Returns the standard deviations (3,) that are likeliest."""
+        """Returns the standard deviations (3,) of the greatest likelihood."""
+        limits = self.settings
 
         def loss(log: Array) -> float:
             """Returns what is minimised, by the logarithm."""
             return float(self.rows(np.exp(log))[0].sum())
 
-        found = minimize(
-            loss,
-            np.zeros(3),
-            method="L-BFGS-B",
-            bounds=[(np.log(_LEAST), np.log(1e3))] * 3,
-        )
+        ends = (np.log(limits.scatter_min_ratio), np.log(limits.scatter_max_ratio))
+        found = minimize(loss, np.zeros(3), method="L-BFGS-B", bounds=[ends] * 3)
         std: Array = np.exp(found.x)
-        return np.where(std > 2.0 * _LEAST, std, 0.0)
+        return np.where(std > 2.0 * limits.scatter_min_ratio, std, 0.0)
 
-    def led(self, std: Array) -> Array:
-        """Returns where steps likely led (n, 3), beside the command."""
+    def displacements(self, std: Array) -> Array:
+        """Returns the likeliest displacement of each step (n, 3)."""
         return -std * self._posterior(std)[2]
 
     def _posterior(self, std: Array) -> tuple[Array, Array, Array]:
         """Returns M (n, 3, 3), b (n, 3) and M^-1 b, in units of `std`.
 
-        The precision of where steps led, what residuals say of it, and its mean.
+        The displacements' precision, what residuals say of them, and their mean.
         """
         JD = self.J * std
         M = np.eye(3) + np.einsum("nci,ncj->nij", JD, JD)
         b = np.einsum("nci,nc->ni", JD, self.r)
         return M, b, np.linalg.solve(M, b[..., None])[..., 0]
 
-    def spread(self, std: Array) -> Array:
-        """Returns the standard deviation (3,) of the estimate, axis by axis."""
-        step = 0.05 * np.maximum(std, 0.1)
+    def standard_errors(self, std: Array) -> Array:
+        """Returns the standard error (3,) of the estimate, axis by axis."""
+        step = _CURVATURE_STEP * np.maximum(std, _LEAST_SIZE)
         middle = self.rows(std)[0].sum()
         curvature = [
-            (self._moved(std, i, h) + self._moved(std, i, -h) - 2.0 * middle) / h**2
+            (self._shifted(std, i, h) + self._shifted(std, i, -h) - 2.0 * middle) / h**2
             for i, h in enumerate(step)
         ]
         return np.sqrt(2.0 / np.maximum(curvature, 1e-12))
 
-    def _moved(self, std: Array, axis: int, by: float) -> float:
+    def _shifted(self, std: Array, axis: int, by: float) -> float:
         away = std + by * (np.arange(3) == axis)
         return float(self.rows(np.abs(away))[0].sum())
 
@@ -131,77 +123,88 @@ class _Likelihood:
         return dataclasses.replace(self, r=self.r[mask], J=self.J[mask])
 
 
-def scatter(fit: Fit, workers: Workers, huber_delta: float) -> Scatter | None:
+def fit_command_scatter(fitter: Fitter, fit: Fit) -> CommandScatter | None:
     """Returns how an arm scatters, if that is what a fit leaves; else None.
 
     Args:
+        fitter: its workers evaluate.
         fit: with all effects on the mean.
-        workers: to evaluate with.
-        huber: where squares end.
     """
-    if not fit.model.has_commands or fit.value <= BEYOND_NOISE:
+    limits = fitter.settings
+    at_noise = fit.objective <= limits.max_objective_at_noise
+    if not fit.model.has_commands or at_noise:
         return None
-    led = np.zeros((len(fit.linearisation.residual), 3))
-    for _ in range(_ROUNDS):
-        seen = _seen(fit, workers, huber_delta, led)
-        std = seen.best()
+    displaced = np.zeros((len(fit.linearisation.residual), 3))
+    for _ in range(limits.scatter_rounds):
+        likelihood = _likelihood(fitter, fit, displaced)
+        std = likelihood.best()
         if not std.any():
             return None
-        led = seen.led(std)
-    blocks = blocks_of(fit.linearisation, fit.model.measurements.episode)
-    if not _carries_over(seen, blocks) or _depends(fit.model, led, std > 0.0):
+        displaced = likelihood.displacements(std)
+    if not _generalises(likelihood, fit.blocks):
         return None
-    before, after = (seen.rows(s)[1] for s in (np.zeros(3), std))
-    usual = after[after <= np.quantile(after, 1.0 - _MISSED)]
-    away = _Z95 * seen.spread(std)
+    if _is_dependent(fit, displaced[:, std > 0.0]):
+        return None
+    return _summary(likelihood, std)
+
+
+def _summary(likelihood: _Likelihood, std: Array) -> CommandScatter:
+    """Returns a scatter (3,) with its interval and what it explains."""
+    limits = likelihood.settings
+    before, after = (likelihood.rows(s)[1] for s in (np.zeros(3), std))
+    usual = after[after <= np.quantile(after, 1.0 - limits.scatter_edge_share)]
+    away = Z * likelihood.standard_errors(std)
     ends = np.stack([np.maximum(std - away, 0.0), std + away], axis=-1)
-    return Scatter(
-        std * _UNIT,
-        ends * _UNIT,
+    return CommandScatter(
+        std * limits.scatter_scale,
+        ends * limits.scatter_scale,
         float(1.0 - after.sum() / before.sum()),
-        float(np.sqrt(usual.mean() / seen.r.shape[1])),
+        float(np.sqrt(usual.mean() / likelihood.r.shape[1])),
     )
 
 
-def _seen(fit: Fit, workers: Workers, huber_delta: float, led: Array) -> _Likelihood:
-    """Returns residuals and derivatives where steps led (n, 3), as from no scatter."""
+def _likelihood(fitter: Fitter, fit: Fit, displaced: Array) -> _Likelihood:
+    """Returns residuals without scatter, and derivatives at displacements (n, 3)."""
+    limits, delta = fitter.settings, fitter.huber_delta
+    step, scale = limits.scatter_step, limits.scatter_scale
 
     def residual(model: LogModel, push: Array) -> Array:
-        """Returns the residuals where steps lead by a push (n, 3) further."""
-        there = model.displaced(led * _UNIT + push)
-        return Objective(there, workers, huber_delta).residuals(fit.theta)[0]
+        """Returns the residuals with steps displaced by a push (n, 3) further."""
+        there = model.displaced(displaced * scale + push)
+        return Objective(there, fitter.workers, delta).residuals(fit.theta)[0]
 
-    ways = _PUSH * np.eye(3)[:, None] * np.ones((len(led), 1))
+    ways = step * np.eye(3)[:, None] * np.ones((len(displaced), 1))
     surrogate = fit.model.surrogate()
     columns = [residual(surrogate, w) - residual(surrogate, -w) for w in ways]
-    J = np.stack(columns, axis=-1) * (_UNIT / (2.0 * _PUSH))
-    linearisation = residual(fit.model, np.zeros_like(led))
-    return _Likelihood(linearisation - np.einsum("nci,ni->nc", J, led), J, huber_delta)
+    J = np.stack(columns, axis=-1) * (scale / (2.0 * step))
+    there = residual(fit.model, np.zeros_like(displaced))
+    return _Likelihood(there - np.einsum("nci,ni->nc", J, displaced), J, delta, limits)
 
 
-def _carries_over(seen: _Likelihood, blocks: NDArray[np.int64]) -> bool:
+def _generalises(likelihood: _Likelihood, blocks: NDArray[np.int64]) -> bool:
     """Returns whether blocks get likelier by a scatter that was fitted to others."""
+    limits = likelihood.settings
     gains = np.zeros(int(blocks.max()) + 1)
-    folds = blocks % _FOLDS
-    for fold in range(_FOLDS):
+    folds = blocks % limits.scatter_folds
+    for fold in range(limits.scatter_folds):
         own = folds == fold
         if not own.any() or own.all():
             continue
-        std = seen.select(~own).best()
-        before, after = (seen.select(own).rows(s)[0] for s in (np.zeros(3), std))
+        std = likelihood.select(~own).best()
+        before, after = (likelihood.select(own).rows(s)[0] for s in (np.zeros(3), std))
         np.add.at(gains, blocks[own], before - after)
-    p = float(wilcoxon(gains, alternative="greater").pvalue) if gains.any() else 1.0
-    return p < ALPHA and float(np.mean(gains > 0.0)) >= LEAST_SHARE
+    p = greater_p(gains) if gains.any() else 1.0
+    return p < limits.alpha and float(np.mean(gains > 0.0)) >= limits.min_block_share
 
 
-def _depends(model: LogModel, led: Array, axes: NDArray[np.bool_]) -> bool:
-    """Returns whether where steps led (n, 3) follows on anything: then it is no chance.
+def _is_dependent(fit: Fit, displaced: Array) -> bool:
+    """Returns whether displacements (n, axes) depend on anything: then no scatter.
 
     On the step before, on a mean, or on what a step began with.
     """
-    about = [c for c in model.covariates(0).values() if np.ptp(c) > 0.0]
+    covariates = [c for c in fit.model.covariates(0).values() if np.ptp(c) > 0.0]
     p = []
-    for d in led[:, axes].T:
+    for d in displaced.T:
         p += [ljung_box(d), float(ttest_1samp(d, 0.0).pvalue)]
-        p += [float(pearsonr(d, c).pvalue) for c in about]
-    return min(p) * len(p) < _DEPENDS
+        p += [float(pearsonr(d, c).pvalue) for c in covariates]
+    return min(p) * len(p) < fit.settings.scatter_alpha

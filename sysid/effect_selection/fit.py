@@ -1,4 +1,4 @@
-"""A model with effects, fitted, and what the fit says of its parameters."""
+"""A fitted model with effects, and what the fit says of its parameters."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.confidence import Z
 from sysid.effect_selection.block_regression import BlockRegression, blocks_of
-from sysid.effect_selection.candidates import Candidate
-from sysid.effect_selection.evidence import FEW
+from sysid.effect_selection.candidates import Candidate, is_joint_group
+from sysid.effect_selection.evidence import Evidence
+from sysid.effect_selection.settings import SelectionSettings
 from sysid.identification.linearisation import Linearisation
 from sysid.models.base import LogModel
 from sysid.objective import pseudo_residual
@@ -17,45 +19,43 @@ from sysid.parameters import Scaling, nominal_values
 
 Array = NDArray[np.float64]
 
-_AT_BOUND = 1e-6  # of a parameter's range
-_Z95 = 1.959963984540054
-
 
 @dataclass(frozen=True)
 class Fit:
-    """A model with effects, fitted.
+    """A fitted model with effects.
 
     Attributes:
         effects: that were added.
         model: with their parameters.
-        theta: (p,) values.
-        here: residuals and derivatives there.
-        value: of the objective.
+        theta: (p,) values of the parameters.
+        linearisation: residuals and derivatives there.
+        objective: rms residual in units of the noise, Huber's beyond `huber_delta`.
+        settings: thresholds.
     """
 
     effects: tuple[Candidate, ...]
     model: LogModel
     theta: Array
     linearisation: Linearisation
-    value: float
+    objective: float
+    settings: SelectionSettings
 
     @property
     def loss(self) -> float:
-        """Sum of the squares, less beyond where they end."""
-        return float(
-            np.sum(
-                pseudo_residual(
-                    self.linearisation.residual, self.linearisation.huber_delta
-                )
-                ** 2
-            )
-        )
+        """Sum of the squared residuals, Huber's beyond `huber_delta`."""
+        linear = self.linearisation
+        return float(np.sum(pseudo_residual(linear.residual, linear.huber_delta) ** 2))
+
+    @property
+    def blocks(self) -> NDArray[np.int64]:
+        """Number of the block (rows,) of each row."""
+        episode = self.model.measurements.episode
+        return blocks_of(self.linearisation, episode, self.settings)
 
     def regression(self, blocks: NDArray[np.int64] | None = None) -> BlockRegression:
         """Returns its normal equations, by blocks (rows,) of its own or of another."""
-        if blocks is None:
-            blocks = blocks_of(self.linearisation, self.model.measurements.episode)
-        return BlockRegression.of(self.linearisation, blocks)
+        chosen = self.blocks if blocks is None else blocks
+        return BlockRegression.of(self.linearisation, chosen, settings=self.settings)
 
     @property
     def values(self) -> dict[str, float]:
@@ -64,44 +64,57 @@ class Fit:
         return dict(zip(names, self.theta.tolist(), strict=True))
 
     def columns_of(self, effect: Candidate) -> NDArray[np.int64]:
-        """Returns which of the parameters are an effect's sizes."""
+        """Returns which of the parameters are an effect's amplitudes."""
         names = [f"{effect.name}.{field}" for field in effect.fields]
         own = [i for i, p in enumerate(self.model.parameters) if p.name in names]
         return np.array(own, dtype=np.int64)
 
     @property
-    def shows(self) -> NDArray[np.bool_]:
-        """Which parameters' (p,) intervals exclude their null value.
+    def significant(self) -> NDArray[np.bool_]:
+        """Which parameters' (p,) 95 % intervals exclude their null value.
 
-        95 %, by the sums of the gradient over blocks (a sandwich): right whatever the
-        correlation within a block.
+        By a sandwich estimate over blocks: right for any correlation within a block.
         """
-        away = self.linearisation.u - self._null
-        return np.asarray(np.abs(away) > _Z95 * self.regression().spread())
+        away = np.abs(self.linearisation.u - self._null)
+        return np.asarray(away > Z * self.regression().standard_errors())
 
-    def all_show(self, names: Sequence[str]) -> bool:
-        """Returns whether each of some effects has a size that shows."""
+    def all_significant(self, names: Sequence[str]) -> bool:
+        """Returns whether each of some effects has a significant amplitude."""
         effects = [effect for effect in self.effects if effect.name in names]
-        shows = self.shows
-        return bool(effects) and all(shows[self.columns_of(e)].any() for e in effects)
+        which = self.significant
+        return bool(effects) and all(which[self.columns_of(e)].any() for e in effects)
 
-    def physical(self, added: Sequence[Candidate]) -> list[Candidate]:
-        """Returns new effects without sizes that end at a bound, unphysical or null.
+    def within_bounds(self, added: Sequence[Candidate]) -> list[Candidate]:
+        """Returns new effects without amplitudes that end at a bound: unphysical.
 
-        Of several that were added because they are alike, those go that do not show.
+        Of one kind of effect at several joints, those that are not significant go.
         """
-        found, shows = [], self.shows
+        found, which = [], self.significant
+        margin = self.settings.bound_tolerance
         for effect in added:
             columns = self.columns_of(effect)
             u = self.linearisation.u[columns]
-            kept = (u > _AT_BOUND) & (u < 1.0 - _AT_BOUND)
+            kept = (u > margin) & (u < 1.0 - margin)
             fields = [f for f, keep in zip(effect.fields, kept, strict=True) if keep]
-            if fields and (len(added) <= FEW or shows[columns].any()):
+            if fields and (not is_joint_group(added) or which[columns].any()):
                 found.append(effect.only(fields))
         return found
 
+    def significant_only(self, known: int) -> tuple[Candidate, ...]:
+        """Returns its effects, those after the first few with significant amplitudes.
+
+        Args:
+            known: number of the effects that keep all amplitudes.
+        """
+        which, new = self.significant, []
+        for effect in self.effects[known:]:
+            pairs = zip(effect.fields, self.columns_of(effect), strict=True)
+            if fields := [field for field, column in pairs if which[column]]:
+                new.append(effect.only(fields))
+        return (*self.effects[:known], *new)
+
     @property
-    def worth(self) -> dict[str, float]:
+    def effect_gains(self) -> dict[str, float]:
         """What each effect gains, by its name; see `gains_of`."""
         gains = self.gains_of([self.columns_of(effect) for effect in self.effects])
         names = [effect.name for effect in self.effects]
@@ -113,19 +126,33 @@ class Fit:
         Of blocks that are not fitted; all other parameters are fitted again.
         """
         regression, null = self.regression(), self._null
-        free = np.zeros(len(null))  # at null a bound is no end
+        unbounded = np.zeros(len(null))  # seen from null, a bound is no limit
         found = []
         for columns in groups:
             own = np.isin(np.arange(len(null)), columns)
-            without = regression.moved(np.where(own, null - self.linearisation.u, 0.0))
-            without = dataclasses.replace(without, side=free)
-            project_out = without.project_out(np.flatnonzero(~own))
-            total = project_out.energy.sum()
-            found.append(float((total - project_out.losses(columns).sum()) / total))
+            change = np.where(own, null - self.linearisation.u, 0.0)
+            without = dataclasses.replace(regression.shifted(change), side=unbounded)
+            projected = without.project_out(np.flatnonzero(~own))
+            total = projected.block_losses.sum()
+            left = projected.held_out_losses(columns).sum()
+            found.append(float((total - left) / total))
         return found
 
     @property
     def _null(self) -> Array:
-        """Where in the unit box (p,) nothing has an effect."""
+        """The point (p,) of the unit box at which no parameter has an effect."""
         parameters = self.model.parameters
         return Scaling(parameters).to_unit(nominal_values(parameters))
+
+
+def measured_evidence(before: Fit, after: Fit, trial: Evidence, tests: int) -> Evidence:
+    """Returns the evidence for what was added, by fits before and after.
+
+    Each block is judged by what the fit after would cost it, were it fitted to all
+    others; the p-value is for as many tests as there are effects (Bonferroni).
+    """
+    blocks = before.blocks
+    losses = before.regression(blocks).block_losses
+    own = np.arange(len(after.theta))
+    gains = losses - after.regression(blocks).held_out_losses(own)
+    return trial.measured(gains, float(losses.sum()), tests)

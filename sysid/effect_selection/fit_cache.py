@@ -1,8 +1,8 @@
-"""Fits that are kept on disk, so that a search that was stopped can go on.
+"""A cache of fits on disk, so that a search that was stopped can resume.
 
-A search is deterministic: begun again with the same log, scenario and library it asks
-for the same fits, and those that are kept cost nothing. Each is found by all that it
-depends on, so nothing can be taken for something else.
+A search is deterministic: started again with the same log, scenario and library it
+asks for the same fits, and cached ones cost nothing. The key of a fit is a hash of all
+that it depends on.
 """
 
 import hashlib
@@ -19,15 +19,15 @@ from sysid.identification.linearisation import Linearisation
 _ARRAYS = ("u", "residual", "jacobian", "weights", "huber_delta")
 
 
-def remembered(
+def cached_fit(
     folder: Path | None, depends_on: Any, find: Callable[[], Linearisation]
 ) -> Linearisation:
-    """Returns what is kept in a folder, else what is found, which is then kept.
+    """Returns a fit from the cache, or computes and caches it.
 
     Args:
-        folder: of the fits; None keeps none.
+        folder: of the cache; None for no cache.
         depends_on: everything that the fit depends on.
-        find: fits.
+        find: computes the fit.
     """
     if folder is None:
         return find()

@@ -1,22 +1,18 @@
 """Errors before and after, on rows that were not fitted."""
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.confidence import QUANTILES
 from sysid.effect_selection.candidates import extended
 from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.search import Tracer
+from sysid.effect_selection.fitter import Fitter
 from sysid.identification.uncertainty import block_length, block_numbers
 from sysid.models.base import Channel, LogModel
 
 Array = NDArray[np.float64]
-
-_FOLDS = 10
-_DRAWS = 2000
-_RCOND = 1e-6  # of directions that the log does not fix
 
 
 @dataclass(frozen=True)
@@ -27,7 +23,8 @@ class HeldOut:
         measured, before, after: (rows, channels), SI.
         episode: (rows,) number of each row's episode.
         channels: what the columns are.
-        how: how the rows were kept apart.
+        how: how the rows were held out, in words.
+        draws: of the bootstrap.
     """
 
     measured: Array
@@ -36,6 +33,7 @@ class HeldOut:
     episode: NDArray[np.int64]
     channels: tuple[Channel, ...]
     how: str
+    draws: int
 
     def rms(self, predicted: Array) -> Array:
         """Returns the rms error (channels,) of a prediction, SI."""
@@ -62,48 +60,54 @@ class HeldOut:
         return float(np.sqrt(np.mean(((predicted - self.measured) / noise) ** 2)))
 
     def interval(self, predicted: Array, seed: int = 0) -> Array:
-        """Returns 95 % intervals (channels, 2) of the rms error, by blocks."""
+        """Returns 95 % intervals (channels, 2) of the rms, by a block bootstrap."""
         error = predicted - self.measured
         blocks = block_numbers(self.episode, block_length(error, self.episode))
         count = int(blocks.max()) + 1
         squares = np.zeros((count, error.shape[1]))
         np.add.at(squares, blocks, error**2)
         rows = np.bincount(blocks, minlength=count)
-        draws = np.random.default_rng(seed).integers(0, count, (_DRAWS, count))
+        size = (self.draws, count)
+        draws = np.random.default_rng(seed).integers(0, count, size)
         drawn = squares[draws].sum(axis=1) / rows[draws].sum(axis=1)[:, None]
-        return np.sqrt(np.quantile(drawn, [0.025, 0.975], axis=0)).T
+        return np.sqrt(np.quantile(drawn, QUANTILES, axis=0)).T
 
 
-def held_out(tracer: Tracer, first: Fit, last: Fit, test: LogModel | None) -> HeldOut:
+def held_out_errors(
+    fitter: Fitter, first: Fit, last: Fit, test: LogModel | None
+) -> HeldOut:
     """Returns the errors of the base model and of the one with effects.
 
     Args:
-        tracer: that found them.
+        fitter: of all rows that were fitted.
         first, last: the fits without and with the effects.
-        test: model of the rows that were kept; None if there are none: then
-            contiguous blocks are predicted by fits to all others.
+        test: model of the held-out episodes; None if there are none: then contiguous
+            blocks are predicted by fits to all others.
     """
     if test is not None:
-        before, after = (_predicted(test, fit) for fit in (first, last))
         measured = test.measurements
+        before, after = (_predicted(test, fit) for fit in (first, last))
         how = f"{len(measured.names)} episodes that were not fitted"
-        return HeldOut(
-            measured.values, before, after, measured.episode, measured.channels, how
-        )
-    measured = tracer.base.measurements
-    folds = contiguous_folds(measured.episode)
-    before, after = (_cross_predicted(tracer, fit, folds) for fit in (first, last))
-    how = f"{folds.max() + 1} contiguous blocks, each predicted by a fit to the others"
-    if not tracer.base.affine:
-        how += " (linearised)"
+    else:
+        measured = fitter.base.measurements
+        folds = contiguous_folds(measured.episode, fitter.settings.held_out_folds)
+        before, after = (_cross_predicted(fitter, fit, folds) for fit in (first, last))
+        how = f"{folds.max() + 1} contiguous blocks, each predicted by a fit to the "
+        how += "others" if fitter.base.affine else "others (linearised)"
     return HeldOut(
-        measured.values, before, after, measured.episode, measured.channels, how
+        measured.values,
+        before,
+        after,
+        measured.episode,
+        measured.channels,
+        how,
+        fitter.settings.bootstrap_draws,
     )
 
 
-def contiguous_folds(episode: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Returns the number of the fold (rows,) of each row."""
-    length = max(1, -(-len(episode) // _FOLDS))
+def contiguous_folds(episode: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Returns the number of the fold (rows,) of each row, for about `count` folds."""
+    length = max(1, -(-len(episode) // count))
     return block_numbers(episode, length)
 
 
@@ -112,19 +116,20 @@ def _predicted(test: LogModel, fit: Fit) -> Array:
     return model.predictions(fit.theta)
 
 
-def _cross_predicted(tracer: Tracer, fit: Fit, folds: NDArray[np.int64]) -> Array:
+def _cross_predicted(fitter: Fitter, fit: Fit, folds: NDArray[np.int64]) -> Array:
     """Returns predictions (rows, channels) of each fold by a fit to the others.
 
     Where an evaluation is a simulation, the fit to the others is one Gauss-Newton
     step away from the fit to all, and its prediction linear.
     """
-    if not tracer.base.affine:
+    base = fitter.base
+    if not base.affine:
         return _linearly_predicted(fit, folds)
-    found = np.zeros(tracer.base.measurements.values.shape)
+    found = np.zeros(base.measurements.values.shape)
     for fold in range(int(folds.max()) + 1):
-        others = dataclasses.replace(tracer, base=tracer.base.of_rows(folds != fold))
-        kept = others.fit(fit.effects, fit)
-        found[folds == fold] = _predicted(tracer.base.of_rows(folds == fold), kept)
+        own = folds == fold
+        others = fitter.with_base(base.of_rows(~own)).fit(fit.effects, fit)
+        found[own] = _predicted(base.of_rows(own), others)
     return found
 
 
@@ -138,18 +143,7 @@ def _linearly_predicted(fit: Fit, folds: NDArray[np.int64]) -> Array:
         own = folds == fold
         A = J[~own].reshape((~own).sum() * channels, len(linearisation.u))
         b = r[~own].reshape(-1)
-        step = -np.linalg.lstsq(A, b, rcond=_RCOND)[0]
+        step = -np.linalg.lstsq(A, b, rcond=fit.settings.held_out_rcond)[0]
         step = np.clip(linearisation.u + step, 0.0, 1.0) - linearisation.u
         residual[own] += linearisation.jacobian[own] @ step
     return np.asarray(measured.values + residual * measured.noise)
-
-
-def improvement(found: HeldOut) -> str:
-    """Returns the error before and after in words."""
-    before, after = (found.rms_by_unit(p) for p in (found.before, found.after))
-    parts = [f"{before[unit]:.3g} -> {after[unit]:.3g} {unit}" for unit in before]
-    relative = [found.relative(p) for p in (found.before, found.after)]
-    return (
-        ", ".join(parts)
-        + f"; {100 * relative[0]:.2g} -> {100 * relative[1]:.2g} % of the readings"
-    )

@@ -1,22 +1,41 @@
-"""A verdict as plain data, for `result.json`."""
+"""A closed loop as plain data, for `result.json`."""
 
 import dataclasses
 from typing import Any
 
-from sysid.effect_selection.close_loop import Closed
+from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.residual_diagnosis import diagnose
-from sysid.effect_selection.search import Survey
+from sysid.effect_selection.search import SelectionRound
+from sysid.effect_selection.survey import Survey
+from sysid.effect_selection.verdict import Verdict
+
+_DEPENDENCES = 10  # listed of each survey, the best ones: a size, no threshold
 
 
-def to_mapping(closed: Closed) -> dict[str, Any]:
-    """Returns everything that a program may want of a verdict."""
-    found = closed.verdict
+def to_mapping(closed: ClosedLoop) -> dict[str, Any]:
+    """Returns everything that a program may want to know of a closed loop."""
+    before, after = (
+        diagnose(fit, survey)
+        for fit, survey in ((closed.first, closed.begin), (closed.last, closed.end))
+    )
+    return {
+        **_verdict(closed.verdict),
+        "text": closed.text,
+        "errors": _errors(closed.errors),
+        "residual_before": [dataclasses.asdict(channel) for channel in before],
+        "residual_after": [dataclasses.asdict(channel) for channel in after],
+        "rounds": [_round(each) for each in closed.rounds],
+        "end": _survey(closed.end),
+    }
+
+
+def _verdict(found: Verdict) -> dict[str, Any]:
     return {
         "ending": found.ending,
         "effects": list(found.names),
-        "rise_without": dict(zip(found.names, found.worth, strict=True)),
+        "rise_without": dict(zip(found.names, found.gains, strict=True)),
         "ties": {
             name: {tie.name: tie.experiment for tie in ties}
             for name, ties in zip(found.names, found.ties, strict=True)
@@ -27,30 +46,12 @@ def to_mapping(closed: Closed) -> dict[str, Any]:
                 "value": value.value,
                 "unit": value.unit,
                 "interval_95": list(value.interval),
-                "excludes_null": value.matters,
+                "excludes_null": value.excludes_null,
             }
             for value in found.values
         },
         "dependence_left": found.dependence,
         "share_explained": found.explained,
-        "text": found.text,
-        "errors": _errors(closed.errors),
-        "residual_before": [
-            dataclasses.asdict(d) for d in diagnose(closed.first, closed.begin)
-        ],
-        "residual_after": [
-            dataclasses.asdict(d) for d in diagnose(closed.last, closed.end)
-        ],
-        "rounds": [
-            {
-                "added": r.chosen.name,
-                "objective": r.value,
-                "ties": [tie.name for tie in r.ties],
-                **_survey(r.survey),
-            }
-            for r in closed.rounds
-        ],
-        "end": _survey(closed.end),
     }
 
 
@@ -80,11 +81,20 @@ def _errors(errors: HeldOut) -> dict[str, Any]:
     }
 
 
+def _round(each: SelectionRound) -> dict[str, Any]:
+    return {
+        "added": each.chosen.name,
+        "objective": each.objective,
+        "ties": [tie.name for tie in each.ties],
+        **_survey(each.survey),
+    }
+
+
 def _survey(survey: Survey) -> dict[str, Any]:
     return {
         "blocks": survey.blocks,
         "candidates": [_evidence(e) for e in survey.effects],
-        "dependences": [_evidence(e) for e in survey.dependences[:10]],
+        "dependences": [_evidence(e) for e in survey.dependences[:_DEPENDENCES]],
     }
 
 
@@ -93,7 +103,7 @@ def _evidence(evidence: Evidence) -> dict[str, Any]:
         "name": evidence.name,
         "gain": evidence.gain,
         "p": evidence.p,
-        "share_of_blocks": evidence.share,
-        "parameters": evidence.cost,
+        "share_of_blocks": evidence.block_share,
+        "parameters": evidence.parameter_count,
         "passes": evidence.accepted,
     }

@@ -1,7 +1,7 @@
-"""What a residual depends on, whatever physics that may be: smooth curves.
+"""Empirical dependences of a residual: smooth curves of covariates.
 
 One curve (a cubic and a step) of one covariate in one channel. Where such a curve
-explains what no effect of the library does, the answer is "unexplained", and the curve
+explains what no effect of the library does, the ending is "unexplained", and the curve
 says where to look.
 """
 
@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.effect_selection.settings import SelectionSettings
 from sysid.models.base import LogModel
 
 Array = NDArray[np.float64]
-
-_STEP = 0.1  # of the covariate's range: how steep the curve's step is
 
 
 @dataclass(frozen=True)
@@ -37,14 +36,16 @@ class Dependence:
         return f"{self.channel} depends on {self.covariate}"
 
 
-def curves(model: LogModel) -> tuple[Array, list[Dependence]]:
+def dependence_curves(
+    model: LogModel, settings: SelectionSettings
+) -> tuple[Array, list[Dependence]]:
     """Returns the columns (rows, channels, k) of all curves, and what they are."""
     measured = model.measurements
     columns: list[Array] = []
     dependences = []
     for number, channel in enumerate(measured.channels):
         for name, values in model.covariates(number).items():
-            basis = _basis(values)
+            basis = _basis(values, settings.curve_step_width)
             begin = len(columns)
             for column in basis.T:
                 full = np.zeros((measured.rows, len(measured.channels)))
@@ -57,8 +58,8 @@ def curves(model: LogModel) -> tuple[Array, list[Dependence]]:
     return np.stack(columns, axis=2), dependences
 
 
-def _basis(values: Array) -> Array:
+def _basis(values: Array, width: float) -> Array:
     """Returns a cubic and a step at zero (rows, 4) of a covariate (rows,)."""
     size = max(float(np.abs(values).max()), 1e-300)
     x = values / size
-    return np.column_stack([x, x**2, x**3, np.tanh(x / _STEP)])
+    return np.column_stack([x, x**2, x**3, np.tanh(x / width)])

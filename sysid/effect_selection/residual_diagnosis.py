@@ -1,26 +1,26 @@
-"""What a residual looks like, channel by channel, before anybody explains it."""
+"""Describes a residual, channel by channel, whatever explains it."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.search import Survey
+from sysid.effect_selection.survey import Survey
 from sysid.identification.whiteness import ljung_box
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class ChannelDiagnosis:
     """One channel's residual.
 
     Attributes:
         channel, unit: which.
         rms: in units of the channel's noise.
-        whiteness: p-value of Ljung and Box: is it white?
+        whiteness: p-value of Ljung and Box's test that it is white.
         between_episodes: share of its power that lies in the episodes' means; 0 if
             there is one episode.
-        dependence: what it depends on most, in words, and the share that explains.
-        gain: of the channels' common loss, by that dependence.
+        dependence: covariate that it depends on most; empty without covariates.
+        gain: share of the channels' common loss that this dependence explains.
         is_significant: whether that is more than chance.
     """
 
@@ -34,7 +34,7 @@ class Diagnosis:
     is_significant: bool
 
 
-def diagnose(fit: Fit, survey: Survey) -> list[Diagnosis]:
+def diagnose(fit: Fit, survey: Survey) -> list[ChannelDiagnosis]:
     """Returns the diagnosis of each channel at a fit."""
     measured, residual = fit.model.measurements, fit.linearisation.residual
     found = []
@@ -42,7 +42,7 @@ def diagnose(fit: Fit, survey: Survey) -> list[Diagnosis]:
         own = [d for d in survey.dependences if d.name.startswith(f"{channel.name} ")]
         best = own[0] if own else None
         found.append(
-            Diagnosis(
+            ChannelDiagnosis(
                 channel.name,
                 channel.unit,
                 float(np.sqrt(np.mean(residual[:, i] ** 2))),

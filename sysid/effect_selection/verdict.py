@@ -1,43 +1,39 @@
-"""What is to be said: nothing, an effect, or that no effect explains it."""
+"""Judges what a search found: no effect missing, effects, or unexplained."""
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drake_disasm.effects import Imprecision
-from sysid.effect_selection.command_scatter import BEYOND_NOISE, Scatter
-from sysid.effect_selection.contradictions import (
-    Contradiction,
-    contradictions,
-    in_words,
-)
-from sysid.effect_selection.evidence import FEW, Evidence
+from sysid.effect_selection.candidates import is_joint_group
+from sysid.effect_selection.command_scatter import CommandScatter
+from sysid.effect_selection.contradictions import Contradiction
+from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.experiments import separating
 from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.held_out import HeldOut, improvement
-from sysid.effect_selection.search import Round, Survey, Tracer
+from sysid.effect_selection.search import SelectionRound
+from sysid.effect_selection.survey import Survey
 from sysid.identification.uncertainty import uncertainty
-from sysid.objective import Objective
+from sysid.parameters import Scaling
 
-Array = NDArray[np.float64]
+_SCATTER = Imprecision.__name__
 
-#: Share of what can be explained that effects must explain to be believed.
-_BELIEVED = 0.75
-_SCATTERS = Imprecision.__name__
-_SHOWN = 3  # of anything, in three lines
+#: Nothing is missing; effects explain the residual; no library effect explains it.
+Ending = Literal["none", "explained", "unexplained"]
 
 
 @dataclass(frozen=True)
-class Value:
+class ParameterValue:
     """A parameter of an effect that was found.
 
     Attributes:
         name: with the effect's.
         value, unit: SI.
         interval: 95 %, by a block bootstrap.
-        null: at which the effect would vanish; None for a shape.
+        null: at which the effect vanishes; None for a shape parameter.
     """
 
     name: str
@@ -47,18 +43,11 @@ class Value:
     null: float | None
 
     @property
-    def matters(self) -> bool:
+    def excludes_null(self) -> bool:
         """Whether the interval excludes the null value."""
         if self.null is None:
             return True
         return not self.interval[0] <= self.null <= self.interval[1]
-
-    @property
-    def text(self) -> str:
-        """Value and interval in words."""
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        low, high = self.interval
-        return f"{self.name} = {self.value:.4g}{unit} ({low:.4g} to {high:.4g})"
 
 
 @dataclass(frozen=True)
@@ -67,7 +56,7 @@ class Tie:
 
     Attributes:
         name: of the other effect, or effects.
-        experiment: that would tell the two apart.
+        experiment: what to record to separate the two.
     """
 
     name: str
@@ -80,100 +69,95 @@ class Verdict:
 
     Attributes:
         ending: "none", "explained" or "unexplained".
-        names: of the effects that are missing, the most important first.
-        worth: for each, the share by which the loss would rise without it, of that.
-        ties: for each, effects that explain as much, each with the experiment that
-            would separate the two.
+        names: of the effects that are missing, the most important first; of an
+            unexplained residual, the nearest.
+        gains: for each, the share of the loss without it that it takes away.
+        ties: for each, effects that explain as much.
         values: of their parameters.
         dependence: the strongest that is left, in words; empty if none is.
-        explained: share of what could be explained that the effects do.
+        explained: share of what could be explained that the effects explain.
         contradictions: episodes that no common effect explains.
-        text: three lines.
+        excess: objective that is left, in units of the noise, if it is more than noise;
+            else 0.
     """
 
-    ending: str
+    ending: Ending
     names: tuple[str, ...]
-    worth: tuple[float, ...]
+    gains: tuple[float, ...]
     ties: tuple[tuple[Tie, ...], ...]
-    values: tuple[Value, ...]
+    values: tuple[ParameterValue, ...]
     dependence: str
     explained: float
     contradictions: tuple[Contradiction, ...]
-    text: str
+    excess: float
 
 
-def verdict(
-    tracer: Tracer,
+def judge(
     first: Fit,
     last: Fit,
     end: Survey,
-    errors: HeldOut,
-    loose: Scatter | None = None,
+    rounds: Sequence[SelectionRound],
+    against: tuple[Contradiction, ...] = (),
+    scatter: CommandScatter | None = None,
 ) -> Verdict:
     """Returns the verdict of a search.
 
     Args:
-        tracer: that searched.
         first, last: the fits without and with the effects.
         end: the survey at which it ended.
-        errors: on rows that were not fitted.
-        loose: how the arm scatters about its commands, if it does.
+        rounds: how the effects were chosen.
+        against: episodes that contradict each other.
+        scatter: how the arm scatters about its commands, if it does.
     """
     left = [d for d in end.dependences if d.accepted]
-    dependence = left[0].name if left else ""
-    explained = _explained(first, last, left[0].gain if left else 0.0)
-    worth = last.worth
-    values = values_of(tracer, last)
-    if loose:
-        worth[_SCATTERS] = loose.gain
-        values = (*values, *_scatter_values(loose))
-    names = tuple(sorted(worth, key=lambda name: -worth[name]))
-    ties = tuple(_tied(name, tracer.rounds) for name in names)
-    assert end.bench is not None
-    against = contradictions(last, end.bench, len(tracer.base.parameters))
-    beyond = _beyond_noise(last, loose)
-    other = in_words(against) or beyond
-    believed = bool(names) and explained >= _BELIEVED and not beyond
-    ending = _ending(bool(names or dependence or other), believed)
-    lines = [
-        _missing(ending, names, ties, dependence, other),
-        _value_line(names, values),
-        f"error on held-out data: {improvement(errors)}",
-    ]
-    return Verdict(
-        ending,
+    gains = last.effect_gains | ({_SCATTER: scatter.gain} if scatter else {})
+    names = tuple(sorted(gains, key=lambda name: -gains[name]))
+    found = Verdict(
+        "none",
         names,
-        tuple(worth[name] for name in names),
-        ties,
-        values,
-        dependence,
-        explained,
+        tuple(gains[name] for name in names),
+        tuple(_ties(name, rounds) for name in names),
+        parameter_values(last, len(first.theta)) + _scatter_values(scatter),
+        left[0].name if left else "",
+        _explained(first, last, left[0].gain if left else 0.0),
         against,
-        "\n".join(lines),
+        _excess(last, scatter),
     )
+    return dataclasses.replace(found, ending=_ending(found, last))
 
 
-def _scatter_values(loose: Scatter) -> tuple[Value, ...]:
+def _ending(found: Verdict, last: Fit) -> Ending:
+    enough = found.explained >= last.settings.min_explained_share
+    if found.names and enough and not found.excess:
+        return "explained"
+    left = found.names or found.dependence or found.contradictions or found.excess
+    return "unexplained" if left else "none"
+
+
+def _scatter_values(scatter: CommandScatter | None) -> tuple[ParameterValue, ...]:
     """Returns how an arm scatters, axis by axis."""
+    if scatter is None:
+        return ()
+    rows = zip("xyz", scatter.std.tolist(), scatter.interval.tolist(), strict=True)
     return tuple(
-        Value(f"{_SCATTERS}.{axis}", float(std), "m", (float(low), float(high)), 0.0)
-        for axis, std, (low, high) in zip("xyz", loose.std, loose.interval, strict=True)
+        ParameterValue(f"{_SCATTER}.{axis}", std, "m", (low, high), 0.0)
+        for axis, std, (low, high) in rows
     )
 
 
-def _beyond_noise(last: Fit, loose: Scatter | None) -> str:
-    """Returns that a residual is too large, in words; empty if it is not.
+def _excess(last: Fit, scatter: CommandScatter | None) -> float:
+    """Returns the objective, if it is more than noise; else 0.
 
     Only where channels state their noise: estimated from a fit it says nothing.
     """
-    value = loose.value if loose else last.value
-    if last.model.affine or value <= BEYOND_NOISE:
-        return ""
-    return f"the residual is {value:.2g} times the noise"
+    objective = scatter.objective if scatter else last.objective
+    known = not last.model.affine
+    is_more = known and objective > last.settings.max_objective_at_noise
+    return objective if is_more else 0.0
 
 
 def _explained(first: Fit, last: Fit, left: float) -> float:
-    """Returns the share that effects explain of what could be.
+    """Returns the share that effects explain of what could be explained.
 
     Args:
         first, last: the fits without and with them.
@@ -184,21 +168,19 @@ def _explained(first: Fit, last: Fit, left: float) -> float:
     return gained / (gained + missing) if gained + missing > 0.0 else 1.0
 
 
-def _ending(is_something: bool, is_believed: bool) -> str:
-    if not is_something:
-        return "none"
-    return "explained" if is_believed else "unexplained"
+def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
+    """Returns the effects' parameters with their intervals.
 
-
-def values_of(tracer: Tracer, fit: Fit) -> tuple[Value, ...]:
-    """Returns the effects' parameters with their intervals."""
-    count = len(tracer.base.parameters)
+    Args:
+        fit: with the effects.
+        own: number of the parameters that the model has anyway, the first ones.
+    """
     spread = uncertainty(fit.linearisation, fit.model.measurements.episode)
-    scaling = Objective(fit.model, tracer.workers, tracer.huber_delta).scaling
+    scaling = Scaling(fit.model.parameters)
     ends = np.clip(fit.linearisation.u[:, None] + spread.bootstrap, 0.0, 1.0)
     low, high = (scaling.from_unit(side) for side in ends.T)
     return tuple(
-        Value(
+        ParameterValue(
             p.name,
             float(fit.theta[i]),
             p.unit,
@@ -206,11 +188,11 @@ def values_of(tracer: Tracer, fit: Fit) -> tuple[Value, ...]:
             None if p.is_shape else 0.0,
         )
         for i, p in enumerate(fit.model.parameters)
-        if i >= count
+        if i >= own
     )
 
 
-def _tied(name: str, rounds: Sequence[Round]) -> tuple[Tie, ...]:
+def _ties(name: str, rounds: Sequence[SelectionRound]) -> tuple[Tie, ...]:
     """Returns what explained as much when an effect was added, each once."""
     joint = name.partition(".")[2]
     for found in rounds:
@@ -225,55 +207,7 @@ def _tied(name: str, rounds: Sequence[Round]) -> tuple[Tie, ...]:
 
 
 def _other(tie: Evidence, joint: str) -> str:
-    """Returns what a tie names: at a joint, where it acts alike at several."""
-    linearisation = [
-        name for name in tie.effects if joint and name.endswith(f".{joint}")
-    ]
-    return " and ".join(
-        linearisation if len(tie.effects) > FEW and linearisation else tie.effects
-    )
-
-
-def _missing(
-    ending: str,
-    names: tuple[str, ...],
-    ties: tuple[tuple[Tie, ...], ...],
-    dependence: str,
-    against: str,
-) -> str:
-    left = "; ".join(part for part in (dependence, against) if part)
-    if ending == "none":
-        return "missing: none; the residual shows nothing beyond chance"
-    effects = ", then ".join(
-        name + (f" (or {_alternatives(name, tie)})" if tie else "")
-        for name, tie in zip(names, ties, strict=True)
-    )
-    tests = list(dict.fromkeys(tie.experiment for each in ties for tie in each))
-    if tests:
-        effects += f"; these data can't tell, this would: {' / '.join(tests[:_SHOWN])}"
-    if ending == "unexplained":
-        near = f"; the nearest is {effects}" if effects else ""
-        return f"missing: unexplained, no effect in the library does it: {left}{near}"
-    more = f"; what is left: {left}" if left else ""
-    return f"missing: {effects}{more}"
-
-
-def _alternatives(name: str, ties: tuple[Tie, ...]) -> str:
-    """Returns the other effects of a tie, without the joint if it is the same."""
-    joint = name.partition(".")[2]
-    names = [tie.name.removesuffix(f".{joint}") for tie in ties]
-    return _or_else(names)
-
-
-def _or_else(words: Sequence[str]) -> str:
-    """Returns some alternatives, and how many more there are."""
-    more = [f"{len(words) - _SHOWN} more"] if len(words) > _SHOWN else []
-    return " or ".join([*words[:_SHOWN], *more])
-
-
-def _value_line(names: Sequence[str], values: tuple[Value, ...]) -> str:
-    """Returns the parameters in the order of their effects."""
-    own = [v for name in names for v in values if v.name.startswith(f"{name}.")]
-    brief = len(names) > _SHOWN  # then shapes are in the report only
-    shown = [v.text for v in own if v.matters and not (brief and v.null is None)]
-    return "parameters: " + ("; ".join(shown) if shown else "none")
+    """Returns the effects of a tie; of one at all joints, that of the same joint."""
+    same = [name for name in tie.effects if joint and name.endswith(f".{joint}")]
+    is_group = is_joint_group(tie.candidates)
+    return " and ".join(same if is_group and same else tie.effects)

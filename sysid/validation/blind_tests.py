@@ -20,13 +20,11 @@ from drake_disasm.effects import (
 )
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario
-from sysid.effect_selection.close_loop import HELD_OUT, HUBER, close_loop
-from sysid.identification.split import split_episodes
+from sysid.effect_selection.close_loop import close_loop
 from sysid.models.twin import TwinModel
 from sysid.objective import pseudo_residual, rms
 from sysid.validation.random_effects import drawn
 from sysid.validation.synthetic_logs import transitions_log
-from sysid.workers import Workers
 
 _SMALL = (3, 25)  # episodes and steps of the log by which a size is found
 
@@ -121,11 +119,8 @@ def answer(case: Case) -> Answer:
             log, nominal(), effects, case.seed, correlation=case.correlation
         )
         model = TwinModel([read_log(log)], nominal(), ())
-        train, test = split_episodes(model.measurements.names, HELD_OUT)
         library = [e for e in registered_effects() if e.__name__ not in case.left_out]
-        closed = close_loop(
-            model, train, test, HUBER, Workers(), lambda _: None, library
-        )
+        closed = close_loop(model, library=library)
     found, errors = closed.verdict, closed.errors
     return Answer(
         case,
@@ -141,8 +136,8 @@ def answer(case: Case) -> Answer:
 def residual(effect: Effect, folder: str) -> float:
     """Returns the rms residual of the nominal twin on a small log with an effect.
 
-    In units of the noise; the log has none. Beyond `HUBER` a residual counts as in the
-    objective: else the one row in which the bolt misses an edge would be all.
+    In units of the noise; the log has none. The loss is Huber's, as in the objective:
+    else the one row in which the bolt misses an edge would be all.
     """
     silent = nominal()
     silent.ft_sensor.noise = [0.0] * 6
@@ -152,7 +147,7 @@ def residual(effect: Effect, folder: str) -> float:
     model = TwinModel([read_log(log)], nominal(), ())
     measured = model.measurements
     error = model.predictions(np.zeros(0)) - measured.values
-    return rms(pseudo_residual(error / measured.noise, HUBER))
+    return rms(pseudo_residual(error / measured.noise, model.default_huber_delta))
 
 
 def answers(

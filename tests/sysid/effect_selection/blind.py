@@ -18,11 +18,10 @@ from drake_disasm.effects import Effect, SensorBias, SensorEffect, amplitudes
 from drake_disasm.effects.sensor.payload_error import PayloadError
 from drake_disasm.logs import read_log, write_static_wrench
 from drake_disasm.scenario import Scenario
-from sysid.effect_selection.close_loop import Closed, close_loop
+from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.effect_selection.verdict import Verdict
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.static_wrench import StaticWrenchModel
-from sysid.workers import Workers
 
 FORCE_NOISE, TORQUE_NOISE = 0.05, 0.002  # N, N m
 READINGS = 100
@@ -88,12 +87,11 @@ def verdict_of(folder: Path, library: Sequence[type[Effect]] | None = None) -> V
     return closed(folder, library).verdict
 
 
-def closed(folder: Path, library: Sequence[type[Effect]] | None = None) -> Closed:
+def closed(folder: Path, library: Sequence[type[Effect]] | None = None) -> ClosedLoop:
     """Returns all that closing the loop finds in a log."""
     model = model_of([read_log(folder)], ModelChoice())
     assert isinstance(model, StaticWrenchModel)
-    chosen = {} if library is None else {"library": library}
-    return close_loop(model, [0], [], np.inf, Workers(), lambda _: None, **chosen)
+    return close_loop(model, library=library)
 
 
 def _readings(folder: Path, R_WS: np.ndarray, effects: list[Effect]) -> np.ndarray:

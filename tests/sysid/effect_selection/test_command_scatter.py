@@ -8,12 +8,12 @@ from drake_disasm.effects import (
     GrooveFriction,
     Imprecision,
     SensorBias,
-    registered_effects,
 )
 from drake_disasm.logs import read_log
-from sysid.effect_selection.close_loop import HUBER, close_loop
-from sysid.effect_selection.command_scatter import scatter
-from sysid.effect_selection.search import Tracer
+from sysid.effect_selection.close_loop import close_loop
+from sysid.effect_selection.command_scatter import fit_command_scatter
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.settings import SelectionSettings
 from sysid.models.twin import TwinModel
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
@@ -26,8 +26,9 @@ def _model(folder, effects):
 
 
 def _scatter(model):
-    fit = Tracer(model, (), Workers(), HUBER, lambda _: None).fit(())
-    return scatter(fit, Workers(), HUBER)
+    delta = model.default_huber_delta
+    fitter = Fitter(model, Workers(), delta, SelectionSettings())
+    return fit_command_scatter(fitter, fitter.fit(()))
 
 
 def test_finds_by_how_much_commands_scatter(tmp_path):
@@ -36,7 +37,7 @@ def test_finds_by_how_much_commands_scatter(tmp_path):
     found = _scatter(_model(tmp_path, [Imprecision(*truth)]))
     np.testing.assert_allclose(found.std, truth, atol=5e-6)
     assert found.interval[1, 0] < 1e-4 < found.interval[1, 1]
-    assert found.value < 1.3 and found.gain > 0.9
+    assert found.objective < 1.3 and found.gain > 0.9
 
 
 @pytest.mark.parametrize(
@@ -51,12 +52,10 @@ def test_what_follows_on_something_is_no_scatter(effects, tmp_path):
 def test_closing_the_loop_adds_it_to_the_scenario(tmp_path):
     model = _model(tmp_path, [Imprecision(y=4e-5, z=4e-5)])
     episodes = range(len(model.measurements.names))
-    library = [
-        e for e in registered_effects() if e in (CommandGain, SensorBias, Imprecision)
-    ]
-    closed = close_loop(model, episodes, [], HUBER, Workers(), lambda _: None, library)
+    library = [CommandGain, SensorBias, Imprecision]
+    closed = close_loop(model, train=episodes, library=library)
     verdict = closed.verdict
     assert (verdict.ending, verdict.names) == ("explained", ("Imprecision",))
-    assert "missing: Imprecision" in verdict.text
+    assert "missing: Imprecision" in closed.text
     [effect] = closed.scenario.effects
     assert isinstance(effect, Imprecision) and effect.x < effect.y

@@ -10,8 +10,9 @@ from drake_disasm.scenario import load_scenario
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
 from sysid.effect_selection.candidates import candidates
-from sysid.effect_selection.close_loop import HUBER
-from sysid.effect_selection.search import Tracer
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.refit_search import at_own_minimum, simplified
+from sysid.effect_selection.settings import SelectionSettings
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.validation.blind_tests import nominal
@@ -23,36 +24,40 @@ _TURN = np.deg2rad(2.0)  # of removal_turned
 
 @pytest.fixture(scope="module")
 def gain(tmp_path_factory):
-    """A search in a log of an arm that goes 3 % too far along x."""
+    """A fitter of a log of an arm that goes 3 % too far along x, and its effect."""
     folder = tmp_path_factory.mktemp("gain") / "log"
     transitions_log(folder, nominal(), [CommandGain(x=0.03)], 0, episodes=6, steps=12)
-    return _search(TwinModel([read_log(folder)], nominal(), ()), CommandGain)
+    return _fitter(TwinModel([read_log(folder)], nominal(), ()), CommandGain)
 
 
-def _search(model, kind):
-    """Returns a tracer that knows one effect."""
-    library = candidates(model, [kind])
-    return Tracer(model, library, Workers(), HUBER, lambda _: None)
+def _fitter(model, kind):
+    """Returns a fitter, and the candidate of a kind of effect."""
+    (effect,) = candidates(model, [kind])
+    delta = model.default_huber_delta
+    return Fitter(model, Workers(), delta, SelectionSettings()), effect
 
 
 def test_an_effect_is_worth_what_the_loss_rises_by_without_it(gain):
-    before, fit = gain.fit(()), gain.fit(tuple(gain.library))
-    assert fit.worth["CommandGain"] == pytest.approx(
+    fitter, effect = gain
+    before, fit = fitter.fit(()), fitter.fit((effect,))
+    assert fit.effect_gains["CommandGain"] == pytest.approx(
         1 - fit.loss / before.loss, abs=0.03
     )
-    x = fit.columns_of(gain.library[0].only(["x"]))
-    assert fit.gains_of([x]) == pytest.approx([fit.worth["CommandGain"]], abs=0.03)
-    assert fit.shows[x].all()
+    x = fit.columns_of(effect.only(["x"]))
+    whole = fit.effect_gains["CommandGain"]
+    assert fit.gains_of([x]) == pytest.approx([whole], abs=0.03)
+    assert fit.significant[x].all()
 
 
-def test_sizes_that_gain_nothing_go(gain):
-    fit = gain.fit(tuple(gain.library))
-    simple = gain.simplified(fit)
+def test_amplitudes_that_gain_nothing_are_left_out(gain):
+    fitter, effect = gain
+    fit = fitter.fit((effect,))
+    simple = simplified(fitter, fit)
     assert len(fit.effects[0].fields) == 6
     assert simple.effects[0].fields == ("x",)
     assert simple.theta == pytest.approx([0.03], rel=0.02)
     assert simple.loss < 1.01 * fit.loss
-    assert gain.simplified(simple) is simple
+    assert simplified(fitter, simple) is simple
 
 
 def test_an_added_effect_ends_where_the_models_own_derivatives_lead(tmp_path):
@@ -61,14 +66,13 @@ def test_an_added_effect_ends_where_the_models_own_derivatives_lead(tmp_path):
     simulation = TaskSimulation(turned, "twin", policy)
     log = record_transitions(tmp_path / "log", simulation, 28)
     model = TwinModel([log], load_scenario("removal"), ())
-    tracer = _search(model, GroovePose)
-    effect = tracer.library[0].only(["ry", "x"])
+    fitter, pose = _fitter(model, GroovePose)
+    effect = pose.only(["ry", "x"])
     assert model.costly
-    near = tracer.fit((effect,), values={"GroovePose.ry": 0.9 * _TURN})
-    fit = tracer._settled(near)
-    assert fit.value < near.value
-    at_truth = Objective(model.with_effects(turned.effects), Workers(), HUBER)(
-        np.zeros(0)
-    )[0]
-    assert fit.value < at_truth
+    near = fitter.fit((effect,), values={"GroovePose.ry": 0.9 * _TURN})
+    fit = at_own_minimum(fitter, near)
+    assert fit.objective < near.objective
+    true = model.with_effects(turned.effects)
+    at_truth = Objective(true, Workers(), fitter.huber_delta)(np.zeros(0))[0]
+    assert fit.objective < at_truth
     assert fit.values["GroovePose.ry"] == pytest.approx(_TURN, rel=0.03)

@@ -2,15 +2,14 @@
 
 import pytest
 
-import sysid.effect_selection.search as selection
+import sysid.effect_selection.fitter as selection
 from drake_disasm.effects import CommandGain, GrooveFriction, SensorBias
 from drake_disasm.logs import read_log
-from sysid.effect_selection.close_loop import HUBER, close_loop
+from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.output import to_mapping
 from sysid.models.twin import TwinModel
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
-from sysid.workers import Workers
 
 _LIBRARY = [CommandGain, GrooveFriction, SensorBias]
 
@@ -35,9 +34,7 @@ def test_what_was_fitted_is_not_fitted_again_and_the_verdict_is_the_same(
 
     def closed(folder):
         model = TwinModel([read_log(tmp_path / "log")], nominal(), ())
-        return close_loop(
-            model, range(5), [5], HUBER, Workers(), lambda _: None, _LIBRARY, folder
-        )
+        return close_loop(model, test=[5], library=_LIBRARY, folder=folder)
 
     monkeypatch.setattr(selection, "gauss_newton", counted)
     stop_at = None

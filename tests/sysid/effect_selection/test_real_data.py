@@ -7,18 +7,17 @@ import pytest
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.logs import read_logs
-from sysid.effect_selection.close_loop import Closed, close_loop
+from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.models.from_logs import ModelChoice, model_of
-from sysid.workers import Workers
 from tests.sysid.effect_selection.blind import sieve
 from tests.sysid.real_data import write_arm, write_motion, write_static
 
 _NULLS = 40
 
 
-def _closed(folders, train, test) -> Closed:
+def _closed(folders, train, test) -> ClosedLoop:
     model = model_of(read_logs(folders), ModelChoice())
-    return close_loop(model, train, test, np.inf, Workers(), lambda _: None)
+    return close_loop(model, train=train, test=test)
 
 
 def test_a_real_force_sensor_drifts_and_stops(tmp_path):
@@ -51,7 +50,7 @@ def test_too_little_of_a_real_arms_motion_is_refused(tmp_path):
     model = model_of(read_logs([log]), ModelChoice())
     short = model.of_rows(np.arange(model.measurements.rows) < 500)
     with pytest.raises(DisasmError, match="too short to decide"):
-        close_loop(short, [0], [], np.inf, Workers(), lambda _: None)
+        close_loop(short)
 
 
 @pytest.mark.slow
@@ -64,11 +63,7 @@ def test_noise_as_correlated_as_a_real_arms_residual_raises_no_alarm(
     log = read_logs([write_motion(1, tmp_path / "run", arm)])
     model = model_of(log, ModelChoice())
     model = model.of_rows(np.arange(model.measurements.rows) % 5 == 0)
-
-    def closed(model):
-        return close_loop(model, [0], [], np.inf, Workers(), lambda _: None)
-
-    found = closed(model)
+    found = close_loop(model)
     fit = getattr(found, residual_of)
     residual = fit.linearisation.residual * fit.model.measurements.noise
     clean = found.first.model.predictions(found.first.theta)
@@ -77,5 +72,7 @@ def test_noise_as_correlated_as_a_real_arms_residual_raises_no_alarm(
         random = np.random.default_rng(seed)
         noise = np.column_stack([sieve(r, 30, random) for r in residual.T])
         null = dataclasses.replace(model.measurements, values=clean + noise)
-        alarms.append(closed(model.with_measurements(null)).verdict.ending != "none")
+        alarms.append(
+            close_loop(model.with_measurements(null)).verdict.ending != "none"
+        )
     assert sum(alarms) <= 0.05 * _NULLS

@@ -13,7 +13,6 @@ from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.scenario_parameters import Request
-from sysid.workers import Workers
 from tests.sysid.models.test_joint_motion import (
     JOINT,
     JOINTS,
@@ -88,7 +87,7 @@ def test_closing_the_loop_finds_it_beside_the_arm_of_the_urdf(log: Log) -> None:
     """With the base parameters frozen; among all else that an arm may have."""
     model = model_of([log], ModelChoice(requests=(Request("upper.Izz"),)))
     assert isinstance(model, JointMotionModel)
-    found = close_loop(model, [0], [], np.inf, Workers(), lambda _: None)
+    found = close_loop(model)
     assert found.verdict.names == ("FlangePayload",)
     (effect,) = found.last.model.scenario_at(found.last.theta).effects
     assert effect.mass == pytest.approx(MASS, abs=0.03)
@@ -98,5 +97,5 @@ def test_closing_the_loop_finds_it_beside_the_arm_of_the_urdf(log: Log) -> None:
 def test_closing_the_loop_says_none_if_the_last_link_is_free(log: Log) -> None:
     model = model_of([log], ModelChoice())
     assert isinstance(model, JointMotionModel)
-    found = close_loop(model, [0], [], np.inf, Workers(), lambda _: None)
+    found = close_loop(model)
     assert found.verdict.ending == "none"

@@ -1,0 +1,119 @@
+"""Fits a model with chosen effects."""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.effect_selection.candidates import Candidate, extended
+from sysid.effect_selection.fit import Fit
+from sysid.effect_selection.fit_cache import cached_fit
+from sysid.effect_selection.settings import SelectionSettings
+from sysid.identification.gauss_newton import gauss_newton
+from sysid.identification.linearisation import Linearisation
+from sysid.models.base import LogModel
+from sysid.objective import Objective
+from sysid.workers import Workers
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Fitter:
+    """Fits a model with chosen effects to its log.
+
+    Attributes:
+        base: the model, with the parameters that it has anyway.
+        workers: to evaluate with.
+        huber_delta: residual, in standard deviations, beyond which the loss is linear.
+        settings: how far a fit goes.
+        exact: whether derivatives are the model's own, else those of its surrogate.
+        folder: where fits are kept, for a search that is stopped; None keeps none.
+    """
+
+    base: LogModel
+    workers: Workers
+    huber_delta: float
+    settings: SelectionSettings
+    exact: bool = False
+    folder: Path | None = None
+
+    def objective(self, model: LogModel) -> Objective:
+        """Returns what is minimised, of a model that extends the base."""
+        surrogate = None if self.exact else model.surrogate()
+        return Objective(model, self.workers, self.huber_delta, surrogate)
+
+    def fit(
+        self,
+        effects: tuple[Candidate, ...],
+        start: Fit | None = None,
+        derivatives: Mapping[str, Array] | None = None,
+        values: Mapping[str, float] | None = None,
+    ) -> Fit:
+        """Returns the model with effects, fitted.
+
+        Args:
+            effects: of the model.
+            start: where to begin; parameters that it does not have begin at null.
+            derivatives: (rows, channels) by parameters that the start does not have, by
+                name, if all of its parameters are kept; those of shape parameters are
+                zero at null.
+            values: where else to begin, by name.
+        """
+        model, _ = extended(self.base, effects, with_shapes=True)
+        begin = (start.values if start else {}) | dict(values or {})
+        theta = [begin.get(p.name, p.nominal) for p in model.parameters]
+        objective = self.objective(model)
+        u = objective.scaling.to_unit(np.array(theta))
+        known = None
+        if start and derivatives is not None:
+            known = _extended_linearisation(start, model, u, derivatives)
+        found = self._minimised(objective, u, known)
+        return Fit(
+            effects,
+            model,
+            objective.scaling.from_unit(found.u),
+            found,
+            objective.value(found.residual),
+            self.settings,
+        )
+
+    def with_exact_derivatives(self) -> "Fitter":
+        """Returns a fitter that uses the model's own derivatives."""
+        return dataclasses.replace(self, exact=True)
+
+    def with_base(self, base: LogModel) -> "Fitter":
+        """Returns a fitter of another model."""
+        return dataclasses.replace(self, base=base)
+
+    def _minimised(
+        self, objective: Objective, u: Array, known: Linearisation | None
+    ) -> Linearisation:
+        """Returns the linearisation at the minimum that is downhill from u (p,)."""
+        model, limits = objective.model, self.settings
+        iterations, progress = limits.fit_iterations, limits.fit_min_progress
+        if model.costly:
+            iterations = limits.costly_fit_iterations
+            progress = limits.costly_fit_min_progress
+        return cached_fit(
+            None if model.affine else self.folder,
+            (model, self.huber_delta, self.exact, u, known, iterations, progress),
+            lambda: gauss_newton(
+                objective, u, iterations, start=known, central=False, min_gain=progress
+            ),
+        )
+
+
+def _extended_linearisation(
+    start: Fit, model: LogModel, u: Array, derivatives: Mapping[str, Array]
+) -> Linearisation:
+    """Returns a fit's linearisation with derivatives by a model's new parameters."""
+    known = start.linearisation
+    names = [p.name for p in model.parameters[len(start.theta) :]]
+    zero = np.zeros_like(known.residual)
+    new = [derivatives.get(name, zero) for name in names]
+    jacobian = np.concatenate([known.jacobian, np.stack(new, axis=-1)], axis=-1)
+    return dataclasses.replace(known, u=u, jacobian=jacobian)

@@ -1,0 +1,229 @@
+"""Adds one effect at a time; where effects are not linear, fits decide which.
+
+The linear account of a survey only says which candidates are worth a fit. Far from
+the data it says nothing: there every effect is fitted roughly (`prescreen`).
+"""
+
+import dataclasses
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from sysid.effect_selection.candidates import Candidate
+from sysid.effect_selection.evidence import Evidence
+from sysid.effect_selection.fit import Fit, measured_evidence
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.prescreen import prescreening_fits
+from sysid.effect_selection.search import ForwardSearch, ties, trials
+from sysid.effect_selection.settings import SelectionSettings
+from sysid.effect_selection.survey import Survey
+
+#: Fits with one more effect each, by the names of the effects, to start from.
+_Starts = Mapping[tuple[str, ...], Fit]
+_Trial = tuple[Evidence, Fit]
+
+
+class RefitSearch(ForwardSearch):
+    """Where effects are not linear: candidates are compared by their fits."""
+
+    def _next(self, fit: Fit, survey: Survey) -> Fit | None:
+        limits, starts = self._settings, dict[tuple[str, ...], Fit]()
+        if fit.objective > limits.max_linear_objective:
+            survey, starts = self._prescreened(fit, survey)
+        worth_a_fit = [
+            e
+            for e in survey.effects
+            if e.gain >= limits.refit_min_linear_gain
+            and (not starts or e.effects in starts)
+        ]
+        chosen = trials(worth_a_fit, limits.max_trials)
+        confirmed, tried = self._try(fit, survey, chosen, starts)
+        if not confirmed:
+            confirmed, _ = self._try(fit, survey, _pairs(tried, limits), {})
+        if not confirmed:
+            return None
+        best, found = _lowest(confirmed, limits)
+        again = self.fitter.fit(fit.effects, found)
+        if again.loss <= (1.0 + limits.min_gain) * found.loss:
+            return self._same_effects(fit, again)
+        rivals = ties(best, survey, worth_a_fit)
+        rivals = _ties_by_fit(rivals, confirmed, fit, found)
+        found = at_own_minimum(self.fitter, found)
+        self._record(best, rivals, survey, found)
+        return found
+
+    def _same_effects(self, fit: Fit, again: Fit) -> Fit | None:
+        """Returns a second fit of the same effects, if it is truly better; else None.
+
+        No effect was missing: the first fit had ended in a worse minimum.
+        """
+        self._report_fit("a better fit without another effect", again)
+        least = (1.0 - self._settings.refit_min_progress) * fit.loss
+        return again if again.loss < least else None
+
+    def _prescreened(
+        self, fit: Fit, survey: Survey
+    ) -> tuple[Survey, dict[tuple[str, ...], Fit]]:
+        """Returns a survey by fits of each effect to a few rows, and where to start.
+
+        Starts are those alone whose loss is near the least.
+        """
+        each = list({e.effects: e for e in reversed(survey.effects)}.values())
+        before, fits = prescreening_fits(self.fitter, fit, [e.candidates for e in each])
+        limit = self._settings.prescreen_max_loss_ratio * min(f.loss for f in fits)
+        pairs = list(zip(each, fits, strict=True))
+        found = [
+            measured_evidence(before, after, e, tests=len(each)) for e, after in pairs
+        ]
+        ranking = sorted(found, key=lambda e: -e.gain)
+        starts = {e.effects: after for e, after in pairs if after.loss <= limit}
+        return dataclasses.replace(survey, effects=ranking), starts
+
+    def _try(
+        self, fit: Fit, survey: Survey, chosen: Sequence[Evidence], starts: _Starts
+    ) -> tuple[list[_Trial], list[_Trial]]:
+        """Returns the trials that their fits confirm, and all trials, with fits."""
+        confirmed, tried = [], []
+        for trial in chosen:
+            found = self._trial_fit(fit, survey, trial, starts.get(trial.effects))
+            tried.append((trial, found))
+            if not self._is_confirmed(fit, found, trial):
+                self._report_rejected(trial)
+                continue
+            confirmed.append((trial, found))
+            if found.model.costly and found.objective < self._settings.noise_level:
+                break
+        return confirmed, tried
+
+    def _trial_fit(
+        self, fit: Fit, survey: Survey, trial: Evidence, start: Fit | None
+    ) -> Fit:
+        """Returns a fit to all rows with what is tried, without what that replaces."""
+        if start:
+            found = self.fitter.fit(start.effects, start)
+            found = _significant_only(self.fitter, found, len(found.effects) - 1)
+        else:
+            found = self._fit_chosen(fit, survey, trial)
+            found = self._with_hidden_amplitudes(fit, found, trial)
+        return self._without_replaced(self._without_needless(found))
+
+    def _with_hidden_amplitudes(self, fit: Fit, found: Fit, trial: Evidence) -> Fit:
+        """Returns the fit with amplitudes that the survey left out, if they help.
+
+        Contact hides some from the linear account that matter once it is gone.
+        """
+        added = found.effects[len(fit.effects) :]
+        simulated = found.model.simulated
+        is_simulated = any(simulated[found.columns_of(c)].any() for c in added)
+        at_noise = found.objective <= self._settings.noise_level
+        if found.model.costly or not is_simulated or at_noise:
+            return found
+        full = self.fitter.fit((*fit.effects, *trial.candidates), found)
+        if full.loss > (1.0 - self._settings.min_gain) * found.loss:
+            return found
+        return _significant_only(self.fitter, full, len(fit.effects))
+
+    def _is_confirmed(self, before: Fit, after: Fit, trial: Evidence) -> bool:
+        """Returns whether blocks that are not fitted are predicted better."""
+        if not self._is_better(before, after, trial):
+            return False
+        tests = len({candidate.name for candidate in self.library})
+        return measured_evidence(before, after, trial, tests).accepted
+
+    def _without_replaced(self, fit: Fit) -> Fit:
+        """Returns the fit without effects that the newest replaces, by fits without."""
+        limits, gains = self._settings, fit.effect_gains
+        for effect in fit.effects[:-1]:
+            if gains[effect.name] > limits.clearly_needed_gain:
+                continue
+            rest = tuple(c for c in fit.effects if c is not effect)
+            without = self.fitter.fit(rest, fit)
+            if without.loss <= (1.0 + limits.min_gain) * fit.loss:
+                self._report_fit(f"without {effect.text}", without)
+                fit = without
+        return fit
+
+
+def at_own_minimum(fitter: Fitter, fit: Fit) -> Fit:
+    """Returns the fit at the model's own minimum, with as few amplitudes as will do.
+
+    A surrogate's derivatives stop short of it: effects that are not there would explain
+    what they leave.
+    """
+    far = fit.objective > fitter.settings.noise_level
+    if fitter.base.costly and not fitter.exact and far:
+        fitter = fitter.with_exact_derivatives()
+        fit = fitter.fit(fit.effects, fit)
+    return simplified(fitter, fit)
+
+
+def simplified(fitter: Fitter, fit: Fit) -> Fit:
+    """Returns the fit without amplitudes that gain next to nothing.
+
+    Even if they are significant: they have taken up what the model does a little
+    differently from the device.
+    """
+    effects = tuple(_with_useful_amplitudes(fit, effect) for effect in fit.effects)
+    if effects == fit.effects:
+        return fit
+    simple = fitter.fit(effects, fit)
+    return simple if simple.loss <= (1.0 + fit.settings.min_gain) * fit.loss else fit
+
+
+def _with_useful_amplitudes(fit: Fit, effect: Candidate) -> Candidate:
+    """Returns an effect with its best amplitude and others that gain enough."""
+    gains = fit.gains_of([np.array([c]) for c in fit.columns_of(effect)])
+    enough = min(fit.settings.min_amplitude_gain, max(gains))
+    pairs = zip(effect.fields, gains, strict=True)
+    return effect.only([field for field, gain in pairs if gain >= enough])
+
+
+def _significant_only(fitter: Fitter, fit: Fit, known: int) -> Fit:
+    """Returns the fit whose effects after the known ones are all significant."""
+    effects = fit.significant_only(known)
+    if len(effects) == known or effects == fit.effects:
+        return fit
+    return fitter.fit(effects, fit)
+
+
+def _ties_by_fit(
+    rivals: Sequence[Evidence],
+    confirmed: Sequence[_Trial],
+    before: Fit,
+    found: Fit,
+) -> tuple[Evidence, ...]:
+    """Returns rivals that could explain as much as the chosen effect's fit does.
+
+    Those that were fitted are judged by their fits, others by the linear account.
+    """
+    limit = (1.0 + found.settings.refit_tie_margin) * found.loss
+    losses = {e.effects: fit.loss for e, fit in confirmed if fit is not found}
+    known = {e.effects: e for e, fit in confirmed if fit is not found}
+    for rival in rivals:
+        known.setdefault(rival.effects, rival)
+    return tuple(
+        rival
+        for effects, rival in known.items()
+        if losses.get(effects, (1.0 - rival.gain) * before.loss) <= limit
+    )
+
+
+def _pairs(tried: Sequence[_Trial], settings: SelectionSettings) -> list[Evidence]:
+    """Returns pairs of what was tried alone, the best first."""
+    order = sorted(tried, key=lambda trial: trial[1].loss)
+    return [
+        dataclasses.replace(
+            first,
+            explanation=(*first.candidates, *second.candidates),
+            parameter_count=first.parameter_count + second.parameter_count,
+        )
+        for (first, _), (second, _) in itertools.combinations(order, 2)
+    ][: settings.refit_max_pairs]
+
+
+def _lowest(confirmed: Sequence[_Trial], settings: SelectionSettings) -> _Trial:
+    """Returns the first of the fits that are as good as the best."""
+    least = min(fit.loss for _, fit in confirmed)
+    limit = (1.0 + settings.min_gain) * least
+    return next(trial for trial in confirmed if trial[1].loss <= limit)

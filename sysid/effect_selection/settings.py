@@ -1,0 +1,364 @@
+"""All thresholds of effect selection, each with its unit and the reason for it."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+_NOT_MEASURED = "not measured"
+#: What was measured with all thresholds at their defaults: docs/closing-the-loop.md.
+_NULL_LOGS = (
+    "no alarm in 200 transition logs and 80 static logs without an effect, 2 wrong "
+    "names in 140 logs of an arm (docs/closing-the-loop.md)"
+)
+_BLIND_LOGS = (
+    "not alone; with the other defaults 351 of 375 hidden effects are named first "
+    "(docs/closing-the-loop.md)"
+)
+
+
+def _setting(
+    default: Any, unit: str, reason: str, measured: str = _NOT_MEASURED
+) -> Any:
+    """Returns a field with its unit, why it has its value, and what was measured."""
+    metadata = {"unit": unit, "reason": reason, "measured": measured}
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+@dataclass(frozen=True)
+class SelectionSettings:
+    """Thresholds of effect selection.
+
+    Each field's metadata has its `unit` ("1" is a pure number), the `reason` for its
+    default, and what was `measured` to choose it. "Loss" is the sum of the squared
+    residuals in units of the noise, Huber's beyond `huber_delta`; "objective" is its
+    root mean square: 1 is as good as the sensors. A gain is a share of the loss of
+    blocks that were not fitted.
+    """
+
+    # When an effect is more than chance.
+    alpha: float = _setting(
+        0.05,
+        "1",
+        "family-wise error rate of a round; the usual 5 %",
+        _NULL_LOGS,
+    )
+    sign_flips: int = _setting(
+        4000,
+        "draws",
+        "a p-value of 0.05 is then known to 0.0035 (binomial standard deviation)",
+    )
+    min_gain: float = _setting(
+        0.01,
+        "share of the loss",
+        "a smaller gain is of no use to a simulation, however significant",
+        _NULL_LOGS,
+    )
+    min_block_share: float = _setting(
+        0.8,
+        "share of the blocks",
+        "an effect acts throughout a log; chosen as 8 of 10 so that a few dominant "
+        "blocks can't decide",
+        _NULL_LOGS,
+    )
+    idle_block_gain: float = _setting(
+        0.1,
+        "of the blocks' mean absolute gain",
+        "a contact effect says nothing of blocks in which the bolt touches nothing: "
+        "blocks that change by less have no vote",
+        _NULL_LOGS,
+    )
+
+    # How rows are grouped into blocks.
+    min_blocks: int = _setting(
+        8,
+        "blocks",
+        "signed ranks of fewer blocks can't reach a p-value below 0.05 with many "
+        "candidates: of 8, the least is 2^-8 = 0.004",
+    )
+    max_blocks: int = _setting(
+        40,
+        "blocks",
+        "more blocks cost time (one set of normal equations each) and gain no power "
+        "to speak of",
+    )
+
+    # The linear account of a residual, block by block.
+    reweighting_steps: int = _setting(
+        3,
+        "iterations",
+        "of the iteratively reweighted least squares with Huber's weights; chosen for "
+        "the time that they take, since every candidate needs them",
+    )
+    outlier_deltas: float = _setting(
+        10.0,
+        "huber_delta",
+        "rows missed by more lose their influence altogether: there contact is made "
+        "or broken, and a derivative says nothing",
+        _BLIND_LOGS,
+    )
+    leverage_quantile: float = _setting(
+        0.95,
+        "quantile of the rows",
+        "no row may have more leverage than 95 % of them have: where contact makes "
+        "and breaks, single derivatives are huge",
+        _BLIND_LOGS,
+    )
+    min_new_column: float = _setting(
+        1e-3,
+        "share of a column's norm",
+        "what the model's own parameters reproduce to 0.1 % is not a new effect but "
+        "rounding of finite differences",
+    )
+
+    # Ranking of candidates.
+    parsimony_tolerance: float = _setting(
+        0.05,
+        "of the best gain",
+        "the candidate with the fewest parameters is taken if it loses less than "
+        "this against the best; chosen as less than candidates typically differ by",
+        _BLIND_LOGS,
+    )
+    tie_min_gain: float = _setting(
+        0.5,
+        "of the best gain",
+        "what gains less than half is no rival, even if few blocks can't tell",
+    )
+    pair_pool: int = _setting(
+        8,
+        "candidates",
+        "28 pairs at most, which cost no simulation; more pairs cost power, since "
+        "p-values count all pairs",
+        "the pairs' p-values were corrected after a pair of the best eight was named "
+        "in one of twelve null logs of an arm (commit 42272a1)",
+    )
+    max_trials: int = _setting(
+        4,
+        "effects per round",
+        "the most promising are fitted until one is confirmed (all, where fits "
+        "decide); chosen for the time that fits take",
+        _BLIND_LOGS,
+    )
+    min_amplitude_gain: float = _setting(
+        0.005,
+        "share of the loss",
+        "an amplitude that gains less takes up what the model does a little "
+        "differently from the device",
+        "without it the groove turned in docs/closing-the-loop.md came with a shift "
+        "of 66 micrometres that nobody had put in",
+    )
+    curve_step_width: float = _setting(
+        0.1,
+        "of the covariate's range",
+        "steepness of the step in a dependence curve: sharp enough for friction that "
+        "changes sign, smooth enough for a regression",
+    )
+
+    # Whether there is enough data.
+    min_rows: int = _setting(
+        10,
+        "rows",
+        "fewer rows make no blocks; chosen as the shortest log",
+    )
+    rows_per_parameter: int = _setting(
+        2, "rows per parameter", "so that half of the rows can be held out"
+    )
+    max_block_excess: float = _setting(
+        1.0,
+        "of a block's fitted loss",
+        "half of the blocks then cost twice as much when they are not fitted: each "
+        "shows something else (Akaike's final prediction error at as many parameters "
+        "as a third of the independent data)",
+        "tells a short log from a correlated residual in the logs of commit 4d1afab; "
+        "the length of the correlation did not",
+    )
+    max_extrapolation: int = _setting(
+        20,
+        "times the log",
+        "an estimate of how many more rows are needed means nothing beyond that",
+    )
+
+    # Episodes that contradict each other.
+    contradiction_max_episodes: int = _setting(
+        12,
+        "episodes",
+        "with more, one alone hardly shows, and it is imprecision rather than a "
+        "contradiction",
+    )
+    contradiction_min_gain: float = _setting(
+        0.2,
+        "share of the loss",
+        "far beyond what a common model leaves",
+        _NULL_LOGS,
+    )
+    contradiction_min_block_share: float = _setting(
+        0.8,
+        "share of the blocks",
+        "the same 8 of 10 as for an effect; here blocks without a change count",
+    )
+    contradiction_parsimony_tolerance: float = _setting(
+        0.1,
+        "of the best gain",
+        "wider than for effects: which parameter differs matters less than that one "
+        "does",
+    )
+
+    # How a model with effects is fitted.
+    fit_iterations: int = _setting(
+        8, "iterations", "a guard: `fit_min_progress` usually ends a fit before"
+    )
+    fit_min_progress: float = _setting(
+        1e-3,
+        "of the objective",
+        "an iteration that gains less ends the fit; a tenth of `min_gain`",
+    )
+    costly_fit_iterations: int = _setting(
+        6, "iterations", "fewer, where one evaluation takes seconds"
+    )
+    costly_fit_min_progress: float = _setting(
+        0.02,
+        "of the objective",
+        "where one evaluation takes seconds, an iteration must gain twice `min_gain`",
+        "reaches the bottom of the README example's valley (commit 3afb199)",
+    )
+    bound_tolerance: float = _setting(
+        1e-6,
+        "of a parameter's range",
+        "an amplitude that ends within this of a bound is at the bound: unphysical",
+    )
+
+    # Refit search: where effects are not linear, fits decide.
+    noise_level: float = _setting(
+        1.0,
+        "objective",
+        "a residual as large as the noise: nothing is left to fit",
+    )
+    max_linear_objective: float = _setting(
+        10.0,
+        "objective",
+        "beyond ten times the noise the linear account is not asked: the bolt is "
+        "inside the model's wall, and the derivative is the wall's stiffness",
+        "a groove turned by 3 degrees is found only by fits (tests/sysid/"
+        "effect_selection/test_prescreen.py)",
+    )
+    costly_search_rows: int = _setting(
+        250,
+        "rows",
+        "a hundred evaluations of a model that takes seconds for all rows then take "
+        "minutes",
+        "130 s from 883 transitions to the verdict (docs/closing-the-loop.md)",
+    )
+    refit_min_linear_gain: float = _setting(
+        0.02,
+        "share of the loss",
+        "a candidate with less, by the linear account, is not worth a fit",
+        _BLIND_LOGS,
+    )
+    refit_max_pairs: int = _setting(
+        3,
+        "pairs per round",
+        "fitted where no effect passes alone; chosen for the time that they take",
+    )
+    refit_min_progress: float = _setting(
+        0.005,
+        "share of the loss",
+        "a second fit of the same effects that gains less is the same fit",
+    )
+    clearly_needed_gain: float = _setting(
+        0.5,
+        "share of the loss without the effect",
+        "what more than halves the loss is needed: no fit without it is made",
+    )
+    refit_tie_margin: float = _setting(
+        0.25,
+        "of the loss that is left",
+        "a rival whose fit ends within this of the best is a tie",
+        _BLIND_LOGS,
+    )
+    prescreen_rows: int = _setting(
+        120,
+        "rows",
+        "there is one such fit for each effect, so it must be cheap",
+    )
+    prescreen_scan: tuple[float, ...] = _setting(
+        (0.5, 0.2, 0.08, 0.032, 0.0128),
+        "of the range on either side of null",
+        "amplitudes at which a fit may begin, a factor of 2.5 apart: downhill from "
+        "null ends where contact does",
+        "a groove turned by 3 degrees is found from them",
+    )
+    prescreen_max_loss_ratio: float = _setting(
+        2.0,
+        "of the least loss of the prescreening fits",
+        "effects whose prescreening fit leaves more are not fitted to all rows",
+    )
+
+    # Errors on rows that were not fitted.
+    held_out_folds: int = _setting(
+        10, "folds", "contiguous tenths, the usual number for cross-validation"
+    )
+    bootstrap_draws: int = _setting(
+        2000, "draws", "ends of a 95 % interval then rest on 50 draws each"
+    )
+    held_out_rcond: float = _setting(
+        1e-6,
+        "of the largest singular value",
+        "directions that a fold's other rows do not fix stay where they are",
+    )
+
+    # Whether the arm scatters about its commands.
+    max_objective_at_noise: float = _setting(
+        1.2,
+        "objective",
+        "beyond it there is more than noise, where channels state their noise",
+        _BLIND_LOGS,
+    )
+    scatter_step: float = _setting(
+        2e-5,
+        "m",
+        "of the derivatives by where a step led: the encoders' repeatability",
+    )
+    scatter_rounds: int = _setting(
+        4,
+        "iterations",
+        "derivatives are taken anew where steps likely led",
+    )
+    scatter_edge_share: float = _setting(
+        0.02,
+        "share of the rows",
+        "so many may lie beyond an edge of the contact that no derivative sees",
+        "with all rows counted, scatter stays hidden in a few logs (commit ee1786c)",
+    )
+    scatter_folds: int = _setting(8, "folds", "as many as `min_blocks`")
+    scatter_scale: float = _setting(
+        1e-4, "m", "the unit of the search: the repeatability that arms declare"
+    )
+    scatter_min_ratio: float = _setting(
+        1e-3,
+        "of scatter_scale",
+        "a standard deviation of less is none: far below the encoders' 2e-5 m",
+    )
+    scatter_max_ratio: float = _setting(
+        1e3, "of scatter_scale", "end of the search, beyond any arm that still works"
+    )
+    scatter_alpha: float = _setting(
+        0.01,
+        "1",
+        "family-wise p below which where steps led depends on something; stricter "
+        "than `alpha`, since many covariates are asked of each axis",
+    )
+
+    # The verdict.
+    min_explained_share: float = _setting(
+        0.75,
+        "share of what could be explained",
+        "effects must explain three quarters of it, or the ending is unexplained",
+        "19 of 25 effects that are not in the library end unexplained "
+        "(docs/closing-the-loop.md)",
+    )
+    max_listed: int = _setting(
+        3, "items", "of anything in the text of a verdict, which has three lines"
+    )
+
+
+#: The defaults.
+DEFAULT_SETTINGS = SelectionSettings()

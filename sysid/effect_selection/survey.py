@@ -1,0 +1,196 @@
+"""Ranks all candidate effects at a fit, by one linearisation and no further fit."""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.effect_selection.block_regression import (
+    BlockRegression,
+    Columns,
+    blocks_of,
+)
+from sysid.effect_selection.candidates import Candidate, extended, joint_groups
+from sysid.effect_selection.evidence import (
+    Evidence,
+    Explanation,
+    rank_by_regression,
+)
+from sysid.effect_selection.fit import Fit
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.residual_curves import Dependence, dependence_curves
+from sysid.identification.linearisation import Linearisation, extend
+from sysid.parameters import nominal_values
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LinearSurvey:
+    """A fit linearised with all candidates at null, and its normal equations.
+
+    Attributes:
+        linearisation: at the fit, with the candidates' amplitudes as parameters.
+        fields: of each parameter, the last part of its name.
+        raw: the regression of the fit's and the candidates' parameters.
+        regression: the same with the fit's parameters projected out.
+        groups: columns of each candidate, by its text.
+        dependences: curves, and the columns of each.
+        episodes: (B,) number of the episode that each block is of.
+    """
+
+    linearisation: Linearisation
+    fields: tuple[str, ...]
+    raw: BlockRegression
+    regression: BlockRegression
+    groups: Mapping[str, Columns]
+    dependences: Sequence[tuple[Dependence, Columns]]
+    episodes: NDArray[np.int64]
+
+    def rank(
+        self, sets: Sequence[tuple[Candidate, ...]]
+    ) -> tuple[list[Evidence], list[Evidence]]:
+        """Returns the evidence for sets of candidates, and for curves, the best first.
+
+        They are one family: a log without an effect raises neither alarm.
+        """
+        columns = [*self._columns(sets), *self.dependences]
+        found = rank_by_regression(self.regression, columns)
+        return (
+            [e for e in found if not isinstance(e.explanation, Dependence)],
+            [e for e in found if isinstance(e.explanation, Dependence)],
+        )
+
+    def accepted_pairs(self, singles: Sequence[Evidence]) -> list[Evidence]:
+        """Returns accepted pairs of the best: some effects show only together.
+
+        The p-values count all pairs, since the best are chosen by the same data.
+        """
+        promising: dict[str, Candidate] = {}
+        for one in singles:
+            if len(one.candidates) == 1:
+                promising.setdefault(one.candidates[0].name, one.candidates[0])
+        best = list(promising.values())[: self.regression.settings.pair_pool]
+        pairs = list(itertools.combinations(best, 2))
+        tests = math.comb(len(promising), 2) / max(1, len(pairs))
+        found = rank_by_regression(self.regression, self._columns(pairs))
+        return [
+            counted
+            for e in found
+            if (counted := dataclasses.replace(e, p=min(1.0, e.p * tests))).accepted
+        ]
+
+    def pruned(self, added: Sequence[Candidate]) -> list[Candidate]:
+        """Returns effects with only those amplitudes free that held-out blocks need.
+
+        Backward elimination: the amplitude that is missed least goes, one by one.
+        """
+        tolerance = 1.0 + self.regression.settings.min_amplitude_gain
+        kept = [int(c) for candidate in added for c in self.groups[candidate.text]]
+        now = self._held_out_loss(kept)
+        while len(kept) > 1:
+            without = {
+                c: self._held_out_loss([k for k in kept if k != c]) for c in kept
+            }
+            least = min(without, key=lambda c: without[c])
+            if without[least] > tolerance * now:
+                break
+            kept.remove(least)
+            now = without[least]
+        found = []
+        for candidate in added:
+            own = [c for c in self.groups[candidate.text] if c in kept]
+            if own:
+                found.append(candidate.only([self.fields[c] for c in own]))
+        return found
+
+    def derivatives(self, added: Sequence[Candidate]) -> dict[str, Array]:
+        """Returns the derivatives (rows, channels) by effects' amplitudes, by name."""
+        return {
+            f"{effect.name}.{self.fields[c]}": self.linearisation.jacobian[..., c]
+            for effect in added
+            for c in self.groups[effect.text]
+        }
+
+    def _held_out_loss(self, columns: Sequence[int]) -> float:
+        return float(self.regression.held_out_losses(np.array(columns)).sum())
+
+    def _columns(
+        self, sets: Sequence[tuple[Candidate, ...]]
+    ) -> list[tuple[Explanation, Columns]]:
+        """Returns sets of candidates with their columns, those that have any."""
+        columns = [np.concatenate([self.groups[c.text] for c in s]) for s in sets]
+        return [(s, c) for s, c in zip(sets, columns, strict=True) if len(c)]
+
+
+@dataclass(frozen=True)
+class Survey:
+    """The evidence for each candidate, and for each dependence, at a fit.
+
+    Attributes:
+        effects, dependences: the best first.
+        blocks: number of blocks.
+        linear: what it was made of; None in a survey that is kept as a record.
+    """
+
+    effects: list[Evidence]
+    dependences: list[Evidence]
+    blocks: int
+    linear: LinearSurvey | None
+
+    @property
+    def linearised(self) -> LinearSurvey:
+        """What the survey was made of.
+
+        Raises:
+            ValueError: it is a record.
+        """
+        if self.linear is None:
+            raise ValueError("a recorded survey has no linearisation")
+        return self.linear
+
+    def record(self) -> "Survey":
+        """Returns the survey without its linearisation, which takes memory."""
+        return dataclasses.replace(self, linear=None)
+
+
+def survey_candidates(fitter: Fitter, fit: Fit, library: Sequence[Candidate]) -> Survey:
+    """Returns the evidence for each candidate of a library that a fit does not have.
+
+    Costs one evaluation of the model for each amplitude of each candidate.
+    """
+    names = {candidate.name for candidate in fit.effects}
+    rest = [c for c in library if c.name not in names]
+    linear = _linear_survey(fitter, fit, rest)
+    effects, dependences = linear.rank([(c,) for c in rest] + joint_groups(rest))
+    return Survey(effects, dependences, len(linear.regression.begins), linear)
+
+
+def _linear_survey(
+    fitter: Fitter, fit: Fit, library: Sequence[Candidate]
+) -> LinearSurvey:
+    """Returns the linearisation at a fit with candidates at null."""
+    model, groups = extended(fit.model, library)
+    count, begin = len(fit.theta), len(model.parameters)
+    objective = fitter.objective(model)
+    rest = nominal_values(model.parameters)[count:]
+    u = objective.scaling.to_unit(np.concatenate([fit.theta, rest]))
+    linearisation = extend(fit.linearisation, objective, u)
+    episode = model.measurements.episode
+    curves, dependences = dependence_curves(model, fitter.settings)
+    blocks = blocks_of(linearisation, episode, fitter.settings)
+    raw = BlockRegression.of(linearisation, blocks, curves, fitter.settings)
+    columns = [np.array(group, dtype=np.int64) for group in groups]
+    return LinearSurvey(
+        linearisation,
+        tuple(p.name.rpartition(".")[2] for p in model.parameters),
+        raw,
+        raw.project_out(np.arange(count)),
+        {c.text: group for c, group in zip(library, columns, strict=True)},
+        [(d, begin + np.array(d.columns, dtype=np.int64)) for d in dependences],
+        episode[np.unique(blocks, return_index=True)[1]],
+    )

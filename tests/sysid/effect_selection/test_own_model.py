@@ -1,0 +1,82 @@
+"""A model of one's own, without a scenario, closed as a library call."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.effects import JointCoulombFriction, JointEffect, JointSamples
+from sysid.effect_selection.close_loop import close_loop
+from sysid.effect_selection.output import to_mapping
+from sysid.models import Channel, LogModel, Measurements
+from sysid.parameters import Parameter
+from sysid.report import closing_page
+
+_ROWS, _NOISE, _FRICTION = 300, 0.01, 0.3
+
+
+class Pendulum(LogModel):
+    """The torque that holds a pendulum on its way; of two episodes."""
+
+    affine = True
+    effect_types = (JointEffect,)
+
+    def __init__(self, q, v, tau):
+        self.q, self.v = q, v
+        self.parameters = (Parameter("weight", 1.0, 0.0, 5.0, "N m"),)
+        channels = [Channel("pivot", "N m", _NOISE, "as given")]
+        self.measurements = Measurements.of_array(tau, channels)
+
+    def predict(self, theta, rows):
+        load = theta[0] * np.sin(self.q[rows])
+        samples = JointSamples(self.q[rows], self.v[rows], 0.0 * load, load)
+        effects = self.effects_at(theta)
+        return (load + sum(effect.torque(samples) for effect in effects))[:, None]
+
+    def select_rows(self, mask):
+        return self.replace(q=self.q[mask], v=self.v[mask])
+
+
+@pytest.fixture(scope="module")
+def pendulum():
+    random = np.random.default_rng(0)
+    t = np.arange(_ROWS) * 0.05
+    q, v = np.sin(t) + 0.3 * np.sin(2.7 * t), np.cos(t) + 0.81 * np.cos(2.7 * t)
+    tau = 2.0 * np.sin(q) + _FRICTION * np.sign(v)
+    return Pendulum(q, v, (tau + _NOISE * random.standard_normal(_ROWS))[:, None])
+
+
+@pytest.fixture(scope="module")
+def closed(pendulum):
+    return close_loop(pendulum)
+
+
+def test_all_but_the_model_has_a_default(closed):
+    assert closed.verdict.ending == "explained"
+    assert closed.verdict.names[0] == "JointCoulombFriction.pivot"
+    found = {value.name: value for value in closed.verdict.values}
+    friction = found["JointCoulombFriction.pivot.size"]
+    assert friction.value == pytest.approx(_FRICTION, abs=0.02)
+    assert friction.excludes_null and friction.unit == "N m"
+    assert closed.errors.in_noise(closed.errors.after) < 1.3
+
+
+def test_there_is_no_scenario_and_a_report_all_the_same(closed):
+    assert closed.scenario is None
+    assert "JointCoulombFriction" in closing_page(closed, {})
+    assert to_mapping(closed)["effects"] == list(closed.verdict.names)
+
+
+def test_prints_nothing_unless_progress_is_given(pendulum, capsys):
+    updates = []
+    library = [JointCoulombFriction]
+    close_loop(pendulum, library=library, progress=updates.append)
+    assert capsys.readouterr() == ("", "")
+    messages = [update.message for update in updates]
+    assert any(m.startswith("JointCoulombFriction.pivot") for m in messages)
+
+
+def test_progress_may_stop_it(pendulum):
+    def stop(update):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        close_loop(pendulum, progress=stop)

@@ -1,0 +1,55 @@
+"""p-values of what blocks gain."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from sysid.effect_selection.settings import SelectionSettings
+from sysid.effect_selection.significance import family_p, share_better, worse_p
+
+_FEW = SelectionSettings(sign_flips=399)  # p-values are multiples of 1 / 400
+_FAMILIES = 800
+
+
+@pytest.fixture(scope="module", params=[0.0, 0.9], ids=["independent", "correlated"])
+def null_p(request):
+    """The least p-value of each of many families in which nothing explains anything."""
+    random = np.random.default_rng(0)
+    size = (_FAMILIES, 20, 12)
+    common = random.standard_normal((*size[:2], 1))
+    rho = request.param
+    gains = np.sqrt(rho) * common + np.sqrt(1.0 - rho) * random.standard_normal(size)
+    return np.array([family_p(g, seed, _FEW).min() for seed, g in enumerate(gains)])
+
+
+@pytest.mark.parametrize("alpha", [0.02, 0.05, 0.2])
+def test_alarms_are_as_many_as_alpha_says(alpha, null_p):
+    """Where nothing is to be found, in 99 of 100 such tests."""
+    low, high = binom.interval(0.99, _FAMILIES, alpha)
+    assert low <= np.sum(null_p < alpha) <= high
+
+
+def test_a_candidate_that_all_blocks_gain_by_is_significant():
+    random = np.random.default_rng(0)
+    gains = random.standard_normal((20, 12))
+    gains[:, 7] += 2.0
+    p = family_p(gains)
+    assert p[7] < 0.01 and np.delete(p, 7).min() > 0.05
+
+
+def test_one_dominant_block_decides_nothing():
+    gains = np.where(np.arange(20) == 0, 1e3, -0.1)[:, None]
+    assert family_p(gains)[0] > 0.5
+
+
+def test_gains_are_compared_block_by_block():
+    random = np.random.default_rng(0)
+    best = 10.0 ** random.uniform(-1, 2, 12)  # one block far beyond the others
+    assert worse_p(best, best) == 1.0
+    assert worse_p(0.9 * best, best) < 0.01
+    assert worse_p(best + random.standard_normal(12), best) > 0.05
+
+
+def test_blocks_that_hardly_change_have_no_vote():
+    gains = np.array([1.0, 1.0, 1.0, -1.0, -1e-3, -1e-3])
+    assert share_better(gains, SelectionSettings()) == 0.75
