@@ -109,11 +109,24 @@ def lift_needed(config: LockConfig, margin: float) -> float:
 
 
 def add_lock(
-    plant: MultibodyPlant, frame_Gn: Frame, lock: LockConfig, contact: ContactConfig
+    plant: MultibodyPlant,
+    frame_Gn: Frame,
+    lock: LockConfig,
+    contact: ContactConfig,
+    environment: Environment | None = None,
 ) -> Lock:
-    """Adds groove (welded to a movable frame in Gn) and bolt (free) to the plant."""
-    frame = plant.AddFrame(FixedOffsetFrame("groove_pose", frame_Gn, RigidTransform()))
+    """Adds groove (welded to a movable frame in Gn) and bolt (free) to the plant.
+
+    Args:
+        plant: not yet finalized.
+        frame_Gn: the groove's nominal frame.
+        lock: dimensions.
+        contact: what bolt and groove are made of.
+        environment: of the default Context; None is the nominal one.
+    """
     nominal = nominal_environment(lock, contact)
+    actual = environment or nominal
+    frame = plant.AddFrame(FixedOffsetFrame("groove_pose", frame_Gn, actual.X_GnG))
     groove = plant.AddRigidBody(
         "groove", plant.AddModelInstance("lock"), _groove_inertia(lock)
     )
@@ -121,8 +134,9 @@ def add_lock(
     bolt = plant.AddRigidBody(
         "bolt", plant.AddModelInstance("bolt"), bolt_inertia(lock)
     )
-    groove_ids = _add_groove_geometry(plant, groove, lock, nominal)
-    bolt_ids = _add_bolt_geometry(plant, bolt, lock, contact.resolution, nominal)
+    shape = dataclasses.replace(lock, clearance=actual.clearance)
+    groove_ids = _add_groove_geometry(plant, groove, shape, actual)
+    bolt_ids = _add_bolt_geometry(plant, bolt, lock, contact, actual)
     return Lock(
         lock, groove, bolt, frame, groove_ids, bolt_ids, contact.resolution, nominal
     )
@@ -174,12 +188,9 @@ def set_environment(
 ) -> None:
     """Writes the environment into plant's and scene graph's Contexts.
 
-    A clearance that is not the lock's own stays in the scene graph's Context.
+    All but its clearance, which `reshape_groove` writes.
     """
     set_pose(lock, environment, plant_context)
-    if environment.clearance != lock.config.clearance:
-        config = dataclasses.replace(lock.config, clearance=environment.clearance)
-        reshape_groove(lock, config, scene_graph, scene_graph_context)
     source = lock.groove.GetParentPlant().get_source_id()
     materials = _bolt_materials(environment, lock.config, lock.resolution)
     groove = _groove_material(environment)
@@ -286,9 +297,9 @@ def groove_boxes(lock: LockConfig) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 def _add_groove_geometry(
-    plant: MultibodyPlant, body: RigidBody, lock: LockConfig, nominal: Environment
+    plant: MultibodyPlant, body: RigidBody, lock: LockConfig, environment: Environment
 ) -> tuple[GeometryId, ...]:
-    properties = _groove_material(nominal)
+    properties = _groove_material(environment)
     ids = []
     for name, (low, high) in groove_boxes(lock).items():
         X_GP, shape = RigidTransform((low + high) / 2), Box(*(high - low))
@@ -301,12 +312,12 @@ def _add_bolt_geometry(
     plant: MultibodyPlant,
     body: RigidBody,
     lock: LockConfig,
-    resolution: float,
-    nominal: Environment,
+    contact: ContactConfig,
+    environment: Environment,
 ) -> dict[str, GeometryId]:
     """Returns the collision geometries of neck and head by name."""
-    materials = _bolt_materials(nominal, lock, resolution)
-    materials["grip"] = _grip_material(nominal)
+    materials = _bolt_materials(environment, lock, contact.resolution)
+    materials["grip"] = _grip_material(contact.dissipation)
     ids = {}
     for name, X_BP, shape in _bolt_parts(lock):
         plant.RegisterVisualGeometry(body, X_BP, shape, f"{name}_visual", _STEEL)
@@ -335,10 +346,10 @@ def _bolt_parts(lock: LockConfig) -> list[tuple[str, RigidTransform, Shape]]:
     ]
 
 
-def _grip_material(nominal: Environment) -> ProximityProperties:
+def _grip_material(dissipation: float) -> ProximityProperties:
     properties = ProximityProperties()
     AddContactMaterial(
-        dissipation=nominal.dissipation,
+        dissipation=dissipation,
         friction=CoulombFriction(_PAD_FRICTION, _PAD_FRICTION),
         properties=properties,
     )

@@ -58,7 +58,8 @@ class ForceTorqueSensor(LeafSystem):
     The reading is the load on the sensor at So in S, [f; tau], untared: a mass
     that hangs on it reads downwards. It is minus the joint's reaction on the
     sensor (Drake's, [tau; f]), through the effects, plus noise, in whole counts.
-    While there has been no step yet, `health` is NO_DATA.
+    While there has been no step yet, `health` is NO_DATA and the load is that at
+    rest, if `set_load_at_rest` has told it.
 
     @system
     name: ForceTorqueSensor
@@ -78,6 +79,7 @@ class ForceTorqueSensor(LeafSystem):
         body: a body that S is fixed to, and X_BodyS its pose there.
         payload: that hangs on the sensor.
         time_step: of the plant whose reaction is read [s].
+        effects: of the default Context, in the order of the chain.
     """
 
     def __init__(
@@ -88,13 +90,16 @@ class ForceTorqueSensor(LeafSystem):
         X_BodyS: RigidTransform,
         payload: Payload,
         time_step: float,
+        effects: Sequence[SensorEffect] = (),
     ) -> None:
         super().__init__()
+        _refuse_too_many_memories(effects)
         self._noise, self._quantum = np.array(config.noise), np.array(config.quantum)
         self._joint, self._body = int(joint), int(body)
         self._R_BodyS, self._payload = X_BodyS.rotation(), payload
         self._time_step = time_step
-        self._effects = self.DeclareAbstractParameter(Value[object](()))
+        self._effects = self.DeclareAbstractParameter(Value[object](tuple(effects)))
+        self._load_at_rest: np.ndarray | None = None
         self._reaction = self.DeclareAbstractInputPort(
             "reaction_forces", Value[list[SpatialForce]]()
         )
@@ -134,13 +139,24 @@ class ForceTorqueSensor(LeafSystem):
         Raises:
             DisasmError: more of them have a memory than the sensor has room for.
         """
-        if sum(isinstance(e, SensorMemoryEffect) for e in effects) > MOST_MEMORIES:
-            raise DisasmError(
-                f"effects: more than {MOST_MEMORIES} of the sensor's have a memory; "
-                "take some out"
-            )
+        _refuse_too_many_memories(effects)
         parameter = context.get_mutable_abstract_parameter(self._effects)
         parameter.set_value(tuple(effects))
+
+    def set_load_at_rest(self, load: np.ndarray) -> None:
+        """Takes what hangs on the sensor (6,) before the first step, for all Contexts.
+
+        A sensor has been there for long when a simulation begins: effects with a
+        memory begin at this load, not at the zeros of a plant that has not stepped.
+        """
+        self._load_at_rest = np.array(load)
+
+    def load(self, context: Context) -> np.ndarray:
+        """Returns the load on the sensor (6,), [f; tau] at So in S."""
+        load = -wrench_from_spatial_force(self._reaction.Eval(context)[self._joint])
+        if self._load_at_rest is not None and not load.any():
+            return self._load_at_rest
+        return load
 
     def reading_at_zeroing(self, context: Context) -> np.ndarray:
         """Returns the noise-free mean (6,) of readings that zeroing averages.
@@ -149,15 +165,16 @@ class ForceTorqueSensor(LeafSystem):
         """
         effects = [e for e in self.effects(context) if e.present_at_zeroing]
         sensing = self._sensing(context, 0.0)
-        return sensed(self._load(context), effects, sensing)
+        return sensed(self.load(context), effects, sensing)
 
     def effects(self, context: Context) -> Sequence[SensorEffect]:
         """Returns what `set_effects` put there."""
         return context.get_abstract_parameter(self._effects).get_value()
 
-    def _load(self, context: Context) -> np.ndarray:
-        """Returns the load on the sensor (6,) at So in S."""
-        return -wrench_from_spatial_force(self._reaction.Eval(context)[self._joint])
+    def _has_stepped(self, context: Context) -> bool:
+        """Returns whether the plant has made a step: its reactions are zero before."""
+        F = self._reaction.Eval(context)[self._joint]
+        return bool(np.any(F.get_coeffs() != 0.0))
 
     def _sensing(self, context: Context, time: float) -> Sensing:
         R_WBody = self._poses.Eval(context)[self._body].rotation()
@@ -165,18 +182,20 @@ class ForceTorqueSensor(LeafSystem):
 
     def _chain(self, context: Context, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Returns the reading (6,) without noise, and the memories (k, 6) up to now."""
-        load, effects = self._load(context), self.effects(context)
+        load, effects = self.load(context), self.effects(context)
         memories = context.get_discrete_state(self._memory).value().reshape(-1, 6)
         if not effects:
             return load, memories
         interval = time - context.get_discrete_state(self._remembered).value()[0]
         if np.isnan(interval):
-            memories = np.full_like(memories, np.nan)
+            interval, memories = 0.0, np.full_like(memories, np.nan)
         sensing = self._sensing(context, time)
         return through_chain(load, effects, sensing, memories, max(interval, 0.0))
 
     def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
         if not any(isinstance(e, SensorMemoryEffect) for e in self.effects(context)):
+            return EventStatus.DidNothing()
+        if not self.load(context).any():  # no step yet, so nothing to remember
             return EventStatus.DidNothing()
         time = self._sample_time(context)
         _, memories = self._chain(context, time)
@@ -190,8 +209,7 @@ class ForceTorqueSensor(LeafSystem):
         output.SetFromVector(quantise(wrench, self._quantum))
 
     def _calc_health(self, context: Context, output: BasicVector) -> None:
-        F = self._reaction.Eval(context)[self._joint]
-        stepped = np.any(F.get_coeffs() != 0.0)
+        stepped = self._has_stepped(context)
         output.SetFromVector([Health.READY if stepped else Health.NO_DATA])
 
     def _calc_time(self, context: Context, output: BasicVector) -> None:
@@ -199,6 +217,14 @@ class ForceTorqueSensor(LeafSystem):
 
     def _sample_time(self, context: Context) -> float:
         return newest_step(context.get_time(), self._time_step)
+
+
+def _refuse_too_many_memories(effects: Sequence[SensorEffect]) -> None:
+    if sum(isinstance(e, SensorMemoryEffect) for e in effects) > MOST_MEMORIES:
+        raise DisasmError(
+            f"effects: more than {MOST_MEMORIES} of the sensor's have a memory; take "
+            "some out"
+        )
 
 
 def sensed(

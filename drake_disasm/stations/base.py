@@ -2,13 +2,14 @@
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, Frame
-from pydrake.systems.framework import Context, Diagram
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram, System
 from pydrake.systems.primitives import RandomSource
 
 from drake_disasm.cell.coordinates import ArmCoordinates, Coordinates
@@ -20,10 +21,13 @@ from drake_disasm.ports import Port
 from drake_disasm.scenario import PlacementConfig, Scenario
 from drake_disasm.systems.observation import Mounting
 
+#: Returns the Context of a part of a station.
+Parts = Callable[[System], Context]
+
 
 @dataclasses.dataclass(frozen=True)
 class InitialState:
-    """Where an episode begins.
+    """Where an episode begins, as what processes commands and readings must know it.
 
     Attributes:
         position: (n,) coordinates from which motion is commanded.
@@ -44,7 +48,8 @@ class Station(Diagram):
         has_velocity_input: whether `<arm>.velocity` is an input as well.
         control_period: at which `<arm>.position` is read [s].
         grip_command: what to send to `gripper.position` [m]; None has no gripper.
-        repeats: whether what began once begins the same again, by its Context alone.
+        start_is_reusable: whether an episode that begins from a copy of an earlier
+            one's first Context begins the same.
         coordinates: maps the arm's coordinates to X_GB and back.
         start: the coordinates (n,) at which an episode starts, X_GB = identity.
         X_SB: the bolt in the sensor frame, as grasped.
@@ -89,14 +94,57 @@ class Station(Diagram):
         """What is random in it: seeded anew in each episode."""
         return ()
 
-    def begin(self, context: Context, effects: Sequence[Effect]) -> InitialState:
+    @property
+    def initial_state(self) -> InitialState:
+        """Where an episode begins by the default Context.
+
+        Raises:
+            DisasmError: nobody knows before `begin`, as on hardware.
+        """
+        raise NotImplementedError  # Drake's metaclass leaves no room for ABC's
+
+    def begin(
+        self, context: Context, effects: Sequence[Effect] | None = None
+    ) -> InitialState:
         """Brings the station to where an episode begins.
 
         Args:
             context: its own, in a diagram whose time is zero.
-            effects: that act in it.
+            effects: that act in it; None means the scenario's own.
+
+        Raises:
+            DisasmError: the station can't carry one of the effects.
         """
-        raise NotImplementedError  # Drake's metaclass leaves no room for ABC's
+        raise NotImplementedError
+
+    def refuse_effects(self, effects: Sequence[Effect]) -> None:
+        """Raises DisasmError if the station can't carry one of the effects."""
+        raise NotImplementedError
+
+    def attach(self, simulator: Simulator) -> None:
+        """Keeps effects that depend on the bolt's motion up to date in a simulation.
+
+        Once a period of the task they are told where the bolt is and how it is
+        commanded to move. A monitor that the simulator already has is called as
+        before; one that is set later takes this one's place.
+
+        Args:
+            simulator: of the diagram with this station, before it is initialised.
+        """
+
+    def leave_local_effects(self, simulator: Simulator) -> None:
+        """Notes that the caller calls `update_local_effects` itself, in each period.
+
+        Args:
+            simulator: of the diagram with this station, before it is initialised.
+        """
+
+    def leave_motion_effects(self) -> None:
+        """Notes that the diagram around the station applies effects on the motion."""
+
+    def effects_in_force(self, context: Context) -> tuple[Effect, ...]:
+        """Returns the effects that this station's Context has."""
+        return ()
 
     def update_local_effects(
         self, context: Context, effects: Sequence[Effect], bolt: BoltMotion

@@ -25,10 +25,11 @@ from drake_disasm.cell.tool import FINGERS
 from drake_disasm.effects import ArmEffect
 from drake_disasm.ports import CELL_PORTS
 from drake_disasm.scenario import Scenario
-from drake_disasm.stations.arm_effects import ArmMechanics
+from drake_disasm.stations.arm_mechanics import ArmMechanics, refuse_unknown_arm_effects
 from drake_disasm.stations.base import refuse_twins_contact
 from drake_disasm.stations.cell_models import add_cell
 from drake_disasm.stations.simulated import SimulatedStation
+from drake_disasm.stations.wiring import export_ready_device, export_required
 
 _ARM_INERTIA = 4.0  # kg m^2, of a joint with its rotor, for the damping ratio
 _PAD_INDENTATION = 3e-5  # m, of a pad (20 MPa, 7.5 mm thick) under some 60 N
@@ -89,17 +90,18 @@ class CellStation(SimulatedStation):
         config = self.scenario
         frame_Gn = self._add_plant(builder, config.simulation.cell_time_step)
         plant = self.plant
-        models = add_cell(plant, frame_Gn, config)
+        models = add_cell(plant, frame_Gn, config, self._environment)
         self.iiwa, self.tool_models, self.lock = models.iiwa, models.tool, models.lock
+        arm = [e for e in self._default_effects if isinstance(e, ArmEffect)]
+        self._mechanics = ArmMechanics(plant, self.iiwa, models.frame_F, arm)
         plant.Finalize()
         self._set_gains()
-        self._mechanics = ArmMechanics(plant, self.iiwa, models.frame_F)
         self._wire_arm(builder)
         self._wire_gripper(builder)
         self._add_sensor(
             builder, self.tool_models.sensor_joint, self.tool_models.frame_S
         )
-        self._finish(builder, self.lock.bolt)
+        self._finish(builder)
 
     def _set_gains(self) -> None:
         plant, arm, gripper = self.plant, self.scenario.arm, self.scenario.gripper
@@ -114,7 +116,12 @@ class CellStation(SimulatedStation):
     def _wire_arm(self, builder: DiagramBuilder) -> None:
         plant, connect = self.plant, builder.Connect
         command = builder.AddNamedSystem("iiwa_command", PassThrough(7))
-        builder.ExportInput(command.get_input_port(), "iiwa.position")
+        export_required(
+            builder,
+            command.get_input_port(),
+            "iiwa.position",
+            "connect the commanded joint angles (7,), station.start to stay there",
+        )
         desired = builder.AddNamedSystem(
             "iiwa_interpolator",
             StateInterpolatorWithDiscreteDerivative(
@@ -140,7 +147,7 @@ class CellStation(SimulatedStation):
         }
         for quantity, port in outputs.items():
             builder.ExportOutput(port, f"iiwa.{quantity}")
-        self._add_ready_device(builder, "iiwa")
+        export_ready_device(builder, "iiwa", self.time_step)
 
     def _add_gravity_compensation(self, builder: DiagramBuilder) -> None:
         """Adds what the controller's own model of arm and tool says of gravity."""
@@ -194,7 +201,12 @@ class CellStation(SimulatedStation):
         plant, gripper = self.plant, self.tool_models.gripper
         halves = np.array([[0.5], [0.5], [0.0], [0.0]])
         fingers = builder.AddNamedSystem("gripper_fingers", MatrixGain(D=halves))
-        builder.ExportInput(fingers.get_input_port(), "gripper.position")
+        export_required(
+            builder,
+            fingers.get_input_port(),
+            "gripper.position",
+            "connect the commanded opening, [station.grip_command] to hold the bolt",
+        )
         builder.Connect(
             fingers.get_output_port(), plant.get_desired_state_input_port(gripper)
         )
@@ -202,23 +214,20 @@ class CellStation(SimulatedStation):
         opening = builder.AddNamedSystem("gripper_opening", MatrixGain(D=sums))
         builder.Connect(plant.get_state_output_port(gripper), opening.get_input_port())
         builder.ExportOutput(opening.get_output_port(), "gripper.state_measured")
-        self._add_ready_device(builder, "gripper")
+        export_ready_device(builder, "gripper", self.time_step)
+
+    def _refuse_arm_effects(self, effects: Sequence[ArmEffect]) -> None:
+        refuse_unknown_arm_effects(effects)
 
     def _set_arm_effects(self, context: Context, effects: Sequence[ArmEffect]) -> None:
-        self._mechanics.set_effects(
-            self.part_context(self.plant, context),
-            self.part_context(self._mechanics.friction, context),
-            self.part_context(self._mechanics.sensor, context),
-            effects,
-        )
+        self._mechanics.set_effects(effects, self._parts(context))
 
     def _fix_commands(self, context: Context) -> None:
         super()._fix_commands(context)
         self.GetInputPort("gripper.position").FixValue(context, self.grip_command)
 
-    def _place_at_start(self, context: Context) -> None:
+    def _place_at_start(self, plant_context: Context) -> None:
         plant = self.plant
-        plant_context = self.part_context(plant, context)
         plant.SetPositions(plant_context, self.iiwa, self.start)
         for name in FINGERS:
             plant.GetJointByName(name).set_translation(

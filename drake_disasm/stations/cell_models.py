@@ -10,6 +10,7 @@ from pydrake.multibody.tree import Frame, ModelInstanceIndex
 from drake_disasm.cell.lock import Lock, add_lock, plate_bottom
 from drake_disasm.cell.parsing import add_arm, add_model
 from drake_disasm.cell.tool import ToolModels, add_tool, grasp_pose
+from drake_disasm.effects import Environment
 from drake_disasm.scenario import Scenario
 
 _BENCH = "package://disasm_models/bench/bench.urdf"
@@ -32,20 +33,26 @@ class CellModels:
     lock: Lock
 
 
-def add_cell(plant: MultibodyPlant, frame_Gn: Frame, scenario: Scenario) -> CellModels:
+def add_cell(
+    plant: MultibodyPlant,
+    frame_Gn: Frame,
+    scenario: Scenario,
+    environment: Environment | None = None,
+) -> CellModels:
     """Adds arm, tool, lock and bench; welds the bolt if the scenario says so.
 
     Args:
         plant: not yet finalised.
         frame_Gn: the groove's nominal frame, fixed in the world.
         scenario: of the cell.
+        environment: of the default Context; None is the nominal one.
 
     Raises:
         DisasmError: a model file is missing or is of another device.
     """
     iiwa, frame_F = add_arm(plant, scenario.arm.model)
     tool = add_tool(plant, frame_F, scenario)
-    lock = add_lock(plant, frame_Gn, scenario.lock, scenario.contact)
+    lock = add_lock(plant, frame_Gn, scenario.lock, scenario.contact, environment)
     _add_bench(plant, frame_Gn, scenario)
     if scenario.gripper.hold == "weld":
         bolt = lock.bolt.body_frame()

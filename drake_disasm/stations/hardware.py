@@ -14,7 +14,7 @@ from pydrake.manipulation import (
     IiwaStatusReceiver,
 )
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder, InputPort
 from pydrake.systems.lcm import (
     LcmInterfaceSystem,
     LcmPublisherSystem,
@@ -34,7 +34,10 @@ from drake_disasm.ports import CELL_PORTS, Health, check_ports
 from drake_disasm.safety import Mode, Supervisor, guards
 from drake_disasm.scenario import ArmConfig, Scenario, validate
 from drake_disasm.stations.base import InitialState, Station, refuse_twins_contact
+from drake_disasm.stations.capabilities import refuse_on_hardware
 from drake_disasm.stations.hardware_config import HardwareConfig
+from drake_disasm.stations.wiring import export_required
+from drake_disasm.systems.connection_check import ConnectionCheck
 from drake_disasm.systems.device_reader import DeviceReader, Readable
 from drake_disasm.systems.gripper_writer import GripperWriter
 from drake_disasm.systems.safety_filter import SafetyFilter
@@ -127,17 +130,35 @@ class HardwareStation(Station):
         self._wire_gripper(builder)
         for name in self.devices:
             self._export_reader(builder, name)
+        self._connection = builder.AddNamedSystem("connection", ConnectionCheck())
         builder.BuildInto(self)
         check_ports(self, self.table)
 
-    def begin(self, context: Context, effects: Sequence[Effect]) -> InitialState:
+    @property
+    def initial_state(self) -> InitialState:
+        """See Station.
+
+        Raises:
+            DisasmError: always: only the devices know.
+        """
+        raise DisasmError(
+            "the hardware station begins where its arm is; call station.begin(context)"
+        )
+
+    def refuse_effects(self, effects: Sequence[Effect]) -> None:
+        """See Station: all of them."""
+        refuse_on_hardware(effects)
+
+    def begin(
+        self, context: Context, effects: Sequence[Effect] | None = None
+    ) -> InitialState:
         """See Station: waits for every device, and zeroes the sensor where the arm is.
 
         Raises:
             DisasmError: effects are set; a device does not answer; the arm is not at
                 the start; the robot is held.
         """
-        refuse_effects(effects)
+        self.refuse_effects(effects or ())
         self.check()
         self.connect()
         self._await_ready()
@@ -147,13 +168,15 @@ class HardwareStation(Station):
         self.safety_filter.zero(reading)
         self.safety_filter.begin()
         self.supervisor.begin()
+        self._connection.is_connected = True
         return InitialState(position, reading)
 
     def check(self) -> None:
         """Raises HoldError, with the reason, while the robot is held."""
         if self.supervisor.mode is Mode.HOLD:
             raise HoldError(
-                f"the robot is held: {self.supervisor.reason}; mend that, then resume"
+                f"the robot is held: {self.supervisor.reason}; fix the cause, then "
+                "resume"
             )
 
     def resume(self) -> None:
@@ -186,6 +209,7 @@ class HardwareStation(Station):
 
     def close(self) -> None:
         """Leaves the devices alone: no thread and no socket stays."""
+        self._connection.is_connected = False
         self._hex.stop()
         self._gripper.stop()
 
@@ -268,8 +292,11 @@ class HardwareStation(Station):
                 self._clock,
             ),
         )
-        builder.ExportInput(
-            self.safety_filter.GetInputPort("position"), "iiwa.position"
+        export_required(
+            builder,
+            self.safety_filter.GetInputPort("position"),
+            "iiwa.position",
+            "connect the commanded joint angles (7,)",
         )
         if self.dry_run:
             return
@@ -291,13 +318,21 @@ class HardwareStation(Station):
     def _wire_gripper(self, builder: DiagramBuilder) -> None:
         if self.dry_run:
             unheard = builder.AddNamedSystem("gripper_unheard", PassThrough(1))
-            builder.ExportInput(unheard.get_input_port(), "gripper.position")
+            self._export_grip(builder, unheard.get_input_port())
             return
         writer = builder.AddNamedSystem(
             "gripper_writer",
             GripperWriter(self._gripper.command, self.supervisor, _GRIPPER_PERIOD),
         )
-        builder.ExportInput(writer.get_input_port(), "gripper.position")
+        self._export_grip(builder, writer.get_input_port())
+
+    def _export_grip(self, builder: DiagramBuilder, port: InputPort) -> None:
+        export_required(
+            builder,
+            port,
+            "gripper.position",
+            "connect the commanded opening, [station.grip_command] to hold the bolt",
+        )
 
     def _export_reader(self, builder: DiagramBuilder, name: str) -> None:
         """Exports a device's health and time, and what its client has checked.
@@ -376,26 +411,13 @@ def refuse_what_is_simulated(scenario: Scenario) -> None:
     Raises:
         DisasmError: names the first such line.
     """
-    refuse_effects(scenario.effects)
+    refuse_on_hardware(scenario.effects)
     if scenario.randomisation:
         parameter = scenario.randomisation[0].parameter
         raise DisasmError(
             f"randomisation.0 ({parameter}): hardware can't be drawn anew; take it out"
         )
     refuse_twins_contact(scenario)
-
-
-def refuse_effects(effects: Sequence[Effect]) -> None:
-    """Refuses effects: they act on a simulated plant, and reality has its own.
-
-    Raises:
-        DisasmError: names the first.
-    """
-    if effects:
-        raise DisasmError(
-            f"effects.0 (!{type(effects[0]).__name__}): acts on a simulated plant, and "
-            "hardware has its own effects; take it out for --station hardware"
-        )
 
 
 def _supervisor(arm: ArmConfig, config: HardwareConfig) -> Supervisor:

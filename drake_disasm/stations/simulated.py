@@ -1,10 +1,10 @@
 """What the simulated stations share."""
 
+import copy
+import functools
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake.common import RandomDistribution
-from pydrake.common.value import Value
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import (
@@ -12,44 +12,48 @@ from pydrake.multibody.plant import (
     MultibodyPlant,
     MultibodyPlantConfig,
 )
-from pydrake.multibody.tree import Frame, RigidBody, WeldJoint
+from pydrake.multibody.tree import Frame, WeldJoint
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import (
-    BasicVector,
-    Context,
-    DiagramBuilder,
-    LeafSystem,
-    OutputPort,
-    System,
-)
-from pydrake.systems.primitives import ConstantVectorSource, RandomSource
+from pydrake.systems.framework import Context, DiagramBuilder, System
+from pydrake.systems.primitives import RandomSource
 
-from drake_disasm.cell.lock import Lock, has_same_material, set_environment, set_pose
-from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.timing import newest_step
+from drake_disasm.cell.lock import Lock, nominal_environment
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor
 from drake_disasm.effects import (
     ArmEffect,
     BoltMotion,
     Effect,
-    Environment,
     environment_at,
     is_local,
     sensor_chain,
 )
-from drake_disasm.ports import Health, check_ports
+from drake_disasm.ports import check_ports
 from drake_disasm.scenario import Scenario, validate
 from drake_disasm.stations.base import (
     InitialState,
+    Parts,
     Station,
     add_nominal_groove,
     nominal_groove_pose,
 )
+from drake_disasm.stations.capabilities import refuse_unknown_kinds
+from drake_disasm.stations.contact import (
+    ContactStrategy,
+    HydroelasticContact,
+    refuse_without_quantity,
+)
+from drake_disasm.stations.local_effects import LocalEffectsMonitor
+from drake_disasm.stations.wiring import export_bolt_pose, wire_sensor
+from drake_disasm.systems.effects_in_force import EffectsInForce
 from drake_disasm.systems.outside_force import OutsideForce
 
 
 class SimulatedStation(Station):
     """A station made of a MultibodyPlant; see CellStation and TwinStation.
+
+    Its default Context is the start of the task, in any diagram: the bolt is gripped
+    at A and rests there, with the scenario's effects in force. An optional input that
+    is not connected is at rest.
 
     Beside the table's ports it has what only a simulation knows: `bolt_pose`
     (X_GnB, true), `contact_results`, and the applied spatial forces input.
@@ -64,6 +68,7 @@ class SimulatedStation(Station):
     plant: MultibodyPlant
     scene_graph: SceneGraph
     lock: Lock
+    contact: ContactStrategy
     sensor: ForceTorqueSensor
     sensor_noise: RandomSource
 
@@ -71,6 +76,12 @@ class SimulatedStation(Station):
         super().__init__()
         validate(scenario)
         self.scenario = scenario
+        # A copy, so that a later change to the same objects is noticed.
+        self._default_effects = copy.deepcopy(list(scenario.effects))
+        self._nominal = nominal_environment(scenario.lock, scenario.contact)
+        self.refuse_effects(scenario.effects)
+        self._environment = environment_at(self._nominal, scenario.effects)
+        self._initial: InitialState | None = None
 
     def _add_plant(self, builder: DiagramBuilder, time_step: float) -> Frame:
         """Adds plant and scene graph; returns the groove's nominal frame."""
@@ -90,86 +101,105 @@ class SimulatedStation(Station):
     def _add_sensor(
         self, builder: DiagramBuilder, joint: WeldJoint, frame_S: Frame
     ) -> None:
-        config, plant = self.scenario.ft_sensor, self.plant
-        self.sensor = builder.AddNamedSystem(
-            "ft_sensor",
-            ForceTorqueSensor(
-                config,
-                joint.index(),
-                frame_S.body().index(),
-                frame_S.GetFixedPoseInBodyFrame(),
-                self.payload,
-                self.time_step,
-            ),
+        config = self.scenario.ft_sensor
+        self.sensor = ForceTorqueSensor(
+            config,
+            joint.index(),
+            frame_S.body().index(),
+            frame_S.GetFixedPoseInBodyFrame(),
+            self.payload,
+            self.time_step,
+            sensor_chain(self.scenario.effects),
         )
-        self.sensor_noise = builder.AddNamedSystem(
-            "ft_sensor_noise",
-            RandomSource(RandomDistribution.kGaussian, 6, config.period),
-        )
-        connect = builder.Connect
-        connect(
-            plant.get_reaction_forces_output_port(),
-            self.sensor.GetInputPort("reaction_forces"),
-        )
-        connect(
-            plant.get_body_poses_output_port(), self.sensor.GetInputPort("body_poses")
-        )
-        connect(self.sensor_noise.get_output_port(), self.sensor.GetInputPort("noise"))
-        for quantity in ("wrench", "health", "time_measured"):
-            builder.ExportOutput(
-                self.sensor.GetOutputPort(quantity), f"ft_sensor.{quantity}"
-            )
+        self.sensor_noise = wire_sensor(builder, self.plant, self.sensor, config.period)
 
-    def _add_ready_device(self, builder: DiagramBuilder, name: str) -> None:
-        """Exports health and sample time of a device that never fails."""
-        ready = builder.AddNamedSystem(
-            f"{name}_health", ConstantVectorSource([float(Health.READY)])
-        )
-        clock = builder.AddNamedSystem(f"{name}_clock", _Clock(self.time_step))
-        builder.ExportOutput(ready.get_output_port(), f"{name}.health")
-        builder.ExportOutput(clock.get_output_port(), f"{name}.time_measured")
-
-    def _finish(self, builder: DiagramBuilder, bolt: RigidBody) -> None:
-        """Exports the simulation's own ports, builds, and checks the table."""
-        plant = self.plant
-        truth = builder.AddNamedSystem(
-            "bolt_pose", _BodyPose(int(bolt.index()), self.X_WG)
-        )
-        builder.Connect(plant.get_body_poses_output_port(), truth.get_input_port())
-        builder.ExportOutput(truth.get_output_port(), "bolt_pose")
+    def _finish(self, builder: DiagramBuilder) -> None:
+        """Exports the simulation's own ports, builds, and settles."""
+        plant, bolt = self.plant, self.lock.bolt
+        export_bolt_pose(builder, plant, int(bolt.index()), self.X_WG)
         builder.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
         self._wire_applied_forces(builder)
         builder.ExportOutput(self.scene_graph.get_query_output_port(), "query_object")
+        self._in_force = builder.AddNamedSystem(
+            "effects_in_force", EffectsInForce(self._default_effects)
+        )
         builder.BuildInto(self)
         check_ports(self, self.table)
+        self._settle_by_default()
 
     def _wire_applied_forces(self, builder: DiagramBuilder) -> None:
         """Exports the input for forces from outside; adds what pulls on the bolt."""
-        self.outside_force = builder.AddNamedSystem(
+        R_WGn = self.X_WG.rotation()
+        outside = builder.AddNamedSystem(
             "outside_force",
-            OutsideForce(self.lock.bolt.index(), self.X_WG.rotation()),
+            OutsideForce(self.lock.bolt.index(), R_WGn, self._environment),
         )
-        outside = self.outside_force.GetInputPort("applied_spatial_force")
-        builder.ExportInput(outside, "applied_spatial_force")
-        self._apply_forces(builder, self.outside_force.get_output_port())
-
-    def _apply_forces(self, builder: DiagramBuilder, forces: OutputPort) -> None:
-        """Connects what pulls on the bolt to the plant."""
+        port = outside.GetInputPort("applied_spatial_force")
+        builder.ExportInput(port, "applied_spatial_force")
+        self.contact = self._make_contact(outside)
+        forces = self.contact.add_forces(builder, outside.get_output_port())
         applied = self.plant.get_applied_spatial_force_input_port()
         builder.Connect(forces, applied)
+
+    def _make_contact(self, outside_force: OutsideForce) -> ContactStrategy:
+        """Returns how bolt and groove push on each other."""
+        return HydroelasticContact(
+            self.plant, self.scene_graph, self.lock, outside_force
+        )
+
+    def _settle_by_default(self) -> None:
+        """Makes the bolt at rest at A, in the scenario's effects, the default."""
+        plant = self.plant
+        unsettled = plant.CreateDefaultContext()
+        self._place_at_start(unsettled)
+        self._unsettled = plant.GetPositions(unsettled)
+        settled = self.settled(self._default_effects)
+        q = plant.GetPositions(self.part_context(plant, settled))
+        plant.SetDefaultPositions(q)
+        self.sensor.set_load_at_rest(
+            self.sensor.load(self.part_context(self.sensor, settled))
+        )
+        self._initial = InitialState(self.start, self.reading_at_zeroing(settled))
+
+    @property
+    def initial_state(self) -> InitialState:
+        """See Station."""
+        if self._initial is None:
+            settled = self.settled(self.scenario.effects)
+            return InitialState(self.start, self.reading_at_zeroing(settled))
+        return self._initial
+
+    def refuse_effects(self, effects: Sequence[Effect]) -> None:
+        """See Station."""
+        refuse_unknown_kinds(effects)
+        self._refuse_arm_effects([e for e in effects if isinstance(e, ArmEffect)])
+        refuse_without_quantity(self.scenario.contact.model, self._nominal, effects)
+
+    def _refuse_arm_effects(self, effects: Sequence[ArmEffect]) -> None:
+        """Raises DisasmError for effects on the arm that the station can't carry."""
 
     def set_effects(self, context: Context, effects: Sequence[Effect]) -> None:
         """Puts effects into this station's Context; nothing is rebuilt.
 
         The bolt stays where it was: `settled` gives a state that fits them.
+
+        Raises:
+            DisasmError: the station can't carry one of them.
         """
+        self.refuse_effects(effects)
+        self._in_force.set(self.part_context(self._in_force, context), effects)
         arm = [effect for effect in effects if isinstance(effect, ArmEffect)]
         self._set_arm_effects(context, arm)
-        self._set_environment(context, environment_at(self.lock.nominal, effects))
-        self.sensor.set_effects(
-            self.part_context(self.sensor, context),
-            sensor_chain(effects),
+        self.contact.set_environment(
+            environment_at(self.lock.nominal, effects), self._parts(context)
         )
+        self.sensor.set_effects(
+            self.part_context(self.sensor, context), sensor_chain(effects)
+        )
+
+    def effects_in_force(self, context: Context) -> tuple[Effect, ...]:
+        """Returns the effects that this station's Context has."""
+        return self._in_force.get(self.part_context(self._in_force, context))
 
     def update_local_effects(
         self, context: Context, effects: Sequence[Effect], bolt: BoltMotion
@@ -183,62 +213,48 @@ class SimulatedStation(Station):
         """
         if is_local(effects):
             environment = environment_at(self.lock.nominal, effects, bolt)
-            self._change_environment(context, environment)
+            self.contact.change_environment(environment, self._parts(context))
+
+    def attach(self, simulator: Simulator) -> None:
+        """See Station."""
+        simulator.set_monitor(LocalEffectsMonitor(self, simulator.get_monitor()))
+        self._in_force.note_updated(simulator)
+
+    def leave_local_effects(self, simulator: Simulator) -> None:
+        """See Station."""
+        self._in_force.note_updated(simulator)
+
+    def leave_motion_effects(self) -> None:
+        """See Station."""
+        self._in_force.motion_is_applied = True
 
     def _set_arm_effects(self, context: Context, effects: Sequence[ArmEffect]) -> None:
-        """Puts an arm's effects, and no others, into this station's Context.
-
-        Raises:
-            DisasmError: the station has no arm.
-        """
-        if effects:
-            raise DisasmError(
-                f"{type(effects[0]).__name__}: acts on the arm, and this station has "
-                "none; take it out of effects, or use --station cell"
-            )
-
-    def _change_environment(self, context: Context, environment: Environment) -> None:
-        """Puts what has changed of the world around the bolt into a Context."""
-        outside = self.part_context(self.outside_force, context)
-        if has_same_material(self.outside_force.material(outside), environment):
-            set_pose(self.lock, environment, self.part_context(self.plant, context))
-            self.outside_force.set_force(outside, np.array(environment.force_Gn))
-        else:
-            self._set_environment(context, environment)
-
-    def _set_environment(self, context: Context, environment: Environment) -> None:
-        """Puts the world around the bolt into this station's Context."""
-        if environment.impact_exponent != self.lock.nominal.impact_exponent:
-            raise DisasmError(
-                "ContactExponent: hydroelastic contact has none; set contact.model to "
-                "impact, on the twin"
-            )
-        outside = self.part_context(self.outside_force, context)
-        self.outside_force.set_force(outside, np.array(environment.force_Gn))
-        self.outside_force.set_material(outside, environment)
-        set_environment(
-            self.lock,
-            environment,
-            self.part_context(self.plant, context),
-            self.scene_graph,
-            self.part_context(self.scene_graph, context),
-        )
+        """Puts an arm's effects, and no others, into this station's Context."""
 
     def at_start(self, effects: Sequence[Effect]) -> Simulator:
         """Returns a simulator of this station alone, commanded to stay at A.
 
-        Its Context is at time zero; `Initialize` it after any further change.
+        Its Context is at time zero and not yet settled; `Initialize` it after any
+        further change. Effects that depend on the bolt's motion act.
         """
+        simulator = self._unsettled_simulator(effects)
+        self.attach(simulator)
+        return simulator
+
+    def _unsettled_simulator(self, effects: Sequence[Effect]) -> Simulator:
         simulator = Simulator(self)
         context = simulator.get_mutable_context()
+        self._prepare(context)
         self.set_effects(context, effects)
-        self._place_at_start(context)
+        plant_context = self.part_context(self.plant, context)
+        self.plant.SetPositions(plant_context, self._unsettled)
         self._fix_commands(context)
         return simulator
 
     def settled(self, effects: Sequence[Effect]) -> Context:
         """Returns a Context of this station alone: bolt gripped at A, at rest."""
-        simulator = self.at_start(effects)
+        simulator = self._unsettled_simulator(effects)
+        self._in_force.note_at_rest(simulator)
         simulator.Initialize()
         simulator.AdvanceTo(self.settling_time)
         return simulator.get_mutable_context()
@@ -248,10 +264,19 @@ class SimulatedStation(Station):
         """See Station."""
         return (self.sensor_noise,)
 
-    def begin(self, context: Context, effects: Sequence[Effect]) -> InitialState:
-        """See Station: the bolt is gripped at A, at rest, and the sensor is zeroed."""
-        settled = self.settled(effects)
-        self.set_effects(context, effects)
+    def begin(
+        self, context: Context, effects: Sequence[Effect] | None = None
+    ) -> InitialState:
+        """See Station: the bolt is gripped at A, at rest, and the sensor is zeroed.
+
+        With the scenario's own effects that is the default Context.
+        """
+        wanted = list(self.scenario.effects if effects is None else effects)
+        if self._initial is not None and wanted == self._default_effects:
+            self.SetDefaultContext(context)
+            return self._initial
+        settled = self.settled(wanted)
+        self.set_effects(context, wanted)
         copy_state(settled, context)
         return InitialState(self.start, self.reading_at_zeroing(settled))
 
@@ -275,64 +300,19 @@ class SimulatedStation(Station):
         """Returns the Context of a part of this station from the station's own."""
         return self.GetMutableSubsystemContext(part, context)
 
-    def _place_at_start(self, context: Context) -> None:
-        """Puts the plant's state where an episode starts, if not at its zeros."""
+    def _parts(self, context: Context) -> Parts:
+        """Returns what finds the Context of a part in this station's."""
+        return functools.partial(self.part_context, context=context)
+
+    def _place_at_start(self, plant_context: Context) -> None:
+        """Puts the plant where settling begins, if not at its default positions."""
+
+    def _prepare(self, context: Context) -> None:
+        """Puts into a default Context what the station has become since it was made."""
 
     def _fix_commands(self, context: Context) -> None:
         """Commands the start, for a station that stands alone."""
         self.GetInputPort(f"{self.arm}.position").FixValue(context, self.start)
-
-
-class _Clock(LeafSystem):
-    """Puts out the time of the newest sample: the plant's newest step.
-
-    @system
-    name: Clock
-    output_ports:
-    - time
-    @endsystem
-    """
-
-    def __init__(self, time_step: float) -> None:
-        super().__init__()
-        self._time_step = time_step
-        self.DeclareVectorOutputPort(
-            "time", 1, self._calc, prerequisites_of_calc={self.time_ticket()}
-        )
-
-    def _calc(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector([newest_step(context.get_time(), self._time_step)])
-
-
-class _BodyPose(LeafSystem):
-    """Picks one body's pose, expressed in the groove's nominal frame.
-
-    @system
-    name: BodyPose
-    input_ports:
-    - body_poses
-    output_ports:
-    - X_GnB
-    @endsystem
-    """
-
-    def __init__(self, body: int, X_WG: RigidTransform) -> None:
-        super().__init__()
-        self._body, self._X_GW = body, X_WG.inverse()
-        poses = self.DeclareAbstractInputPort(
-            "body_poses", Value[list[RigidTransform]]()
-        )
-        self._poses = poses
-        self.DeclareAbstractOutputPort(
-            "X_GnB",
-            Value[RigidTransform],
-            self._calc,
-            prerequisites_of_calc={poses.ticket()},
-        )
-
-    def _calc(self, context: Context, output: Value) -> None:
-        X_WB = self._poses.Eval(context)[self._body]
-        output.set_value(self._X_GW @ X_WB)
 
 
 def copy_state(source: Context, target: Context) -> None:

@@ -1,51 +1,30 @@
 """The digital twin: bolt, groove and contact alone."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
-from pydrake.multibody.tree import (
-    FixedOffsetFrame,
-    Frame,
-    Joint,
-    JointActuator,
-    PdControllerGains,
-    PrismaticJoint,
-    RevoluteJoint,
-    RigidBody,
-    SpatialInertia,
-)
-from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
-from pydrake.systems.primitives import (
-    ConstantVectorSource,
-    Demultiplexer,
-    Multiplexer,
-)
+from pydrake.multibody.tree import FixedOffsetFrame, Frame, WeldJoint
+from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Multiplexer
 
 from drake_disasm.cell.coordinates import BoltCoordinates
-from drake_disasm.cell.lock import (
-    GROOVE_FIELDS,
-    add_lock,
-    nominal_environment,
-    reshape_groove,
-)
+from drake_disasm.cell.lock import GROOVE_FIELDS, add_lock, nominal_environment
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import Environment
-from drake_disasm.impact import (
-    ImpactConditions,
-    ImpactLaw,
-    LockShape,
-    Surroundings,
-)
+from drake_disasm.effects import ArmEffect
+from drake_disasm.impact import ImpactConditions
 from drake_disasm.ports import TWIN_PORTS
 from drake_disasm.scenario import ImpactConfig, Scenario, TwinConfig, validate
+from drake_disasm.stations.capabilities import refuse_arm_effects
+from drake_disasm.stations.carrier import Carrier
+from drake_disasm.stations.contact import ContactStrategy, ImpactContactForce
 from drake_disasm.stations.simulated import SimulatedStation
-from drake_disasm.systems.impact_contact import ImpactContact
+from drake_disasm.stations.wiring import export_ready_device, export_required
+from drake_disasm.systems.optional_input import OptionalInput
+from drake_disasm.systems.outside_force import OutsideForce
 
-_AXES = np.eye(3)
-_JOINT_ORDER = (0, 1, 2, 5, 4, 3)  # x, y, z, then yaw, pitch, roll
 _MATERIAL_FIELDS = ("friction", "modulus", "head_modulus", "dissipation")
 
 
@@ -56,7 +35,8 @@ class TwinStation(SimulatedStation):
     controllers are the stiffness and damping of arm, gripper and sensor; the
     solver takes them implicitly. The bolt hangs on the carrier by a weld at S
     whose reaction is the sensor's load, so the readings mean the same as the
-    cell's and pass the same processing.
+    cell's and pass the same processing. While `bolt.velocity` is not connected it is
+    zero.
 
     @system
     name: TwinStation
@@ -87,11 +67,12 @@ class TwinStation(SimulatedStation):
         self.control_period = scenario.simulation.twin_time_step
         self.X_SB = Tool.from_models(scenario).X_SB
         self.coordinates, self.start = BoltCoordinates(), np.zeros(6)
+        self._is_reconfigured = False
         builder = DiagramBuilder()
         self._build(builder)
 
     def can_reconfigure(self, scenario: Scenario) -> bool:
-        """Returns whether `become` can turn this station into another scenario's."""
+        """Returns whether `reconfigure` can turn this station into another's."""
         return _structure(scenario) == _structure(self.scenario)
 
     def reconfigure(self, context: Context, scenario: Scenario) -> None:
@@ -100,7 +81,8 @@ class TwinStation(SimulatedStation):
         Identification asks for hundreds of parameter sets; in place, one costs a few
         milliseconds and leaves nothing behind, and every bit is as after a rebuild.
         Springs and dampers belong to the plant, not to the Context: a station that
-        is reconfigured serves one Context.
+        is reconfigured serves one Context, and its default Context is no longer the
+        start of the task.
 
         Args:
             context: this station's; its time and state stay as they are.
@@ -115,174 +97,104 @@ class TwinStation(SimulatedStation):
             raise DisasmError(
                 "the twin can't take this scenario in place; build a station of it"
             )
-        self.scenario = scenario
-        if self.impact is None:  # a new shape would forget the collision filter
-            reshape_groove(
-                self.lock,
-                scenario.lock,
-                self.scene_graph,
-                self.part_context(self.scene_graph, context),
-            )
+        self.scenario, self._initial = scenario, None
+        self._is_reconfigured = True
         self.lock = dataclasses.replace(
             self.lock,
             config=scenario.lock,
             nominal=nominal_environment(scenario.lock, scenario.contact),
         )
-        self._set_springs(scenario.twin, self.part_context(self.plant, context))
+        self._prepare(context)
         self.set_effects(context, scenario.effects)
 
-    def _build(self, builder: DiagramBuilder) -> None:
-        time_step = self.scenario.simulation.twin_time_step
-        frame_Gn, plant = self._add_plant(builder, time_step), self.plant
-        self.lock = add_lock(plant, frame_Gn, self.scenario.lock, self.scenario.contact)
-        carrier = self._add_carrier(frame_Gn)
-        frame_S, joint = self._add_sensor_joint(carrier)
-        plant.Finalize()
-        self._read_payload(frame_S)
-        self._wire_commands(builder, carrier)
-        self._add_sensor(builder, joint, frame_S)
-        self._add_ready_device(builder, "bolt")
-        self._finish(builder, self.lock.bolt)
+    def impact_conditions(self, context: Context) -> ImpactConditions:
+        """Returns what IMPACT depends on now.
 
-    def _add_carrier(self, frame_Gn: Frame) -> RigidBody:
-        """Adds six joints with the spring and damper of each axis."""
-        twin, plant = self.scenario.twin, self.plant
-        self._actuators: dict[int, JointActuator] = {}
-        self._carrier = instance = plant.AddModelInstance("carrier")
-        parent, body = frame_Gn, None
-        for axis in _JOINT_ORDER:
-            body = plant.AddRigidBody(f"axis_{axis}", instance, SpatialInertia.Zero())
-            joint = plant.AddJoint(_axis_joint(axis, parent, body.body_frame()))
-            actuator = plant.AddJointActuator(f"axis_{axis}", joint)
-            actuator.set_default_rotor_inertia(_inertia(twin, axis))
-            actuator.set_default_gear_ratio(1.0)
-            actuator.set_controller_gains(_gains(twin, axis))
-            self._actuators[axis] = actuator
-            parent = body.body_frame()
-        assert body is not None
-        return body
+        Raises:
+            DisasmError: the contact is hydroelastic.
+        """
+        if not isinstance(self.contact, ImpactContactForce):
+            raise DisasmError("contact.model: is hydroelastic; set it to impact")
+        system = self.contact.system
+        return system.conditions(self.part_context(system, context))
 
-    def _set_springs(self, twin: TwinConfig, plant_context: Context) -> None:
-        for axis, actuator in self._actuators.items():
-            actuator.SetRotorInertia(plant_context, _inertia(twin, axis))
-            actuator.set_controller_gains(_gains(twin, axis))
-
-    def _apply_forces(self, builder: DiagramBuilder, forces: OutputPort) -> None:
-        """Adds IMPACT's force, if that is the contact's model."""
-        self.impact: ImpactContact | None = None
-        if self.scenario.contact.model == "hydroelastic":
-            super()._apply_forces(builder, forces)
+    def _prepare(self, context: Context) -> None:
+        if not self._is_reconfigured:
             return
-        self._part_bolt_and_groove()
-        self.impact = builder.AddNamedSystem(
-            "impact_contact",
-            ImpactContact(self.lock.bolt.index(), self.X_WG.rotation(), self.time_step),
-        )
-        state = self.plant.get_state_output_port(self._carrier)
-        builder.Connect(state, self.impact.GetInputPort("state"))
-        desired = builder.GetSubsystemByName("desired_state").get_output_port()
-        builder.Connect(desired, self.impact.GetInputPort("desired_state"))
-        builder.Connect(forces, self.impact.GetInputPort("applied_spatial_force"))
-        super()._apply_forces(builder, self.impact.get_output_port())
-
-    def _part_bolt_and_groove(self) -> None:
-        """Leaves their contact to IMPACT."""
-        bolt, groove = (
-            GeometrySet(list(ids))
-            for ids in (self.lock.bolt_ids.values(), self.lock.groove_ids)
-        )
-        declaration = CollisionFilterDeclaration().ExcludeBetween(bolt, groove)
-        self.scene_graph.collision_filter_manager().Apply(declaration)
-
-    def _change_environment(self, context: Context, environment: Environment) -> None:
-        if self.impact is None:
-            super()._change_environment(context, environment)
-        else:
-            self._set_environment(context, environment)
-
-    def _set_environment(self, context: Context, environment: Environment) -> None:
-        if self.impact is None:
-            super()._set_environment(context, environment)
-            return
+        scenario = self.scenario
+        self.contact.reconfigure(self.lock, scenario.contact, self._parts(context))
         plant_context = self.part_context(self.plant, context)
-        force_context = self.part_context(self.outside_force, context)
-        self.outside_force.set_force(force_context, np.array(environment.force_Gn))
-        self.lock.frame.SetPoseInParentFrame(plant_context, environment.X_GnG)
-        gains = [self._actuators[axis].get_controller_gains() for axis in _JOINT_ORDER]
-        conditions = ImpactConditions(
-            law=dataclasses.replace(
-                ImpactLaw.of(self.scenario.contact.impact),
-                stiffness=environment.impact_stiffness,
-                exponent=environment.impact_exponent,
-            ),
-            shape=self._shape(environment.clearance),
-            around=Surroundings.of([environment]),
-            M=self._mass_matrix(plant_context),
-            K=np.array([gain.p for gain in gains]),
-            D=np.array([gain.d for gain in gains]),
+        self._carrier.set_springs(scenario.twin, plant_context)
+
+    def _build(self, builder: DiagramBuilder) -> None:
+        scenario = self.scenario
+        frame_Gn = self._add_plant(builder, scenario.simulation.twin_time_step)
+        plant = self.plant
+        self.lock = add_lock(
+            plant, frame_Gn, scenario.lock, scenario.contact, self._environment
         )
-        self.impact.set_conditions(self.part_context(self.impact, context), conditions)
+        self._carrier = Carrier(plant, frame_Gn, scenario.twin)
+        frame_S, joint = self._add_sensor_joint()
+        plant.Finalize()
+        self._read_payload()
+        self._wire_commands(builder)
+        self._add_sensor(builder, joint, frame_S)
+        export_ready_device(builder, "bolt", self.time_step)
+        self._finish(builder)
 
-    def _shape(self, clearance: float) -> LockShape:
-        """Returns the lock's shape with a clearance [m]."""
-        return LockShape(dataclasses.replace(self.scenario.lock, clearance=clearance))
+    def _make_contact(self, outside_force: OutsideForce) -> ContactStrategy:
+        if self.scenario.contact.model == "hydroelastic":
+            return super()._make_contact(outside_force)
+        return ImpactContactForce(
+            self.plant,
+            self.scene_graph,
+            self.lock,
+            outside_force,
+            carrier=self._carrier,
+            R_WGn=self.X_WG.rotation(),
+            time_step=self.time_step,
+            contact=self.scenario.contact,
+            environment=self._environment,
+        )
 
-    def _mass_matrix(self, plant_context: Context) -> np.ndarray:
-        """Returns the joints' mass matrix at their zero."""
-        at_zero = self.plant.CreateDefaultContext()
-        for actuator in self._actuators.values():
-            inertia = actuator.rotor_inertia(plant_context)
-            actuator.SetRotorInertia(at_zero, inertia)
-        return self.plant.CalcMassMatrix(at_zero)
+    def _refuse_arm_effects(self, effects: Sequence[ArmEffect]) -> None:
+        refuse_arm_effects(effects)
 
-    def _add_sensor_joint(self, carrier: RigidBody) -> tuple[Frame, Joint]:
+    def _add_sensor_joint(self) -> tuple[Frame, WeldJoint]:
         X_BS = self.X_SB.inverse()
         plant, bolt = self.plant, self.lock.bolt
         on_carrier = plant.AddFrame(
-            FixedOffsetFrame("carrier_sensor", carrier.body_frame(), X_BS)
+            FixedOffsetFrame("carrier_sensor", self._carrier.body.body_frame(), X_BS)
         )
         frame_S = plant.AddFrame(FixedOffsetFrame("sensor", bolt.body_frame(), X_BS))
         return frame_S, plant.WeldFrames(on_carrier, frame_S)
 
-    def _read_payload(self, frame_S: Frame) -> None:
+    def _read_payload(self) -> None:
         M_B = self.lock.bolt.default_spatial_inertia()
         self.payload_mass = M_B.get_mass()
         self.p_SoScm_S = self.X_SB @ M_B.get_com()
 
-    def _wire_commands(self, builder: DiagramBuilder, carrier: RigidBody) -> None:
+    def _wire_commands(self, builder: DiagramBuilder) -> None:
         """Commands place and rate; carries the bolt's weight as an arm would."""
-        plant, instance = self.plant, carrier.model_instance()
+        plant, instance = self.plant, self._carrier.instance
+        connect = builder.Connect
         desired = builder.AddNamedSystem("desired_state", Multiplexer([6, 6]))
-        builder.ExportInput(desired.get_input_port(0), "bolt.position")
-        builder.ExportInput(desired.get_input_port(1), "bolt.velocity")
+        rate = builder.AddNamedSystem("commanded_rate", OptionalInput(np.zeros(6)))
+        export_required(
+            builder,
+            desired.get_input_port(0),
+            "bolt.position",
+            "connect the commanded coordinates (6,), station.start to stay there",
+        )
+        builder.ExportInput(rate.get_input_port(), "bolt.velocity")
+        connect(rate.get_output_port(), desired.get_input_port(1))
         weight = plant.CalcGravityGeneralizedForces(plant.CreateDefaultContext())
         carried = builder.AddNamedSystem("carried", ConstantVectorSource(-weight))
         measured = builder.AddNamedSystem("measured", Demultiplexer([6, 6]))
-        connect = builder.Connect
         connect(desired.get_output_port(), plant.get_desired_state_input_port(instance))
         connect(carried.get_output_port(), plant.get_actuation_input_port(instance))
         connect(plant.get_state_output_port(instance), measured.get_input_port())
         builder.ExportOutput(measured.get_output_port(0), "bolt.position_measured")
-
-    def _fix_commands(self, context: Context) -> None:
-        super()._fix_commands(context)
-        self.GetInputPort("bolt.velocity").FixValue(context, np.zeros(6))
-
-
-def _axis_joint(axis: int, parent: Frame, child: Frame) -> Joint:
-    kind = PrismaticJoint if axis < 3 else RevoluteJoint
-    return kind(f"axis_{axis}", parent, child, _AXES[axis % 3])
-
-
-def _inertia(twin: TwinConfig, axis: int) -> float:
-    """Returns what an axis moves beside the bolt [kg or kg m^2]."""
-    return twin.mass if axis < 3 else twin.inertia
-
-
-def _gains(twin: TwinConfig, axis: int) -> PdControllerGains:
-    k = twin.stiffness[axis]
-    d = 2.0 * twin.damping_ratio * np.sqrt(k * _inertia(twin, axis))
-    return PdControllerGains(p=k, d=d)
 
 
 def _structure(scenario: Scenario) -> Scenario:

@@ -33,14 +33,19 @@ class ImpactContact(LeafSystem):
         bolt: the body that is pushed.
         R_WGn: nominal groove frame in the world.
         time_step: of the plant, h [s].
+        conditions: of the default Context.
     """
 
     def __init__(
-        self, bolt: BodyIndex, R_WGn: RotationMatrix, time_step: float
+        self,
+        bolt: BodyIndex,
+        R_WGn: RotationMatrix,
+        time_step: float,
+        conditions: ImpactConditions,
     ) -> None:
         super().__init__()
         self._bolt, self._R_WGn, self._h = bolt, R_WGn.matrix(), time_step
-        self._conditions = self.DeclareAbstractParameter(Value[object](None))
+        self._conditions = self.DeclareAbstractParameter(Value[object](conditions))
         self._state = self.DeclareVectorInputPort("state", 12)
         self._desired = self.DeclareVectorInputPort("desired_state", 12)
         self._outside = self.DeclareAbstractInputPort(

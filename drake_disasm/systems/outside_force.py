@@ -28,13 +28,17 @@ class OutsideForce(LeafSystem):
     Args:
         bolt: the body that is pulled.
         R_WGn: nominal groove frame in the world.
+        environment: of the default Context.
     """
 
-    def __init__(self, bolt: BodyIndex, R_WGn: RotationMatrix) -> None:
+    def __init__(
+        self, bolt: BodyIndex, R_WGn: RotationMatrix, environment: Environment
+    ) -> None:
         super().__init__()
         self._bolt, self._R_WGn = bolt, R_WGn.matrix()
-        self._force = self.DeclareNumericParameter(BasicVector(3))
-        self._material = self.DeclareAbstractParameter(Value[object](None))
+        force = BasicVector(np.array(environment.force_Gn))
+        self._force = self.DeclareNumericParameter(force)
+        self._material = self.DeclareAbstractParameter(Value[object](environment))
         self._outside = self.DeclareAbstractInputPort(
             "applied_spatial_force", Value[list[ExternallyAppliedSpatialForce]]()
         )

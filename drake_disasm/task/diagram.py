@@ -154,6 +154,7 @@ def add_task(
     )
     builder.Connect(noise.get_output_port(), imprecision.GetInputPort("noise"))
     pose_target = _add_pose_target(builder, station, imprecision, processor)
+    station.leave_motion_effects()  # the pose target applies them
     motion = add_motion(builder, pose_target.GetOutputPort("velocity"), station)
     _add_grip(builder, station)
     chooser, source, action = _add_policy(builder, policy, processor, station)

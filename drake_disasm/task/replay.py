@@ -250,11 +250,7 @@ class ReplayDiagram:
 
     def impact_conditions(self) -> ImpactConditions:
         """Returns what IMPACT depends on now; the scenario has that contact."""
-        impact = self.station.impact
-        assert impact is not None
-        return impact.conditions(
-            self.station.part_context(impact, self.station_context)
-        )
+        return self.station.impact_conditions(self.station_context)
 
     def observed(self, time: float, q: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Returns the state (12,) of the task at coordinates under a load.
@@ -289,12 +285,13 @@ class ReplayDiagram:
         self._motion = add_motion(builder, self._source.get_output_port(), self.station)
         self.processor = add_observation(builder, self.station)
         self._simulator = Simulator(builder.Build())
+        self.station.leave_local_effects(self._simulator)
+        self.station.leave_motion_effects()  # the steps' commands have them
         self._clean: Context = self._simulator.get_context().Clone()
         self._observation = self.processor.GetOutputPort("observation")
         self._pose = self.processor.GetOutputPort("X_GB")
         self._find_contexts()
         self.effects = scenario.effects
-        self.station.set_effects(self.station_context, scenario.effects)
 
     def _find_contexts(self) -> None:
         root = self._simulator.get_mutable_context()

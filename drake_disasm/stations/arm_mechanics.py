@@ -1,0 +1,300 @@
+"""What effects on the arm do in the cell: to its plant, as friction, to its sensors."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    Frame,
+    JointActuator,
+    ModelInstanceIndex,
+    RevoluteJoint,
+)
+from pydrake.symbolic import Expression, Variable
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    Multiplexer,
+    SymbolicVectorSystem,
+)
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
+from drake_disasm.effects import (
+    ArmEffect,
+    FlangePayload,
+    JointEffect,
+    JointViscousFriction,
+    RotorInertia,
+    TorqueGain,
+    TorqueOffset,
+)
+from drake_disasm.stations.base import Parts
+from drake_disasm.stations.flange_payload import add_payload_body, payload_inertia
+from drake_disasm.stations.joint_friction import (
+    DRY_FRICTION,
+    JointFriction,
+    steepest_slope,
+)
+
+_CARRIED = (
+    *DRY_FRICTION,
+    JointViscousFriction,
+    RotorInertia,
+    TorqueGain,
+    TorqueOffset,
+    FlangePayload,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Joint:
+    """A joint of the arm, as its model file has it.
+
+    Attributes:
+        actuator: its drive.
+        joint: the same as `actuator.joint()`.
+        rotor_inertia, gear_ratio: of the drive [kg m^2], [1].
+        damping: of the joint [N m s/rad].
+    """
+
+    actuator: JointActuator
+    joint: RevoluteJoint
+    rotor_inertia: float
+    gear_ratio: float
+    damping: float
+
+
+@dataclasses.dataclass(frozen=True)
+class _ArmNumbers:
+    """All numbers that effects on the arm change.
+
+    Attributes:
+        rotor_inertia: (n,) of the drives [kg m^2].
+        damping: (n,) of the joints [N m s/rad].
+        friction: (k,) values of the friction's symbols.
+        misreading: (2 n,) share and offset [N m] of each torque sensor's error.
+    """
+
+    rotor_inertia: list[float]
+    damping: list[float]
+    friction: np.ndarray
+    misreading: np.ndarray
+
+
+class ArmMechanics:
+    """The arm's friction, rotors, payload and sensors.
+
+    Viscous friction is a joint's damping, which the solver takes implicitly; a
+    rotor's inertia and the payload are Drake's own as well. Drake's joints have no
+    dry friction, so a system beside the plant adds it as a generalized force in each
+    of the plant's steps. It is made of the effects' own equations as symbolic
+    expressions, which Drake evaluates without Python.
+
+    A force by the velocity at a step's beginning overshoots where it is steeper than
+    M / h (M the rotor's inertia, h the step), so a joint's `creep` is widened to what
+    a step can follow: 9 N m at joint 4 to 0.007 rad/s. Faster than that nothing
+    changes; slower, and at rest, the joint gives way at that speed.
+
+    What a torque sensor reads wrongly shows in `torque_measured` alone; the cell's
+    drives do not go by it, and `torque_external` is what truly pushes.
+
+    Args:
+        plant: with the arm, not yet finalized.
+        arm: its model instance.
+        frame_F: its flange.
+        effects: of the default Context.
+    """
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        arm: ModelInstanceIndex,
+        frame_F: Frame,
+        effects: Sequence[ArmEffect],
+    ) -> None:
+        self._plant = plant
+        self._payload = add_payload_body(plant, frame_F, effects)
+        self._joints: dict[str, _Joint] = {}
+        for index in plant.GetJointActuatorIndices():  # by instance: not yet finalized
+            actuator = plant.get_joint_actuator(index)
+            if actuator.model_instance() != arm:
+                continue
+            joint = actuator.joint()
+            self._joints[joint.name()] = _Joint(
+                actuator,
+                joint,
+                actuator.default_rotor_inertia(),
+                actuator.default_gear_ratio(),
+                joint.default_damping(),
+            )
+        self._friction = [JointFriction(name) for name in self._joints]
+        self._defaults = self._numbers(effects)
+        self._set_defaults()
+
+    def wire(
+        self, builder: DiagramBuilder, velocity: OutputPort, torque: OutputPort
+    ) -> OutputPort:
+        """Adds friction and sensor to the diagram, behind ports of all joints.
+
+        Their parameters come from sources: Drake's own symbolic parameters have no
+        default.
+
+        Args:
+            builder: of the station, whose plant is finalized.
+            velocity: of the joints.
+            torque: of their drives, in the step before.
+
+        Returns:
+            The port of the torques as they are measured.
+        """
+        self._friction_values = ConstantVectorSource(self._defaults.friction)
+        self._misreading = ConstantVectorSource(self._defaults.misreading)
+        friction = _add_symbolic(
+            builder,
+            "arm_friction",
+            self._friction_system(),
+            [velocity, torque],
+            self._friction_values,
+        )
+        forces = self._plant.get_applied_generalized_force_input_port()
+        builder.Connect(friction, forces)
+        return _add_symbolic(
+            builder,
+            "arm_torque_sensor",
+            _torque_sensor(list(self._joints)),
+            [torque],
+            self._misreading,
+        )
+
+    def set_effects(self, effects: Sequence[ArmEffect], parts: Parts) -> None:
+        """Puts effects, and no others, onto the arm of a Context.
+
+        Raises:
+            DisasmError: the cell can't carry one of them.
+        """
+        plant_context = parts(self._plant)
+        numbers = self._numbers(effects)
+        for joint, rotor_inertia, damping in zip(
+            self._joints.values(), numbers.rotor_inertia, numbers.damping, strict=True
+        ):
+            joint.actuator.SetRotorInertia(plant_context, rotor_inertia)
+            joint.joint.SetDamping(plant_context, damping)
+        for source, values in (
+            (self._friction_values, numbers.friction),
+            (self._misreading, numbers.misreading),
+        ):
+            value = source.get_mutable_source_value(parts(source))
+            value.SetFromVector(values)
+        M_F = payload_inertia(effects)
+        self._payload.SetSpatialInertiaInBodyFrame(plant_context, M_F)
+
+    def _set_defaults(self) -> None:
+        numbers = self._defaults
+        for joint, rotor_inertia, damping in zip(
+            self._joints.values(), numbers.rotor_inertia, numbers.damping, strict=True
+        ):
+            joint.actuator.set_default_rotor_inertia(rotor_inertia)
+            joint.joint.set_default_damping(damping)
+
+    def _by_joint(self, effects: Sequence[ArmEffect]) -> dict[str, list[JointEffect]]:
+        own: dict[str, list[JointEffect]] = {name: [] for name in self._joints}
+        for effect in effects:
+            if not isinstance(effect, JointEffect):
+                continue
+            if effect.joint not in own:
+                raise DisasmError(
+                    f"{type(effect).__name__}.joint: the arm has no joint "
+                    f"'{effect.joint}'; {closest(effect.joint, list(own))}"
+                )
+            own[effect.joint].append(effect)
+        return own
+
+    def _numbers(self, effects: Sequence[ArmEffect]) -> _ArmNumbers:
+        own, joints = self._by_joint(effects), self._joints.items()
+        friction: list[float] = []
+        for symbols, (name, joint) in zip(self._friction, joints, strict=True):
+            inertia = joint.gear_ratio**2 * _rotor_inertia(joint, own[name])
+            steepest = inertia / self._plant.time_step()
+            slope = steepest_slope(own[name], joint.actuator.effort_limit())
+            friction += symbols.values(own[name], max(1.0, slope / steepest))
+        return _ArmNumbers(
+            [_rotor_inertia(joint, own[name]) for name, joint in joints],
+            [_damping(joint, own[name]) for name, joint in joints],
+            np.array(friction),
+            np.concatenate([_misreading(own[name]) for name in self._joints]),
+        )
+
+    def _friction_system(self) -> SymbolicVectorSystem:
+        """Returns the system that adds friction to the plant."""
+        joints = self._friction
+        applied = np.array([Expression(0.0)] * self._plant.num_velocities())
+        for joint, symbols in zip(self._joints.values(), joints, strict=True):
+            applied[joint.joint.velocity_start()] = symbols.applied()
+        inputs = [joint.v for joint in joints] + [joint.u for joint in joints]
+        inputs += [symbol for joint in joints for symbol in joint.parameters]
+        return SymbolicVectorSystem(input=np.array(inputs), output=applied)
+
+
+def refuse_unknown_arm_effects(effects: Sequence[ArmEffect]) -> None:
+    """Refuses effects on the arm that the cell does not simulate.
+
+    Raises:
+        DisasmError: names the first.
+    """
+    for effect in effects:
+        if not isinstance(effect, _CARRIED):
+            raise DisasmError(
+                f"{type(effect).__name__}: acts on the arm in a way that the cell does "
+                "not simulate; take it out of effects"
+            )
+
+
+def _add_symbolic(
+    builder: DiagramBuilder,
+    name: str,
+    system: SymbolicVectorSystem,
+    inputs: Sequence[OutputPort],
+    parameters: ConstantVectorSource,
+) -> OutputPort:
+    """Adds a system of expressions, and the source of the last of its inputs."""
+    builder.AddNamedSystem(name, system)
+    builder.AddNamedSystem(f"{name}_parameters", parameters)
+    ports = [*inputs, parameters.get_output_port()]
+    inputs_of_all = builder.AddNamedSystem(
+        f"{name}_inputs", Multiplexer([port.size() for port in ports])
+    )
+    for i, port in enumerate(ports):
+        builder.Connect(port, inputs_of_all.get_input_port(i))
+    builder.Connect(inputs_of_all.get_output_port(), system.get_input_port())
+    return system.get_output_port()
+
+
+def _torque_sensor(joints: Sequence[str]) -> SymbolicVectorSystem:
+    """Returns the system that reads joints' torques, each with a gain and an offset."""
+    u = [Variable(f"{name}.torque") for name in joints]
+    wrong = [(Variable(f"{n}.share"), Variable(f"{n}.offset")) for n in joints]
+    reading = [t + share * t + c for t, (share, c) in zip(u, wrong, strict=True)]
+    parameters = [symbol for pair in wrong for symbol in pair]
+    return SymbolicVectorSystem(
+        input=np.array([*u, *parameters]), output=np.array(reading)
+    )
+
+
+def _misreading(effects: Sequence[JointEffect]) -> np.ndarray:
+    """Returns share and offset (2,) by which a joint's sensor is wrong."""
+    share = sum(e.share for e in effects if isinstance(e, TorqueGain))
+    offset = sum(e.size for e in effects if isinstance(e, TorqueOffset))
+    return np.array([share, offset], dtype=float)
+
+
+def _rotor_inertia(joint: _Joint, effects: Sequence[JointEffect]) -> float:
+    """Returns a drive's rotor inertia; effects add reflected inertia."""
+    more = sum(e.inertia for e in effects if isinstance(e, RotorInertia))
+    return joint.rotor_inertia + more / joint.gear_ratio**2
+
+
+def _damping(joint: _Joint, effects: Sequence[JointEffect]) -> float:
+    more = sum(e.coefficient for e in effects if isinstance(e, JointViscousFriction))
+    return joint.damping + more

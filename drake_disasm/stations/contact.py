@@ -1,0 +1,284 @@
+"""What the simulated contact between bolt and groove is made of: two strategies.
+
+A strategy knows which quantities of an `Environment` it has, how they are put into a
+Context, and what it adds to the diagram. Contexts are handed in as `Parts`, which finds
+that of any system in the station.
+"""
+
+import abc
+import dataclasses
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, SceneGraph
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
+
+from drake_disasm.cell.lock import (
+    Lock,
+    has_same_material,
+    reshape_groove,
+    set_environment,
+    set_pose,
+)
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import Effect, Environment, EnvironmentEffect, environment_at
+from drake_disasm.impact import ImpactConditions, ImpactLaw, LockShape, Surroundings
+from drake_disasm.scenario import ContactConfig, LockConfig
+from drake_disasm.stations.base import Parts
+from drake_disasm.stations.carrier import Carrier
+from drake_disasm.systems.impact_contact import ImpactContact
+from drake_disasm.systems.outside_force import OutsideForce
+
+
+class ContactStrategy(abc.ABC):
+    """How bolt and groove push on each other.
+
+    Attributes:
+        quantities: fields of an Environment that it has.
+        remedy: what to do about an effect that needs others.
+        outside_force: adds what pulls on the bolt beside the contact.
+    """
+
+    quantities: ClassVar[frozenset[str]]
+    remedy: ClassVar[str]
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        scene_graph: SceneGraph,
+        lock: Lock,
+        outside_force: OutsideForce,
+    ) -> None:
+        self._plant, self._scene_graph, self._lock = plant, scene_graph, lock
+        self.outside_force = outside_force
+
+    @abc.abstractmethod
+    def add_forces(self, builder: DiagramBuilder, forces: OutputPort) -> OutputPort:
+        """Adds what computes the contact, if that is not the plant itself.
+
+        Args:
+            forces: that act on the bolt from outside.
+
+        Returns:
+            The port of all forces that the plant is to apply.
+        """
+
+    @abc.abstractmethod
+    def reconfigure(self, lock: Lock, contact: ContactConfig, parts: Parts) -> None:
+        """Takes another lock and contact; `set_environment` is to follow."""
+
+    @abc.abstractmethod
+    def set_environment(self, environment: Environment, parts: Parts) -> None:
+        """Puts the world around the bolt into a Context."""
+
+    def change_environment(self, environment: Environment, parts: Parts) -> None:
+        """Puts what has changed of the world around the bolt into a Context."""
+        self.set_environment(environment, parts)
+
+
+class HydroelasticContact(ContactStrategy):
+    """Drake's own contact, of the surfaces' materials in the scene graph."""
+
+    quantities = frozenset(
+        (
+            "X_GnG",
+            "friction",
+            "modulus",
+            "head_modulus",
+            "dissipation",
+            "clearance",
+            "force_Gn",
+        )
+    )
+    remedy = "set contact.model to impact, and use --station twin"
+
+    def add_forces(self, builder: DiagramBuilder, forces: OutputPort) -> OutputPort:
+        """See ContactStrategy."""
+        return forces
+
+    def reconfigure(self, lock: Lock, contact: ContactConfig, parts: Parts) -> None:
+        """See ContactStrategy."""
+        self._lock = lock
+        self._reshape(lock.config, parts)
+
+    def set_environment(self, environment: Environment, parts: Parts) -> None:
+        """See ContactStrategy: makes the materials anew, which takes milliseconds."""
+        outside = parts(self.outside_force)
+        if environment.clearance != self.outside_force.material(outside).clearance:
+            clearance = environment.clearance
+            shape = dataclasses.replace(self._lock.config, clearance=clearance)
+            self._reshape(shape, parts)
+        self.outside_force.set_force(outside, np.array(environment.force_Gn))
+        self.outside_force.set_material(outside, environment)
+        set_environment(
+            self._lock,
+            environment,
+            parts(self._plant),
+            self._scene_graph,
+            parts(self._scene_graph),
+        )
+
+    def change_environment(self, environment: Environment, parts: Parts) -> None:
+        """See ContactStrategy: leaves materials that have not changed noticeably."""
+        outside = parts(self.outside_force)
+        if has_same_material(self.outside_force.material(outside), environment):
+            set_pose(self._lock, environment, parts(self._plant))
+            self.outside_force.set_force(outside, np.array(environment.force_Gn))
+        else:
+            self.set_environment(environment, parts)
+
+    def _reshape(self, config: LockConfig, parts: Parts) -> None:
+        reshape_groove(self._lock, config, self._scene_graph, parts(self._scene_graph))
+        outside = parts(self.outside_force)
+        material = self.outside_force.material(outside)
+        self.outside_force.set_material(
+            outside, dataclasses.replace(material, clearance=config.clearance)
+        )
+
+
+class ImpactContactForce(ContactStrategy):
+    """The thesis's contact law, as a force on the bolt; the plant sees no contact.
+
+    Args:
+        carrier: the twin's, whose springs and masses the law's solution depends on.
+        R_WGn, time_step: of the station [s].
+        contact: parameters of the law.
+        environment: of the default Context.
+    """
+
+    quantities = frozenset(
+        (
+            "X_GnG",
+            "friction",
+            "clearance",
+            "impact_stiffness",
+            "impact_exponent",
+            "force_Gn",
+        )
+    )
+    remedy = "set contact.model to hydroelastic"
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        scene_graph: SceneGraph,
+        lock: Lock,
+        outside_force: OutsideForce,
+        *,
+        carrier: Carrier,
+        R_WGn: RotationMatrix,
+        time_step: float,
+        contact: ContactConfig,
+        environment: Environment,
+    ) -> None:
+        super().__init__(plant, scene_graph, lock, outside_force)
+        self._carrier, self._contact = carrier, contact
+        self._exclude_from_scene_graph()
+        at_zero = plant.CreateDefaultContext()
+        self.system = ImpactContact(
+            lock.bolt.index(), R_WGn, time_step, self._conditions(environment, at_zero)
+        )
+
+    def add_forces(self, builder: DiagramBuilder, forces: OutputPort) -> OutputPort:
+        """See ContactStrategy."""
+        system = builder.AddNamedSystem("impact_contact", self.system)
+        state = self._plant.get_state_output_port(self._carrier.instance)
+        builder.Connect(state, system.GetInputPort("state"))
+        desired = builder.GetSubsystemByName("desired_state").get_output_port()
+        builder.Connect(desired, system.GetInputPort("desired_state"))
+        builder.Connect(forces, system.GetInputPort("applied_spatial_force"))
+        return system.get_output_port()
+
+    def reconfigure(self, lock: Lock, contact: ContactConfig, parts: Parts) -> None:
+        """See ContactStrategy.
+
+        The scene graph keeps the old shapes: new ones would forget that bolt and
+        groove do not collide there.
+        """
+        self._lock, self._contact = lock, contact
+
+    def set_environment(self, environment: Environment, parts: Parts) -> None:
+        """See ContactStrategy."""
+        plant_context, outside = parts(self._plant), parts(self.outside_force)
+        self.outside_force.set_force(outside, np.array(environment.force_Gn))
+        set_pose(self._lock, environment, plant_context)
+        conditions = self._conditions(environment, plant_context)
+        self.system.set_conditions(parts(self.system), conditions)
+
+    def _conditions(
+        self, environment: Environment, plant_context: Context
+    ) -> ImpactConditions:
+        config, clearance = self._lock.config, environment.clearance
+        K, D = self._carrier.gains()
+        return ImpactConditions(
+            law=dataclasses.replace(
+                ImpactLaw.of(self._contact.impact),
+                stiffness=environment.impact_stiffness,
+                exponent=environment.impact_exponent,
+            ),
+            shape=LockShape(dataclasses.replace(config, clearance=clearance)),
+            around=Surroundings.of([environment]),
+            M=self._carrier.mass_matrix(plant_context),
+            K=K,
+            D=D,
+        )
+
+    def _exclude_from_scene_graph(self) -> None:
+        """Leaves the contact between bolt and groove to the law."""
+        bolt, groove = (
+            GeometrySet(list(ids))
+            for ids in (self._lock.bolt_ids.values(), self._lock.groove_ids)
+        )
+        declaration = CollisionFilterDeclaration().ExcludeBetween(bolt, groove)
+        self._scene_graph.collision_filter_manager().Apply(declaration)
+
+
+#: By the scenario's `contact.model`.
+CONTACTS: dict[str, type[ContactStrategy]] = {
+    "hydroelastic": HydroelasticContact,
+    "impact": ImpactContactForce,
+}
+
+
+def refuse_without_quantity(
+    model: str, nominal: Environment, effects: Sequence[Effect]
+) -> None:
+    """Refuses effects on what a contact model does not have.
+
+    Args:
+        model: the scenario's `contact.model`.
+        nominal: the environment without effects.
+        effects: any.
+
+    Raises:
+        DisasmError: names the first effect that would change nothing.
+    """
+    contact = CONTACTS[model]
+    for effect in effects:
+        if isinstance(effect, EnvironmentEffect):
+            actual = environment_at(nominal, [effect])
+            changed = environment_differences(nominal, actual)
+            if changed and not changed & contact.quantities:
+                raise DisasmError(
+                    f"{type(effect).__name__}: changes {', '.join(sorted(changed))}, "
+                    f"which {model} contact does not have; take it out of effects, or "
+                    f"{contact.remedy}"
+                )
+
+
+def environment_differences(one: Environment, other: Environment) -> frozenset[str]:
+    """Returns the names of the quantities in which environments differ."""
+    return frozenset(
+        field.name
+        for field in dataclasses.fields(Environment)
+        if not _same(getattr(one, field.name), getattr(other, field.name))
+    )
+
+
+def _same(one: object, other: object) -> bool:
+    if isinstance(one, RigidTransform) and isinstance(other, RigidTransform):
+        return one.IsExactlyEqualTo(other)
+    return one == other

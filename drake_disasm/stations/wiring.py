@@ -1,0 +1,81 @@
+"""Parts that simulated stations have in common, added to their diagrams."""
+
+import numpy as np
+from pydrake.common import RandomDistribution
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder, InputPort
+from pydrake.systems.primitives import ConstantVectorSource, RandomSource
+
+from drake_disasm.devices.ft_sensor import ForceTorqueSensor
+from drake_disasm.ports import Health
+from drake_disasm.systems.body_pose import BodyPose
+from drake_disasm.systems.required_input import RequiredInput
+from drake_disasm.systems.step_clock import StepClock
+
+
+def export_required(
+    builder: DiagramBuilder, port: InputPort, name: str, remedy: str
+) -> None:
+    """Exports an input of a station, without which no simulation begins.
+
+    Args:
+        builder: of the station.
+        port: that takes the command.
+        name: of the station's port.
+        remedy: what to do if it is not connected, for the message.
+    """
+    check = RequiredInput(name, port.size(), remedy)
+    builder.AddNamedSystem(f"{name.replace('.', '_')}_required", check)
+    builder.ExportInput(port, name)
+    builder.ConnectInput(name, check.get_input_port())
+
+
+def wire_sensor(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    sensor: ForceTorqueSensor,
+    period: float,
+) -> RandomSource:
+    """Connects a force/torque sensor to its plant, and exports what it reads.
+
+    Args:
+        builder: of the station.
+        plant: whose reaction is read.
+        sensor: not yet in the diagram.
+        period: of its noise [s].
+
+    Returns:
+        The source of its noise.
+    """
+    connect = builder.Connect
+    builder.AddNamedSystem("ft_sensor", sensor)
+    noise = builder.AddNamedSystem(
+        "ft_sensor_noise", RandomSource(RandomDistribution.kGaussian, 6, period)
+    )
+    reactions = plant.get_reaction_forces_output_port()
+    connect(reactions, sensor.GetInputPort("reaction_forces"))
+    connect(plant.get_body_poses_output_port(), sensor.GetInputPort("body_poses"))
+    connect(noise.get_output_port(), sensor.GetInputPort("noise"))
+    for quantity in ("wrench", "health", "time_measured"):
+        builder.ExportOutput(sensor.GetOutputPort(quantity), f"ft_sensor.{quantity}")
+    return noise
+
+
+def export_ready_device(builder: DiagramBuilder, name: str, time_step: float) -> None:
+    """Exports health and sample time of a device that never fails."""
+    ready = builder.AddNamedSystem(
+        f"{name}_health", ConstantVectorSource(np.array([float(Health.READY)]))
+    )
+    clock = builder.AddNamedSystem(f"{name}_clock", StepClock(time_step))
+    builder.ExportOutput(ready.get_output_port(), f"{name}.health")
+    builder.ExportOutput(clock.get_output_port(), f"{name}.time_measured")
+
+
+def export_bolt_pose(
+    builder: DiagramBuilder, plant: MultibodyPlant, bolt: int, X_WG: RigidTransform
+) -> None:
+    """Exports where the bolt truly is, X_GnB, which only a simulation knows."""
+    truth = builder.AddNamedSystem("bolt_pose", BodyPose(bolt, X_WG))
+    builder.Connect(plant.get_body_poses_output_port(), truth.get_input_port())
+    builder.ExportOutput(truth.get_output_port(), "bolt_pose")

@@ -1,0 +1,91 @@
+"""Which effects a station simulates, and whether something keeps them up to date."""
+
+import weakref
+from collections.abc import Sequence
+
+from pydrake.common.value import Value
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import Effect, is_local, motion_chain
+
+
+class EffectsInForce(LeafSystem):
+    """Holds the effects of a station's Context; refuses those that would not act.
+
+    Effects that depend on the bolt's motion need something that tells them of it,
+    outside of Drake's events, since proximity properties can't be changed by one.
+    Effects on the motion act before the station. Where neither is there, a simulator's
+    initialisation fails: an effect never goes missing silently.
+
+    @system
+    name: EffectsInForce
+    input_ports: []
+    output_ports: []
+    @endsystem
+
+    Attributes:
+        motion_is_applied: whether the diagram around the station applies the effects
+            on the motion.
+
+    Args:
+        effects: in force in the default Context.
+    """
+
+    def __init__(self, effects: Sequence[Effect]) -> None:
+        super().__init__()
+        self.motion_is_applied = False
+        self._updated: weakref.WeakSet[Simulator] = weakref.WeakSet()
+        self._at_rest: weakref.WeakSet[Simulator] = weakref.WeakSet()
+        self._effects = self.DeclareAbstractParameter(Value[object](tuple(effects)))
+        self.DeclareInitializationUnrestrictedUpdateEvent(self._check)
+
+    def set(self, context: Context, effects: Sequence[Effect]) -> None:
+        """Notes the effects that are in force in this system's Context."""
+        parameter = context.get_mutable_abstract_parameter(self._effects)
+        parameter.set_value(tuple(effects))
+
+    def get(self, context: Context) -> tuple[Effect, ...]:
+        """Returns the effects that are in force in this system's Context."""
+        return context.get_abstract_parameter(self._effects).get_value()
+
+    def note_updated(self, simulator: Simulator) -> None:
+        """Notes a simulator whose local effects somebody keeps up to date."""
+        self._updated.add(simulator)
+
+    def note_at_rest(self, simulator: Simulator) -> None:
+        """Notes a simulator in which the bolt rests at A: no effect has to follow."""
+        self._at_rest.add(simulator)
+
+    def _check(self, context: Context, state: State) -> EventStatus:
+        if not self._is_of(context, self._at_rest):
+            updated = self._is_of(context, self._updated)
+            for effect in self.get(context):
+                self._refuse(effect, updated)
+        return EventStatus.DidNothing()
+
+    def _refuse(self, effect: Effect, updated: bool) -> None:
+        name = type(effect).__name__
+        if is_local([effect]) and not updated:
+            raise DisasmError(
+                f"{name}: depends on the bolt's motion and would not act here; add the "
+                "line station.attach(simulator) before the simulation begins"
+            )
+        if motion_chain([effect]) and not self.motion_is_applied:
+            raise DisasmError(
+                f"{name}: acts on the commanded motion, before the station, and would "
+                "not act here; build the diagram with add_task(builder, station)"
+            )
+
+    def _is_of(
+        self, context: Context, simulators: "weakref.WeakSet[Simulator]"
+    ) -> bool:
+        """Returns whether a Context of this system belongs to one of simulators."""
+        return any(self._context_in(s) is context for s in list(simulators))
+
+    def _context_in(self, simulator: Simulator) -> Context | None:
+        try:
+            return self.GetMyContextFromRoot(simulator.get_context())
+        except RuntimeError:  # a simulator of the station before it joined a diagram
+            return None
