@@ -115,15 +115,21 @@ class ObservationProcessor(LeafSystem):
         coordinates: maps the measured coordinates to X_GB.
         mounting: geometry and payload of the sensor.
         variant: "exact", or "small_angle" for the thesis's equations.
+        reading: (6,) at which the default Context is zeroed; None: it is not.
     """
 
     def __init__(
-        self, coordinates: Coordinates, mounting: Mounting, variant: str = "exact"
+        self,
+        coordinates: Coordinates,
+        mounting: Mounting,
+        variant: str = "exact",
+        reading: np.ndarray | None = None,
     ) -> None:
         super().__init__()
         self._coordinates, self._mounting = coordinates, mounting
         self._exact = variant == "exact"
-        self._offset = self.DeclareNumericParameter(BasicVector(6))
+        offset = np.zeros(6) if reading is None else self._offset_of(reading)
+        self._offset = self.DeclareNumericParameter(BasicVector(offset))
         self._position = self.DeclareVectorInputPort(
             "position_measured", coordinates.size
         )
@@ -145,10 +151,13 @@ class ObservationProcessor(LeafSystem):
 
     def zero(self, context: Context, reading: np.ndarray) -> None:
         """Zeroes the sensor: `reading` (6,) was taken at the start, X_GB = identity."""
-        offset = reading
-        if self._exact:
-            offset = reading - self._mounting.weight(self._mounting.X_BS.rotation())
-        context.get_mutable_numeric_parameter(self._offset).SetFromVector(offset)
+        parameter = context.get_mutable_numeric_parameter(self._offset)
+        parameter.SetFromVector(self._offset_of(reading))
+
+    def _offset_of(self, reading: np.ndarray) -> np.ndarray:
+        if not self._exact:
+            return reading
+        return reading - self._mounting.weight(self._mounting.X_BS.rotation())
 
     def observation(
         self, context: Context, X_GB: RigidTransform, reading: np.ndarray

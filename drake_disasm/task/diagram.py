@@ -186,6 +186,7 @@ def add_observation(builder: DiagramBuilder, station: Station) -> ObservationPro
             station.coordinates,
             station.mounting,
             station.scenario.observation.variant,
+            station.initial_state.reading if station.start_is_reusable else None,
         ),
     )
     for port, name in (
