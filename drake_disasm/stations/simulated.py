@@ -278,6 +278,8 @@ class SimulatedStation(Station):
         settled = self.settled(wanted)
         self.set_effects(context, wanted)
         copy_state(settled, context)
+        plant_context = self.part_context(self.plant, context)
+        self.plant.SetVelocities(plant_context, np.zeros(self.plant.num_velocities()))
         return InitialState(self.start, self.reading_at_zeroing(settled))
 
     def bolt_is_out(self, context: Context, lift_needed: float) -> bool:
