@@ -1,18 +1,18 @@
 """Blind tests of closing the loop: the confusion matrix, null logs, and more."""
 
-import multiprocessing
 import os
 import tempfile
 import time
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
 from objective_speed import recorded_log
-from tqdm import tqdm
 
+from drake_disasm.common.executors import WorkerPool
 from drake_disasm.common.files import make_folder, write_figure, write_text
+from drake_disasm.common.finished_work import FinishedWork
+from drake_disasm.common.program import ProgressBar
 from drake_disasm.effects import GroovePose
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
@@ -44,7 +44,7 @@ def run_matrix(folder: Path, seeds: int, nulls: int, pairs: int) -> str:
     Answers that are in the folder already are not asked for again.
 
     Args:
-        folder: gets `answers.json`, `effects.md` and `confusion.png`.
+        folder: gets `results.jsonl` with the answers, `effects.md` and `confusion.png`.
         seeds: of each effect at each level.
         nulls: logs without an effect, of each correlation of the noise.
         pairs: logs with two effects.
@@ -57,12 +57,11 @@ def run_matrix(folder: Path, seeds: int, nulls: int, pairs: int) -> str:
     }
     cases = [case for group in groups.values() for case in group]
     make_folder(folder)
-    context = multiprocessing.get_context("spawn")
     with (
-        ProcessPoolExecutor(os.cpu_count() or 1, context) as executor,
-        tqdm(total=len(cases), unit="log") as bar,
+        ProgressBar(unit="log") as bar,
+        WorkerPool(os.cpu_count() or 1, progress=bar) as pool,
     ):
-        found = answers(cases, executor, folder / "answers.json", bar.update)
+        found = answers(cases, pool, FinishedWork(folder))
     by_key = {a.case.key: a for a in found}
     text = in_words({n: [by_key[c.key] for c in g] for n, g in groups.items()})
     write_text(folder / "effects.md", text + "\n")

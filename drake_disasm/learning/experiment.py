@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import make_folder, write_json
+from drake_disasm.common.files import write_json
+from drake_disasm.common.finished_work import is_resumed, refuse_difference
 from drake_disasm.learning.hyperparameters import Hyperparameters
 from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.statistics import wilson_interval
@@ -76,25 +77,14 @@ def open_experiment(experiment: Experiment, folder: Path, resume: bool) -> Exper
         DisasmError: the folder holds something and `resume` is false, or it holds
             another experiment; names the first difference.
     """
-    make_folder(folder)
     path = folder / "training.json"
     wanted = json.loads(json.dumps(experiment.to_mapping()))
-    if not path.exists():
-        if any(folder.iterdir()):
-            raise DisasmError(f"{folder}: is not empty; name a new folder")
+    if not is_resumed(folder, path.name, "a training", resume):
         write_json(path, wanted)
         return experiment
-    if not resume:
-        raise DisasmError(
-            f"{folder}: holds a training already; add --resume, or name a new folder"
-        )
     found = _with_station(read_json(path))
-    for key in wanted:
-        if key != "provenance" and found.get(key) != wanted[key]:
-            raise DisasmError(
-                f"{folder}: was begun with another {_difference(found, wanted, key)}; "
-                "resume with the same, or name a new folder"
-            )
+    del wanted["provenance"]
+    refuse_difference(folder, found, wanted)
     return dataclasses.replace(experiment, provenance=found["provenance"])
 
 
@@ -103,15 +93,6 @@ def _with_station(found: dict[str, Any]) -> dict[str, Any]:
     if "model" in found:
         found["station"] = found.pop("model")
     return found
-
-
-def _difference(found: dict[str, Any], wanted: dict[str, Any], key: str) -> str:
-    """Returns the path and both values of the first difference under a key."""
-    old, new = found.get(key), wanted[key]
-    if isinstance(old, dict) and isinstance(new, dict):
-        inner = next(k for k in {**old, **new} if old.get(k) != new.get(k))
-        return f"{key}.{_difference(old, {**new, inner: new.get(inner)}, inner)}"
-    return f"{key} ({old}, not {new})"
 
 
 def read_json(path: Path) -> dict[str, Any]:

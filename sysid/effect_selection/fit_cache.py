@@ -11,12 +11,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from drake_disasm.common.files import make_folder, write_npz
+from drake_disasm.common.finished_work import Arrays, FinishedWork
 from sysid.identification.linearisation import Linearisation
 
-_ARRAYS = ("u", "residual", "jacobian", "weights", "huber_delta")
+_ARRAYS = ("u", "residual", "jacobian", "weights")
 
 
 def cached_fit(
@@ -31,14 +29,11 @@ def cached_fit(
     """
     if folder is None:
         return find()
-    name = hashlib.sha256(pickle.dumps(depends_on)).hexdigest()
-    path = folder / f"{name[:32]}.npz"
-    if path.exists():
-        with np.load(path) as data:
-            arrays = {key: data[key] for key in _ARRAYS[:-1]}
-            return Linearisation(**arrays, huber_delta=float(data["huber_delta"]))
-    found = find()
-    make_folder(folder)
-    arrays = {key: getattr(found, key) for key in _ARRAYS}
-    write_npz(path, **arrays)
-    return found
+    key = hashlib.sha256(pickle.dumps(depends_on)).hexdigest()
+    kept = FinishedWork(folder).arrays(key, lambda: _arrays(find()))
+    arrays = {name: kept[name] for name in _ARRAYS}
+    return Linearisation(**arrays, huber_delta=float(kept["huber_delta"]))
+
+
+def _arrays(fit: Linearisation) -> Arrays:
+    return {name: getattr(fit, name) for name in (*_ARRAYS, "huber_delta")}

@@ -2,15 +2,16 @@
 
 import json
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, as_completed
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from drake_disasm.common.files import write_json
+from drake_disasm.common.executors import WorkerPool
+from drake_disasm.common.finished_work import FinishedWork
+from drake_disasm.common.progress import Progress, ProgressUpdate
 from drake_disasm.effects import (
     Effect,
     EnvironmentEffect,
@@ -151,45 +152,25 @@ def residual(effect: Effect, folder: str) -> float:
 
 
 def answers(
-    cases: Sequence[Case],
-    executor: Executor,
-    path: Path,
-    tell: Callable[[], object] = lambda: None,
+    cases: Sequence[Case], pool: WorkerPool, finished: FinishedWork
 ) -> list[Answer]:
-    """Returns the answers to cases, those that are in a file already from there.
+    """Returns the answers to cases; those that are kept are not asked for again.
 
     Args:
         cases: to ask.
-        executor: does the work.
-        path: of a JSON file that gets each answer when it is there.
-        tell: called after each.
+        pool: does the work.
+        finished: gets each answer when it is there.
     """
-    known = {a.case.key: a for a in read_answers(path)}
-    open_cases = [case for case in cases if case.key not in known]
-    for _ in range(len(cases) - len(open_cases)):
-        tell()
-    futures = [executor.submit(answer, case) for case in open_cases]
-    try:
-        for future in as_completed(futures):
-            found = future.result()
-            known[found.case.key] = found
-            _write(path, list(known.values()))
-            tell()
-    finally:
-        for future in futures:
-            future.cancel()
-    return [known[case.key] for case in cases]
+    open_cases = [case for case in cases if finished.get(case.key) is None]
+    for case, found in pool.run(_answer, open_cases):
+        finished.keep(case.key, asdict(found))
+    return [_answer_of(finished.get(case.key)) for case in cases]
 
 
-def _write(path: Path, found: Sequence[Answer]) -> None:
-    write_json(path, [asdict(each) for each in found], indent=1)
-
-
-def read_answers(path: Path) -> list[Answer]:
-    """Returns the answers of a file; none if there is no such file."""
-    if not path.exists():
-        return []
-    return [_answer_of(entry) for entry in json.loads(path.read_text("utf-8"))]
+def _answer(case: Case, progress: Progress) -> Answer:
+    found = answer(case)
+    progress(ProgressUpdate("blind tests", 1, 1))
+    return found
 
 
 def _answer_of(entry: dict[str, Any]) -> Answer:

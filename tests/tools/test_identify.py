@@ -114,7 +114,7 @@ def test_ctrl_c_leaves_a_state_that_resumes_to_the_same_result(
     whole = run(*arguments, "--out", tmp_path / "whole")
     assert whole.returncode == 0, whole.stderr
     out = tmp_path / "fit"
-    journal = out / "evaluations.jsonl"
+    journal = out / "results.jsonl"
 
     def is_searching() -> bool:
         return journal.exists() and len(journal.read_text().splitlines()) > 5

@@ -123,7 +123,7 @@ def test_an_interrupted_identification_goes_on_to_the_same_bits(tmp_path):
 
 def test_half_a_line_in_the_journal_is_dropped(tmp_path):
     whole = run(Decay(), tmp_path / "fit")
-    path = tmp_path / "fit" / "evaluations.jsonl"
+    path = tmp_path / "fit" / "results.jsonl"
     text = path.read_text()
     path.write_text(text[: len(text) // 2])
     again = run(Decay(), tmp_path / "fit", resume=True)

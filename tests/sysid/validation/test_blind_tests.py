@@ -5,6 +5,8 @@ from concurrent.futures import Executor, Future
 import numpy as np
 import pytest
 
+from drake_disasm.common.executors import WorkerPool
+from drake_disasm.common.finished_work import FinishedWork
 from drake_disasm.effects import CommandGain, SensorBias
 from drake_disasm.logs import read_log
 from sysid.models.twin import TwinModel
@@ -15,7 +17,6 @@ from sysid.validation.blind_tests import (
     answers,
     nominal,
     pair_cases,
-    read_answers,
     residual,
     single_cases,
     traceable,
@@ -34,7 +35,7 @@ class _Here(Executor):
         """Returns a future that is done."""
         self.done += 1
         future = Future()
-        future.set_result(Answer(arguments[0], (), "none", (), (), 1.0, 1.0))
+        future.set_result(Answer(arguments[2], (), "none", (), (), 1.0, 1.0))
         return future
 
 
@@ -86,11 +87,13 @@ def test_effects_are_drawn_by_the_residual_they_leave(tmp_path):
 def test_answers_are_kept_and_not_asked_for_again(tmp_path):
     cases = single_cases((1.0, 2.0), (0,))
     executor = _Here()
-    first = answers(cases[:3], executor, tmp_path / "answers.json")
-    second = answers(cases[:5], executor, tmp_path / "answers.json")
+    with WorkerPool(executor=executor) as pool:
+        first = answers(cases[:3], pool, FinishedWork(tmp_path))
+        second = answers(cases[:5], pool, FinishedWork(tmp_path))
+        assert executor.done == 5
+        assert second[:3] == first
+        assert answers(cases[:5], pool, FinishedWork(tmp_path)) == second
     assert executor.done == 5
-    assert second[:3] == first
-    assert set(second) == set(read_answers(tmp_path / "answers.json"))
 
 
 def test_pairs_are_of_two_effects_that_can_show():

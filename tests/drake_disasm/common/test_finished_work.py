@@ -1,0 +1,71 @@
+"""What is kept is found again bit for bit, and nothing is taken for something else."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.finished_work import FinishedWork
+
+IDENTITY = {"seed": 0, "config": {"rate": 0.1, "layers": (2, 3)}}
+
+
+def test_results_come_back_bit_for_bit(tmp_path: Path) -> None:
+    value = 0.1 + 0.2
+    FinishedWork(tmp_path, IDENTITY).keep(["stage", [value, -0.0]], {"f": value / 3})
+    again = FinishedWork(tmp_path, IDENTITY)
+    assert again.get(["stage", [value, -0.0]]) == {"f": value / 3}
+    assert again.get(["stage", [value, 0.0]]) is None
+
+
+def test_arrays_are_found_once(tmp_path: Path) -> None:
+    found = {"u": np.array([0.1, np.inf]), "huber": np.float64(3.0)}
+    FinishedWork(tmp_path).arrays("key", lambda: found)
+    again = FinishedWork(tmp_path).arrays("key", lambda: pytest.fail("again"))
+    assert again["u"].tobytes() == found["u"].tobytes()
+    assert float(again["huber"]) == 3.0
+    other = {"u": np.zeros(1)}
+    assert FinishedWork(tmp_path).arrays("another", lambda: other) is other
+
+
+def test_without_a_folder_results_are_kept_in_memory() -> None:
+    work = FinishedWork()
+    work.keep("a", 1)
+    assert work.get("a") == 1 and work.get("b") is None
+
+
+def test_half_a_line_of_a_killed_run_is_dropped(tmp_path: Path) -> None:
+    FinishedWork(tmp_path).keep_all([("a", 1), ("b", 2)])
+    path = tmp_path / "results.jsonl"
+    path.write_text(path.read_text()[:-5])
+    work = FinishedWork(tmp_path)
+    assert work.get("a") == 1 and work.get("b") is None
+    work.keep("c", 3)
+    assert FinishedWork(tmp_path).get("c") == 3
+
+
+REFUSED = [
+    (IDENTITY, False, r"holds results already; add --resume"),
+    (IDENTITY | {"seed": 1}, True, r"another seed \(0, not 1\)"),
+    (
+        IDENTITY | {"config": {"rate": 0.2, "layers": (2, 3)}},
+        True,
+        r"another config\.rate \(0\.1, not 0\.2\)",
+    ),
+]
+
+
+@pytest.mark.parametrize(("identity", "resume", "message"), REFUSED)
+def test_other_work_is_not_taken_up(
+    tmp_path: Path, identity: dict, resume: bool, message: str
+) -> None:
+    FinishedWork(tmp_path, IDENTITY)
+    with pytest.raises(DisasmError, match=message):
+        FinishedWork(tmp_path, identity, resume)
+
+
+def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(DisasmError, match="not empty and does not hold a study"):
+        FinishedWork(tmp_path, IDENTITY, what="a study")
