@@ -40,18 +40,25 @@ def shift_and_express(wrench_So_S: np.ndarray, X_AS: RigidTransform) -> np.ndarr
 
 
 def weight_wrench(
-    mass: float, p_SoScm_S: np.ndarray, R_WS: RotationMatrix, g_W: np.ndarray
+    mass: float, p_SoScm_S: np.ndarray, R_WS: np.ndarray, g_W: np.ndarray
 ) -> np.ndarray:
-    """Returns what a hanging mass loads the sensor with, (6,) [f; tau] at So in S."""
-    f = mass * (R_WS.matrix().T @ g_W)
-    return np.concatenate([f, cross(p_SoScm_S, f)])
+    """Returns what a hanging mass loads the sensor with, (..., 6) [f; tau] in S.
+
+    Args:
+        mass: [kg].
+        p_SoScm_S: (3,) its centre of mass from So, about which the torque is [m].
+        R_WS: (..., 3, 3) orientations of the sensor.
+        g_W: (3,) gravity [m/s^2].
+    """
+    f = mass * (g_W @ R_WS)
+    return np.concatenate([f, cross(p_SoScm_S, f)], axis=-1)
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Returns a x b of two (3,) vectors; a tenth of the time of `np.cross`."""
+    """Returns a x b, (..., 3), of a (3,) and b (..., 3); faster than `np.cross`."""
     a1, a2, a3 = a
-    b1, b2, b3 = b
-    return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1])
+    b1, b2, b3 = b.T
+    return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1]).T
 
 
 def pose_to_vector(X: RigidTransform) -> np.ndarray:

@@ -1,6 +1,5 @@
 """The force/torque sensor, as the simulated stations carry it."""
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,37 +18,17 @@ from pydrake.systems.framework import (
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.spatial import wrench_from_spatial_force
 from drake_disasm.common.timing import newest_step
+from drake_disasm.devices.sensor_chain import (
+    Payload,
+    sensed_at_zeroing,
+    sensed_sample,
+)
 from drake_disasm.effects import Sensing, SensorEffect, SensorMemoryEffect
 from drake_disasm.ports import Health
 from drake_disasm.scenario import SensorConfig
 
 #: For how many effects with a memory a sensor has room.
 MOST_MEMORIES = 4
-
-
-@dataclasses.dataclass(frozen=True)
-class Payload:
-    """What is known to hang on the sensor.
-
-    Attributes:
-        mass: [kg].
-        p_SoScm_S: (3,) its centre of mass [m].
-        g_W: gravity (3,) [m/s^2].
-    """
-
-    mass: float
-    p_SoScm_S: np.ndarray
-    g_W: np.ndarray
-
-    def sensing(self, time: np.ndarray, R_WS: np.ndarray) -> Sensing:
-        """Returns the circumstances of readings.
-
-        Args:
-            time: (...,) [s].
-            R_WS: (..., 3, 3) orientations of the sensor.
-        """
-        x, y, z = self.p_SoScm_S
-        return Sensing(time, R_WS, self.g_W, self.mass, (x, y, z))
 
 
 class ForceTorqueSensor(LeafSystem):
@@ -163,9 +142,8 @@ class ForceTorqueSensor(LeafSystem):
 
         Whenever it is taken, zeroing is time 0 for the effects: the episode begins.
         """
-        effects = [e for e in self.effects(context) if e.present_at_zeroing]
-        sensing = self._sensing(context, 0.0)
-        return sensed(self.load(context), effects, sensing)
+        effects, sensing = self.effects(context), self._sensing(context, 0.0)
+        return sensed_at_zeroing(self.load(context), effects, sensing)
 
     def effects(self, context: Context) -> Sequence[SensorEffect]:
         """Returns what `set_effects` put there."""
@@ -190,7 +168,7 @@ class ForceTorqueSensor(LeafSystem):
         if np.isnan(interval):
             interval, memories = 0.0, np.full_like(memories, np.nan)
         sensing = self._sensing(context, time)
-        return through_chain(load, effects, sensing, memories, max(interval, 0.0))
+        return sensed_sample(load, effects, sensing, memories, max(interval, 0.0))
 
     def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
         if not any(isinstance(e, SensorMemoryEffect) for e in self.effects(context)):
@@ -225,47 +203,6 @@ def _refuse_too_many_memories(effects: Sequence[SensorEffect]) -> None:
             f"effects: more than {MOST_MEMORIES} of the sensor's have a memory; take "
             "some out"
         )
-
-
-def sensed(
-    load: np.ndarray, effects: Sequence[SensorEffect], sensing: Sensing
-) -> np.ndarray:
-    """Returns what a sensor with effects reads of loads, (..., 6) [f; tau] in S."""
-    for effect in effects:
-        sensing = effect.circumstances(sensing)
-        load = effect.apply(load, sensing)
-    return load
-
-
-def through_chain(
-    load: np.ndarray,
-    effects: Sequence[SensorEffect],
-    sensing: Sensing,
-    memories: np.ndarray,
-    interval: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns what a sensor with memory reads, (..., 6), and remembers, (k, ..., 6).
-
-    Args:
-        load: (..., 6) [f; tau] in S.
-        effects: in the order of the chain.
-        sensing: of the loads.
-        memories: (k, ..., 6) of the sample before, one for each effect that has one,
-            and maybe more; NaN where there was none.
-        interval: since then [s].
-    """
-    memories, number = np.array(memories), 0
-    for effect in effects:
-        sensing = effect.circumstances(sensing)
-        if isinstance(effect, SensorMemoryEffect):
-            before = memories[number]
-            before = np.where(np.isnan(before), effect.begin(load), before)
-            memories[number] = effect.remember(before, load, interval)
-            load = effect.read(load, memories[number])
-            number += 1
-        else:
-            load = effect.apply(load, sensing)
-    return load, memories
 
 
 def quantise(values: np.ndarray, quantum: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from pydrake.systems.primitives import RandomSource
 from drake_disasm.cell.coordinates import ArmCoordinates, Coordinates
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.devices.ft_sensor import Payload
+from drake_disasm.devices.sensor_chain import Payload
 from drake_disasm.effects import BoltMotion, Effect
 from drake_disasm.ports import Port
 from drake_disasm.scenario import PlacementConfig, Scenario

@@ -42,7 +42,8 @@ class Mounting:
 
     def weight(self, R_GS: RotationMatrix) -> np.ndarray:
         """Returns the payload's own load on the sensor, (6,) [f; tau] at So in S."""
-        return weight_wrench(self.mass, self.p_SoScm_S, self.R_WG @ R_GS, self.g_W)
+        R_WS = (self.R_WG @ R_GS).matrix()
+        return weight_wrench(self.mass, self.p_SoScm_S, R_WS, self.g_W)
 
 
 def contact_wrench(

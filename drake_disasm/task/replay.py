@@ -21,7 +21,7 @@ from drake_disasm.common.spatial import (
     shift_and_express,
 )
 from drake_disasm.common.timing import boundary
-from drake_disasm.devices.ft_sensor import sensed
+from drake_disasm.devices.sensor_chain import sensed
 from drake_disasm.effects import BoltMotion
 from drake_disasm.impact import ImpactConditions
 from drake_disasm.scenario import Scenario

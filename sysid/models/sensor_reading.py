@@ -9,13 +9,15 @@ from scipy.spatial.transform import Rotation
 
 from drake_disasm.cell.lock import bolt_inertia
 from drake_disasm.cell.tool import Tool
-from drake_disasm.devices.ft_sensor import Payload
-from drake_disasm.effects import SensorEffect, SensorMemoryEffect
+from drake_disasm.devices.sensor_chain import (
+    Payload,
+    sensed_along,
+    sensed_at_zeroing,
+)
+from drake_disasm.effects import SensorEffect
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.base import nominal_groove_pose
 from sysid.models.base import Array
-
-_SAMPLES = 10  # of the sensor between two states
 
 
 def at_sensor(states: Array, X_SB: RigidTransform) -> Array:
@@ -76,8 +78,8 @@ class SensorReading:
             states: of the task.
             zero: (6,) the reading at zeroing.
         """
-        weight = self._weight(self._R_WS(states))
-        at_rest = self._weight(self._R_WG[None] @ self._R_BS)[0]
+        weight = self._payload.weight(self._R_WS(states))
+        at_rest = self._payload.weight(self._R_WG[None] @ self._R_BS)[0]
         return states[:, 6:] + zero - at_rest + weight
 
     def read(
@@ -98,45 +100,11 @@ class SensorReading:
         raw = self.raw(states, zero)
         sensing = self._payload.sensing(times, self._R_WS(states))
         rest = self._payload.sensing(np.array(0.0), self._R_WG @ self._R_BS)
-        load, at_rest, seen = raw, zero, zero
-        for effect in effects:
-            sensing, rest = (effect.circumstances(each) for each in (sensing, rest))
-            if isinstance(effect, SensorMemoryEffect):
-                load = _along(effect, load, at_rest, times)
-                continue
-            load = effect.apply(load, sensing)
-            at_rest = effect.apply(at_rest, rest)
-            if effect.present_at_zeroing:
-                seen = effect.apply(seen, rest)
+        load = sensed_along(raw, effects, sensing, zero, rest)
+        seen = sensed_at_zeroing(zero, effects, rest)
         change = (load - raw) - (seen - zero)
         return np.hstack([states[:, :6], states[:, 6:] + change])
 
     def _R_WS(self, states: Array) -> Array:
         R_GB = Rotation.from_rotvec(states[:, 3:6]).as_matrix()
         return np.asarray(self._R_WG @ R_GB @ self._R_BS)
-
-    def _weight(self, R_WS: Array) -> Array:
-        """Returns what the payload loads the sensor with, (n, 6), at orientations."""
-        f = self._payload.mass * (self._payload.g_W @ R_WS)
-        return np.hstack([f, np.cross(self._payload.p_SoScm_S, f)])
-
-
-def _along(
-    effect: SensorMemoryEffect, loads: Array, at_rest: Array, times: Array
-) -> Array:
-    """Returns what an effect with a memory reads of loads (n, 6), each in its turn.
-
-    Between two of them the load goes evenly. An episode begins at rest.
-    """
-    found, previous, before = np.empty_like(loads), at_rest, 0.0
-    memory = effect.begin(at_rest)
-    for i, (load, time) in enumerate(zip(loads, times, strict=True)):
-        if time <= before:
-            memory, previous, before = effect.begin(at_rest), at_rest, 0.0
-        interval = (time - before) / _SAMPLES
-        for part in np.arange(1, _SAMPLES + 1) / _SAMPLES:
-            now = previous + part * (load - previous)
-            memory = effect.remember(memory, now, interval)
-        found[i] = effect.read(load, memory)
-        previous, before = load, time
-    return found

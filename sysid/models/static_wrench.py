@@ -9,7 +9,7 @@ from pydrake.multibody.tree import UniformGravityFieldElement
 
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.devices.ft_sensor import sensed
+from drake_disasm.devices.sensor_chain import Payload, sensed
 from drake_disasm.effects import (
     Effect,
     PayloadError,
@@ -78,9 +78,8 @@ class StaticWrenchModel(ScenarioModel):
                     "name such a log",
                 )
         self.parameters, self.scenario = tuple(parameters), scenario
-        payload = _payload(scenario) if known_payload else (0.0, np.zeros(3))
-        self._mass: float = payload[0]
-        self._p_SoScm_S: Array = payload[1]
+        nothing = Payload(0.0, np.zeros(3), _GRAVITY_W)
+        self._payload = _payload(scenario) if known_payload else nothing
         episodes = [episode for log in logs for episode in log.episodes]
         self._R_WS = np.concatenate(
             [rotation_matrices(episode["R_WS"]) for episode in episodes]
@@ -95,10 +94,7 @@ class StaticWrenchModel(ScenarioModel):
         """See LogModel."""
         effects = sensor_chain(self.scenario_at(theta).effects)
         sensing = Sensing(self._time[rows], self._R_WS[rows], _GRAVITY_W)
-        weight = self._mass * sensing.g_S
-        torque = np.cross(self._p_SoScm_S, weight)
-        load = np.concatenate([weight, torque], axis=1)
-        return sensed(load, effects, sensing)
+        return sensed(self._payload.weight(self._R_WS[rows]), effects, sensing)
 
     @property
     def noise_groups(self) -> tuple[str, ...]:
@@ -148,9 +144,9 @@ class StaticWrenchModel(ScenarioModel):
         return self.replace(_R_WS=self._R_WS[mask], _time=self._time[mask])
 
 
-def _payload(scenario: Scenario) -> tuple[float, np.ndarray]:
+def _payload(scenario: Scenario) -> Payload:
     tool = Tool.from_models(scenario)
-    return tool.mass, tool.p_SoScm_S
+    return Payload(tool.mass, tool.p_SoScm_S, _GRAVITY_W)
 
 
 def _clock(episode: Episode) -> Array:

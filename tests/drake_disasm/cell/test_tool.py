@@ -74,7 +74,9 @@ def test_wrench_is_at_the_sensing_frame_of_the_model(
     station = CellStation(load_scenario("removal", [QUIET, f"ft_sensor.model={model}"]))
     R_WS = station.X_WG.rotation() @ station.X_SB.rotation().inverse()
     g_W = np.array([0, 0, -9.81])
-    expected = weight_wrench(station.payload_mass, station.p_SoScm_S, R_WS, g_W)
+    expected = weight_wrench(
+        station.payload_mass, station.p_SoScm_S, R_WS.matrix(), g_W
+    )
     reading = station.reading_at_zeroing(station.settled([]))
     np.testing.assert_allclose(reading, expected, atol=2e-3)
 

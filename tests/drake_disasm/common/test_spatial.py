@@ -79,7 +79,7 @@ def test_weight_pulls_down_through_the_centre_of_mass(seed: int) -> None:
     generator = np.random.default_rng(seed)
     rpy, p_SoScm_S = generator.normal(size=(2, 3))
     R_WS = RollPitchYaw(rpy).ToRotationMatrix()
-    wrench = weight_wrench(2.0, p_SoScm_S, R_WS, np.array([0, 0, -9.81]))
+    wrench = weight_wrench(2.0, p_SoScm_S, R_WS.matrix(), np.array([0, 0, -9.81]))
     np.testing.assert_allclose(R_WS @ wrench[:3], [0, 0, -19.62], atol=1e-12)
     p_W = R_WS @ p_SoScm_S  # torque about z_W is none, about x and y: m g times arm
     expected = 19.62 * np.array([-p_W[1], p_W[0], 0])

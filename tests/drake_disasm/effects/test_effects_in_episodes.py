@@ -72,7 +72,7 @@ def test_payload_error_shows_once_the_sensor_turns(simulation: TaskSimulation) -
     R_WG, g_W = simulation.station.X_WG.rotation(), np.array([0, 0, -9.81])
     R_GS0 = simulation.station.X_SB.rotation().inverse()
     loads = [
-        weight_wrench(mass, first_moment / mass, R_WG @ R, g_W)
+        weight_wrench(mass, first_moment / mass, (R_WG @ R).matrix(), g_W)
         for R in (X_GS.rotation(), R_GS0)
     ]
     expected = shift_and_express(loads[0] - loads[1], X_GS)

@@ -36,7 +36,7 @@ def _reading(
     f_G, t_Bo_G = wrench_G[:3], wrench_G[3:]
     t_So_G = t_Bo_G + np.cross(-p_BoSo_G, f_G)
     R_SG = R_GS.inverse()
-    weight = weight_wrench(mounting.mass, mounting.p_SoScm_S, R_WS, G_W)
+    weight = weight_wrench(mounting.mass, mounting.p_SoScm_S, R_WS.matrix(), G_W)
     return np.concatenate([R_SG @ f_G, R_SG @ t_So_G]) + weight
 
 

@@ -35,7 +35,7 @@ ASKEW = Mounting(
 
 def _weight(mounting: Mounting, R_GB: RotationMatrix) -> np.ndarray:
     R_WS = mounting.R_WG @ R_GB @ mounting.X_SB.rotation().inverse()
-    return weight_wrench(mounting.mass, mounting.p_SoScm_S, R_WS, G_W)
+    return weight_wrench(mounting.mass, mounting.p_SoScm_S, R_WS.matrix(), G_W)
 
 
 def _observe(

@@ -1,0 +1,157 @@
+"""The chain from the load on a force/torque sensor to its reading."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from drake_disasm.common.spatial import weight_wrench
+from drake_disasm.effects import Sensing, SensorEffect, SensorMemoryEffect
+
+_SAMPLES = 10  # of the sensor between two loads of a trajectory
+
+#: Reads a load (..., 6) through the i-th effect of a chain, which has a memory.
+ReadMemory = Callable[[int, SensorMemoryEffect, np.ndarray], np.ndarray]
+
+
+@dataclasses.dataclass(frozen=True)
+class Payload:
+    """What is known to hang on the sensor.
+
+    Attributes:
+        mass: [kg].
+        p_SoScm_S: (3,) its centre of mass [m].
+        g_W: gravity (3,) [m/s^2].
+    """
+
+    mass: float
+    p_SoScm_S: np.ndarray
+    g_W: np.ndarray
+
+    def sensing(self, time: np.ndarray, R_WS: np.ndarray) -> Sensing:
+        """Returns the circumstances of readings.
+
+        Args:
+            time: (...,) [s].
+            R_WS: (..., 3, 3) orientations of the sensor.
+        """
+        x, y, z = self.p_SoScm_S
+        return Sensing(time, R_WS, self.g_W, self.mass, (x, y, z))
+
+    def weight(self, R_WS: np.ndarray) -> np.ndarray:
+        """Returns its load on the sensor, (..., 6) [f; tau] at So in S.
+
+        Args:
+            R_WS: (..., 3, 3) orientations of the sensor.
+        """
+        return weight_wrench(self.mass, self.p_SoScm_S, R_WS, self.g_W)
+
+
+def sensed(
+    load: np.ndarray,
+    effects: Sequence[SensorEffect],
+    sensing: Sensing,
+    read_memory: ReadMemory | None = None,
+) -> np.ndarray:
+    """Returns what a sensor with effects reads of loads, (..., 6) [f; tau] in S.
+
+    Args:
+        load: (..., 6) on the sensor.
+        effects: in the order of the chain.
+        sensing: of the loads.
+        read_memory: reads a load through an effect with a memory; None for what is
+            read after long rest.
+    """
+    for i, effect in enumerate(effects):
+        sensing = effect.circumstances(sensing)
+        if read_memory and isinstance(effect, SensorMemoryEffect):
+            load = read_memory(i, effect, load)
+        else:
+            load = effect.apply(load, sensing)
+    return load
+
+
+def sensed_at_zeroing(
+    load: np.ndarray, effects: Sequence[SensorEffect], sensing: Sensing
+) -> np.ndarray:
+    """Returns the reading (6,) that zeroing takes, of the load (6,) at that moment."""
+    return sensed(load, [e for e in effects if e.present_at_zeroing], sensing)
+
+
+def sensed_sample(
+    load: np.ndarray,
+    effects: Sequence[SensorEffect],
+    sensing: Sensing,
+    memories: np.ndarray,
+    interval: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns what a sensor with memory reads, (..., 6), and remembers, (k, ..., 6).
+
+    Args:
+        load: (..., 6) [f; tau] in S.
+        effects: in the order of the chain.
+        sensing: of the loads.
+        memories: (k, ..., 6) of the sample before, one for each effect that has one,
+            and maybe more; NaN where there was none.
+        interval: since then [s].
+    """
+    memories = np.array(memories)
+
+    def read(i: int, effect: SensorMemoryEffect, load: np.ndarray) -> np.ndarray:
+        """Updates the effect's memory, and reads with it."""
+        slot = sum(isinstance(e, SensorMemoryEffect) for e in effects[:i])
+        before = memories[slot]
+        before = np.where(np.isnan(before), effect.begin(load), before)
+        memories[slot] = effect.remember(before, load, interval)
+        return effect.read(load, memories[slot])
+
+    return sensed(load, effects, sensing, read), memories
+
+
+def sensed_along(
+    loads: np.ndarray,
+    effects: Sequence[SensorEffect],
+    sensing: Sensing,
+    at_rest: np.ndarray,
+    rest: Sensing,
+) -> np.ndarray:
+    """Returns what a sensor reads of loads one after the other, (n, 6) [f; tau] in S.
+
+    Args:
+        loads: (n, 6).
+        effects: in the order of the chain.
+        sensing: of the loads; its times (n,) start anew in each episode.
+        at_rest: (6,) the load before an episode begins.
+        rest: the circumstances then.
+    """
+
+    def read(i: int, effect: SensorMemoryEffect, loads: np.ndarray) -> np.ndarray:
+        """Reads all loads, from what reaches this effect at rest."""
+        times = np.asarray(sensing.time)
+        return _along(effect, loads, sensed(at_rest, effects[:i], rest), times)
+
+    return sensed(loads, effects, sensing, read)
+
+
+def _along(
+    effect: SensorMemoryEffect,
+    loads: np.ndarray,
+    at_rest: np.ndarray,
+    times: np.ndarray,
+) -> np.ndarray:
+    """Returns what an effect with a memory reads of loads (n, 6), each in its turn.
+
+    Between two of them the load changes linearly. An episode begins at rest.
+    """
+    found, previous, before = np.empty_like(loads), at_rest, 0.0
+    memory = effect.begin(at_rest)
+    for i, (load, time) in enumerate(zip(loads, times, strict=True)):
+        if time <= before:
+            memory, previous, before = effect.begin(at_rest), at_rest, 0.0
+        interval = (time - before) / _SAMPLES
+        for part in np.arange(1, _SAMPLES + 1) / _SAMPLES:
+            now = previous + part * (load - previous)
+            memory = effect.remember(memory, now, interval)
+        found[i] = effect.read(load, memory)
+        previous, before = load, time
+    return found
