@@ -135,7 +135,7 @@ def _read_file(path: Path) -> list[Request]:
         ) from None
     except yaml.YAMLError as error:
         text = " ".join(str(error).split())
-        raise DisasmError(f"{path}: not YAML ({text}); mend it") from None
+        raise DisasmError(f"{path}: not YAML ({text}); correct it") from None
     if not isinstance(raw, dict) or not raw:
         raise DisasmError(
             f"{path}: is no mapping; write lines of `contact.friction: "

@@ -58,6 +58,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     cli.add_scenario_arguments(parser)
     _add_task_arguments(parser.add_argument)
     _add_agent_arguments(parser.add_argument)
+    _add_data_arguments(parser.add_argument)
     _add_run_arguments(parser.add_argument)
     cli.add_workers_argument(parser, "; seeds at a time")
     return parser.parse_args(arguments)
@@ -97,6 +98,9 @@ def _add_agent_arguments(add: Callable[..., object]) -> None:
         help="change hyper-parameters; drake_disasm/learning/hyperparameters.py "
         "lists them with their units",
     )
+
+
+def _add_data_arguments(add: Callable[..., object]) -> None:
     add(
         "--from-logs",
         nargs="+",

@@ -117,9 +117,9 @@ class FakeCell:
         position.FixValue(self._context, self.commanded)
         self._steps += 1
         self.simulator.AdvanceTo(boundary(self._steps, self.station.control_period))
-        self.tell(heard)
+        self.send_measurements(heard)
 
-    def tell(self, heard: Callable[[], bool] = lambda: True) -> None:
+    def send_measurements(self, heard: Callable[[], bool] = lambda: True) -> None:
         """Lets a control period pass, and sends what is measured at its end."""
         self.time += self.station.control_period
         self._send_status()

@@ -19,12 +19,12 @@ _STICTION = 1e-4  # m/s: creep at which friction is three quarters
 
 @dataclasses.dataclass(frozen=True)
 class Surroundings:
-    """What may differ from state to state; m is their number, or 1 for all alike.
+    """What may differ from state to state; m is their number, or 1 for one for all.
 
     Attributes:
         friction: (m,) Coulomb coefficient.
         R_GnG, p_GnG: (m, 3, 3), (m, 3) the true groove in the nominal frame.
-        f_Gn: (m, 3) what pulls on the bolt at Bo beside the contact, in Gn [N].
+        f_Gn: (m, 3) force on the bolt at Bo other than the contact's, in Gn [N].
     """
 
     friction: np.ndarray

@@ -102,7 +102,7 @@ def read_header(folder: Path) -> LogHeader:
     try:
         raw = yaml.safe_load(data)
     except yaml.YAMLError as error:
-        raise refusal(path, f"not YAML ({error})", "mend that line") from error
+        raise refusal(path, f"not YAML ({error})", "correct that line") from error
     return parse_header(raw, str(path))
 
 

@@ -203,8 +203,8 @@ def _compared(
         ("observation.variant", trained.observation_variant, variant),
     ):
         yield name, then, now, then == now
-    alike = math.isclose(trained.period, task.period)
-    yield "task.period", trained.period, task.period, alike
+    same = math.isclose(trained.period, task.period)
+    yield "task.period", trained.period, task.period, same
     for name in ("max_translation", "max_rotation"):
         before, after = getattr(trained, name), getattr(task, name)
         yield f"task.{name}", before, after, after >= before

@@ -124,9 +124,9 @@ Propose = Callable[[Trace, Box, int, np.random.Generator], Array]
 
 
 class BeesAlgorithm:
-    """One search; everything that it is can be written to a file and taken up again.
+    """One search, whose whole state can be written to a file and resumed.
 
-    All points of a cycle are asked for in one batch, sites and scouts alike. Where
+    All points of a cycle, of sites and of scouts, are evaluated in one batch. Where
     the thesis's algorithm leaves a choice: the best site shrinks, too (line 7 read
     literally would leave it searching the whole box), but is never abandoned; an
     abandoned site is replaced by the best of its foragers sent out as scouts, so

@@ -187,5 +187,5 @@ def test_no_thread_and_no_socket_is_left() -> None:
 def test_the_driver_gets_no_command_before_it_listens() -> None:
     lcm = DrakeLcm("memq://")
     with FakeCell(load_scenario("removal"), lcm) as cell:
-        cell.tell()
+        cell.send_measurements()
         assert cell.commands == 0  # and it asserts that none comes within 0.25 s
