@@ -1,4 +1,4 @@
-"""The commands of measured episodes, and where effects on the motion take them."""
+"""Commanded motion of measured episodes, and what effects on the motion make of it."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from sysid.models.base import Array
 
 @dataclasses.dataclass(frozen=True)
 class Commands:
-    """What an arm was told in an episode of n steps.
+    """Commanded motion of an episode of n steps.
 
     Attributes:
         path: (n + 1, 6) commanded position and rotation vector of B in G [m, rad].
@@ -29,13 +29,13 @@ class Commands:
 
     @classmethod
     def of(cls, episode: Episode, period: float) -> Self:
-        """Returns those of an episode of transitions."""
+        """Returns the commands of an episode of transitions."""
         pose = episode["X_GB_commanded"]
         turn = Rotation.from_quat(pose[:, [4, 5, 6, 3]]).as_rotvec()
         return cls(np.hstack([pose[:, :3], turn]), episode["wrench"], period)
 
     def executed(self, effects: Sequence[MotionEffect]) -> Array:
-        """Returns where effects, in the chain's order, take the path (n + 1, 6)."""
+        """Returns the path (n + 1, 6) executed under effects in the chain's order."""
         path, memories = [self.path[0]], np.zeros((len(effects), 6))
         for commanded, wrench in zip(self.path[1:], self.wrench, strict=False):
             executed, memories = through_motion(

@@ -1,4 +1,4 @@
-"""The model that a kind of log asks for."""
+"""The model for each kind of log."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -24,15 +24,15 @@ OBJECTIVES = {
 
 @dataclass(frozen=True)
 class ModelChoice:
-    """What a user says of the model beside the logs.
+    """What a user chooses of the model, apart from the logs.
 
     Attributes:
         objective: one of OBJECTIVES for the kind of log; None for the default.
-        scenario: in place of what the log states; None for that.
-        requests: parameters to vary; none asks for a kind's default ones.
-        urdf: of the arm, in place of what the log states.
+        scenario: nominal; None for the one stated in the log.
+        requests: parameters to vary; none stands for the default ones of the kind.
+        urdf: of the arm; None for the one named in the log.
         coarse: whether transitions may begin in coarse time steps.
-        noise: standard deviations of channels, by name, in place of the model's.
+        noise: standard deviations of channels, by name, instead of the model's, SI.
         fixed: whether a twin may have no parameter to vary.
     """
 
@@ -74,12 +74,12 @@ def _twin(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
     scenario = choice.scenario or stated_scenario(logs)
     if scenario is None:
         raise DisasmError(
-            f"{logs[0].folder}: states no scenario; name the one that the twin "
-            "begins with by --scenario"
+            f"{logs[0].folder}: states no scenario; name the twin's nominal one by "
+            "--scenario"
         )
     if not (choice.requests or choice.fixed):
         raise DisasmError(
-            "name what the twin is to learn by --parameters, for example "
+            "no parameters to identify; name them by --parameters, for example "
             "contact.friction lock.clearance GroovePose.ry"
         )
     scenario, parameters = scenario_parameters(scenario, choice.requests)
@@ -102,7 +102,7 @@ def _joint_motion(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
 
 
 def _with_noise(model: LogModel, noise: dict[str, float]) -> LogModel:
-    """Returns the model with some channels' noise as the user says."""
+    """Returns the model with the noise of some channels as given."""
     known = [channel.name for channel in model.measurements.channels]
     for name, value in noise.items():
         if name not in known:

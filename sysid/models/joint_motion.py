@@ -25,15 +25,15 @@ from sysid.models.regressor import ArmDynamics, BaseSet, base_set
 from sysid.parameters import Parameter
 
 _NEEDED = ("q", "v", "vd", "tau")
-_REACH = 5.0  # times what a parameter would need to explain all torque alone
+_REACH = 5.0  # times the value with which a parameter alone gives all the torque
 
 
 class JointMotionModel(LogModel):
     """tau = Y(q, v, vd) beta, with beta the identifiable base parameters.
 
-    Of ten inertial parameters per link, many never show in joint torques, and
-    others only in sums. `parameters` are the sums that do show; each is named by
-    the first of its terms, and `doc` has them all. Parameters of arm effects come
+    Of ten inertial parameters per link, many have no effect on joint torques, and
+    others only in linear combinations. `parameters` are those combinations; each is
+    named by its first term, and `doc` has them all. Parameters of arm effects come
     after the base parameters.
     """
 
@@ -46,11 +46,11 @@ class JointMotionModel(LogModel):
         urdf: str | None = None,
         scenario: Scenario | None = None,
     ) -> None:
-        """Takes the motion out of the logs.
+        """Reads the motion from the logs.
 
         Args:
             logs: of joint motion, with q, v, vd and tau, of one arm.
-            urdf: the arm; by default what the first log names.
+            urdf: of the arm; by default the one named in the first log.
             scenario: whose arm effects act.
 
         Raises:
@@ -63,7 +63,9 @@ class JointMotionModel(LogModel):
         urdf = urdf or header.urdf
         if urdf is None:
             raise refusal(
-                logs[0].folder / "log.yaml", "no 'urdf'", "name the arm by --urdf FILE"
+                logs[0].folder / "log.yaml",
+                "no 'urdf'",
+                "give the arm's URDF by --urdf FILE",
             )
         arm = ArmDynamics(urdf, header.joints)
         base = base_set(arm.random_regressor())
@@ -111,7 +113,9 @@ class JointMotionModel(LogModel):
         return {word: self._motion[key][:, channel] for key, word in names.items()}
 
     def only(self, names: Sequence[str]) -> Self:
-        """Returns the same model with all but the named parameters at the URDF's.
+        """Returns the same model with all but the named parameters frozen.
+
+        They keep the URDF's values.
 
         Raises:
             DisasmError: there is no such base parameter.
@@ -121,7 +125,7 @@ class JointMotionModel(LogModel):
         for name in names:
             if name not in known:
                 raise DisasmError(
-                    f"parameter {name}: is no base parameter of this arm; "
+                    f"parameter {name}: not a base parameter of this arm; "
                     f"{closest(name, known)}"
                 )
         rest = {p.name: p.nominal for p in base if p.name not in names}
@@ -176,7 +180,9 @@ def _refuse_other_logs(
                 "name such a log",
             )
         if header.joints != logs[0].header.joints:
-            raise refusal(where, "other joints than in the first log", "fit it apart")
+            raise refusal(
+                where, "other joints than in the first log", "fit it by itself"
+            )
     for _, episode in episodes:
         for quantity in _NEEDED:
             if quantity not in episode:

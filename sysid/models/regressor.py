@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 INERTIAL = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 INERTIAL_UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
 
-_EXCITATION = 200  # random states that reveal which parameters matter
+_EXCITATION = 200  # random states, to see which parameters matter
 _RANK = 1e-8  # of the largest diagonal element
 
 
@@ -75,7 +75,7 @@ class ArmDynamics:
         return np.array([self._row(*state) for state in zip(q, v, vd, strict=True)])
 
     def random_regressor(self) -> Array:
-        """Returns Y of random states: what any motion at all could reveal."""
+        """Returns Y of random states: it excites all that motion can reveal."""
         generator = np.random.default_rng(0)
         size = (_EXCITATION, len(self._columns))
         low, high = -np.ones(size), np.ones(size)
@@ -134,7 +134,7 @@ def body_regressor(w: Array, alpha: Array, a: Array) -> Array:
 
 @dataclass(frozen=True)
 class BaseSet:
-    """The combinations of inertial parameters that motion can reveal at all.
+    """The combinations of inertial parameters that joint torques can reveal.
 
     beta = pi[independent] + K pi[dependent], and tau = Y[:, independent] beta.
 
@@ -178,7 +178,7 @@ def base_set(Y: Array) -> BaseSet:
 
 
 def _weld_root(plant: MultibodyPlant, bodies: Sequence[RigidBody]) -> None:
-    """Welds what no joint holds to the world: an arm's base."""
+    """Welds bodies that are no joint's child to the world: an arm's base."""
     joints = [plant.get_joint(i) for i in plant.GetJointIndices()]
     held = {int(joint.child_body().index()) for joint in joints}
     for body in bodies:

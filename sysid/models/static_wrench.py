@@ -26,7 +26,7 @@ from sysid.models.base import Array, ScenarioModel
 from sysid.models.measurements import Channel, Measurements
 from sysid.parameters import Parameter
 
-#: Weight, first moment and bias: all that a rigid load on an ideal sensor can do.
+#: Mass, first moment and bias: all that a rigid load on an ideal sensor can have.
 DEFAULT_PARAMETERS = tuple(
     f"{effect}.{field}"
     for effect, fields in (
@@ -56,14 +56,15 @@ class StaticWrenchModel(ScenarioModel):
         parameters: Sequence[Parameter],
         known_payload: bool = False,
     ) -> None:
-        """Takes the readings out of the logs.
+        """Reads the log's readings.
 
         Args:
             logs: of static readings.
             scenario: its sensor effects act; parameters are paths in it.
             parameters: of sensor effects.
-            known_payload: whether the scenario's tool hangs on the sensor, so that
-                PayloadError is what its data lack. Else PayloadError is all.
+            known_payload: whether the scenario's tool is mounted on the sensor, so
+                that PayloadError is the error of its data. Otherwise PayloadError is
+                the whole payload.
 
         Raises:
             DisasmError: a log is of another kind, or a parameter is of something
@@ -73,7 +74,7 @@ class StaticWrenchModel(ScenarioModel):
             if log.header.kind != "static_wrench":
                 raise refusal(
                     log.folder / "log.yaml",
-                    f"a log of kind '{log.header.kind}', readings at rest are "
+                    f"a log of kind '{log.header.kind}', static readings are "
                     "'static_wrench'",
                     "name such a log",
                 )
@@ -100,12 +101,13 @@ class StaticWrenchModel(ScenarioModel):
     def noise_groups(self) -> tuple[str, ...]:
         """Force axes share one unknown noise, torque axes another.
 
-        Estimated one by one, an axis that happens to fit well would outvote the rest.
+        Estimated one by one, an axis that happens to fit well would outweigh the
+        others.
         """
         return tuple(channel.unit for channel in self.measurements.channels)
 
     def describe(self, theta: Array) -> dict[str, tuple[float, str]]:
-        """Returns weight and centre of mass of what PayloadError stands for."""
+        """Returns weight and centre of mass of the PayloadError."""
         for effect in self.scenario_at(theta).effects:
             if isinstance(effect, PayloadError) and effect.mass != 0.0:
                 moment = {"x": effect.cx, "y": effect.cy, "z": effect.cz}
@@ -130,7 +132,7 @@ class StaticWrenchModel(ScenarioModel):
             effect = self.scenario.effects[int(number)] if head == "effects" else None
             if not isinstance(effect, SensorEffect):
                 raise DisasmError(
-                    f"parameter {parameter.name}: readings at rest do not depend on "
+                    f"parameter {parameter.name}: static readings do not depend on "
                     "it; name sensor effects, such as PayloadError.mass SensorBias.fx"
                 )
 
@@ -150,7 +152,7 @@ def _payload(scenario: Scenario) -> Payload:
 
 
 def _clock(episode: Episode) -> Array:
-    """Returns the time (rows,) since the log began [s], or the order of readings."""
+    """Returns the time (rows,) since the log began [s], or else the readings' order."""
     clock: Array = episode["time"] if "time" in episode else episode["order"]
     return clock - clock[0]
 

@@ -7,10 +7,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.cell.coordinates import BoltCoordinates
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.spatial import pose_from_vector
 from drake_disasm.effects import (
     ContactExponent,
     Effect,
@@ -20,10 +18,7 @@ from drake_disasm.effects import (
     motion_chain,
     sensor_chain,
 )
-from drake_disasm.logs import Episode, Log
-from drake_disasm.logs.refusal import refusal
-from drake_disasm.logs.transitions import observations
-from drake_disasm.mdp import STATE_NAMES
+from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.replay import Steps, TwinReplay
@@ -33,14 +28,9 @@ from sysid.models.base import (
     ScenarioModel,
     even_chunks,
 )
-from sysid.models.commands import Commands, twin_coordinates
-from sysid.models.measurements import Channel, Measurements
 from sysid.models.sensor_reading import SensorReading, at_sensor
+from sysid.models.transitions import Transitions, measured_states
 from sysid.parameters import Parameter
-
-#: How well a robot's own encoders repeat within an episode, m and rad: below its
-#: repeatability (0.1 mm, against an outside frame), above their resolution.
-POSE_NOISE = (2e-5, 1e-4)
 
 _FRICTION = "contact.friction"  # which both kinds of contact have
 _CHUNK = 32  # transitions: a tenth of a second of work
@@ -48,7 +38,7 @@ _IMPACT_CHUNK = 512  # large enough for arrays, small enough to share
 
 
 class TwinModel(ScenarioModel):
-    """The twin replays measured commands; its next states are compared.
+    """The twin replays measured commands; the states that follow are compared.
 
     Channels are the bolt's pose in G (x, y, z, u, v, w) and the processed wrench,
     taken back to the sensor's origin and axes (fx ... tz), where the noise of the
@@ -77,36 +67,24 @@ class TwinModel(ScenarioModel):
 
         Args:
             logs: of transitions.
-            scenario: what the twin is at the parameters' nominal values.
+            scenario: of the twin, at the parameters' nominal values.
             parameters: paths in that scenario.
             rollout: whether episodes are simulated whole.
-            coarse: whether a transition may begin in coarse steps (`TwinReplay`).
+            coarse: whether a transition may begin in coarse time steps
+                (`TwinReplay`).
 
         Raises:
             DisasmError: a log is of another kind or period.
         """
         self.parameters = tuple(parameters)
         self.scenario, self.rollout, self.coarse = scenario, rollout, coarse
-        tool = Tool.from_models(scenario)
-        self._X_SB = tool.X_SB
-        for log in logs:
-            _refuse_other_logs(log, scenario)
-        episodes = [episode for log in logs for episode in log.episodes]
-        period = scenario.task.period
-        self._commands = [Commands.of(e, period) for e in episodes]
-        self._readings = [at_sensor(observations(e), self._X_SB) for e in episodes]
-        self.steps = _concatenated([_steps(e, scenario) for e in episodes])
-        self._rows = np.arange(len(self.steps))
-        self.measurements = Measurements.of_logs(
-            logs,
-            _channels(scenario),
-            lambda _, episode: at_sensor(observations(episode)[1:], self._X_SB),
-        )
-        self._sensing = SensorReading(scenario, tool)
-        self._replay: TwinReplay | ImpactReplay | None = None
-        self._simulated: bytes | None = None
-        self._moved: tuple[str, Steps] | None = None
+        self._sensing = SensorReading(scenario, Tool.from_models(scenario))
+        self._transitions = Transitions.of(logs, scenario, self._sensing)
+        self.measurements = measured_states(logs, scenario, self._sensing)
         self._displacement: Array | None = None
+        self._replay: TwinReplay | ImpactReplay | None = None
+        self._replayed: bytes | None = None
+        self._executed: tuple[str, Steps] | None = None
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
@@ -122,23 +100,23 @@ class TwinModel(ScenarioModel):
             replay = self._replay_at(theta, scenario)
             steps = self._steps_of(_mean_chain(scenario)).select(rows)
             if self._displacement is not None:
-                rate = self._displacement[rows] / self.scenario.task.period
+                rate = self._displacement[rows] / self._transitions.period
                 steps = _faster(steps, rate)
-            states = at_sensor(self._states(replay, steps), self._X_SB)
+            states = at_sensor(self._states(replay, steps), self._sensing.X_SB)
         except (RuntimeError, DisasmError, ValueError) as error:
-            self._replay = self._simulated = None
+            self._replay = self._replayed = None
             text = " ".join(str(error).split())
             raise PredictionError(text) from None
         zero = np.broadcast_to(replay.reading_at_zeroing, (len(states), 6))
         return np.hstack([states, zero])
 
     def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
-        """Returns the states as the sensor's effects let them be read."""
+        """Returns the states (len(rows), 12) with the wrench read through effects."""
         effects = sensor_chain(self.scenario_at(theta).effects)
         states, zero = simulated[:, :12], simulated[0, 12:]
         if not effects:
             return states
-        times = (self.steps.index[rows] + 1) * self.scenario.task.period
+        times = (self._transitions.steps.index[rows] + 1) * self._transitions.period
         return self._sensing.read(effects, states, zero, times)
 
     @property
@@ -165,7 +143,7 @@ class TwinModel(ScenarioModel):
         return super().applicable_effects(acting)
 
     def surrogate(self) -> Self:
-        """See LogModel: IMPACT, where all parameters mean the same to it."""
+        """See LogModel: IMPACT, where it has all parameters, with the same meaning."""
         paths = [parameter.path for parameter in self.parameters]
         own = [p for p in paths if p.startswith("contact.") and p != _FRICTION]
         if self._has_impact or self.rollout or own:
@@ -181,34 +159,13 @@ class TwinModel(ScenarioModel):
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: time, place, action and force at the beginning of a step."""
-        steps, rows = self.steps, self._rows
-        before = np.concatenate([r[:-1] for r in self._readings])[rows]
-        found = {
-            "time": steps.index * self.scenario.task.period,
-            "order of steps": rows.astype(float),
-            "travel x": steps.q[:, 0],
-            "position z": steps.q[:, 2],
-            "commanded rate along x": steps.qd_rate[:, 0],
-            "commanded rate along z": steps.qd_rate[:, 2],
-        }
-        forces = {f"force along {a}_S": before[:, 6 + i] for i, a in enumerate("xyz")}
-        return found | forces
+        return self._transitions.covariates()
 
     def _steps_of(self, effects: Sequence[MotionEffect]) -> Steps:
-        """Returns the steps as effects on the motion would have them executed."""
-        if not effects:
-            return self.steps
-        if self._moved is None or self._moved[0] != repr(effects):
-            paths = [twin_coordinates(c.executed(effects)) for c in self._commands]
-            period = self.scenario.task.period
-            steps = dataclasses.replace(
-                self.steps,
-                qd=np.concatenate([p[:-1] for p in paths])[self._rows],
-                qd_rate=np.concatenate([np.diff(p, axis=0) for p in paths])[self._rows]
-                / period,
-            )
-            self._moved = (repr(effects), steps)
-        return self._moved[1]
+        """Returns the steps as effects on the motion have them executed."""
+        if self._executed is None or self._executed[0] != repr(effects):
+            self._executed = repr(effects), self._transitions.executed(effects)
+        return self._executed[1]
 
     def chunks(self) -> list[slice]:
         """See LogModel; a rollout can't be cut within an episode."""
@@ -231,16 +188,20 @@ class TwinModel(ScenarioModel):
 
     def select_rows(self, mask: NDArray[np.bool_]) -> Self:
         """See LogModel."""
-        return self.replace(steps=self.steps.select(mask), _rows=self._rows[mask])
+        displacement = self._displacement
+        return self.replace(
+            _transitions=self._transitions.select(mask),
+            _displacement=None if displacement is None else displacement[mask],
+        )
 
     def _replay_at(self, theta: Array, scenario: Scenario) -> TwinReplay | ImpactReplay:
-        """Returns the twin at parameters (p,); a change takes some 10 ms."""
+        """Returns the replay at parameters (p,); a change takes some 10 ms."""
         key = theta[self.simulated].tobytes()
         if self._replay is None:
             self._replay = self._new_replay(_environment_alone(scenario))
-        elif self._simulated != key:
+        elif self._replayed != key:
             self._replay.reconfigure(_environment_alone(scenario))
-        self._simulated = key
+        self._replayed = key
         return self._replay
 
     def _new_replay(self, scenario: Scenario) -> TwinReplay | ImpactReplay:
@@ -261,11 +222,11 @@ class TwinModel(ScenarioModel):
 
     def __getstate__(self) -> dict[str, Any]:
         """Leaves the diagram out: each worker builds its own."""
-        return self.__dict__ | {"_replay": None, "_simulated": None, "_moved": None}
+        return self.__dict__ | {"_replay": None, "_replayed": None, "_executed": None}
 
 
 def _mean_chain(scenario: Scenario) -> tuple[MotionEffect, ...]:
-    """Returns the effects on the motion that a prediction can follow."""
+    """Returns the effects on the motion that are not random, in the chain's order."""
     return tuple(e for e in motion_chain(scenario.effects) if not e.is_random)
 
 
@@ -276,71 +237,8 @@ def _faster(steps: Steps, rate: Array) -> Steps:
 
 
 def _environment_alone(scenario: Scenario) -> Scenario:
-    """Returns a scenario with those effects alone that a replay simulates."""
+    """Returns a scenario with only the effects that a replay simulates."""
     effects: list[Any] = [
         e for e in scenario.effects if isinstance(e, EnvironmentEffect)
     ]
     return dataclasses.replace(scenario, effects=effects)
-
-
-def _channels(scenario: Scenario) -> tuple[Channel, ...]:
-    units = ["m"] * 3 + ["rad"] * 3 + ["N"] * 3 + ["N m"] * 3
-    sensor = scenario.ft_sensor
-    counts = np.array(sensor.quantum) / np.sqrt(12.0)
-    wrench = np.hypot(sensor.noise, counts)
-    noise = [POSE_NOISE[0]] * 3 + [POSE_NOISE[1]] * 3 + wrench.tolist()
-    if min(noise) <= 0.0:
-        raise DisasmError(
-            "ft_sensor.noise: is zero with a zero quantum; channels are weighted by "
-            "their noise, give the sensor's"
-        )
-    origins = ["repeatability of the arm"] * 6 + ["ft_sensor.noise"] * 6
-    return tuple(
-        Channel(*row) for row in zip(STATE_NAMES, units, noise, origins, strict=True)
-    )
-
-
-def _refuse_other_logs(log: Log, scenario: Scenario) -> None:
-    where = log.folder / "log.yaml"
-    if log.header.kind != "transitions":
-        raise refusal(
-            where,
-            f"a log of kind '{log.header.kind}', the twin predicts 'transitions'",
-            "name a log that tools/simulate.py --record or the cell wrote",
-        )
-    period = log.header.period
-    if period is None or abs(period - scenario.task.period) > 1e-9:
-        raise refusal(
-            where,
-            f"period {period} s, the scenario has task.period {scenario.task.period} s",
-            "give the scenario that was recorded, or --set task.period",
-        )
-
-
-def _steps(episode: Episode, scenario: Scenario) -> Steps:
-    measured = _coordinates(episode["X_GB_measured"])
-    commanded = _coordinates(episode["X_GB_commanded"])
-    period = scenario.task.period
-    rates = np.diff(measured, axis=0) / period
-    return Steps(
-        np.arange(episode.rows - 1),
-        measured[:-1],
-        np.vstack([np.zeros((1, 6)), rates[:-1]]),
-        commanded[:-1],
-        np.diff(commanded, axis=0) / period,
-    )
-
-
-def _coordinates(poses: Array) -> Array:
-    """Returns the twin's coordinates (n, 6) of poses (n, 7)."""
-    twin = BoltCoordinates()
-    return np.array([twin.solve(pose_from_vector(p), np.zeros(6)) for p in poses])
-
-
-def _concatenated(parts: Sequence[Steps]) -> Steps:
-    return Steps(
-        *(
-            np.concatenate([getattr(part, f.name) for part in parts])
-            for f in dataclasses.fields(Steps)
-        )
-    )

@@ -127,7 +127,7 @@ def test_some_parameters_alone(urdf, tmp_path):
     np.testing.assert_allclose(
         alone.predictions(theta), model.measurements.values, atol=1e-9
     )
-    with pytest.raises(DisasmError, match="no base parameter"):
+    with pytest.raises(DisasmError, match="not a base parameter"):
         model.only(["upper.mass"])
 
 

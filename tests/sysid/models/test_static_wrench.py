@@ -79,7 +79,7 @@ def test_unknown_noise_is_one_for_forces_and_one_for_torques(tmp_path):
 
 def test_only_sensor_effects_reach_a_reading_at_rest(tmp_path):
     log = synthetic(tmp_path / "log")
-    with pytest.raises(DisasmError, match=r"contact\.friction: readings at rest"):
+    with pytest.raises(DisasmError, match=r"contact\.friction: static readings"):
         make(log, ["contact.friction"])
     with pytest.raises(DisasmError, match="--objective rollout"):
         model_of([log], ModelChoice(objective="rollout"))
