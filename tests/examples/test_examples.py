@@ -14,6 +14,7 @@ PRINTED = {
     "own_diagram": ["watch at http://", "0.20", "the bolt is held at A"],
     "own_policy": ["twin        12", "cell        12"],
     "gymnasium_sb3": ["trained for 20 steps", "outcome: ", "progress"],
+    "own_log_model": ["missing: JointCoulombFriction.pivot", "size = 0.150"],
     "hardware_station": ["step  x [mm]", "iiwa: READY", "ft_sensor: READY"],
 }
 
