@@ -10,7 +10,6 @@ declares an entry point of the group `drake_disasm.effects`:
 """
 
 import importlib
-import os
 import sys
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -18,13 +17,12 @@ from types import ModuleType
 from typing import TypeVar
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.executors import import_in_workers
 from drake_disasm.common.quantity import closest
 from drake_disasm.effects.base import Effect
 from drake_disasm.effects.definition import refuse_faulty
 
 _GROUP = "drake_disasm.effects"
-#: Names what `import_effects` has imported: worker processes inherit it.
-_VARIABLE = "DRAKE_DISASM_IMPORT"
 _REMEDY = (
     "an effect of your own must be imported before it is used: import its module, "
     "give --import FILE.py|MODULE, or declare an entry point of the group "
@@ -53,6 +51,8 @@ def register_effect(effect: _Kind) -> _Kind:
             f"{_place(other)}; rename one of them"
         )
     _effects[effect.__name__] = effect
+    if not effect.__module__.startswith("drake_disasm."):
+        import_in_workers(effect.__module__)
     return effect
 
 
@@ -80,7 +80,7 @@ def find_effect(name: str) -> type[Effect]:
 
 
 def import_effects(name: str) -> str:
-    """Imports the module that registers effects, here and in worker processes.
+    """Imports a module that registers effects; worker processes import it, too.
 
     Args:
         name: of a module, or of a Python file, whose folder joins the search path.
@@ -99,18 +99,11 @@ def import_effects(name: str) -> str:
         raise DisasmError(
             f"{name}: registers no effect; put @register_effect above the class"
         )
-    known = _imported()
-    if (entry := str(path or name)) not in known:
-        os.environ[_VARIABLE] = os.pathsep.join([*known, entry])
     return name
 
 
 def _place(effect: type[Effect]) -> str:
     return f"{effect.__module__}.{effect.__qualname__}"
-
-
-def _imported() -> list[str]:
-    return [name for name in os.environ.get(_VARIABLE, "").split(os.pathsep) if name]
 
 
 def _import_file(path: Path) -> ModuleType:
@@ -143,14 +136,12 @@ def _import_module(name: str, source: str = "") -> ModuleType:
 
 
 def _load_plugins() -> None:
-    """Imports what entry points and the parent process name, once."""
+    """Imports what entry points name, once."""
     global _plugins_are_loaded
     if _plugins_are_loaded:
         return
     _plugins_are_loaded = True  # a plugin may ask for the effects while it is imported
     try:
-        for name in _imported():
-            import_effects(name)
         for point in entry_points(group=_GROUP):
             package = point.dist.name if point.dist else "an unknown package"
             _import_module(point.module, f"entry point {point.name} of {package}")

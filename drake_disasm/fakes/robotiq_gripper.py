@@ -43,7 +43,6 @@ class FakeRobotiqGripper:
         object_at: the position where something stops the closing fingers.
         rate: how far the fingers move between two polls.
         frames: all requests, as they came.
-        connections: how many were made.
     """
 
     def __init__(self, activated: bool = True, rate: int = 255) -> None:
@@ -51,7 +50,6 @@ class FakeRobotiqGripper:
         self.object_at: int | None = None
         self.rate = rate
         self.frames: list[bytes] = []
-        self.connections = 0
         self.state = Activation.DONE if activated else Activation.RESET
         self.command = Command(activate=activated)
         self.position = 3
@@ -90,7 +88,6 @@ class FakeRobotiqGripper:
                 connection, _ = self._listener.accept()
             except TimeoutError:
                 continue
-            self.connections += 1
             with connection:
                 connection.settimeout(TICK)
                 self._talk(connection)

@@ -1,11 +1,9 @@
 """How results over seeds are reported (Agarwal et al., 2021; Wilson, 1927)."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
-
-_Z95 = 1.959963984540054  # the standard normal's 97.5 % quantile
+from scipy.stats import binomtest
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
@@ -16,11 +14,8 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
     """
     if not 0 <= successes <= trials or trials == 0:
         raise ValueError(f"{successes} of {trials} is no success rate")
-    rate, z2 = successes / trials, _Z95**2
-    centre = (rate + z2 / (2 * trials)) / (1 + z2 / trials)
-    spread = rate * (1 - rate) / trials + z2 / (4 * trials**2)
-    half = _Z95 * math.sqrt(spread) / (1 + z2 / trials)
-    return max(0.0, centre - half), min(1.0, centre + half)
+    interval = binomtest(successes, trials).proportion_ci(0.95, method="wilson")
+    return float(interval.low), float(interval.high)
 
 
 def interquartile_mean(values: np.ndarray, axis: int = 0) -> np.ndarray:

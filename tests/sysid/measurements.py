@@ -14,13 +14,12 @@ import dataclasses
 import json
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from drake_disasm.common.executors import WorkerPool
 from drake_disasm.logs import Log, read_log
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
@@ -233,8 +232,8 @@ def measure_thesis(figure: Path) -> None:
             for seed in range(5)
             for method in ("bees", "nlopt")
         ]
-        with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-            traces = list(pool.map(_thesis_run, jobs))
+        with WorkerPool(2) as pool:
+            traces = pool.map(_thesis_run, jobs)
     kept = [
         dict(zip(("setting", "method", "seed"), job[1:], strict=True)) | found
         for job, found in zip(jobs, traces, strict=True)

@@ -16,8 +16,8 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.codec_error import CodecError
 from drake_disasm.devices.robotiq import Activation, RobotiqClient, RobotiqSettings
 from drake_disasm.fakes.robotiq_gripper import FakeRobotiqGripper
-from drake_disasm.fakes.serial_line import serial_line
 from drake_disasm.ports import Health
+from tests.fakes.serial_line import serial_line
 
 OPEN = bytes.fromhex("09 10 03 E8 00 03 06 09 00 00 00 FF FF 72 19")
 RESET = bytes.fromhex("09 10 03 E8 00 03 06 00 00 00 00 00 00 73 30")

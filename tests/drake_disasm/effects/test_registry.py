@@ -1,17 +1,16 @@
 """Effects that are defined outside the package, and what is refused as one."""
 
 import dataclasses
-import multiprocessing
-import pickle
 import sys
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from drake_disasm.common import executors
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.executors import WorkerPool
 from drake_disasm.effects import (
     EnvironmentEffect,
     JointEffect,
@@ -61,7 +60,7 @@ class {name}(SensorEffect):
 def _registry(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Takes out again what a test registers and imports."""
     monkeypatch.setattr(registry, "_effects", dict(registry._effects))
-    monkeypatch.setenv("DRAKE_DISASM_IMPORT", "")
+    monkeypatch.setattr(executors, "_modules", dict(executors._modules))
     monkeypatch.setattr(sys, "path", list(sys.path))
     modules = set(sys.modules)
     yield
@@ -199,10 +198,10 @@ def test_types_that_are_text_are_understood(tmp_path: Path) -> None:
     assert type(scenario.effects[0]).__name__ == "FromText"
 
 
-def _in_worker(pickled: bytes, override: str) -> list[str]:
-    """Returns the names of a scenario's effects and of one that came by pickle."""
-    scenario = load_scenario("removal", [override])
-    both = [pickle.loads(pickled), *scenario.effects]
+def _in_worker(effect: SensorEffect) -> list[str]:
+    """Returns the names of an effect that came by pickle and of a scenario's."""
+    scenario = load_scenario("removal", ["effects=[!Spawned {fx: 0.05}]"])
+    both = [effect, *scenario.effects]
     return [f"{type(effect).__module__}.{type(effect).__name__}" for effect in both]
 
 
@@ -210,12 +209,8 @@ def test_a_spawned_worker_knows_what_was_imported(tmp_path: Path) -> None:
     """By pickle, and by name alone, from a file outside any package."""
     import_effects(_file(tmp_path, "own_spawned", _FILE.format(name="Spawned")))
     effect = find_effect("Spawned")(fx=0.01)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(1, context) as executor:
-        found = executor.submit(
-            _in_worker, pickle.dumps(effect), "effects=[!Spawned {fx: 0.05}]"
-        ).result()
-    assert found == ["own_spawned.Spawned"] * 2
+    with WorkerPool(2) as pool:
+        assert pool.map(_in_worker, [effect]) == [["own_spawned.Spawned"] * 2]
 
 
 @pytest.mark.parametrize(
