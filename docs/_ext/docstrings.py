@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 if TYPE_CHECKING:
+    from docutils import nodes
     from sphinx.application import Sphinx
 
 #: A bar outside of ``literals`` and `names`; |x| is an absolute value to us.
@@ -136,7 +137,17 @@ def _process(
         lines += quantity_table(obj)
 
 
+def _tidy(app: "Sphinx", doctree: "nodes.document") -> None:
+    """Calls attributes so, and leaves out that a class is an object."""
+    for node in list(doctree.findall()):
+        if node.tagname == "paragraph" and node.astext() == "Bases: object":
+            node.parent.remove(node)
+        elif node.tagname == "field_name" and node.astext() == "Variables":
+            node[0] = type(node[0])("Attributes")
+
+
 def setup(app: "Sphinx") -> dict[str, bool]:
-    """Registers the hook, ahead of napoleon's."""
+    """Registers the hooks; that on docstrings comes before napoleon's."""
     app.connect("autodoc-process-docstring", _process, priority=400)
+    app.connect("doctree-read", _tidy)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
