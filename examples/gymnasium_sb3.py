@@ -22,10 +22,10 @@ SCALE = np.array([0.01] * 3 + [0.1] * 3 + [10.0] * 3 + [0.5] * 3)  # m, rad, N, 
 def make_environment(station: str) -> gymnasium.Env:
     """Returns the sliding task, scaled to about [-1, 1]."""
     env = gymnasium.make(ENVIRONMENT, station=station)
-    env = gymnasium.wrappers.RescaleAction(env, -1.0, 1.0)
-    unlimited = gymnasium.spaces.Box(-np.inf, np.inf, (12,), np.float32)
+    one = np.ones(6, np.float32)
+    env = gymnasium.wrappers.RescaleAction(env, -one, one)
     return gymnasium.wrappers.TransformObservation(
-        env, lambda s: (s / SCALE).astype(np.float32), unlimited
+        env, lambda s: (s / SCALE).astype(np.float32), env.observation_space
     )
 
 

@@ -18,6 +18,7 @@ from pydrake.systems.framework import (
 )
 
 from drake_disasm.cell.lock import lift_needed
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.timing import MOTION_DELAY, POLICY_DELAY, boundary
 from drake_disasm.effects import BoltMotion, Effect, is_local
 from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
@@ -97,7 +98,16 @@ class TaskSimulation:
         self._build(scenario)
 
     def _build(self, scenario: Scenario) -> None:
-        """Makes the diagram of a scenario whose ranges are drawn, or left alone."""
+        """Makes the diagram of a scenario whose ranges are drawn, or left alone.
+
+        Raises:
+            DisasmError: the policy is a System, and part of another diagram already.
+        """
+        if isinstance(self._policy, System) and hasattr(self, "diagram"):
+            raise DisasmError(
+                f"policy {type(self._policy).__name__}: a System can't move to another "
+                "diagram; randomise effects alone, or give a callable"
+            )
         self._built = scenario
         self.bounds = action_bounds(scenario.task)
         builder = DiagramBuilder()
