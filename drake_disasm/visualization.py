@@ -129,7 +129,7 @@ class MeshcatView:
 
 
 class MeasuredView:
-    """Shows where devices say that arm and fingers are; simulates nothing.
+    """Shows arm and fingers as the devices measure them; simulates nothing.
 
     Args:
         meshcat: the server.
@@ -166,7 +166,7 @@ class MeasuredView:
 
 
 def _measured_geometry(builder: DiagramBuilder, station: Station) -> OutputPort:
-    """Returns the query port of a station's cell, where it measures itself to be."""
+    """Returns the query port of a station's cell, posed by its measurements."""
     cell = builder.AddNamedSystem("measured_cell", MeasuredCell(station.scenario))
     for port in MEASURED_PORTS:
         builder.Connect(station.GetOutputPort(port), cell.GetInputPort(port))
@@ -179,7 +179,7 @@ def _add_geometry(builder: DiagramBuilder, query: OutputPort, meshcat: Meshcat) 
 
 
 def _look_at(meshcat: Meshcat, X_WG: RigidTransform, close_up: bool) -> None:
-    """Puts the camera where arm and lock are seen, or at the groove."""
+    """Points the camera at arm and lock, or at the groove alone."""
     A = X_WG.translation()
     meshcat.SetProperty("/Background", "top_color", [0.82, 0.88, 0.94])
     meshcat.SetProperty("/Background", "bottom_color", [0.97, 0.98, 0.99])
@@ -191,7 +191,7 @@ def _look_at(meshcat: Meshcat, X_WG: RigidTransform, close_up: bool) -> None:
 
 
 class WrenchVisualizer(LeafSystem):
-    """Draws the wrench on the bolt as two arrows, and the way that Bo went.
+    """Draws the wrench on the bolt as two arrows, and the path of Bo.
 
     @system
     name: WrenchVisualizer
@@ -208,7 +208,7 @@ class WrenchVisualizer(LeafSystem):
     def __init__(self, meshcat: Meshcat, X_WG: RigidTransform) -> None:
         super().__init__()
         self._meshcat, self._X_WG = meshcat, X_WG
-        self._way: list[np.ndarray] = []
+        self._path: list[np.ndarray] = []
         self._observation = self.DeclareVectorInputPort("observation", 12)
         self._pose = self.DeclareVectorInputPort("X_GB", 7)
         self.DeclarePeriodicPublishEvent(_FRAME_PERIOD, 0.0, self._publish)
@@ -216,8 +216,8 @@ class WrenchVisualizer(LeafSystem):
             meshcat.SetObject(f"wrench/{name}", Cylinder(0.002, 1.0), color)
 
     def clear(self) -> None:
-        """Forgets the way so far."""
-        self._way = []
+        """Clears the path so far."""
+        self._path = []
         self._meshcat.Delete("path")
 
     def _publish(self, context: Context) -> EventStatus:
@@ -228,9 +228,9 @@ class WrenchVisualizer(LeafSystem):
         time = context.get_time()
         self._draw("force", p_WB, R_WG @ wrench[:3] / _NEWTONS_PER_METRE, time)
         self._draw("torque", p_WB, R_WG @ wrench[3:] / _NEWTON_METRES_PER_METRE, time)
-        self._way.append(p_WB)
-        if len(self._way) > 1:
-            self._meshcat.SetLine("path", np.array(self._way).T, 3.0, _PATH)
+        self._path.append(p_WB)
+        if len(self._path) > 1:
+            self._meshcat.SetLine("path", np.array(self._path).T, 3.0, _PATH)
         return EventStatus.Succeeded()
 
     def _draw(

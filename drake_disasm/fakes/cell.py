@@ -1,4 +1,4 @@
-"""Our simulated cell behind the devices' own protocols: a simulated stand-in.
+"""A simulated cell behind the devices' own protocols, in place of a real one.
 
 It runs in step with whoever calls `advance`, in virtual time, so that a test has the
 same trajectory each time; `tools/fake_cell.py` advances it in real time.
@@ -35,21 +35,21 @@ _ARRIVES = 0.2  # s, on a busy machine
 class FakeCell:
     """Arm, sensor and gripper of a simulated cell, as devices on the loopback.
 
-    The driver's rules hold: torques that are measured or commanded have KUKA's sign,
-    and a command within 0.25 s of the first status stops it.
+    It behaves as drake-iiwa-driver does: measured and commanded torques have KUKA's
+    sign, and a command within 0.25 s of the first status stops it.
 
     Attributes:
-        time: virtual [s]; the clock of what listens.
+        time: virtual [s]; the clock of whoever listens to the devices.
         hex, gripper: the devices behind sockets, with their faults.
         fault: of the arm's status, one of IIWA_FAULTS.
-        commands: how many the arm got.
+        commands: how many the arm has received.
         commanded: (7,) the last of them [rad]; the start before the first.
 
     Args:
-        scenario: of the simulated cell, with the effects that it hides.
+        scenario: of the simulated cell; its effects are hidden in the readings.
         lcm: over which the arm talks.
-        seed: of the sensor's noise, which begins at switching on and not with an
-            episode: the same seed gives other readings than a simulated station's.
+        seed: of the sensor's noise, which starts at power-up and not with an episode:
+            the same seed gives other readings than a simulated station's.
     """
 
     def __init__(self, scenario: Scenario, lcm: DrakeLcm, seed: int = 0) -> None:
@@ -83,7 +83,7 @@ class FakeCell:
         self.stop()
 
     def stop(self) -> None:
-        """Switches all of it off."""
+        """Switches all devices off."""
         self.hex.stop()
         self.gripper.stop()
 
@@ -92,7 +92,7 @@ class FakeCell:
         return self.time
 
     def config(self) -> HardwareConfig:
-        """Returns where it is to be found."""
+        """Returns the configuration by which a hardware station finds it."""
         config = HardwareConfig()
         config.ft_sensor = dataclasses.replace(
             config.ft_sensor, address="127.0.0.1", port=self.hex.port
@@ -103,10 +103,10 @@ class FakeCell:
         return config
 
     def advance(self, heard: Callable[[], bool] = lambda: True) -> None:
-        """Moves the cell by a control period, by the newest command; then tells.
+        """Advances the cell by a control period under the newest command; then sends.
 
-        The arm takes the command up at the end of the period, as one over a network:
-        it follows a control period later than one in the same diagram.
+        The arm receives a command at the end of the period, as over a network: it
+        follows a control period later than one in the same diagram.
 
         Args:
             heard: whether the sensor's sample has arrived; waited for, so that the
@@ -120,7 +120,7 @@ class FakeCell:
         self.send_measurements(heard)
 
     def send_measurements(self, heard: Callable[[], bool] = lambda: True) -> None:
-        """Lets a control period pass, and sends what is measured at its end."""
+        """Lets a control period pass, and sends the measurements at its end."""
         self.time += self.station.control_period
         self._send_status()
         if self.hex.started:
@@ -131,7 +131,7 @@ class FakeCell:
                 time.sleep(1e-5)
 
     def position_measured(self) -> np.ndarray:
-        """Returns where the arm truly is (7,) [rad]."""
+        """Returns the arm's true joint angles (7,) [rad]."""
         return self._evaluate("iiwa.position_measured")
 
     def _evaluate(self, port: str) -> np.ndarray:
@@ -182,19 +182,19 @@ class FakeCell:
 
 
 def in_step(cell: FakeCell, read: Callable[[], Reading]) -> Callable[[Context], None]:
-    """Returns what advances a cell whenever a diagram has stepped by a period.
+    """Returns a monitor that advances a cell with a diagram, period by period.
 
-    It is the monitor of the diagram's simulator: the cell is then one period ahead,
-    and what it sends is there when the diagram takes its next step.
+    Set it as the monitor of the diagram's simulator: the cell is then one period
+    ahead, and its messages have arrived when the diagram takes its next step.
 
     Args:
-        cell: that is advanced.
-        read: the sensor's client's, to see that a sample has arrived.
+        cell: to advance.
+        read: of the sensor's client, to detect that a sample has arrived.
     """
     period, steps = cell.station.control_period, 0
 
     def monitor(root: Context) -> None:
-        """Advances the played devices up to the simulator's time."""
+        """Advances the fake devices up to the simulator's time."""
         nonlocal steps
         while steps * period + COMMAND_DELAY / 2 < root.get_time():
             cell.advance(arrival(read))
@@ -204,6 +204,6 @@ def in_step(cell: FakeCell, read: Callable[[], Reading]) -> Callable[[Context], 
 
 
 def arrival(read: Callable[[], Reading]) -> Callable[[], bool]:
-    """Returns whether anything has come since now, good or bad."""
+    """Returns a function: whether anything, valid or not, has arrived since now."""
     before = read()
     return lambda: read() is not before

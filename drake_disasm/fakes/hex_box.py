@@ -1,4 +1,4 @@
-"""A Compute Box on the loopback, with faults to order."""
+"""An OnRobot Compute Box on the loopback, with faults on request."""
 
 import contextlib
 import socket
@@ -33,7 +33,7 @@ STATUS = 0x2
 
 
 class FakeHexBox:
-    """Listens from its construction on, and streams when its user says.
+    """Listens from its construction on, and streams when a client asks.
 
     It sends to the client that started it last, as many samples as it is given.
 
@@ -72,7 +72,7 @@ class FakeHexBox:
         self.stop()
 
     def stop(self) -> None:
-        """Falls silent, as without power; harmless twice."""
+        """Falls silent, as without power; may be called twice."""
         self._stopping.set()
         self._thread.join()
         self._client = None
@@ -81,11 +81,11 @@ class FakeHexBox:
 
     @property
     def started(self) -> bool:
-        """Whether a client has it stream."""
+        """Whether a client has requested the stream."""
         return self._started.is_set()
 
     def wait_started(self, timeout: float = 5.0) -> bool:
-        """Waits until a client has it stream [s]; returns whether one has."""
+        """Waits [s] for a client's request to stream; returns whether it came."""
         return self._started.wait(timeout)
 
     def send(self, wrench: Iterable[float]) -> None:
@@ -116,7 +116,7 @@ class FakeHexBox:
         return due
 
     def _undisturbed(self, datagram: bytes) -> list[bytes]:
-        """Returns what leaves now that this datagram is to."""
+        """Returns the datagrams to send in place of this one, by the fault."""
         if self.fault == "loss":
             return []
         if self.fault == "delay":

@@ -18,7 +18,7 @@ class FakeHardware:
 
     Attributes:
         station: talks to the devices by their own protocols.
-        cell: plays them; a simulated cell stands behind it.
+        cell: plays the devices, with a simulated cell behind them.
     """
 
     station: HardwareStation

@@ -1,4 +1,4 @@
-"""Adam as a function (Kingma & Ba, 2015), in the form that torch.optim has."""
+"""Adam as a function (Kingma & Ba, 2015), in the form of torch.optim."""
 
 from typing import Any, NamedTuple
 
@@ -10,13 +10,13 @@ _BETA1, _BETA2 = 0.9, 0.999
 
 
 class Moments(NamedTuple):
-    """Adam's memory.
+    """Adam's moments.
 
     Attributes:
         steps: () taken.
         bias: (2,) that the running means will have at the next step: 1 - beta1^t and
-            the root of 1 - beta2^t. Carried along, since inside the step's loop a
-            compiler works both powers out again and again.
+            the root of 1 - beta2^t. Stored, since compiled code would compute both
+            powers again in every iteration of the step's loop.
         first, second: running means of the gradient and its square, shaped as the
             parameters.
     """
@@ -28,7 +28,7 @@ class Moments(NamedTuple):
 
 
 def no_moments(parameters: Any) -> Moments:
-    """Returns the memory before the first step."""
+    """Returns the moments before the first step."""
     zeros = tree_map(torch.zeros_like, parameters)
     steps = torch.zeros((), dtype=torch.float64)
     return Moments(steps, _bias(steps + 1.0), zeros, zeros)
@@ -37,7 +37,7 @@ def no_moments(parameters: Any) -> Moments:
 def descend(
     parameters: Any, gradient: Any, moments: Moments, rate: float, epsilon: float
 ) -> tuple[Any, Moments]:
-    """Returns the parameters after one step down the gradient, and the new memory."""
+    """Returns the parameters after one step down the gradient, and the new moments."""
     first = tree_map(
         lambda m, g: _BETA1 * m + (1.0 - _BETA1) * g, moments.first, gradient
     )

@@ -1,4 +1,4 @@
-"""An agent: what it has learned, how it acts, how it learns."""
+"""An agent: its networks, how it explores, and its updates."""
 
 import functools
 import os
@@ -24,7 +24,7 @@ from drake_disasm.policies import Network
 
 _ACTIONS = len(ACTION_NAMES)
 _Update = Callable[[AgentState, Tensor, Tensor], tuple[AgentState, Tensor]]
-#: Small networks spend their time between the kernels: less of that, same numbers.
+#: Small networks spend most time between kernels; this saves it, with equal results.
 _OPTIONS: dict[str, str | int | bool | Callable[..., Any]] = {
     "cpp_wrapper": True,
     "size_asserts": False,
@@ -39,16 +39,16 @@ def can_compile() -> bool:
 
 
 class Agent:
-    """DDPG, TD3 or SAC, as its hyper-parameters say.
+    """DDPG, TD3 or SAC, by its hyper-parameters.
 
     Attributes:
-        state: what it has learned.
+        state: parameters of the networks, targets, and the optimiser's moments.
         updates: gradient updates done.
-        compiled: whether updates run compiled; other bits than without, same law.
+        compiled: whether updates run compiled; results differ by rounding.
 
     Args:
         config: hyper-parameters.
-        seed: of the first parameters.
+        seed: of the initial parameters.
         compiled: whether to compile, where there is a compiler.
     """
 
@@ -87,11 +87,11 @@ class Agent:
         sigma: float,
         generator: np.random.Generator,
     ) -> np.ndarray:
-        """Returns an action (6,) in [-1, 1] to try.
+        """Returns an exploring action (6,) in [-1, 1].
 
         Args:
-            output: what the network gave.
-            sigma: of the noise on the choice; SAC has its own.
+            output: of the network.
+            sigma: standard deviation of the noise on it; SAC has its own.
             generator: source of the noise.
         """
         noise = generator.standard_normal(_ACTIONS, dtype=np.float32)
@@ -105,7 +105,7 @@ class Agent:
         self.updates += 1
         with_actor = self.updates % self.config.policy_delay == 0
         batch, noise = torch.from_numpy(rows), self._noise(len(rows), generator)
-        if len(rows) != self.config.batch:  # merged draws: another number every time
+        if len(rows) != self.config.batch:  # merged draws: their number varies
             for tensor in (batch, noise):
                 torch._dynamo.mark_dynamic(tensor, 0)
         with torch.no_grad():
@@ -133,7 +133,7 @@ def _update(config: Hyperparameters, with_actor: bool, compiled: bool) -> _Updat
         return plain
     key = (repr(config), with_actor)
     if key not in _COMPILED:
-        # One graph per agent is meant; torch takes it for a fault from the eighth on.
+        # One graph per agent is intended; torch suspects a fault from the eighth on.
         torch._dynamo.config.recompile_limit = max(64, 2 * len(_COMPILED))
         _COMPILED[key] = torch.compile(plain, fullgraph=True, options=_OPTIONS)
     return _COMPILED[key]

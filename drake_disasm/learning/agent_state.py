@@ -1,4 +1,4 @@
-"""What an agent has learned so far, as plain data."""
+"""The state of an agent, as plain data."""
 
 from typing import Any, NamedTuple
 
@@ -22,7 +22,7 @@ class AgentState(NamedTuple):
         critics: networks from states and actions to values.
         target_actor, target_critics: their slow copies; SAC has no target actor.
         log_entropy: () logarithm of SAC's entropy coefficient.
-        actor_moments, critic_moments, entropy_moments: Adam's memory.
+        actor_moments, critic_moments, entropy_moments: Adam's moments.
     """
 
     actor: Layers
@@ -61,11 +61,11 @@ def make_state(config: Hyperparameters, seed: int) -> AgentState:
 
 
 def _quiet(actor: Layers, log_sigma: float) -> Layers:
-    """Returns the actor with a last layer so small that it adds next to nothing.
+    """Returns the actor with a last layer so small that its output is nearly zero.
 
     Args:
         actor: as drawn.
-        log_sigma: what SAC's log sigmas begin at.
+        log_sigma: initial value of SAC's log sigmas.
     """
     last = {name: 0.01 * value for name, value in actor[-1].items()}
     last["bias"][_ACTIONS:] += log_sigma

@@ -1,4 +1,4 @@
-"""A training's state on disk: whole, and after every episode."""
+"""A training's state on disk, written atomically after every episode."""
 
 import json
 import zipfile
@@ -32,7 +32,7 @@ def save_checkpoint(
 
 
 def load_checkpoint(path: Path, agent: Agent, replay: Replay) -> dict[str, Any]:
-    """Puts an agent and its memory back, and returns the notes.
+    """Restores an agent and its memory, and returns the notes.
 
     Raises:
         DisasmError: the file is damaged, or of another kind of agent.
@@ -45,7 +45,7 @@ def load_checkpoint(path: Path, agent: Agent, replay: Replay) -> dict[str, Any]:
 
 
 def load_agent(path: Path, agent: Agent) -> None:
-    """Gives an agent what another has learned: networks, targets, Adam's memory.
+    """Gives an agent the state of another: networks, targets, Adam's moments.
 
     Raises:
         DisasmError: the file is damaged, or of another kind of agent.
@@ -55,7 +55,7 @@ def load_agent(path: Path, agent: Agent) -> None:
 
 
 def load_memory(path: Path) -> Replay:
-    """Returns what a training remembers.
+    """Returns the replay memory of a training.
 
     Raises:
         DisasmError: the file is damaged.
@@ -74,7 +74,7 @@ def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         return arrays, json.loads(arrays["text"].tobytes())
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise DisasmError(
-            f"{path}: is no whole checkpoint ({error}); delete it to begin anew"
+            f"{path}: is not a complete checkpoint ({error}); delete it to start anew"
         ) from None
 
 
@@ -87,6 +87,6 @@ def _restore_state(path: Path, agent: Agent, arrays: dict[str, np.ndarray]) -> N
     ):
         raise DisasmError(
             f"{path}: is of an agent with other networks; resume with the "
-            "hyper-parameters that the training began with"
+            "hyper-parameters that the training was started with"
         )
     agent.state = tree_unflatten([torch.from_numpy(a) for a in found], structure)

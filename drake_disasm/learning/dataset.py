@@ -1,4 +1,4 @@
-"""Transitions of recorded episodes, as an agent remembers them."""
+"""Transitions of recorded episodes, in an agent's replay memory."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ def remember(
     action_map: ActionMap,
     config: Hyperparameters,
 ) -> None:
-    """Adds one recorded episode to a memory.
+    """Adds one recorded episode to a replay memory.
 
     The reward is computed anew from the states, so that a log of any origin and
     any reward teaches this task. An action that this agent can't choose (beyond
@@ -29,9 +29,9 @@ def remember(
         observations: (T + 1, 12) states [m, rad, N, N m].
         actions: (T, 6) un-noised actions [m, rad].
         terminated: whether the task itself ended the episode.
-        task: whose reward counts.
+        task: defines the reward.
         action_map: of the agent.
-        config: of the agent; its scales are used.
+        config: of the agent, for the scales of the state.
     """
     scaled = observations / np.array(config.observation_scale)
     states = [BoltState.from_vector(s) for s in observations]

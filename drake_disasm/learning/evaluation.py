@@ -17,13 +17,13 @@ from drake_disasm.task.simulation import TaskSimulation
 
 @dataclasses.dataclass(frozen=True)
 class Evaluation:
-    """What episodes of a policy showed.
+    """Figures of a policy over episodes.
 
     Attributes:
         episodes: run.
         successes: of them.
         success_low, success_high: Wilson's 95 % interval of the rate.
-        truly_out: episodes after which the bolt truly was out (simulation only).
+        truly_out: episodes after which the bolt was truly out (simulation only).
         performance: mean episodic reward (thesis: P).
         instability: standard deviation of the episodic reward (table 3.3).
         mean_force, mean_torque: mean over the episodes of each one's mean [N, N m].
@@ -71,12 +71,12 @@ def evaluate(
 def validate_policy(
     policy: Policy, scenario: Scenario, station: str, seeds: Sequence[int]
 ) -> "Evaluation":
-    """Returns how a policy does in a diagram of its own, away from any training."""
+    """Evaluates a policy in a diagram of its own, so that no training is affected."""
     return summed_up(evaluate(TaskSimulation(scenario, station, policy), seeds))
 
 
 def summed_up(summaries: Sequence[EpisodeSummary]) -> Evaluation:
-    """Returns the figures of at least one episode."""
+    """Returns the figures of one or more episodes."""
     rewards = np.array([s.reward for s in summaries])
     successes = sum(s.outcome is Outcome.SUCCESS for s in summaries)
     low, high = wilson_interval(successes, len(summaries))

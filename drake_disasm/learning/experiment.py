@@ -1,7 +1,7 @@
 """Several seeds of one training, in one folder.
 
 folder/
-  training.json        what is done: scenario, hyper-parameters, provenance
+  training.json        scenario, hyper-parameters, provenance
   seed_000/ ...        one training each (see run.py)
   summary.json         figures over the seeds that are finished
   learning_curve.png
@@ -26,12 +26,12 @@ from drake_disasm.scenario import Scenario, scenario_to_mapping
 
 @dataclasses.dataclass(frozen=True)
 class Experiment:
-    """What all seeds have in common.
+    """What all seeds of a training have in common.
 
     Attributes:
         scenario, station, config, compiled, threads: as in TrainingSpec.
         preset: name of the hyper-parameters that `config` started from.
-        validation: greedy episodes after each training.
+        validation: greedy episodes after each training, for its result.
         logs: folders to learn from without acting, with the hash of what is in
             them; empty to act.
         updates: gradient updates on those; 0 for one per transition.
@@ -71,7 +71,7 @@ class Experiment:
 
 
 def open_experiment(experiment: Experiment, folder: Path, resume: bool) -> Experiment:
-    """Makes the folder, or finds the same experiment in it, and returns that.
+    """Creates the folder, or finds the same experiment in it, and returns it.
 
     Raises:
         DisasmError: the folder holds something and `resume` is false, or it holds
@@ -96,7 +96,7 @@ def _with_station(found: dict[str, Any]) -> dict[str, Any]:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Returns what one of a training's files says.
+    """Returns the content of one of a training's JSON files.
 
     Raises:
         DisasmError: it can't be read.
@@ -105,12 +105,12 @@ def read_json(path: Path) -> dict[str, Any]:
         return json.loads(path.read_text())
     except (OSError, ValueError) as error:
         raise DisasmError(
-            f"{path}: can't be read ({error}); name a new folder"
+            f"{path}: can't be read ({error}); give a new folder"
         ) from None
 
 
 def write_summary(folder: Path) -> str:
-    """Writes summary and learning curve of what is finished; returns it as text."""
+    """Writes summary and learning curve of the finished seeds; returns them as text."""
     results = [read_json(path) for path in sorted(folder.glob("seed_*/result.json"))]
     if not results:
         return "no seed is finished yet"

@@ -1,8 +1,7 @@
-"""What an agent is made of: one dataclass, and the presets of the thesis.
+"""Hyper-parameters of an agent: one dataclass, and the presets of the thesis.
 
-A preset is a function of the algorithm, because DDPG, TD3 and SAC share what they
-can and differ in little (thesis, table 3.3, footnotes c and d, which name each
-other's parameters).
+A preset is a function of the algorithm, because DDPG, TD3 and SAC share most values
+and differ in few (thesis, table 3.3; its footnotes c and d are swapped).
 """
 
 import contextlib
@@ -24,7 +23,7 @@ class Hyperparameters:
     """Hyper-parameters of an agent; the defaults are DDPG's of chapter 3.
 
     The state is divided by the scales below before a network sees it, and an action
-    is the tanh output times the task's bounds; the thesis is silent on both.
+    is the tanh output times the task's bounds; the thesis states neither.
     """
 
     algorithm: str = quantity("ddpg", "", "which update", choices=ALGORITHMS)
@@ -37,7 +36,7 @@ class Hyperparameters:
     )
     updates_per_step: int = quantity(1, "1", "gradient updates", low=1, high=100)
     warmup_episodes: int = quantity(
-        0, "1", "first episodes, which are not learned from yet", low=0, high=10_000
+        0, "1", "first episodes, before updates start", low=0, high=10_000
     )
     hidden: list[int] = dataclasses.field(
         default_factory=lambda: [50, 50],
@@ -51,12 +50,14 @@ class Hyperparameters:
     replay: int = quantity(100_000, "1", "transitions kept", low=1, high=10_000_000)
     batch: int = quantity(30, "1", "transitions per update", low=1, high=100_000)
     gamma: float = quantity(0.9, "1", "discount", low=0.0, high=1.0)
-    tau: float = quantity(0.9, "1", "share of the new in the target", low=0.0, high=1.0)
+    tau: float = quantity(
+        0.9, "1", "weight of the new parameters in the targets", low=0.0, high=1.0
+    )
     policy_delay: int = quantity(
         1, "1", "critic updates per actor update", low=1, high=100
     )
     exploration: float = quantity(
-        0.003, "m", "first sigma of the action noise", low=0.0, high=0.1
+        0.003, "m", "initial sigma of the action noise", low=0.0, high=0.1
     )
     exploration_decay: float = quantity(
         0.995, "1", "of sigma, per episode", low=0.0, high=1.0
@@ -65,13 +66,17 @@ class Hyperparameters:
         0.0, "1", "TD3: sigma on the target's action", low=0.0, high=1.0
     )
     target_noise_limit: float = quantity(
-        0.0, "1", "TD3: where that noise is cut", low=0.0, high=1.0
+        0.0, "1", "TD3: bound of that noise", low=0.0, high=1.0
     )
     entropy: float = quantity(
-        0.2, "1", "SAC: entropy coefficient; first one if adapted", low=1e-6, high=100.0
+        0.2,
+        "1",
+        "SAC: entropy coefficient; the initial one if adapted",
+        low=1e-6,
+        high=100.0,
     )
     log_sigma: float = quantity(
-        -2.0, "1", "SAC: its first log sigma on a base policy", low=-20.0, high=2.0
+        -2.0, "1", "SAC: initial log sigma on a base policy", low=-20.0, high=2.0
     )
     adapt_entropy: bool = quantity(False, "", "SAC: learn it (target: -6)")
     demonstrations: float = quantity(
@@ -113,7 +118,7 @@ class Hyperparameters:
 
 
 def _variant(algorithm: str, **shared: Any) -> Hyperparameters:
-    """Returns an algorithm with what the three share."""
+    """Returns an algorithm's hyper-parameters with the shared values."""
     own: dict[str, dict[str, Any]] = {
         "ddpg": {},
         "td3": {
@@ -133,7 +138,7 @@ def _chapter3(algorithm: str) -> Hyperparameters:
 
 
 def _chapter4(algorithm: str) -> Hyperparameters:
-    """Table 4.1; 150 episodes as in the twin."""
+    """Table 4.1; 150 episodes as on the twin."""
     return _variant(
         algorithm,
         episodes=150,
@@ -147,7 +152,7 @@ def _chapter4(algorithm: str) -> Hyperparameters:
 
 
 def _chapter5(algorithm: str) -> Hyperparameters:
-    """Tables 5.1 and 5.2; what is a factor there has a level here: 100, 0.5, 0.005."""
+    """Tables 5.1 and 5.2; their factors are fixed here: 100, 0.5, 0.005."""
     return _variant(
         algorithm,
         episodes=100,
@@ -163,10 +168,10 @@ def _chapter5(algorithm: str) -> Hyperparameters:
 
 
 def _best(algorithm: str) -> Hyperparameters:
-    """What did best of all that was tried: docs/learning.md tells the whole story.
+    """The best of all that was tried; see docs/learning.md.
 
     A bounded residual on the admittance policy: it works from the first episode, and
-    the bounds keep what the agent adds, times the arm's stiffness, below the safety
+    the bounds keep the agent's correction, times the arm's stiffness, below the safety
     force. SAC with LayerNorm in the critics then learns how to press less.
     """
     own = dataclasses.asdict(_variant(algorithm)) | {

@@ -21,7 +21,7 @@ from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 
 @dataclasses.dataclass(frozen=True)
 class SeedJob:
-    """What a worker is asked for.
+    """One worker's job: the training of one seed.
 
     Attributes:
         experiment: what all seeds have in common.
@@ -44,7 +44,7 @@ def seed_jobs(
 def train_seeds(
     jobs: Sequence[SeedJob], workers: int = 1, progress: Progress = ignore_progress
 ) -> None:
-    """Trains all of them, each in a process of its own if there are several workers.
+    """Trains all seeds, each in a process of its own if there are several workers.
 
     Args:
         jobs: one for each seed.
@@ -69,7 +69,7 @@ class _Log:
         self._writer = LogWriter(job.folder / "log", header, resume=True)
 
     def write(self, number: int, recorder: EpisodeRecorder) -> None:
-        """Writes the episode, unless a killed run had come as far as this."""
+        """Writes the episode, unless a run that was killed had written it."""
         if number >= self._writer.next_number:
             self._writer.write_episode(flat_columns("transitions", recorder.columns()))
 
@@ -103,7 +103,7 @@ def train_seed(job: SeedJob, progress: Progress) -> dict[str, Any]:
 
 
 def _demonstrations(job: SeedJob) -> Replay | None:
-    """Returns what to mix into each batch: logs, or else what the start remembers."""
+    """Returns what to mix into each batch: logs, or the start's replay memory."""
     experiment = job.experiment
     shown = _memory(experiment, experiment.demonstrations)
     if shown or not (experiment.start and experiment.config.demonstrations):
@@ -112,7 +112,7 @@ def _demonstrations(job: SeedJob) -> Replay | None:
 
 
 def _memory(experiment: Experiment, folders: Collection[str]) -> Replay | None:
-    """Returns a memory that holds all transitions of some logs, if there are any."""
+    """Returns a replay memory of all transitions of some logs, if there are any."""
     task, config = experiment.scenario.task, experiment.config
     if not folders:
         return None

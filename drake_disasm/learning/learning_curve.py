@@ -1,4 +1,4 @@
-"""The figure of a training: reward and success against episodes, over seeds."""
+"""Learning curves: reward and success against episodes, over seeds."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -75,7 +75,7 @@ def _label(axes: Any) -> None:
 
 
 def _curves(values: Sequence[Sequence[float]]) -> np.ndarray:
-    """Returns (seeds, episodes), as far as all have come."""
+    """Returns (seeds, episodes), up to the shortest training."""
     length = min(len(row) for row in values)
     return np.stack([moving_mean(row[:length], _WINDOW) for row in values])
 

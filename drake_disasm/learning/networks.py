@@ -26,7 +26,7 @@ Critics = tuple[Layers, ...]
 def make_layers(
     sizes: Sequence[int], generator: torch.Generator, layer_norm: bool = False
 ) -> Layers:
-    """Returns freshly drawn parameters, in the way of torch.nn.Linear.
+    """Returns newly drawn parameters, distributed as torch.nn.Linear's.
 
     Args:
         sizes: of input, hidden layers and output.
@@ -62,6 +62,6 @@ def q_value(critic: Layers, observation: Tensor, action: Tensor) -> Tensor:
 
 
 def least_q(critics: Sequence[Layers], observation: Tensor, action: Tensor) -> Tensor:
-    """Returns the least of the critics' values (n,)."""
+    """Returns the minimum of the critics' values (n,)."""
     values = [q_value(critic, observation, action) for critic in critics]
     return torch.stack(values).amin(dim=0)

@@ -1,4 +1,4 @@
-"""Transitions: their layout in one table, and the memory that is sampled from."""
+"""Transitions: their layout as rows of one table, and the replay memory."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ _STATES, _ACTIONS = len(STATE_NAMES), len(ACTION_NAMES)
 #: Numbers in one transition; the last is its weight in a batch.
 WIDTH = 2 * _STATES + _ACTIONS + 3
 # A row drawn twice is computed once, with twice the weight: the same gradient on fewer
-# rows. It pays where matrix products rule, and costs a look through the draws.
+# rows. It pays where matrix products dominate, and costs a search for equal draws.
 _MERGED_FROM = 1000  # rows of a batch
 _MERGED_OUT_OF = 64  # rows of the memory
 
@@ -57,7 +57,7 @@ class Replay:
         size: transitions held.
 
     Args:
-        capacity: transitions kept; the oldest gives way.
+        capacity: transitions kept; a new one then replaces the oldest.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -102,7 +102,7 @@ class Replay:
         return self._rows[: self.size], self._next
 
     def restore(self, rows: np.ndarray, following: int) -> None:
-        """Takes up what `contents` gave.
+        """Restores the result of `contents`.
 
         Raises:
             DisasmError: the rows don't fit in here.
@@ -110,7 +110,7 @@ class Replay:
         if len(rows) > len(self._rows) or rows.shape[1:] != (WIDTH,):
             raise DisasmError(
                 f"a memory of {rows.shape} does not fit one of {self._rows.shape}; "
-                "resume with the hyper-parameters that the training began with"
+                "resume with the hyper-parameters that the training was started with"
             )
         self.size, self._next = len(rows), following
         self._rows[: self.size] = rows

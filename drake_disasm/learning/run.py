@@ -1,11 +1,11 @@
 """One seed's training in a folder: checkpoint, log, policy, result.
 
 folder/
-  checkpoint.npz   after every episode; what a resumed run goes on from
+  checkpoint.npz   written after every episode; a resumed run continues from it
   log/             every episode (the caller's writer)
   episodes.csv     one row per episode
-  policy.npz       what was learned
-  result.json      its figures and its validation; there once all is done
+  policy.npz       the trained policy
+  result.json      its figures and its validation; written last
 """
 
 import contextlib
@@ -30,11 +30,11 @@ from drake_disasm.task.episode import EpisodeSummary
 from drake_disasm.task.recording import EpisodeRecorder
 
 _SHOWN = 20  # latest episodes over which progress is averaged
-_PATIENCE = 10.0  # s that a killed run's workers have to notice
+_PATIENCE = 10.0  # s until the workers of a killed run have noticed
 
 
 class EpisodeLog(Protocol):
-    """What takes the rows of each episode."""
+    """Writes the rows of each episode."""
 
     def write(self, number: int, recorder: EpisodeRecorder) -> None:
         """Writes episode `number`, if it is not there yet."""
@@ -48,21 +48,21 @@ def run_training(
     validation: int,
     progress: Progress,
 ) -> dict[str, Any]:
-    """Trains to the end, from the folder's checkpoint if there is one.
+    """Trains to the end, continuing from the folder's checkpoint if there is one.
 
     Args:
         training: fresh.
         folder: of this seed.
-        log: takes each episode before its checkpoint is written.
+        log: gets each episode before its checkpoint is written.
         provenance: where the policy is from.
         validation: greedy episodes at the end.
         progress: called after each episode.
 
     Returns:
-        What `result.json` says.
+        The content of `result.json`.
 
     Raises:
-        DisasmError: somebody else is training in the folder; a damaged checkpoint.
+        DisasmError: another program is training in the folder; a damaged checkpoint.
     """
     make_folder(folder)
     with _locked(folder):
@@ -124,7 +124,7 @@ def learn_offline(
 def finish(
     training: Training, folder: Path, provenance: dict[str, Any], validation: int
 ) -> dict[str, Any]:
-    """Validates what was learned, and writes policy, episodes and result."""
+    """Validates the trained policy, and writes policy, episodes and result."""
     spec = training.spec
     seeds = [seed_for(spec.seed, Purpose.VALIDATION, i) for i in range(validation)]
     policy = trained_policy(training, provenance)
@@ -145,7 +145,7 @@ def finish(
 
 
 def _figures(summaries: list[EpisodeSummary]) -> dict[str, Any]:
-    """Returns what the training itself showed; nothing of it for a dataset's."""
+    """Returns the figures of the training itself; none for an offline one."""
     if not summaries:
         return {}
     won = [i for i, s in enumerate(summaries, 1) if s.outcome is Outcome.SUCCESS]
@@ -194,7 +194,7 @@ def _locked(folder: Path) -> Iterator[None]:
             if time.monotonic() > until:
                 raise DisasmError(
                     f"{folder}: another program is training there; wait for it, or "
-                    "name another folder"
+                    "give another folder"
                 )
             time.sleep(0.1)
         yield

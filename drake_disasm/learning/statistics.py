@@ -1,4 +1,4 @@
-"""How results over seeds are reported (Agarwal et al., 2021; Wilson, 1927)."""
+"""Statistics of results over seeds (Agarwal et al., 2021; Wilson, 1927)."""
 
 from collections.abc import Sequence
 

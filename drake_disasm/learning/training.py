@@ -1,8 +1,8 @@
-"""Learning by trial and error, or from a dataset alone, one seed at a time.
+"""Reinforcement learning, online or from a dataset alone, one seed at a time.
 
-Everything that is drawn at random in episode e of seed s comes from
-`SeedSequence([s, purpose, e])`, so an episode depends on the checkpoint before it and
-on nothing else: a resumed training goes on bit for bit.
+All random numbers of episode e of seed s come from `SeedSequence([s, purpose, e])`, so
+an episode depends on the checkpoint before it alone: a resumed training continues bit
+for bit.
 """
 
 import contextlib
@@ -34,7 +34,7 @@ from drake_disasm.task.recording import EpisodeRecorder
 
 
 class Purpose(enum.IntEnum):
-    """What random numbers are for."""
+    """What random numbers are used for."""
 
     PARAMETERS = 0
     EPISODE = 1
@@ -51,7 +51,7 @@ def seed_for(seed: int, purpose: Purpose, number: int = 0) -> int:
 
 @dataclasses.dataclass(frozen=True)
 class TrainingSpec:
-    """What a training is; two of the same give the same bits on one machine.
+    """What defines a training; equal ones give the same bits on one machine.
 
     Attributes:
         scenario: the task.
@@ -59,7 +59,7 @@ class TrainingSpec:
         config: hyper-parameters.
         seed: of everything.
         compiled: whether updates run compiled.
-        threads: of torch; with more than one, sums come in another order.
+        threads: of torch; with more than one, the order of sums varies.
     """
 
     scenario: Scenario
@@ -71,19 +71,19 @@ class TrainingSpec:
 
 
 class Training:
-    """One agent that learns on one environment.
+    """One agent that is trained on one environment.
 
     Attributes:
         agent: the learner.
-        replay: its memory.
+        replay: its replay memory.
         summaries: of the episodes done.
         rounds: done on a dataset.
-        seconds: spent in "simulation", "updates" and "saving", over all resumptions.
+        seconds: spent in "simulation", "updates" and "saving", resumed runs included.
 
     Args:
-        spec: what to do.
+        spec: of the training.
         demonstrations: transitions to mix into each batch, or None.
-        dataset: transitions to learn from without acting, or None.
+        dataset: transitions for offline training, or None.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class Training:
         if config.demonstrations and not (demonstrations and demonstrations.size):
             raise DisasmError(
                 f"demonstrations: {config.demonstrations:g} of each batch are to come "
-                "from logs; name some by --demonstrations DIR"
+                "from logs; give some by --demonstrations DIR"
             )
         self.env = DisassemblyEnv(spec.scenario, spec.station)
         self.agent = Agent(
@@ -114,9 +114,9 @@ class Training:
         self._observation = np.zeros(12)
 
     def start_from(self, path: Path) -> None:
-        """Begins with what another training's agent has learned, memory empty.
+        """Starts from another training's agent, with an empty replay memory.
 
-        What was remembered there is not taken along: it is true of another model.
+        Its transitions are not taken over: they are of another station or scenario.
 
         Raises:
             DisasmError: the checkpoint is damaged or of another agent.
@@ -124,7 +124,7 @@ class Training:
         load_agent(path, self.agent)
 
     def restore(self, path: Path) -> None:
-        """Goes on from a checkpoint.
+        """Restores a checkpoint.
 
         Raises:
             DisasmError: it is damaged or of another agent.
@@ -134,7 +134,7 @@ class Training:
         self.rounds, self.seconds = notes["rounds"], notes["seconds"]
 
     def save(self, path: Path) -> None:
-        """Writes a checkpoint from which `restore` goes on bit for bit."""
+        """Writes a checkpoint, from which training continues bit for bit."""
         notes = {
             "episodes": [dataclasses.asdict(s) for s in self.summaries],
             "rounds": self.rounds,
@@ -144,11 +144,11 @@ class Training:
             save_checkpoint(path, self.agent, self._own_memory(), notes)
 
     def _own_memory(self) -> Replay:
-        """Returns what a checkpoint is to hold; a dataset is on disk already."""
+        """Returns the memory that a checkpoint holds; a dataset is on disk already."""
         return self.replay if self._acts else Replay(1)
 
     def run_episode(self) -> tuple[EpisodeSummary, EpisodeRecorder]:
-        """Plays one episode, and learns as the schedule says."""
+        """Runs one episode, with updates by the schedule."""
         config, number = self.spec.config, len(self.summaries)
         learning = number >= config.warmup_episodes
         every_step = learning and config.schedule == "every_step"
@@ -177,7 +177,7 @@ class Training:
     def _step(
         self, explorer: "_Explorer", summary: EpisodeSummary, recorder: EpisodeRecorder
     ) -> None:
-        """Takes one exploring step and remembers it."""
+        """Takes one exploring step and stores its transition."""
         with self._clock("simulation"):
             before = self._observation
             scaled = (before / self._scale).astype(np.float32)
@@ -192,7 +192,7 @@ class Training:
             summary.add(self.env.result)
 
     def run_round(self, updates: int) -> None:
-        """Does updates on what the memory holds, without acting (thesis 3.4.2)."""
+        """Does updates on the replay memory, without acting (thesis 3.4.2)."""
         self._learn(updates, self._generator(Purpose.UPDATES, self.rounds))
         self.rounds += 1
 
@@ -212,8 +212,8 @@ class Training:
     def _explorer(self, number: int) -> "_Explorer":
         """Returns how episode `number` explores.
 
-        The hyper-parameter is in metres of an agent that has the task's whole range;
-        rotations, and a residual's smaller range, go in proportion.
+        The hyper-parameter is in metres, for an agent with the task's whole range of
+        actions; for rotations, and a residual's smaller range, it is scaled.
         """
         config, task = self.spec.config, self.spec.scenario.task
         sigma = config.exploration * config.exploration_decay**number
@@ -232,7 +232,7 @@ class Training:
 
 @dataclasses.dataclass
 class _Explorer:
-    """How an episode is explored: the actor, noise on its choice, and its source."""
+    """How an episode is explored: the actor, and the noise on its output."""
 
     network: Network
     sigma: float
@@ -240,7 +240,7 @@ class _Explorer:
 
 
 def action_map(scenario: Scenario, config: Hyperparameters) -> ActionMap:
-    """Returns how an agent's tanh output becomes an action on a task."""
+    """Returns the map from an agent's tanh output to an action of a task."""
     scale = action_bounds(scenario.task) * np.array(config.residual)
     return ActionMap(scale, make_policy(config.base) if config.base else None)
 

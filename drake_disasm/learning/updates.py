@@ -45,7 +45,7 @@ def update_deterministic(
         rows: (n, WIDTH) transitions.
         noise: (n, 6) standard normal, for the target's action.
         config: rates, discount and the like.
-        with_actor: whether actor and targets move, too (every `policy_delay`).
+        with_actor: whether actor and targets are updated, too (every `policy_delay`).
     """
     batch = split(rows)
     limit = config.target_noise_limit
@@ -58,7 +58,7 @@ def update_deterministic(
         return state, loss
 
     def actor_loss(actor: Layers) -> Tensor:
-        """Minus the value of what the actor would do."""
+        """Returns minus the value of the actor's actions."""
         chosen = torch.tanh(evaluate(actor, batch.observation))
         value = q_value(state.critics[0], batch.observation, chosen)
         return -(batch.weight * value).sum()
@@ -80,7 +80,7 @@ def update_soft(
         state, rows, config: as in `update_deterministic`.
         noise: (n, 12) standard normal: for the actions at the states, then for
             those at the next states.
-        with_actor: whether actor and entropy coefficient move, too.
+        with_actor: whether actor and entropy coefficient are updated, too.
     """
     batch = split(rows)
     now, then = noise[:, :6], noise[:, 6:]
@@ -91,7 +91,7 @@ def update_soft(
     if with_actor:
 
         def actor_loss(actor: Layers) -> _LossAndDensity:
-            """Minus value and entropy of what the actor would do; mean log density."""
+            """Returns minus value and entropy of the actions; mean log density."""
             chosen, density = sample_action(actor, batch.observation, now)
             q = least_q(state.critics, batch.observation, chosen)
             loss = entropy * density - q
@@ -137,7 +137,7 @@ def _fit_critics(
     y = batch.reward + config.gamma * (1.0 - batch.terminated) * next_value
 
     def loss(critics: Critics) -> Tensor:
-        """Their mean squared error."""
+        """Returns their mean squared error."""
         errors = [q_value(c, batch.observation, batch.action) - y for c in critics]
         squares = torch.stack(errors).square()
         return factor * (batch.weight * squares).sum()

@@ -1,10 +1,10 @@
-"""Going on elsewhere with what was learned: from twin to cell, from ψ to ψ.
+"""Starting a training from another one: from twin to cell, from ψ to ψ.
 
 A training that starts from another takes over its agent (networks, targets, Adam's
-moments), seed by seed. Its own memory is empty, its exploration begins anew. What was
-remembered there can be rehearsed: with the hyper-parameter `demonstrations` that share
-of each batch comes from it (half and half: Ball et al., 2023, RLPD). Both must mean
-the same by what the networks read and give.
+moments), seed by seed. Its own replay memory is empty, its exploration starts anew.
+The other's transitions can be rehearsed: with the hyper-parameter `demonstrations`
+that share of each batch comes from them (half and half: Ball et al., 2023, RLPD). The
+networks' inputs and outputs must mean the same in both.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ _TASK = ("period", "max_translation", "max_rotation")
 
 
 def start_checkpoint(folder: Path | str, seed: int) -> Path:
-    """Returns where a training keeps what one seed has learned."""
+    """Returns the path of the checkpoint of one seed of a training."""
     return Path(folder) / f"seed_{seed:03d}" / "checkpoint.npz"
 
 
@@ -32,11 +32,11 @@ def start_hash(folder: Path | str, seed: int) -> str:
 
 
 def check_start(experiment: Experiment, seeds: Sequence[int]) -> None:
-    """Refuses an experiment that can't go on from its start.
+    """Refuses an experiment that can't start from the training that it names.
 
     Raises:
-        DisasmError: the start lacks a seed or has not finished it, or its agent reads
-            or gives something else; names the first difference.
+        DisasmError: the start lacks a seed or has not finished it, or its networks
+            have other inputs or outputs; names the first difference.
     """
     for seed in seeds:
         if (
@@ -46,21 +46,21 @@ def check_start(experiment: Experiment, seeds: Sequence[int]) -> None:
         ):
             raise DisasmError(
                 f"{experiment.start}: has not finished seed {seed}; train it there "
-                "first (tools/train.py), or name another folder"
+                "first (tools/train.py), or give another folder"
             )
     before = read_json(Path(experiment.start) / "training.json")
     for name, then, now in _compared(before, experiment.to_mapping()):
         if then != now:
             raise DisasmError(
-                f"{experiment.start}: was trained with {name} {then}, not {now}; go on "
-                "with the same"
+                f"{experiment.start}: was trained with {name} {then}, not {now}; use "
+                "the same"
             )
 
 
 def _compared(
     before: dict[str, Any], after: dict[str, Any]
 ) -> Iterator[tuple[str, Any, Any]]:
-    """Yields what an agent's networks depend on: name, then, now."""
+    """Yields what an agent's networks depend on: name, value then, value now."""
     for name in (*_NETWORKS, *_ACTIONS, *_SCALES):
         yield name, before["config"][name], after["config"][name]
     old, new = before["scenario"], after["scenario"]

@@ -1,4 +1,4 @@
-"""Named arrays and a text in one .npz: no pickle, nothing damaged goes unnoticed."""
+"""Named arrays and a text in one .npz: no pickle, and damage is always detected."""
 
 import hashlib
 import io
@@ -12,13 +12,13 @@ from drake_disasm.common.errors import DisasmError
 
 Arrays = dict[str, np.ndarray]
 
-AGAIN = "copy it again, or train anew (tools/train.py)"
+AGAIN = "copy it again, or train it again (tools/train.py)"
 _OURS = "give one that tools/train.py wrote"
 _STAMP = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can say
 
 
 def pack(arrays: Arrays, text: dict[str, Any]) -> bytes:
-    """Returns an .npz of arrays and plain data; the same give the same bytes."""
+    """Returns an .npz of arrays and plain data; equal input gives equal bytes."""
     plain = json.dumps(text, sort_keys=True).encode()
     content = arrays | {"text": np.frombuffer(plain, dtype=np.uint8)}
     digest = np.frombuffer(_checksum(content), dtype=np.uint8)
@@ -26,10 +26,10 @@ def pack(arrays: Arrays, text: dict[str, Any]) -> bytes:
 
 
 def unpack(data: bytes) -> tuple[Arrays, dict[str, Any]]:
-    """Returns the arrays and the text of what `pack` gave.
+    """Returns the arrays and the text that were packed.
 
     Raises:
-        DisasmError: not such a file, or its content is not as it was.
+        DisasmError: not such a file, or its content has changed.
     """
     if not data.startswith(b"PK"):
         raise DisasmError(f"is no .npz file; {_OURS}")

@@ -1,10 +1,10 @@
-"""A policy with noise on its actions, for logs that show more of the contact."""
+"""A policy with noise on its actions, so that logs excite the contact more."""
 
 from collections.abc import Callable
 
 import numpy as np
 
-_STREAM = 0x4558504C  # apart from those of sensor noise and imprecision
+_STREAM = 0x4558504C  # separates it from sensor noise and imprecision
 _TURN = np.deg2rad(0.1) / 1e-3  # rad of rotation noise per m of translation noise
 
 
@@ -13,9 +13,10 @@ class Exploring:
 
     Args:
         policy: from observation (12,) to action (6,).
-        deviation: of the translations [m]; rotations get a tenth of a degree per mm.
+        deviation: standard deviation on translations [m]; rotations get 0.1 degrees
+            per mm.
         seed: of the first episode; the next ones count on, so that an interrupted
-            recording goes on with the same noise.
+            recording continues with the same noise.
     """
 
     def __init__(

@@ -18,7 +18,7 @@ from drake_disasm.scenario import Scenario
 class Network:
     """A multilayer perceptron with ReLU in the hidden layers and a linear output.
 
-    It reuses its working memory from call to call: one network, one thread.
+    It reuses its working memory from call to call, so use it in one thread only.
 
     Attributes:
         weights: (out, in) float32 of each layer; not to be changed after a call.
@@ -47,7 +47,7 @@ class Network:
 
 
 class _Memory:
-    """What a network computes with, made once.
+    """A network's working memory, allocated once.
 
     Biases are a further column of the weights and each layer's input ends in a 1, so
     that a layer is one product. Zeros of the right size spare `maximum` a conversion.
@@ -67,10 +67,10 @@ class _Memory:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ActionMap:
-    """How an agent's choice in [-1, 1] becomes an action, and back.
+    """Maps an agent's output in [-1, 1] to an action, and back.
 
     a = scale * chosen, plus the base policy's action where there is one: then the
-    agent only corrects a policy that works, by no more than `action_scale` (bounded
+    agent only corrects a policy that works, by at most `action_scale` (bounded
     residual; Johannink et al., 2019). Whoever asks the policy clips to the task's
     bounds (`systems.policy.ask`).
 
@@ -109,7 +109,7 @@ class ActionMap:
 
 @dataclasses.dataclass(frozen=True)
 class PolicyDescription:
-    """What a policy was trained for, and where it is from; the dicts as JSON has them.
+    """What a policy was trained for, and its provenance; the dicts as JSON has them.
 
     Attributes:
         agent: "ddpg", "td3" or "sac".
@@ -117,7 +117,7 @@ class PolicyDescription:
         hyperparameters: all of them.
         scenario_hash: of the scenario that it was trained on.
         station: "twin" or "cell", on which it was trained.
-        state_names, action_names: what goes in and out, in order.
+        state_names, action_names: inputs and outputs, in order.
         observation_variant: of the scenario that it was trained on.
         period: of the MDP [s].
         max_translation, max_rotation: bounds of the action [m, rad].
@@ -174,10 +174,10 @@ class LearnedPolicy:
         return self.action_map.to_action(observation, chosen)
 
     def check_fits(self, scenario: Scenario) -> None:
-        """Refuses a task on which this policy would mistake what it sees or does.
+        """Refuses a task whose observations or actions differ from the policy's.
 
-        Another lock, friction or effect is fine: carrying a policy over to those is
-        what it is for. So are wider bounds, which it won't use.
+        Another lock, friction or effect is accepted: transfer to those is the purpose.
+        So are wider bounds, which it does not use.
 
         Raises:
             DisasmError: names what differs, and the remedy.
@@ -195,7 +195,7 @@ class LearnedPolicy:
 def _compared(
     trained: PolicyDescription, scenario: Scenario
 ) -> Iterator[tuple[str, Any, Any, bool]]:
-    """Yields what a policy depends on: name, then, now, whether they go together."""
+    """Yields what a policy depends on: name, value then, value now, if they fit."""
     task, variant = scenario.task, scenario.observation.variant
     for name, then, now in (
         ("state", trained.state_names, STATE_NAMES),

@@ -10,7 +10,7 @@ from drake_disasm.common.quantity import closest
 
 @dataclasses.dataclass(frozen=True)
 class Straight:
-    """Always moves along +x, whatever it feels.
+    """Always moves along +x, whatever the wrench.
 
     Attributes:
         speed: per step [m].
@@ -29,15 +29,15 @@ class Admittance:
 
     A Cartesian admittance per step (Hogan 1985): a = C (w_push + w), where w is
     the measured wrench on the bolt and C its compliance per step. Along x it pushes
-    with a bounded force, so it slows down as resistance grows and stands still
-    against a stop; then, and while it is being lifted, it pushes upwards instead.
-    It knows neither the groove's direction nor where it ends.
+    with a bounded force, so it slows down as resistance grows and stops at a stop;
+    then, and while the bolt is being lifted, it pushes upwards instead. It knows
+    neither the groove's direction nor where it ends.
 
     Attributes:
         speed: greatest step along x [m].
-        push: force at which it stands still along x [N].
+        push: resistance at which the motion along x stops [N].
         stop: resistance along x that counts as the end of the groove [N].
-        lift: force at which it stands still along y [N].
+        lift: resistance at which the motion along y stops [N].
         lift_speed: greatest step along y [m].
         lifted: rise from which on it keeps lifting [m].
         yield_compliance: step per force across the motion [m/N]. Times the arm's
@@ -71,7 +71,7 @@ class Admittance:
         return np.concatenate([move, turn])
 
 
-#: The policies that can be named.
+#: The scripted policies, by name.
 SCRIPTED: dict[str, type[Straight] | type[Admittance]] = {
     "straight": Straight,
     "admittance": Admittance,

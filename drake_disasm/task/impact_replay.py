@@ -22,12 +22,12 @@ from drake_disasm.task.replay import ReplayDiagram, Steps, coarse_step
 
 
 class ImpactReplay:
-    """What `TwinReplay.transitions` says of a scenario with IMPACT, faster.
+    """Computes `TwinReplay.transitions` for a scenario with IMPACT contact, faster.
 
     The diagram stays the reference: it holds the parameters, zeroes the sensor and
-    processes observations; only the steps themselves are taken here, by the equation
-    with which the diagram's `ImpactContact` foresees them. What that leaves out (the
-    change of inertia with the angles, Coriolis forces) is far below the sensor's noise.
+    processes observations; only the steps themselves are computed here, by the equation
+    with which the diagram's `ImpactContact` predicts them. What it neglects (the change
+    of inertia with the angles, Coriolis forces) is far below the sensor's noise.
 
     Args:
         scenario: what the twin is, `contact.model` being impact.
@@ -67,7 +67,7 @@ class ImpactReplay:
         """See TwinReplay.
 
         Raises:
-            RuntimeError: no force balances a step.
+            RuntimeError: the contact equations of a step have no solution.
         """
         conditions = self._conditions(steps)
         q, v, qd = steps.q, steps.v, steps.qd
@@ -84,7 +84,7 @@ class ImpactReplay:
         return np.array([self._diagram.observed(*row) for row in rows])
 
     def _conditions(self, steps: Steps) -> ImpactConditions:
-        """Returns what the contact depends on, step by step if an effect asks so."""
+        """Returns the contact's conditions, per step where an effect is local."""
         conditions, effects = self._diagram.impact_conditions(), self._scenario.effects
         if not is_local(effects):
             return conditions
@@ -106,7 +106,7 @@ class ImpactReplay:
     def _loads(
         self, q: np.ndarray, vdot: np.ndarray, contact: np.ndarray
     ) -> np.ndarray:
-        """Returns what the bolt loads the sensor with, (n, 6) [f; tau] at Bo in Gn.
+        """Returns the bolt's load on the sensor, (n, 6) [f; tau] at Bo in Gn.
 
         Newton's and Euler's laws for the bolt, without products of velocities.
 

@@ -1,8 +1,8 @@
 """The twin driven open loop: from a measured state, through a measured command.
 
-Arm, gripper and sensor together are a damped spring that forgets in some 11 ms how it
-was moved. So a step of 100 ms, of which only the end is compared, needs its last part
-alone in fine steps: `TwinReplay` can take the rest in coarse ones, at half the time
+Arm, gripper and sensor together act as a damped spring, whose transients decay within
+some 11 ms. Of a step of 100 ms only the end is compared, so only its last part needs
+fine time steps: `TwinReplay` can simulate the rest with coarse ones, in half the time
 (docs/identification.md has the figures).
 """
 
@@ -28,7 +28,7 @@ from drake_disasm.scenario import Scenario
 from drake_disasm.stations import TwinStation
 from drake_disasm.task.diagram import add_motion, add_observation
 
-#: Coordinates, their rates and the commanded ones, each (6,).
+#: Coordinates, their rates and the commanded coordinates, each (6,).
 _State = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 _COARSE = 0.02  # s, what validity allows at most
@@ -68,13 +68,13 @@ class Steps:
 
 
 class TwinReplay:
-    """Simulates measured steps of the task, each from a state that is given.
+    """Simulates measured steps of the task, each from a given state.
 
-    It is the task's diagram without policy, reward and imprecision, and without
-    sensor noise: what a noise-free sensor would read. Of the scenario's effects, those
-    on the environment act, and those on the sensor that have no memory; effects on
-    the motion are to be in the steps' commands. Motion is Drake's own; Python is
-    called once a step, at its end. `reconfigure` changes the parameters in place, so
+    It is the task's diagram without policy, reward and imprecision, and with a sensor
+    without noise. Of the scenario's effects, those on the environment act, and those
+    on the sensor that have no memory; effects on the motion must be in the steps'
+    commands already. The motion is integrated by Drake; Python is called once a step,
+    at its end. `reconfigure` changes the parameters in place, so
     that one diagram serves a whole identification.
 
     The coordinates are the twin's: x, y, z [m], yaw, pitch, roll [rad] of B in Gn
@@ -119,10 +119,10 @@ class TwinReplay:
         return self._fine.reading_at_zeroing
 
     def transitions(self, steps: Steps) -> np.ndarray:
-        """Returns the states (n, 12) after steps that stand alone, each from its q, v.
+        """Returns the states (n, 12) after independent steps, each from its own q, v.
 
         Raises:
-            RuntimeError: Drake's solver gave up.
+            RuntimeError: Drake's contact solver did not converge.
         """
         states = []
         for i in range(len(steps)):
@@ -131,10 +131,10 @@ class TwinReplay:
         return np.array(states)
 
     def episode(self, steps: Steps) -> np.ndarray:
-        """Returns the states (n, 12) after steps that follow on the first one's state.
+        """Returns the states (n, 12) after consecutive steps from the first state.
 
         Raises:
-            RuntimeError: Drake's solver gave up.
+            RuntimeError: Drake's contact solver did not converge.
         """
         self._start(steps, 0)
         return np.array([self.advance(rate) for rate in steps.qd_rate])
@@ -143,7 +143,7 @@ class TwinReplay:
         self.start(int(steps.index[i]), steps.q[i], steps.v[i], steps.qd[i])
 
     def start(self, step: int, q: np.ndarray, v: np.ndarray, qd: np.ndarray) -> None:
-        """Puts the twin into a state.
+        """Sets the twin's state.
 
         Args:
             step: periods of the MDP since the episode began.
@@ -160,7 +160,7 @@ class TwinReplay:
             qd_rate: (6,) rate of the commanded coordinates.
 
         Raises:
-            RuntimeError: Drake's solver gave up.
+            RuntimeError: Drake's contact solver did not converge.
         """
         begin, end = (boundary(self._step + i, self._period) for i in (0, 1))
         self._step += 1
@@ -213,7 +213,7 @@ class ReplayDiagram:
         self.station.reconfigure(self.station_context, noise_free(scenario))
 
     def zero(self) -> None:
-        """Lets the bolt settle at A and zeroes the sensor, as an episode does."""
+        """Lets the bolt settle at A and zeroes the sensor, as at an episode's start."""
         rest = np.zeros(6)
         self.start(boundary(0, 1.0), rest, rest, self.station.start)
         self.advance(rest, self.station.settling_time)
@@ -226,7 +226,7 @@ class ReplayDiagram:
         self.station.update_local_effects(self.station_context, self.effects, motion)
 
     def start(self, time: float, q: np.ndarray, v: np.ndarray, qd: np.ndarray) -> None:
-        """Puts the twin into a state (see `TwinReplay`) at a time [s]."""
+        """Sets the twin's state (see `TwinReplay`) and the time [s]."""
         self._context.SetTime(time)
         plant = self.station.plant
         plant.SetPositions(self._plant_context, q)
@@ -249,7 +249,7 @@ class ReplayDiagram:
         )
 
     def impact_conditions(self) -> ImpactConditions:
-        """Returns what IMPACT depends on now; the scenario has that contact."""
+        """Returns the present conditions of IMPACT contact, which the scenario has."""
         return self.station.impact_conditions(self.station_context)
 
     def observed(self, time: float, q: np.ndarray, load: np.ndarray) -> np.ndarray:
@@ -319,12 +319,12 @@ def coarse_step(scenario: Scenario) -> float:
 
 
 def with_time_step(scenario: Scenario, time_step: float) -> Scenario:
-    """Returns the scenario with another step of the twin [s]."""
+    """Returns the scenario with another time step of the twin [s]."""
     simulation = dataclasses.replace(scenario.simulation, twin_time_step=time_step)
     return dataclasses.replace(scenario, simulation=simulation)
 
 
 def noise_free(scenario: Scenario) -> Scenario:
-    """Returns the scenario with a sensor that neither errs nor rounds."""
+    """Returns the scenario with a sensor without noise and quantisation."""
     silent = dataclasses.replace(scenario.ft_sensor, noise=[0.0] * 6, quantum=[0.0] * 6)
     return dataclasses.replace(scenario, ft_sensor=silent, randomisation=[])
