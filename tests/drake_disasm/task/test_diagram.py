@@ -102,7 +102,8 @@ def _states(
     if isinstance(system, Diagram):
         for part in system.GetSystems():
             inner = system.GetSubsystemContext(part, context)
-            yield from _states(part, inner, f"{path}/{part.get_name()}")
+            name = part.get_name().partition("@")[0]  # Drake's own ends in an address
+            yield from _states(part, inner, f"{path}/{name}")
         return
     for i in range(context.num_discrete_state_groups()):
         yield f"{path} state {i}", context.get_discrete_state(i).CopyToVector()
