@@ -88,7 +88,7 @@ def transitions_header(
     Args:
         scenario: that the log states.
         station: "cell" or "hardware", which have joints, or "twin".
-        provenance: where the log is from, beside its station.
+        provenance: where the log is from; the station is added.
     """
     simulated = {"simulated": station != "hardware", "station": station}
     return LogHeader(
