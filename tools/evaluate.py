@@ -1,8 +1,8 @@
-"""Validates policies: N episodes each, without exploration, at what you choose.
+"""Evaluates policies: N episodes each, without exploration, for each setting.
 
 Prints one line per policy and setting: P (mean episodic reward), instability (its
 standard deviation), success with Wilson's 95 % interval, and the forces on the bolt.
-The same seeds give the same episodes. It touches no training.
+The same seeds give the same episodes.
 """
 
 import argparse
@@ -100,7 +100,7 @@ def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
     rows = list(_rows(args))
-    for row in rows:  # whatever is wrong is said before anything runs
+    for row in rows:  # errors are reported before anything runs
         cli.named_policy(row.policy, load_scenario(row.scenario, row.overrides))
     found: dict[Row, Evaluation] = {}
     try:
@@ -146,7 +146,7 @@ def _settings(sweep: str | None) -> list[str]:
 
 
 def _run(row: Row, progress: Progress) -> Evaluation:
-    """Returns one row's figures, in whatever process."""
+    """Returns one row's figures; runs in a worker process."""
     scenario = load_scenario(row.scenario, row.overrides)
     policy = cli.named_policy(row.policy, scenario)
     simulation = TaskSimulation(scenario, row.station, policy)

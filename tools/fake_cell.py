@@ -1,9 +1,9 @@
-"""Plays the devices of a cell on this machine, to try the hardware station on.
+"""Simulates the devices of a cell on this machine, to try the hardware station.
 
-The simulated cell stands behind an iiwa driver's LCM channels, an OnRobot HEX and a
-Robotiq gripper on the loopback: a simulated stand-in, in real time. It writes the
-configuration by which it is found, then runs until Ctrl-C. A key and Enter orders a
-fault, an empty line ends it:
+A simulated cell runs in real time behind the LCM channels of an iiwa driver, an OnRobot
+HEX and a Robotiq gripper on the loopback. The program writes the configuration file for
+simulate.py --hardware-config, then runs until Ctrl-C. Type a device and a fault to
+cause the fault, and an empty line to end it:
 
   ft_sensor: delay, loss, reorder, short, header, status, frozen, jump
   gripper:   crc, drop, silent, status, short, header
@@ -52,7 +52,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         type=Path,
         default=Path("fake_cell.yaml"),
         metavar="FILE",
-        help="written: for simulate.py --hardware-config (default: fake_cell.yaml)",
+        help="is written, for simulate.py --hardware-config (default: fake_cell.yaml)",
     )
     add("--lcm-url", default=_LCM, metavar="URL", help=f"(default: {_LCM})")
     add("--seed", type=int, default=0, help="of the sensor's noise (default: 0)")
@@ -75,7 +75,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _play(cell: FakeCell) -> None:
-    """Advances the cell in real time; obeys what is typed."""
+    """Advances the cell in real time; causes the faults that are typed."""
     period, begun, steps = cell.station.control_period, time.monotonic(), 0
     while True:
         program.stop_if_interrupted()
@@ -87,11 +87,11 @@ def _play(cell: FakeCell) -> None:
         if steps % 20 == 0 and sys.stdin and select.select([sys.stdin], [], [], 0)[0]:
             line = sys.stdin.readline()
             if line:
-                _order(cell, line.split())
+                _cause(cell, line.split())
 
 
-def _order(cell: FakeCell, words: Sequence[str]) -> None:
-    """Orders a fault of a device; none ends all."""
+def _cause(cell: FakeCell, words: Sequence[str]) -> None:
+    """Causes a fault of a device; no words end all faults."""
     devices: dict[str, tuple[object, Sequence[str]]] = {
         "iiwa": (cell, IIWA_FAULTS),
         "ft_sensor": (cell.hex, hex_box.FAULTS),

@@ -27,14 +27,14 @@ def open_station(
     """
     if config is None:
         raise DisasmError(
-            "--station hardware: say where the devices are by --hardware-config FILE; "
-            "copy models/hardware/cell.yaml"
+            "--station hardware: give the devices' addresses by --hardware-config "
+            "FILE; copy models/hardware/cell.yaml"
         )
     return HardwareStation(scenario, load_hardware_config(config), dry_run)
 
 
 def watch(station: HardwareStation, view: MeasuredView | None) -> None:
-    """Prints and shows how the devices are until Ctrl-C; commands nothing."""
+    """Prints and shows the devices' state until Ctrl-C; commands nothing."""
     print("dry run: nothing is commanded; Ctrl-C ends it", flush=True)
     station.connect()
     while True:
@@ -46,7 +46,7 @@ def watch(station: HardwareStation, view: MeasuredView | None) -> None:
 
 
 def _pump(station: HardwareStation, duration: float) -> None:
-    """Takes what the arm sends for a time [s]."""
+    """Receives the arm's messages for a time [s]."""
     end = time.monotonic() + duration
     while time.monotonic() < end:
         program.stop_if_interrupted()
@@ -56,7 +56,7 @@ def _pump(station: HardwareStation, duration: float) -> None:
 
 def health_table(station: HardwareStation) -> str:
     """Returns a line for each device: health, values, age, packets."""
-    station.pump()  # else the arm looks as old as the last step
+    station.pump()  # else the arm's reading is as old as the last step
     readings, healths, now = station.readings(), station.healths(), time.monotonic()
     return "\n".join(
         _line(name, reading, healths[name], now) for name, reading in readings.items()

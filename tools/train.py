@@ -1,9 +1,9 @@
-"""Trains a policy by trial and error on the twin or the cell, or from logs alone.
+"""Trains a policy by reinforcement learning, on the twin or the cell or from logs.
 
-Each seed is a training of its own, in a process of its own. Everything goes into one
+Each seed is a training of its own, in a process of its own. All results go into one
 folder: per seed the log of all episodes, a checkpoint after each of them, the policy
 and its validation; over the seeds a learning curve and a summary. A run that was
-interrupted or killed goes on with --resume, bit for bit.
+interrupted or killed continues with --resume, bit for bit.
 """
 
 import argparse
@@ -43,7 +43,7 @@ _EXAMPLES = """examples:
       --preset chapter3 --out out/offline                      without acting
   python tools/train.py --station cell --start-from out/turned --scenario \\
       removal_turned --hyper demonstrations=0.5 --out out/in_the_cell    twin to cell
-  python tools/train.py ... --out out/sliding --resume         go on after Ctrl-C
+  python tools/train.py ... --out out/sliding --resume         continue after Ctrl-C
 """
 
 
@@ -107,7 +107,7 @@ def _add_data_arguments(add: Callable[..., object]) -> None:
         type=Path,
         default=[],
         metavar="DIR",
-        help="learn from these logs alone, without acting",
+        help="learn from these logs alone, offline",
     )
     add(
         "--updates",
@@ -128,13 +128,13 @@ def _add_data_arguments(add: Callable[..., object]) -> None:
         "--start-from",
         type=Path,
         metavar="DIR",
-        help="go on with what the same seeds learned in this training, elsewhere; "
-        "with --hyper demonstrations=0.5 half of each batch is what they remember",
+        help="start from the agents of the same seeds in this training; with --hyper "
+        "demonstrations=0.5 half of each batch comes from their replay memory",
     )
 
 
 def _add_run_arguments(add: Callable[..., object]) -> None:
-    add("--out", type=Path, required=True, metavar="DIR", help="folder for all of it")
+    add("--out", type=Path, required=True, metavar="DIR", help="folder for all results")
     add(
         "--seeds",
         type=cli.positive,
@@ -159,7 +159,7 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
         "(default: 1)",
     )
     add("--eager", action="store_true", help="don't compile the updates")
-    add("--resume", action="store_true", help="go on with what is in --out")
+    add("--resume", action="store_true", help="continue what is in --out")
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -177,7 +177,7 @@ def main(arguments: Sequence[str]) -> int:
             train_seeds(jobs, args.workers, bar)
     finally:
         print(write_summary(args.out))
-    print(f"all of it: {args.out}")
+    print(f"results: {args.out}")
     return 0
 
 
@@ -205,7 +205,7 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
 
 
 def _hashes(folders: Sequence[Path]) -> dict[str, str]:
-    """Returns the hash of each log's data; a log that can't be read is refused here."""
+    """Returns the hash of each log's data; refuses a log that can't be read."""
     if not folders:
         return {}
     return {str(log.folder): log.data_hash for log in read_logs(folders)}

@@ -1,10 +1,10 @@
 """Compares how agents learn in a stand-in for the robot (thesis, table 4.3).
 
-One agent has learned on the twin as first identified, one on the twin after closing
-the loop, one nothing; all go on learning in the stand-in, which is simulated, too, and
-has effects that the first twin lacks. P is the mean episodic reward over the training
-there. Every training is one of tools/train.py, in a folder of its own within --out. A
-study that was interrupted goes on with --resume.
+One agent is trained on the twin as first identified, one on the twin after closing the
+loop, one is untrained; all are then trained in the stand-in, which is simulated, too,
+and has effects that the first twin lacks. P is the mean episodic reward over the
+training there. Every training is one of tools/train.py, in a folder of its own within
+--out. A study that was interrupted continues with --resume.
 """
 
 import argparse
@@ -40,7 +40,7 @@ from drake_disasm.studies.transfer import (
 _EXAMPLES = """examples:
   python tools/transfer_study.py --before removal --after out/closed/scenario.yaml \\
       --stand-in hidden.yaml --seeds 3 --out out/transfer
-  python tools/transfer_study.py ... --out out/transfer --resume   go on after Ctrl-C
+  python tools/transfer_study.py ... --out out/transfer --resume   continue after Ctrl-C
 """
 
 
@@ -99,13 +99,13 @@ def _add_agent_arguments(add: Callable[..., object]) -> None:
         type=float,
         default=0.5,
         metavar="SHARE",
-        help="of each batch in the stand-in: what is remembered of the twin "
+        help="of each batch in the stand-in that comes from the twin's replay memory "
         "(default: 0.5)",
     )
 
 
 def _add_run_arguments(add: Callable[..., object]) -> None:
-    add("--out", type=Path, required=True, metavar="DIR", help="folder for all of it")
+    add("--out", type=Path, required=True, metavar="DIR", help="folder for all results")
     add("--seeds", type=cli.positive, default=3, metavar="N", help="(default: 3)")
     add("--first-seed", type=int, default=0, metavar="S", help="(default: 0)")
     add(
@@ -113,10 +113,10 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
         type=cli.positive,
         default=10,
         metavar="N",
-        help="greedy episodes before and after learning in the stand-in (default: 10)",
+        help="greedy episodes before and after training in the stand-in (default: 10)",
     )
     add("--eager", action="store_true", help="don't compile the updates")
-    add("--resume", action="store_true", help="go on with what is in --out")
+    add("--resume", action="store_true", help="continue what is in --out")
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -130,7 +130,7 @@ def main(arguments: Sequence[str]) -> int:
             _train(name, experiment, seeds, study.folder / name, args.resume, workers)
     finally:
         print(write_results(study.folder, study.common.provenance))
-    print(f"all of it: {args.out}")
+    print(f"results: {args.out}")
     return 0
 
 
@@ -166,7 +166,7 @@ def _train(
     resume: bool,
     workers: int,
 ) -> None:
-    """Trains the seeds of one part; before, deploys what they start from as it is."""
+    """Trains the seeds of one part, after deploying the agents that they start from."""
     if experiment.start:
         check_start(experiment, seeds)
     experiment = open_experiment(experiment, folder, resume)

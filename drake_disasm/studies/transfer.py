@@ -1,14 +1,14 @@
 """Does closing the loop help the policy? (thesis 4.4.2, table 4.3)
 
 Agents are trained on the twin as first identified and on the twin after closing the
-loop. Each, and one that is new, then goes on learning in a stand-in for the robot: a
+loop. Each, and an untrained one, is then trained in a stand-in for the robot: a
 simulation with effects that the first twin lacks. P is the mean episodic reward over
-that second training, so it rewards good policies and getting there soon.
+that second training, so it rewards good policies and fast learning.
 
 folder/
   twin_before/ twin_after/                trainings on the twins (see learning/run.py)
   untrained/ from_before/ from_after/     trainings in the stand-in
-  from_*/seed_*/deployed.json             greedy episodes there before learning went on
+  from_*/seed_*/deployed.json             greedy episodes there before that training
   result.json  transfer.png
 """
 
@@ -33,13 +33,13 @@ from drake_disasm.task.simulation import TaskSimulation
 
 @dataclasses.dataclass(frozen=True)
 class Branch:
-    """One way for an agent to come into the stand-in.
+    """One agent in the stand-in, by where it was trained before.
 
     Attributes:
         folder: of its training in the stand-in.
         start: folder of its training on a twin; empty for none.
-        label: as people read it.
-        thesis: P of the thesis's like (table 4.3), on its robot.
+        label: in tables and figures.
+        thesis: P of its counterpart in the thesis (table 4.3), on a robot.
     """
 
     folder: str
@@ -57,16 +57,16 @@ BRANCHES = (
 
 @dataclasses.dataclass(frozen=True)
 class TransferStudy:
-    """What is compared with what.
+    """What is compared.
 
     Attributes:
         before, after: scenarios of the twin, before and after closing the loop.
-        stand_in: scenario of what stands for the robot.
+        stand_in: scenario of the simulation in place of the robot.
         station: "cell" or "twin", of the stand-in.
         common: everything else of the trainings; its scenario and station are unused.
         episodes: of each training in the stand-in.
-        rehearsal: share of each batch there that comes from what the agent remembers
-            of its twin; without it a new memory is so narrow that the agent unlearns.
+        rehearsal: share of each batch there that comes from the replay memory of its
+            twin; without it the new memory is so narrow that the agent unlearns.
         folder: for all of it.
     """
 
@@ -105,10 +105,10 @@ class TransferStudy:
 
 @dataclasses.dataclass(frozen=True)
 class Deployment:
-    """A policy from a twin that is to act in the stand-in, as it is.
+    """A policy from a twin, to be evaluated in the stand-in before further training.
 
     Attributes:
-        experiment: of the training there that goes on from it.
+        experiment: of the training there that starts from it.
         seed: of both trainings.
         folder: of this seed of that training.
     """
@@ -119,10 +119,10 @@ class Deployment:
 
 
 def deploy(job: Deployment, progress: Progress) -> None:
-    """Writes how the policy does before it learns on, unless that is known.
+    """Evaluates the policy before further training, unless that was done.
 
     Args:
-        job: what to do.
+        job: the policy and where it acts.
         progress: called after each episode.
     """
     path = job.folder / "deployed.json"
@@ -225,7 +225,7 @@ def _greedy(row: dict[str, Any], name: str) -> str:
 
 
 def write_results(folder: Path, provenance: dict[str, Any]) -> str:
-    """Writes result and figure of what is finished; returns it as a table."""
+    """Writes result and figure of the finished trainings; returns them as a table."""
     rows = results(folder)
     if not rows:
         return "no training in the stand-in is finished yet"
