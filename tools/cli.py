@@ -70,7 +70,7 @@ def add_station_argument(
     add(
         "--station",
         default=default,
-        metavar="|".join(STATIONS),
+        metavar="|".join(STATIONS if hardware else SIMULATED_STATIONS),
         action=_StationAction if hardware else _SimulatedStationAction,
         help=f"{text} (default: {default})",
     )

@@ -28,7 +28,7 @@ from drake_disasm.cell.lock import lift_needed
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Effect, motion_chain
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES, action_bounds
-from drake_disasm.scenario import TaskConfig
+from drake_disasm.scenario import Scenario, TaskConfig
 from drake_disasm.stations import InitialState, Station
 from drake_disasm.systems.imprecision import ImprecisionNoise
 from drake_disasm.systems.observation import ObservationProcessor
@@ -140,19 +140,9 @@ def add_task(
     Raises:
         DisasmError: a system that is no policy.
     """
-    scenario, add = station.scenario, builder.AddNamedSystem
-    task = scenario.task
-    bounds = action_bounds(task)
     processor = add_observation(builder, station)
-    lift = lift_needed(scenario.lock, task.lift_success)
-    monitor = add("task_monitor", TaskMonitor(task, lift))
-    builder.Connect(processor.get_output_port(0), monitor.get_input_port())
-    imprecision = add("imprecision", ImprecisionNoise(scenario.imprecision, bounds))
-    noise = add(
-        "imprecision_noise",
-        RandomSource(RandomDistribution.kGaussian, len(ACTION_NAMES), task.period),
-    )
-    builder.Connect(noise.get_output_port(), imprecision.GetInputPort("noise"))
+    monitor = _add_monitor(builder, station.scenario, processor)
+    imprecision, noise = _add_imprecision(builder, station.scenario)
     pose_target = _add_pose_target(builder, station, imprecision, processor)
     station.leave_motion_effects()  # the pose target applies them
     motion = add_motion(builder, pose_target.GetOutputPort("velocity"), station)
@@ -225,6 +215,32 @@ def add_motion(
     if station.has_velocity_input:
         builder.Connect(velocity, station.GetInputPort(f"{station.arm}.velocity"))
     return motion
+
+
+def _add_monitor(
+    builder: DiagramBuilder, scenario: Scenario, processor: ObservationProcessor
+) -> TaskMonitor:
+    lift = lift_needed(scenario.lock, scenario.task.lift_success)
+    monitor = builder.AddNamedSystem("task_monitor", TaskMonitor(scenario.task, lift))
+    observation = processor.GetOutputPort("observation")
+    builder.Connect(observation, monitor.get_input_port())
+    return monitor
+
+
+def _add_imprecision(
+    builder: DiagramBuilder, scenario: Scenario
+) -> tuple[ImprecisionNoise, RandomSource]:
+    """Returns what makes the action imprecise, and the source of its noise."""
+    bounds, size = action_bounds(scenario.task), len(ACTION_NAMES)
+    imprecision = builder.AddNamedSystem(
+        "imprecision", ImprecisionNoise(scenario.imprecision, bounds)
+    )
+    noise = builder.AddNamedSystem(
+        "imprecision_noise",
+        RandomSource(RandomDistribution.kGaussian, size, scenario.task.period),
+    )
+    builder.Connect(noise.get_output_port(), imprecision.GetInputPort("noise"))
+    return imprecision, noise
 
 
 def _add_pose_target(
