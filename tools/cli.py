@@ -17,7 +17,7 @@ from drake_disasm.policies import (
     shipped_policies,
 )
 from drake_disasm.scenario import Scenario, shipped_scenarios
-from drake_disasm.stations import STATIONS
+from drake_disasm.stations import SIMULATED_STATIONS, STATIONS
 from drake_disasm.systems.policy import Policy
 
 
