@@ -1,0 +1,60 @@
+"""An effect of one's own: hidden in a log, then found and named by closing the loop.
+
+    python examples/own_effect.py
+"""
+
+import dataclasses
+import math
+import tempfile
+from pathlib import Path
+
+from drake_disasm.effects import (
+    BoltMotion,
+    Environment,
+    EnvironmentEffect,
+    amplitude,
+    register_effect,
+    shape_parameter,
+)
+from drake_disasm.logs import read_log
+from drake_disasm.scenario import load_scenario
+from sysid.effect_selection.close_loop import HELD_OUT, HUBER, close_loop
+from sysid.identification.split import split_episodes
+from sysid.models.twin import TwinModel
+from sysid.validation.synthetic_logs import transitions_log
+from sysid.workers import Workers
+
+
+@register_effect
+@dataclasses.dataclass
+class MagneticCatch(EnvironmentEffect):
+    """A magnet that holds the bolt at the closed end of the groove.
+
+    Equation: f = -F exp(-x / d) along the groove, x the travel from A.
+    Where it acts: a force on the bolt at Bo.
+    """
+
+    force: float = amplitude("N", 0.0, 50.0, "F, of the magnet at A")
+    reach: float = shape_parameter(
+        0.01, "m", 0.002, 0.05, "d, of the magnet", (0.005, 0.01, 0.02)
+    )
+    is_local = True
+    experiment = "slow pulls from A and back, without contact at the walls"
+
+    def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
+        """Adds the pull of the magnet."""
+        x, y, z = environment.force_Gn
+        x -= self.force * math.exp(-max(bolt.p[0], 0.0) / self.reach)
+        return dataclasses.replace(environment, force_Gn=(x, y, z))
+
+
+if __name__ == "__main__":
+    scenario = load_scenario("removal", ["contact.model=impact"])
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "log"  # states the scenario, and was made with a magnet
+        transitions_log(log, scenario, [MagneticCatch(force=1.5, reach=0.008)], seed=0, episodes=8, steps=20)
+        model = TwinModel([read_log(log)], scenario, ())
+    train, test = split_episodes(model.measurements.names, HELD_OUT)
+    closed = close_loop(model, train, test, HUBER, Workers(), print)
+    print(closed.verdict.text)
+    print(closed.scenario.effects)
