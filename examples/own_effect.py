@@ -1,6 +1,6 @@
 """An effect of one's own: hidden in a log, then found and named by closing the loop.
 
-    python examples/own_effect.py
+python examples/own_effect.py
 """
 
 import dataclasses
@@ -18,11 +18,9 @@ from drake_disasm.effects import (
 )
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import load_scenario
-from sysid.effect_selection.close_loop import HELD_OUT, HUBER, close_loop
-from sysid.identification.split import split_episodes
+from sysid.effect_selection.close_loop import close_loop
 from sysid.models.twin import TwinModel
 from sysid.validation.synthetic_logs import transitions_log
-from sysid.workers import Workers
 
 
 @register_effect
@@ -35,9 +33,7 @@ class MagneticCatch(EnvironmentEffect):
     """
 
     force: float = amplitude("N", 0.0, 50.0, "F, of the magnet at A")
-    reach: float = shape_parameter(
-        0.01, "m", 0.002, 0.05, "d, of the magnet", (0.005, 0.01, 0.02)
-    )
+    reach: float = shape_parameter(0.01, "m", 0.002, 0.05, "d", (0.005, 0.01, 0.02))
     is_local = True
     experiment = "slow pulls from A and back, without contact at the walls"
 
@@ -50,11 +46,11 @@ class MagneticCatch(EnvironmentEffect):
 
 if __name__ == "__main__":
     scenario = load_scenario("removal", ["contact.model=impact"])
+    magnet = MagneticCatch(force=1.5, reach=0.008)
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log"  # states the scenario, and was made with a magnet
-        transitions_log(log, scenario, [MagneticCatch(force=1.5, reach=0.008)], seed=0, episodes=8, steps=20)
+        transitions_log(log, scenario, [magnet], seed=0, episodes=8, steps=20)
         model = TwinModel([read_log(log)], scenario, ())
-    train, test = split_episodes(model.measurements.names, HELD_OUT)
-    closed = close_loop(model, train, test, HUBER, Workers(), print)
-    print(closed.verdict.text)
+    closed = close_loop(model)  # asks all registered effects: the library's, and this
+    print(closed.text)
     print(closed.scenario.effects)
