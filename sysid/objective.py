@@ -43,7 +43,7 @@ class Objective:
     def __init__(
         self,
         model: LogModel,
-        workers: Workers,
+        workers: Workers | None = None,
         huber_delta: float = np.inf,
         surrogate: LogModel | None = None,
     ) -> None:
@@ -51,7 +51,7 @@ class Objective:
 
         Args:
             model: predicts.
-            workers: evaluate it.
+            workers: evaluate it; by default this process.
             huber_delta: residual, in standard deviations, beyond which the loss is
                 linear.
             surrogate: a faster model with the same parameters, for derivatives.
@@ -60,7 +60,7 @@ class Objective:
         self.scaling = Scaling(model.parameters)
         self.evaluations = 0
         self.failures: list[tuple[Array, str]] = []
-        self._workers = workers
+        self._workers = workers = workers or Workers()
         self.differences = self
         if surrogate is not None and surrogate is not model:
             self.differences = Objective(surrogate, workers, huber_delta)

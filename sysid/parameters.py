@@ -45,7 +45,12 @@ class Parameter:
 
     @classmethod
     def of_field(
-        cls, name: str, path: str, value: float, metadata: Mapping[str, Any]
+        cls,
+        name: str,
+        path: str,
+        value: float,
+        metadata: Mapping[str, Any],
+        log_scale: bool | None = None,
     ) -> Self:
         """Returns the parameter that stands for a field of a dataclass.
 
@@ -54,6 +59,8 @@ class Parameter:
             path: of the field.
             value: nominal.
             metadata: of the field, as `common.quantity.quantity` makes it.
+            log_scale: whether it is searched by its logarithm; None decides by the
+                bounds.
 
         Raises:
             DisasmError: the field has no finite bounds.
@@ -66,7 +73,7 @@ class Parameter:
             high,
             metadata["unit"],
             metadata["doc"],
-            low > 0.0 and high > DECADES * low,
+            low > 0.0 and high > DECADES * low if log_scale is None else log_scale,
             path,
             bool(metadata.get("grid")),
         )

@@ -16,7 +16,6 @@ from sysid.parameters import Parameter
 
 _KEYS = ("low", "high", "nominal", "scale")
 _SCALES = ("linear", "log")
-_DECADES = 1e3  # bounds that span more are searched by logarithm
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,18 +97,10 @@ def _parameter(
     low = metadata["low"] if request.low is None else request.low
     high = metadata["high"] if request.high is None else request.high
     _refuse_beyond(path, low, high, metadata)
-    scale = request.scale or ("log" if low > 0 and high > _DECADES * low else "linear")
-    return Parameter(
-        request.name,
-        value if request.nominal is None else request.nominal,
-        low,
-        high,
-        metadata["unit"],
-        metadata["doc"],
-        scale == "log",
-        path,
-        bool(metadata.get("grid")),
-    )
+    nominal = value if request.nominal is None else request.nominal
+    bounded = {**metadata, "low": low, "high": high}
+    log_scale = None if request.scale is None else request.scale == "log"
+    return Parameter.of_field(request.name, path, nominal, bounded, log_scale)
 
 
 def _refuse_beyond(

@@ -10,7 +10,8 @@ from sysid.effect_selection.candidates import extended
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.identification.uncertainty import block_length, block_numbers
-from sysid.models.base import Channel, LogModel
+from sysid.models.base import LogModel
+from sysid.models.measurements import Channel
 
 Array = NDArray[np.float64]
 

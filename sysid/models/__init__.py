@@ -5,7 +5,8 @@ twin, static readings of a force/torque sensor, joint torques of an arm, and mod
 of your own.
 """
 
-from sysid.models.base import LogModel, PredictionError, ScenarioModel
+from sysid.models.base import LogModel, PredictionError
 from sysid.models.measurements import Channel, Measurements
+from sysid.models.scenario_model import ScenarioModel
 
 __all__ = ["Channel", "LogModel", "Measurements", "PredictionError", "ScenarioModel"]

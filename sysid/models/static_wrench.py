@@ -22,8 +22,9 @@ from drake_disasm.logs import Episode, Log, rotation_matrices, sensor_wrench
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.logs.schema import WRENCH
 from drake_disasm.scenario import Scenario
-from sysid.models.base import Array, ScenarioModel
+from sysid.models.base import Array
 from sysid.models.measurements import Channel, Measurements
+from sysid.models.scenario_model import ScenarioModel
 from sysid.parameters import Parameter
 
 #: Mass, first moment and bias: all that a rigid load on an ideal sensor can have.

@@ -22,12 +22,8 @@ from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.replay import Steps, TwinReplay
-from sysid.models.base import (
-    Array,
-    PredictionError,
-    ScenarioModel,
-    even_chunks,
-)
+from sysid.models.base import Array, PredictionError, even_chunks
+from sysid.models.scenario_model import ScenarioModel
 from sysid.models.sensor_reading import SensorReading, at_sensor
 from sysid.models.transitions import Transitions, measured_states
 from sysid.parameters import Parameter

@@ -1,7 +1,7 @@
-"""Derivative-free minimisation within a box: the Bees Algorithm, and NLopt beside it.
+"""Derivative-free minimisation within a box: the Bees Algorithm and NLopt.
 
-Each search takes a function of a *batch* of points, so that whoever evaluates them
-can do so in parallel, and returns a `Trace` of all that it evaluated.
+Each search takes a function of a *batch* of points, which may evaluate them in
+parallel, and returns a `Trace` of all evaluations.
 """
 
 from sysid.optimise.bees import BeesAlgorithm, BeesSettings

@@ -28,15 +28,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BeesSettings:
-    """The colony; the defaults are a good all-round one for some hundred evaluations.
+    """The colony; the defaults suit most searches of some hundred evaluations.
 
     Attributes:
-        scouts: ns, bees that search globally in each cycle, beside the sites.
+        scouts: ns, bees that search globally in each cycle, in addition to the sites.
         sites: nb, best sites that are searched locally.
         recruits: nr, foragers of each of those.
         elite_sites: ne, the best of the best, with more foragers.
         elite_recruits: nre, foragers of each elite site.
-        stagnation_limit: stlim, cycles without improvement before a site is left.
+        stagnation_limit: stlim, cycles without improvement before a site is abandoned.
         shrink: alpha, factor on the neighbourhood of a site that did not improve.
         neighbourhood: ngh, edge of a new site's neighbourhood over the box's.
     """
@@ -56,7 +56,7 @@ class BeesSettings:
         return cls(2, 2, 2, 0, 0, 2, 0.5, 1.0)
 
     def __post_init__(self) -> None:
-        """Refuses a colony that can't work."""
+        """Refuses settings that contradict each other."""
         for name in ("sites", "recruits", "stagnation_limit"):
             if getattr(self, name) < 1:
                 raise DisasmError(f"bees: {name} must be at least 1")
@@ -86,7 +86,7 @@ class BeesSettings:
 
 @dataclass
 class Site:
-    """A place worth searching.
+    """A place that is searched locally.
 
     Attributes:
         centre: (p,) the best point found there.
@@ -103,12 +103,12 @@ class Site:
 
 @dataclass(frozen=True)
 class Stop:
-    """When to end; the first that is met.
+    """When to end: at the first criterion that is met.
 
     Attributes:
-        cycles: how many there are.
-        evaluations: how many there may be; no cycle begins that would exceed it.
-        value: good enough.
+        cycles: number of cycles.
+        evaluations: maximum; no cycle begins that would exceed it.
+        value: of the function that is good enough.
         stagnation: cycles without a better value than this many cycles ago.
     """
 
@@ -171,7 +171,7 @@ class BeesAlgorithm:
         callback: Callable[[Self], None] | None = None,
         checkpoint: Path | None = None,
     ) -> Trace:
-        """Searches until told to stop, and may be called again to go on.
+        """Searches until a criterion of `stop` is met; called again, it continues.
 
         Args:
             function: to minimise.
@@ -201,7 +201,7 @@ class BeesAlgorithm:
         write_json(path, self.state(), indent=None)
 
     def state(self) -> dict[str, Any]:
-        """Returns the search as plain data that keeps every bit in JSON."""
+        """Returns the whole search as plain data, of which JSON keeps every bit."""
         sites = [
             {**asdict(s), "centre": s.centre.tolist(), "edge": s.edge.tolist()}
             for s in self.sites
@@ -214,7 +214,7 @@ class BeesAlgorithm:
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Takes up what `state` gave.
+        """Restores what `state` returned.
 
         Raises:
             DisasmError: it is of another box or colony.
@@ -237,7 +237,7 @@ class BeesAlgorithm:
         return {"bounds": bounds, "settings": asdict(self.settings)}
 
     def _reason(self, stop: Stop) -> str:
-        """Returns why to stop now, or nothing."""
+        """Returns why to stop now; an empty text to go on."""
         done, trace = len(self.trace.cycle_ends) - 1, self.trace
         if stop.cycles is not None and done >= stop.cycles:
             return f"{stop.cycles} cycles"
@@ -253,7 +253,7 @@ class BeesAlgorithm:
         return ""
 
     def _cycle(self, function: BatchFunction) -> None:
-        """Lines 1 to 2 at first, then lines 3 to 10."""
+        """Does lines 1 and 2 of algorithm 4.1 at first, then lines 3 to 10."""
         if self.sites:
             self._search(function)
         else:
@@ -279,7 +279,7 @@ class BeesAlgorithm:
         self.sites = sites + [self._site(x, f) for x, f in found[starts[-1] :]]
 
     def _foragers(self, rank: int) -> Array:
-        """Returns points (nr, p) about a site; anywhere, if it has no life left."""
+        """Returns points (nr, p) around a site; anywhere, if it has no life left."""
         site, count = self.sites[rank], self.settings.foragers(rank)
         if site.lives == 0:
             return self.box.sample(count, self._generator)
@@ -292,7 +292,7 @@ class BeesAlgorithm:
         return self.box.sample(count, self._generator)
 
     def _after_search(self, site: Site, found: Sequence[tuple[Array, float]]) -> Site:
-        """Returns the site as its foragers leave it."""
+        """Returns the site updated by its foragers' points and values."""
         x, value = min(found, key=lambda pair: pair[1])
         if site.lives == 0:
             return self._site(x, value)

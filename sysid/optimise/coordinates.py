@@ -1,4 +1,4 @@
-"""Where a search moves: a box, or coordinates whitened about a starting point."""
+"""Search spaces: a box, and coordinates whitened about an estimate."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,14 +28,17 @@ class Box:
 
     @classmethod
     def of(cls, low: ArrayLike, high: ArrayLike) -> Self:
-        """Returns a box from anything that makes arrays.
+        """Returns the box between two corners.
 
         Raises:
             DisasmError: bounds are not finite, or reversed, or there are none.
         """
         a, b = np.array(low, dtype=float), np.array(high, dtype=float)
         if a.shape != b.shape or a.ndim != 1 or not len(a):
-            raise DisasmError("bounds: give as many highs as lows, at least one")
+            raise DisasmError(
+                "bounds: low and high differ in shape or are empty; give (p,) each, "
+                "with at least one element"
+            )
         if not (np.isfinite(a).all() and np.isfinite(b).all()):
             raise DisasmError("bounds: are not finite; a search needs a box")
         if (a >= b).any():
@@ -62,7 +65,7 @@ class Box:
         return generator.uniform(self.low, self.high, (count, self.size))
 
     def clip(self, points: Points) -> Points:
-        """Returns points moved into the box."""
+        """Returns points clipped to the box."""
         return np.clip(points, self.low, self.high)
 
 

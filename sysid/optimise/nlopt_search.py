@@ -1,4 +1,4 @@
-"""The second opinion: NLopt's controlled random search, and SBPLX as polish."""
+"""NLopt's controlled random search, and SBPLX to polish its result."""
 
 from collections.abc import Callable
 
@@ -25,16 +25,16 @@ def nlopt_search(
 ) -> Trace:
     """Minimises within a box by one of NLopt's derivative-free algorithms.
 
-    What goes wrong inside NLopt (round-off, a point a rounding error outside) ends
-    the search and keeps all that was found: the best point is the trace's own, never
-    the solver's. The budget is the only stopping rule, since on a noisy function
-    tolerances stop anywhere.
+    A failure inside NLopt (round-off, a point a rounding error outside) ends the
+    search but loses nothing: the best point is taken from the trace, never from the
+    solver. The budget is the only stopping criterion, since on a noisy function
+    tolerances are met anywhere.
 
     Args:
         function: values of a batch; it is asked for one point at a time.
         box: to search.
         algorithm: NLopt's name, such as "GN_CRS2_LM" or "LN_SBPLX".
-        evaluations: how many there are at most.
+        evaluations: maximum.
         start: (p,) where to begin; the middle of the box by default.
         seed: of NLopt's generator, which all its searches in a process share.
         step: first step of a local search over the box's width, one or (p,).

@@ -1,8 +1,8 @@
 """A Gaussian process that proposes points between the bees' cycles.
 
-The thesis names surrogates as future work: where an evaluation is dear, a model of
-the objective from the points so far tells where the next one pays. This is expected
-improvement (Jones et al. 1998) on scikit-learn's Gaussian process.
+The thesis names surrogates as future work: where an evaluation is expensive, a model
+of the objective from the points so far says where the next one is worth it. This is
+expected improvement (Jones et al. 1998) on scikit-learn's Gaussian process.
 """
 
 import warnings
@@ -35,12 +35,12 @@ def propose(
 ) -> Array:
     """Returns points (count, p) of the largest expected improvement.
 
-    The objective is learnt by its logarithm: it spans decades, and what matters is
-    its lower end. After each chosen point the process is told what it expects
-    there, so that the next one is chosen elsewhere.
+    The process is fitted to the objective's logarithm: it spans decades, and what
+    matters is its lower end. After each chosen point its own prediction there is added
+    to the data, so that the next one is chosen elsewhere.
 
     Args:
-        trace: what is known.
+        trace: evaluations so far.
         box: to choose from.
         count: how many points.
         generator: of the candidates.

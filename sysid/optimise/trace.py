@@ -51,7 +51,7 @@ class Trace:
         return np.minimum.accumulate(np.array(self.values))
 
     def to_mapping(self) -> dict[str, Any]:
-        """Returns plain data that keeps every bit in JSON."""
+        """Returns plain data, of which JSON keeps every bit."""
         return {
             "points": [point.tolist() for point in self.points],
             "values": list(self.values),
@@ -61,7 +61,7 @@ class Trace:
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> Self:
-        """Returns the trace of what `to_mapping` gave."""
+        """Returns the trace that `to_mapping` was called on."""
         return cls(
             [np.array(point) for point in mapping["points"]],
             list(mapping["values"]),

@@ -1,4 +1,4 @@
-"""The pictures of a report, as pure functions of a result."""
+"""The figures of a report, as pure functions of a result."""
 
 import base64
 import io
@@ -73,7 +73,7 @@ def residual_figure(comparison: Comparison, channels: Sequence[Channel]) -> Figu
 
 
 def trace_figure(methods: Sequence[MethodResult], floor: float) -> Figure:
-    """Returns best value against evaluations, as the thesis's figure 4.6."""
+    """Returns the best value against evaluations, like the thesis's figure 4.6."""
     names = [stage.name.split(", ")[1] for stage in methods[0].stages]
     figure = Figure(figsize=(4.4 * len(names), 3.2), layout="constrained")
     for number, ax in enumerate(np.atleast_1d(figure.subplots(1, len(names)))):
@@ -156,7 +156,7 @@ def _mark_episodes(ax: Axes, episode: NDArray[np.int64]) -> None:
 
 
 def _zoom(ax: Axes, measured: Array, after: Array) -> None:
-    """Shows measured and fitted values whole; before the fit anything may be."""
+    """Scales the axis to measured and fitted values; those before may be far off."""
     values = np.concatenate([measured, after])
     low, high = float(values.min()), float(values.max())
     margin = 0.08 * (high - low) or 1e-9

@@ -1,4 +1,4 @@
-"""The page: a result and its pictures in a template."""
+"""The page: a result and its figures in a template."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,7 +14,7 @@ def report_page(found: Identification, origin: Mapping[str, Any]) -> str:
 
     Args:
         found: the result.
-        origin: where it is from, as `result.json` has it.
+        origin: its provenance, as in `result.json`.
     """
     shown = found.held_out or found.fitted
     return render(
@@ -51,12 +51,12 @@ def _conclusion(found: Identification) -> str:
         coloured = int((found.whiteness < 0.05).sum())
         return (
             "The sensors' noise is not stated, so it was estimated from this fit. "
-            f"{coloured} of {len(found.channels)} channels leave a residual that does "
-            "not look like noise (Ljung-Box, p < 0.05)."
+            f"{coloured} of {len(found.channels)} channels leave a residual that is "
+            "not white noise (Ljung-Box, p < 0.05)."
         )
     if ratio < 1.1:
         return f"The model explains the {where} rows down to the sensors' noise."
     return (
-        f"The {where} rows are off by {ratio:.1f} times what noise explains: the model "
-        "lacks something, or a channel's noise is stated too small."
+        f"The error on {where} rows is {ratio:.1f} times what noise explains: the "
+        "model lacks something, or the stated noise of a channel is too small."
     )
