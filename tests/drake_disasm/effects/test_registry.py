@@ -65,7 +65,8 @@ def _registry(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     modules = set(sys.modules)
     yield
     for name in set(sys.modules) - modules:
-        del sys.modules[name]
+        if name.startswith("own_"):
+            del sys.modules[name]
 
 
 class _Reads(SensorEffect):
