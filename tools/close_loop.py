@@ -38,12 +38,7 @@ _EXAMPLES = """examples:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = argparse.ArgumentParser(
-        prog="close_loop.py",
-        description=__doc__,
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = program.argument_parser("close_loop", __doc__, _EXAMPLES)
     add = parser.add_argument
     add("--log", nargs="+", required=True, metavar="DIR", help="logs of one kind")
     _add_model_arguments(add)

@@ -57,12 +57,7 @@ class Row:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = argparse.ArgumentParser(
-        prog="evaluate.py",
-        description=__doc__,
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = program.argument_parser("evaluate", __doc__, _EXAMPLES)
     cli.add_scenario_arguments(parser)
     add = parser.add_argument
     add(

@@ -39,12 +39,7 @@ _EXAMPLES = """examples:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = argparse.ArgumentParser(
-        prog="fake_cell.py",
-        description=__doc__,
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = program.argument_parser("fake_cell", __doc__, _EXAMPLES)
     cli.add_scenario_arguments(parser)
     add = parser.add_argument
     add(

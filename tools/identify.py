@@ -56,12 +56,7 @@ A file of parameters has lines like
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = argparse.ArgumentParser(
-        prog="identify.py",
-        description=__doc__,
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = program.argument_parser("identify", __doc__, _EXAMPLES)
     _add_input_arguments(parser.add_argument)
     _add_search_arguments(parser.add_argument)
     cli.add_import_argument(parser)

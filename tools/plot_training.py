@@ -21,12 +21,7 @@ _EXAMPLES = """example:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = argparse.ArgumentParser(
-        prog="plot_training.py",
-        description=__doc__,
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = program.argument_parser("plot_training", __doc__, _EXAMPLES)
     parser.add_argument(
         "trainings",
         nargs="+",

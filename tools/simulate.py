@@ -43,12 +43,7 @@ _EXAMPLES = """examples:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = argparse.ArgumentParser(
-        prog="simulate.py",
-        description=__doc__,
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = program.argument_parser("simulate", __doc__, _EXAMPLES)
     cli.add_scenario_arguments(parser)
     _add_run_arguments(parser.add_argument)
     _add_hardware_arguments(parser.add_argument)

@@ -49,12 +49,7 @@ _EXAMPLES = """examples:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = argparse.ArgumentParser(
-        prog="train.py",
-        description=__doc__,
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = program.argument_parser("train", __doc__, _EXAMPLES)
     cli.add_scenario_arguments(parser)
     _add_task_arguments(parser.add_argument)
     _add_agent_arguments(parser.add_argument)

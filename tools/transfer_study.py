@@ -46,12 +46,7 @@ _EXAMPLES = """examples:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = argparse.ArgumentParser(
-        prog="transfer_study.py",
-        description=__doc__,
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = program.argument_parser("transfer_study", __doc__, _EXAMPLES)
     _add_scenario_arguments(parser.add_argument)
     _add_agent_arguments(parser.add_argument)
     _add_run_arguments(parser.add_argument)

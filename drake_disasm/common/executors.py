@@ -20,7 +20,6 @@ from concurrent.futures import (
 )
 from functools import partial
 from queue import SimpleQueue
-from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from drake_disasm.common.errors import DisasmError
@@ -227,12 +226,7 @@ class WorkerPool:
         """Returns the pool."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Ends its own workers."""
         self.close()
 

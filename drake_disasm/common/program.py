@@ -1,5 +1,6 @@
 """What every command-line program does: exit statuses, Ctrl-C, progress, provenance."""
 
+import argparse
 import importlib.metadata
 import math
 import signal
@@ -8,7 +9,7 @@ import sys
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, Self
 
 from tqdm import tqdm
@@ -60,6 +61,24 @@ def status(main: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> in
     except KeyboardInterrupt:
         print("interrupted; what was finished is kept", file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def argument_parser(
+    name: str, description: str | None, epilog: str
+) -> argparse.ArgumentParser:
+    """Returns a parser whose help shows both texts line by line.
+
+    Args:
+        name: of the program, without `.py`.
+        description: its docstring.
+        epilog: examples.
+    """
+    return argparse.ArgumentParser(
+        prog=f"{name}.py",
+        description=description,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
 
 
 class ProgressBar:
@@ -118,12 +137,7 @@ class ProgressBar:
         """Returns the bar."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Ends the bar."""
         self.close()
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from multiprocessing import AuthenticationError
 from multiprocessing.connection import Client, Connection, Listener
 from queue import SimpleQueue
-from types import TracebackType
 from typing import Any, Self
 
 from drake_disasm.common.errors import DisasmError
@@ -123,12 +122,7 @@ class ProgressServer:
         """Returns the server."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Stops jobs that still run, and listens no more."""
         self.stop_jobs()
         with contextlib.suppress(OSError, EOFError, AuthenticationError):

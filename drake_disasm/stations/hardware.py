@@ -216,7 +216,7 @@ class HardwareStation(Station):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *exception: object) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def pump(self) -> None:
