@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.effects import Effect, Imprecision, registered_effects
 from drake_disasm.scenario import Scenario
-from sysid.effect_selection.candidates import candidates
+from sysid.effect_selection.candidates import Candidate, candidates
 from sysid.effect_selection.command_scatter import (
     CommandScatter,
     fit_command_scatter,
@@ -21,7 +22,12 @@ from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.held_out import HeldOut, held_out_errors
 from sysid.effect_selection.refit_search import RefitSearch
-from sysid.effect_selection.search import ForwardSearch, LinearSearch, SelectionRound
+from sysid.effect_selection.search import (
+    ForwardSearch,
+    LinearSearch,
+    SearchResult,
+    SelectionRound,
+)
 from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
 from sysid.effect_selection.survey import Survey
 from sysid.effect_selection.verdict import Verdict, judge
@@ -102,51 +108,68 @@ def close_loop(
         folder: of a cache of fits: the same call, stopped and made again, resumes.
 
     Raises:
-        DisasmError: the log is too short to decide anything.
+        DisasmError: the log is too short to decide anything, or no effect of the
+            library can act on the model.
     """
-    if huber_delta is None:
-        huber_delta = model.default_huber_delta
-    train, test = _split(model, train, test)
-    workers, progress = workers or Workers(), progress or ignore_progress
-    base = with_estimated_noise(model.of_episodes(train), workers, huber_delta)
-    refuse_few_rows(base, settings)
     library = registered_effects() if library is None else library
-    applicable = candidates(base, library)
-    fitter = Fitter(
-        _affordable(base, settings), workers, huber_delta, settings, folder=folder
-    )
-    kind = LinearSearch if base.affine else RefitSearch
-    search = kind(fitter, applicable, progress)
-    first, last, begin, end = _searched(search)
-    if fitter.base is not base:
-        _report(progress, "fitting all rows")
-        fitter = fitter.with_base(base).with_exact_derivatives()
-        first, last = fitter.fit(()), fitter.fit(last.effects, last)
-    refuse_short_logs(last)
+    train, test = _split(model, train, test)
+    delta = model.default_huber_delta if huber_delta is None else huber_delta
+    workers = workers or Workers()
+    base = with_estimated_noise(model.of_episodes(train), workers, delta)
+    refuse_few_rows(base, settings)
+    applicable = _applicable(base, library)
+    is_stated = not np.isnan(model.measurements.noise).any()
+    fitter = Fitter(base, workers, delta, settings, folder, is_stated)
+    found = _search(fitter, applicable, progress or ignore_progress)
+    refuse_short_logs(found.last)
     held_out = _with_noise_of(base, model.of_episodes(test)) if test else None
+    return _judged(fitter, found, held_out, may_scatter=Imprecision in library)
+
+
+def _applicable(
+    model: LogModel, library: Sequence[type[Effect]]
+) -> Sequence[Candidate]:
+    """Returns the effects of a library that could act on a model.
+
+    Raises:
+        DisasmError: there are none, so that no verdict would mean anything.
+    """
+    found = candidates(model, library)
+    if not found and Imprecision not in library:
+        raise DisasmError(
+            f"{type(model).__name__}: no effect of the library can act on it; name the "
+            "classes of effects that its predict applies in effect_types"
+        )
+    return found
+
+
+def _search(
+    fitter: Fitter, library: Sequence[Candidate], progress: Progress
+) -> SearchResult:
+    """Returns what a search finds; costly models are searched on some rows only."""
+    thinned = fitter.with_base(_affordable(fitter.base, fitter.settings))
+    kind = LinearSearch if fitter.base.affine else RefitSearch
+    found = kind(thinned, library, progress).run()
+    if thinned.base is fitter.base:
+        return found
+    progress(ProgressUpdate(ForwardSearch.stage, message="fitting all rows"))
+    exact = fitter.with_exact_derivatives()
+    first, last = exact.fit(()), exact.fit(found.last.effects, found.last)
+    return dataclasses.replace(found, first=first, last=last)
+
+
+def _judged(
+    fitter: Fitter, found: SearchResult, held_out: LogModel | None, may_scatter: bool
+) -> ClosedLoop:
+    """Returns the verdict on what a search found, with the errors."""
+    first, last, end = found.first, found.last, found.end
     errors = held_out_errors(fitter, first, last, held_out)
-    may_scatter = Imprecision in library
     scatter = fit_command_scatter(fitter, last) if may_scatter else None
-    rounds = tuple(search.rounds)
-    against = contradictions(last, end.linearised, len(base.parameters))
-    verdict = judge(first, last, end, rounds, against, scatter)
-    return ClosedLoop(verdict, errors, first, last, rounds, begin, end, scatter)
-
-
-def _searched(search: ForwardSearch) -> tuple[Fit, Fit, Survey, Survey]:
-    """Returns the fits without and with effects, and the surveys at both."""
-    _report(search.progress, "fitting the model as it is")
-    first = search.fitter.fit(())
-    count = len(search.library)
-    line = f"objective {first.objective:.4g}; testing {count} candidates"
-    _report(search.progress, line, first.objective)
-    begin = search.survey(first)
-    last, end = search.run(first, begin)
-    return first, last, begin, end
-
-
-def _report(progress: Progress, text: str, value: float = np.nan) -> None:
-    progress(ProgressUpdate(ForwardSearch.stage, message=text, value=value))
+    against = contradictions(last, end.linearised, len(fitter.base.parameters))
+    verdict = judge(first, last, end, found.rounds, against, scatter)
+    return ClosedLoop(
+        verdict, errors, first, last, found.rounds, found.begin, end, scatter
+    )
 
 
 def _split(

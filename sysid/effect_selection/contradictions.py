@@ -58,7 +58,7 @@ def contradictions(
 
 def _is_noise(fit: Fit) -> bool:
     """Returns whether channels whose noise is known leave nothing to explain."""
-    return not fit.model.affine and fit.objective < fit.settings.noise_level
+    return fit.noise_is_stated and fit.objective < fit.settings.noise_level
 
 
 def _difference(

@@ -31,6 +31,8 @@ class Fit:
         linearisation: residuals and derivatives there.
         objective: rms residual in units of the noise, Huber's beyond `huber_delta`.
         settings: thresholds.
+        noise_is_stated: whether the objective is in units of a noise that is known; of
+            one that was estimated from a fit, it is about 1 whatever is missing.
     """
 
     effects: tuple[Candidate, ...]
@@ -39,6 +41,7 @@ class Fit:
     linearisation: Linearisation
     objective: float
     settings: SelectionSettings
+    noise_is_stated: bool = True
 
     @property
     def loss(self) -> float:

@@ -30,16 +30,18 @@ class Fitter:
         workers: to evaluate with.
         huber_delta: residual, in standard deviations, beyond which the loss is linear.
         settings: how far a fit goes.
-        exact: whether derivatives are the model's own, else those of its surrogate.
         folder: where fits are kept, for a search that is stopped; None keeps none.
+        noise_is_stated: whether the channels' noise is known, else estimated.
+        exact: whether derivatives are the model's own, else those of its surrogate.
     """
 
     base: LogModel
     workers: Workers
     huber_delta: float
     settings: SelectionSettings
-    exact: bool = False
     folder: Path | None = None
+    noise_is_stated: bool = True
+    exact: bool = False
 
     def objective(self, model: LogModel) -> Objective:
         """Returns what is minimised, of a model that extends the base."""
@@ -79,6 +81,7 @@ class Fitter:
             found,
             objective.value(found.residual),
             self.settings,
+            self.noise_is_stated,
         )
 
     def with_exact_derivatives(self) -> "Fitter":

@@ -29,7 +29,7 @@ class RefitSearch(ForwardSearch):
 
     def _next(self, fit: Fit, survey: Survey) -> Fit | None:
         limits, starts = self._settings, dict[tuple[str, ...], Fit]()
-        if fit.objective > limits.max_linear_objective:
+        if survey.effects and fit.objective > limits.max_linear_objective:
             survey, starts = self._prescreened(fit, survey)
         worth_a_fit = [
             e

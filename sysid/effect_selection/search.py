@@ -31,6 +31,23 @@ class SelectionRound:
     objective: float
 
 
+@dataclass(frozen=True)
+class SearchResult:
+    """What a search found.
+
+    Attributes:
+        first, last: the fits without effects and with those that were added.
+        begin, end: the evidence for each candidate at both.
+        rounds: how the effects were chosen.
+    """
+
+    first: Fit
+    last: Fit
+    begin: Survey
+    end: Survey
+    rounds: tuple[SelectionRound, ...]
+
+
 @dataclass
 class ForwardSearch(abc.ABC):
     """Adds effects to a model one at a time, as long as one is confirmed by a fit.
@@ -39,7 +56,6 @@ class ForwardSearch(abc.ABC):
         fitter: fits the model with chosen effects.
         library: candidates.
         progress: gets a line after each step.
-        rounds: how effects were chosen.
     """
 
     stage: ClassVar[str] = "selecting effects"
@@ -47,20 +63,20 @@ class ForwardSearch(abc.ABC):
     fitter: Fitter
     library: Sequence[Candidate]
     progress: Progress = ignore_progress
-    rounds: list[SelectionRound] = field(default_factory=list)
+    _rounds: list[SelectionRound] = field(default_factory=list)
 
-    def run(self, fit: Fit, survey: Survey) -> tuple[Fit, Survey]:
-        """Returns the fit with all effects that pass, and the survey that ended it.
-
-        Args:
-            fit: without effects.
-            survey: at that fit.
-        """
+    def run(self) -> SearchResult:
+        """Fits the model, and adds effects until none is confirmed any more."""
+        self._report("fitting the model without effects")
+        fit = first = self.fitter.fit(())
+        self._report_fit("without effects", first)
+        self._report(f"testing {len(self.library)} candidates")
+        survey = begin = self._survey(first)
         while (found := self._next(fit, survey)) is not None:
-            fit, survey = found, self.survey(found)
-        return fit, survey
+            fit, survey = found, self._survey(found)
+        return SearchResult(first, fit, begin, survey, tuple(self._rounds))
 
-    def survey(self, fit: Fit) -> Survey:
+    def _survey(self, fit: Fit) -> Survey:
         """Returns the evidence for each candidate that a fit does not have."""
         return survey_candidates(self.fitter, fit, self.library)
 
@@ -83,7 +99,7 @@ class ForwardSearch(abc.ABC):
         self, chosen: Evidence, ties: Sequence[Evidence], survey: Survey, fit: Fit
     ) -> None:
         """Keeps what was added and why."""
-        self.rounds.append(
+        self._rounds.append(
             SelectionRound(chosen, tuple(ties), survey.record(), fit.objective)
         )
         self._report_fit(chosen.name, fit)

@@ -148,11 +148,11 @@ def _scatter_values(scatter: CommandScatter | None) -> tuple[ParameterValue, ...
 def _excess(last: Fit, scatter: CommandScatter | None) -> float:
     """Returns the objective, if it is more than noise; else 0.
 
-    Only where channels state their noise: estimated from a fit it says nothing.
+    Only where the noise is known: estimated from a fit it says nothing.
     """
     objective = scatter.objective if scatter else last.objective
-    known = not last.model.affine
-    is_more = known and objective > last.settings.max_objective_at_noise
+    limit = last.settings.max_objective_at_noise
+    is_more = last.noise_is_stated and objective > limit
     return objective if is_more else 0.0
 
 

@@ -80,5 +80,5 @@ def test_ctrl_c_leaves_fits_with_which_the_same_command_goes_on(tmp_path):
     )
     again = run(*arguments)
     assert again.returncode == 0, again.stderr
-    assert f"objective {value:.4g}; testing" in again.stdout
+    assert f"without effects: objective {value:.4g}" in again.stdout
     assert not (out / "fits").exists()

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from drake_disasm.effects import JointCoulombFriction, JointEffect, JointSamples
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import (
+    JointCoulombFriction,
+    JointEffect,
+    JointSamples,
+    SensorBias,
+    TorqueOffset,
+)
 from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.output import to_mapping
 from sysid.models import Channel, LogModel, Measurements
@@ -72,6 +79,18 @@ def test_prints_nothing_unless_progress_is_given(pendulum, capsys):
     assert capsys.readouterr() == ("", "")
     messages = [update.message for update in updates]
     assert any(m.startswith("JointCoulombFriction.pivot") for m in messages)
+
+
+def test_an_unexplained_residual_beyond_the_stated_noise_is_called_so(pendulum):
+    found = close_loop(pendulum, library=[TorqueOffset])
+    assert found.verdict.ending == "unexplained"
+    assert found.verdict.excess == pytest.approx(_FRICTION / _NOISE, rel=0.2)
+    assert "No library effect explains the residual" in found.text
+
+
+def test_a_model_on_which_no_effect_can_act_is_refused(pendulum):
+    with pytest.raises(DisasmError, match=r"Pendulum.* effect_types"):
+        close_loop(pendulum, library=[SensorBias])
 
 
 def test_progress_may_stop_it(pendulum):
