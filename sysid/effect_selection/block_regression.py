@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
+from sysid.effect_selection.settings import SelectionSettings
 from sysid.identification.linearisation import Linearisation
 from sysid.identification.uncertainty import block_length, block_numbers
 from sysid.objective import huber_weights, pseudo_residual
@@ -51,23 +51,23 @@ class BlockRegression:
     side: Array
     channels: int
     huber_delta: float
-    settings: SelectionSettings = DEFAULT_SETTINGS
+    settings: SelectionSettings
 
     @classmethod
     def of(
         cls,
         linearisation: Linearisation,
         blocks: NDArray[np.int64],
+        settings: SelectionSettings,
         extra: Array | None = None,
-        settings: SelectionSettings = DEFAULT_SETTINGS,
     ) -> Self:
         """Returns the regression of a linearisation.
 
         Args:
             linearisation: at the fit, with the candidates at null.
             blocks: (rows,) number of each row's block.
-            extra: (rows, channels, k) further columns, of dependence curves.
             settings: how rows are weighted.
+            extra: (rows, channels, k) further columns, of dependence curves.
         """
         if extra is None:
             extra = np.zeros((*linearisation.residual.shape, 0))
@@ -229,7 +229,7 @@ class BlockRegression:
 def blocks_of(
     linearisation: Linearisation,
     episode: NDArray[np.int64],
-    settings: SelectionSettings = DEFAULT_SETTINGS,
+    settings: SelectionSettings,
 ) -> NDArray[np.int64]:
     """Returns the block (rows,) of each row: longer than residuals stay correlated.
 

@@ -72,7 +72,7 @@ def _difference(
     sets += [(e.text, fit.columns_of(e)) for e in fit.effects]
     sets.append((_OWN, np.arange(own)))
     gains = np.column_stack([_gains(regression, columns, begin) for _, columns in sets])
-    p, share = family_p(gains, settings=limits) * tests, np.mean(gains > 0.0, axis=0)
+    p, share = family_p(gains, limits) * tests, np.mean(gains > 0.0, axis=0)
     gain = gains.sum(axis=0) / regression.block_losses.sum()
     passed = (p < limits.alpha) & (share >= limits.contradiction_min_block_share)
     passed &= gain >= limits.contradiction_min_gain

@@ -116,7 +116,7 @@ def rank_by_regression(
     gains = np.array(
         [before - regression.held_out_losses(group) for _, group in columns]
     ).T
-    p, total = family_p(gains, settings=settings), before.sum()
+    p, total = family_p(gains, settings), before.sum()
     found = [
         Evidence(
             explanation,

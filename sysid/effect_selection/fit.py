@@ -58,7 +58,7 @@ class Fit:
     def regression(self, blocks: NDArray[np.int64] | None = None) -> BlockRegression:
         """Returns its normal equations, by blocks (rows,) of its own or of another."""
         chosen = self.blocks if blocks is None else blocks
-        return BlockRegression.of(self.linearisation, chosen, settings=self.settings)
+        return BlockRegression.of(self.linearisation, chosen, self.settings)
 
     @property
     def values(self) -> dict[str, float]:

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import rankdata, wilcoxon
 
-from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
+from sysid.effect_selection.settings import SelectionSettings
 
 Array = NDArray[np.float64]
 
@@ -13,9 +13,7 @@ _EQUAL = 1e-6  # of the largest gain of a block
 _ROUNDING = 1e-12  # of a sum of unit ranks
 
 
-def family_p(
-    gains: Array, seed: int = 0, settings: SelectionSettings = DEFAULT_SETTINGS
-) -> Array:
+def family_p(gains: Array, settings: SelectionSettings, seed: int = 0) -> Array:
     """Returns each candidate's family-wise p-value (k,) that it explains nothing.
 
     The statistic is Wilcoxon's sum of signed ranks of what blocks gain by a candidate
@@ -27,8 +25,8 @@ def family_p(
 
     Args:
         gains: (B, k), of each block by each candidate.
-        seed: of the signs.
         settings: number of draws.
+        seed: of the signs.
     """
     draws = settings.sign_flips
     ranks = np.sign(gains) * rankdata(np.abs(gains), axis=0)

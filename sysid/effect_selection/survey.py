@@ -183,7 +183,7 @@ def _linear_survey(
     episode = model.measurements.episode
     curves, dependences = dependence_curves(model, fitter.settings)
     blocks = blocks_of(linearisation, episode, fitter.settings)
-    raw = BlockRegression.of(linearisation, blocks, curves, fitter.settings)
+    raw = BlockRegression.of(linearisation, blocks, fitter.settings, curves)
     columns = [np.array(group, dtype=np.int64) for group in groups]
     return LinearSurvey(
         linearisation,

@@ -19,7 +19,7 @@ def null_p(request):
     common = random.standard_normal((*size[:2], 1))
     rho = request.param
     gains = np.sqrt(rho) * common + np.sqrt(1.0 - rho) * random.standard_normal(size)
-    return np.array([family_p(g, seed, _FEW).min() for seed, g in enumerate(gains)])
+    return np.array([family_p(g, _FEW, seed).min() for seed, g in enumerate(gains)])
 
 
 @pytest.mark.parametrize("alpha", [0.02, 0.05, 0.2])
@@ -33,13 +33,13 @@ def test_a_candidate_that_all_blocks_gain_by_is_significant():
     random = np.random.default_rng(0)
     gains = random.standard_normal((20, 12))
     gains[:, 7] += 2.0
-    p = family_p(gains)
+    p = family_p(gains, SelectionSettings())
     assert p[7] < 0.01 and np.delete(p, 7).min() > 0.05
 
 
 def test_one_dominant_block_decides_nothing():
     gains = np.where(np.arange(20) == 0, 1e3, -0.1)[:, None]
-    assert family_p(gains)[0] > 0.5
+    assert family_p(gains, SelectionSettings())[0] > 0.5
 
 
 def test_gains_are_compared_block_by_block():

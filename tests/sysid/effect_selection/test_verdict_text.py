@@ -1,0 +1,93 @@
+"""Verdicts in words."""
+
+import numpy as np
+import pytest
+
+from sysid.effect_selection.contradictions import Contradiction
+from sysid.effect_selection.held_out import HeldOut
+from sysid.effect_selection.verdict import ParameterValue, Tie, Verdict
+from sysid.effect_selection.verdict_text import verdict_text
+from sysid.models import Channel
+
+_ERRORS = HeldOut(
+    np.array([[10.0], [-10.0]]),
+    np.array([[11.0], [-11.0]]),
+    np.array([[10.1], [-10.1]]),
+    np.zeros(2, dtype=np.int64),
+    (Channel("fx", "N", 0.1, "as given"),),
+    "1 episode",
+    100,
+)
+_VALUE = ParameterValue("GrooveFriction.mu", 0.2, "1", (0.1, 0.3), 0.0)
+_SHAPE = ParameterValue("SensorLag.tau", 0.5, "s", (0.4, 0.6), None)
+_RIVAL = Tie("GrooveBend", "slow pulls both ways")
+
+
+def _text(ending, names=(), ties=(), values=(), dependence="", against=(), excess=0.0):
+    gains = tuple(0.5 for _ in names)
+    ties = ties or tuple(() for _ in names)
+    found = Verdict(
+        ending, names, gains, ties, values, dependence, 1.0, against, excess
+    )
+    return verdict_text(found, _ERRORS, most=3).split("\n")
+
+
+def test_nothing_is_missing():
+    assert _text("none") == [
+        "missing: none; the residual is consistent with noise",
+        "parameters: none",
+        "error on held-out data: 1 -> 0.1 N; 10 -> 1 % of the readings",
+    ]
+
+
+def test_an_effect_with_its_parameters_and_what_to_record():
+    missing, values, _ = _text(
+        "explained", ("GrooveFriction",), ((_RIVAL,),), (_VALUE,)
+    )
+    assert missing == (
+        "missing: GrooveFriction (or GrooveBend). Not distinguishable from this log; "
+        "to separate them, record: slow pulls both ways"
+    )
+    assert values == "parameters: GrooveFriction.mu = 0.2 (0.1 to 0.3)"
+
+
+def test_what_effects_leave_is_said():
+    missing, *_ = _text("explained", ("SensorLag",), dependence="fx depends on time")
+    assert missing == "missing: SensorLag. Left unexplained: fx depends on time"
+
+
+def test_no_library_effect_explains_it_and_the_nearest():
+    missing, *_ = _text("unexplained", ("SensorLag",), excess=3.14)
+    assert missing == (
+        "No library effect explains the residual: the residual is 3.1 times the "
+        "noise. Nearest: SensorLag"
+    )
+
+
+def test_episodes_that_contradict_each_other_come_before_the_size_of_the_residual():
+    against = (Contradiction(("a", "b"), "SensorBias", 0.5),)
+    missing, *_ = _text("unexplained", against=against, excess=2.0)
+    assert missing.endswith(
+        "episodes that no common effect explains: a against b (SensorBias)"
+    )
+    assert "times" not in missing
+
+
+def test_the_joint_of_a_tie_is_not_repeated_and_many_are_counted():
+    names = ("Friction.j1",)
+    ties = (tuple(Tie(f"E{i}.j1", "rests") for i in range(5)),)
+    missing, *_ = _text("explained", names, ties)
+    assert "Friction.j1 (or E0 or E1 or E2 or 2 more)" in missing
+    assert missing.endswith("record: rests")
+
+
+@pytest.mark.parametrize(("count", "is_shown"), [(1, True), (4, False)])
+def test_shape_parameters_are_listed_for_few_effects(count, is_shown):
+    names = ("SensorLag", "A", "B", "C")[:count]
+    _, values, _ = _text("explained", names, values=(_SHAPE,))
+    assert ("SensorLag.tau = 0.5 s" in values) == is_shown
+
+
+def test_a_parameter_that_may_be_null_is_not_listed():
+    value = ParameterValue("SensorLag.size", 0.1, "N", (-0.1, 0.3), 0.0)
+    assert _text("explained", ("SensorLag",), values=(value,))[1] == "parameters: none"
