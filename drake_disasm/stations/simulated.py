@@ -78,6 +78,7 @@ class SimulatedStation(Station):
         self.scenario = scenario
         # A copy, so that a later change to the same objects is noticed.
         self._default_effects = copy.deepcopy(list(scenario.effects))
+        self._acting_by_default = _acting(self._default_effects)
         self._nominal = nominal_environment(scenario.lock, scenario.contact)
         self.refuse_effects(scenario.effects)
         self._environment = environment_at(self._nominal, scenario.effects)
@@ -272,7 +273,7 @@ class SimulatedStation(Station):
         With the scenario's own effects that is the default Context.
         """
         wanted = list(self.scenario.effects if effects is None else effects)
-        if self._initial is not None and wanted == self._default_effects:
+        if self._initial is not None and _acting(wanted) == self._acting_by_default:
             self.SetDefaultContext(context)
             return self._initial
         settled = self.settled(wanted)
@@ -315,6 +316,10 @@ class SimulatedStation(Station):
     def _fix_commands(self, context: Context) -> None:
         """Commands the start, for a station that stands alone."""
         self.GetInputPort(f"{self.arm}.position").FixValue(context, self.start)
+
+
+def _acting(effects: Sequence[Effect]) -> list[Effect]:
+    return [effect for effect in effects if not effect.is_null]
 
 
 def copy_state(source: Context, target: Context) -> None:

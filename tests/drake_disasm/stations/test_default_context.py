@@ -1,0 +1,241 @@
+"""A station's default Context is the start of the task, in any diagram."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from pydrake.multibody.plant import CoulombFriction
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import (
+    AT_REST,
+    ChainPull,
+    Effect,
+    FlangePayload,
+    GrooveClearance,
+    GrooveFriction,
+    GroovePose,
+    JointCoulombFriction,
+    JointViscousFriction,
+    PayloadError,
+    RotorInertia,
+    SensorBias,
+    SensorLag,
+    TorqueOffset,
+    environment_at,
+)
+from drake_disasm.policies import make_policy
+from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.stations import SimulatedStation, TwinStation, make_station
+from drake_disasm.task.simulation import TaskSimulation
+from tests.drake_disasm.conftest import QUIET
+from tests.drake_disasm.stations.contexts import numbers
+
+JOINT = "iiwa_joint_4"
+ANYWHERE: list[Effect] = [
+    GroovePose(ry=0.03, z=3e-4),
+    GrooveFriction(0.2),
+    GrooveClearance(1e-4),
+    ChainPull(fx=-2.0),
+    SensorBias(fx=1.0),
+    SensorLag(share=0.8, time_constant=0.2),
+    PayloadError(mass=0.1),
+]
+ON_ARM: list[Effect] = [
+    JointViscousFriction(JOINT, 80.0),
+    JointCoulombFriction(JOINT, 9.0),
+    RotorInertia(JOINT, 2.0),
+    TorqueOffset(JOINT, -2.0),
+    FlangePayload(0.3, 0.01, 0.0, 0.02),
+]
+
+
+def _scenario(effects: list[Effect], *overrides: str) -> Scenario:
+    scenario = load_scenario("removal_turned", [QUIET, *overrides])
+    scenario.effects = [*scenario.effects, *effects]
+    return scenario
+
+
+def _simulated(station: SimulatedStation) -> Simulator:
+    """Returns the program of a user who never heard of TaskSimulation."""
+    builder = DiagramBuilder()
+    builder.AddSystem(station)
+    commands = {f"{station.arm}.position": station.start}
+    if station.grip_command is not None:
+        commands["gripper.position"] = np.array([station.grip_command])
+    for name, value in commands.items():
+        source = builder.AddSystem(ConstantVectorSource(value))
+        builder.Connect(source.get_output_port(), station.GetInputPort(name))
+    simulator = Simulator(builder.Build())
+    station.attach(simulator)  # a chain's pull depends on where the bolt is
+    return simulator
+
+
+STATIONS: dict[str, Callable[[], SimulatedStation]] = {
+    "twin": lambda: make_station("twin", _scenario(ANYWHERE)),
+    "impact": lambda: make_station("twin", _scenario(ANYWHERE, "contact.model=impact")),
+    "cell": lambda: make_station("cell", _scenario([*ANYWHERE, *ON_ARM])),
+}
+
+
+@pytest.fixture(scope="module", params=STATIONS)
+def simulator(request: pytest.FixtureRequest) -> Simulator:
+    """A user's own diagram with every kind of effect, not yet initialised."""
+    return _simulated(STATIONS[request.param]())
+
+
+@pytest.fixture
+def station(simulator: Simulator) -> SimulatedStation:
+    """The station in it."""
+    systems = simulator.get_system().GetSystems()
+    return next(each for each in systems if isinstance(each, SimulatedStation))
+
+
+def test_begin_leaves_it_as_it_is(
+    simulator: Simulator, station: SimulatedStation
+) -> None:
+    default = numbers(station.CreateDefaultContext())
+    context = station.CreateDefaultContext()
+    begun = station.begin(context)
+    np.testing.assert_array_equal(numbers(context), default)
+    np.testing.assert_array_equal(begun.reading, station.initial_state.reading)
+    np.testing.assert_array_equal(begun.position, station.start)
+
+
+def test_begin_comes_back_to_it(station: SimulatedStation) -> None:
+    default = numbers(station.CreateDefaultContext())
+    context = station.CreateDefaultContext()
+    station.set_effects(context, [])
+    plant = station.part_context(station.plant, context)
+    station.plant.SetVelocities(plant, np.ones(station.plant.num_velocities()))
+    assert not np.array_equal(numbers(context), default, equal_nan=True)
+    station.begin(context, list(station.scenario.effects))
+    np.testing.assert_array_equal(numbers(context), default)
+
+
+def test_setting_the_scenarios_effects_changes_no_number(
+    station: SimulatedStation,
+) -> None:
+    """What is declared at construction is what `set_effects` writes."""
+    context = station.CreateDefaultContext()
+    default = numbers(context)
+    station.set_effects(context, [])
+    assert not np.array_equal(numbers(context), default, equal_nan=True)
+    station.set_effects(context, station.scenario.effects)
+    np.testing.assert_array_equal(numbers(context), default)
+
+
+def test_groove_and_materials_are_the_effects(station: SimulatedStation) -> None:
+    context = station.CreateDefaultContext()
+    expected = environment_at(station.lock.nominal, station.scenario.effects, AT_REST)
+    assert station.true_groove_pose(context).IsExactlyEqualTo(expected.X_GnG)
+    inspector = station.GetOutputPort("query_object").Eval(context).inspector()
+    for geometry in (*station.lock.groove_ids, *station.lock.bolt_ids.values()):
+        friction: CoulombFriction = inspector.GetProximityProperties(
+            geometry
+        ).GetProperty("material", "coulomb_friction")
+        assert friction.static_friction() == expected.friction
+
+
+def _slot(station: SimulatedStation, effects: list[Effect] | None) -> float:
+    """Returns the width between the lips [m] as the scene graph has it."""
+    context = station.CreateDefaultContext()
+    if effects is not None:
+        station.set_effects(context, effects)
+    inspector = station.GetOutputPort("query_object").Eval(context).inspector()
+    left, right = (
+        (inspector.GetPoseInFrame(i), inspector.GetShape(i))
+        for i in station.lock.groove_ids[:2]
+    )
+    apart = left[0].translation()[2] - right[0].translation()[2]
+    return float(apart - (left[1].height() + right[1].height()) / 2)
+
+
+def test_the_slot_is_as_wide_as_the_effects_say(twin: TwinStation) -> None:
+    """By default, after a change, and after the change is gone."""
+    nominal = _slot(twin, None)
+    wider = TwinStation(_scenario([GrooveClearance(1e-4)]))
+    assert _slot(wider, None) == pytest.approx(nominal + 1e-4)
+    assert _slot(wider, []) == pytest.approx(nominal)
+    assert _slot(twin, [GrooveClearance(1e-4)]) == pytest.approx(nominal + 1e-4)
+
+
+def test_it_stays_at_the_start_in_a_users_diagram(
+    simulator: Simulator, station: SimulatedStation
+) -> None:
+    """The program at the top of redesign.md: gripped at A, at rest, zeroed."""
+    context = station.GetMyContextFromRoot(simulator.get_context())
+    ports = [station.GetOutputPort(name) for name in ("bolt_pose", "ft_sensor.wrench")]
+    before, reading = (port.Eval(context) for port in ports)
+    simulator.AdvanceTo(0.2)
+    after, later = (port.Eval(context) for port in ports)
+    away = (before.inverse() @ after).translation()
+    assert np.linalg.norm(away) < 1e-4  # the pads creep under the pull
+    assert np.all(np.abs(later - reading) < [0.2, 0.2, 0.2, 0.05, 0.05, 0.05])
+    position = station.GetOutputPort(f"{station.arm}.position_measured").Eval(context)
+    np.testing.assert_allclose(position, station.start, atol=2e-3)
+
+
+def test_the_first_reading_is_of_the_load_at_rest(station: SimulatedStation) -> None:
+    """Not of the zeros that a plant's reactions are before its first step."""
+    context = station.CreateDefaultContext()
+    reading = station.GetOutputPort("ft_sensor.wrench").Eval(context)
+    bias = np.array([1.0, 0, 0, 0, 0, 0])  # which comes up after zeroing
+    expected = station.initial_state.reading + bias
+    quantum = np.array(station.scenario.ft_sensor.quantum)
+    assert np.all(np.abs(reading - expected) <= quantum / 2 + 1e-9)
+
+
+@pytest.mark.parametrize("name", ["twin", "cell"])
+def test_an_episode_begins_with_the_default_context(name: str) -> None:
+    """TaskSimulation starts from it, to the bit: its first step is a plain one."""
+    simulation = TaskSimulation(
+        load_scenario("removal_turned", [QUIET]), name, make_policy("admittance")
+    )
+    plain = Simulator(simulation.diagram)
+    default = numbers(simulation.diagram.CreateDefaultContext())
+    np.testing.assert_array_equal(numbers(plain.get_context()), default)
+    begun = simulation.diagram.CreateDefaultContext()
+    simulation.systems.begin(begun)
+    np.testing.assert_array_equal(numbers(begun), default)
+
+
+def test_an_unconnected_velocity_is_at_rest(twin: TwinStation) -> None:
+    ends = []
+    for velocity in (None, np.zeros(6)):
+        simulator = Simulator(twin)
+        context = simulator.get_mutable_context()
+        target = np.array([1e-3, 0, 0, 0, 0, 0])
+        twin.GetInputPort("bolt.position").FixValue(context, target)
+        if velocity is not None:
+            twin.GetInputPort("bolt.velocity").FixValue(context, velocity)
+        simulator.AdvanceTo(0.02)
+        ends.append(numbers(context))
+    np.testing.assert_array_equal(*ends)
+
+
+@pytest.mark.parametrize(
+    ("name", "port", "remedy"),
+    [
+        ("cell", "gripper.position", "station.grip_command"),
+        ("cell", "iiwa.position", "station.start"),
+        ("twin", "bolt.position", "station.start"),
+    ],
+)
+def test_a_diagram_that_lacks_a_command_is_one_clear_error(
+    name: str, port: str, remedy: str, request: pytest.FixtureRequest
+) -> None:
+    station: SimulatedStation = request.getfixturevalue(name)
+    simulator = Simulator(station)
+    context = simulator.get_mutable_context()
+    for command in ({"gripper.position", f"{station.arm}.position"}) - {port}:
+        if station.HasInputPort(command):
+            size = station.GetInputPort(command).size()
+            station.GetInputPort(command).FixValue(context, np.zeros(size))
+    with pytest.raises(DisasmError) as caught:
+        simulator.Initialize()
+    message = str(caught.value)
+    assert f"{port} is not connected" in message and remedy in message

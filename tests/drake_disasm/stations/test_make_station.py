@@ -1,0 +1,157 @@
+"""Stations by name, and what each of them refuses."""
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+from pydrake.lcm import DrakeLcm
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import (
+    BoltMotion,
+    ContactExponent,
+    Effect,
+    Environment,
+    EnvironmentEffect,
+    GroovePose,
+    JointEffect,
+    JointSamples,
+    TorqueOffset,
+    registry,
+)
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.stations import (
+    STATIONS,
+    CellStation,
+    SimulatedStation,
+    TwinStation,
+    make_station,
+)
+from drake_disasm.stations.hardware import HardwareStation
+from drake_disasm.stations.hardware_config import HardwareConfig
+
+
+@pytest.fixture(autouse=True)
+def own_effects(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Registers the effects of this file, for its own tests alone."""
+    monkeypatch.setattr(registry, "_effects", dict(registry._effects))
+    for effect in (Magnetism, HotGear, SoftHead):
+        registry._effects[effect.__name__] = effect
+
+
+@dataclasses.dataclass
+class Magnetism(Effect):
+    """Acts in no place that a station has."""
+
+    field: float = amplitude("T", -1.0, 1.0, "nobody knows where")
+
+
+@dataclasses.dataclass
+class HotGear(JointEffect):
+    """A joint effect that the cell does not simulate."""
+
+    joint: str = "iiwa_joint_4"
+    size: float = amplitude("N m", -1.0, 1.0, "of an arm that runs hot")
+
+    def torque(self, samples: JointSamples) -> None:
+        """Is never asked."""
+
+
+@dataclasses.dataclass
+class SoftHead(EnvironmentEffect):
+    """Changes what hydroelastic contact has, and IMPACT has not."""
+
+    share: float = amplitude("1", 0.0, 0.9, "of the head's modulus that is lost")
+
+    def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
+        """Softens the head."""
+        softer = environment.head_modulus * (1.0 - self.share)
+        return dataclasses.replace(environment, head_modulus=softer)
+
+
+def _scenario(*effects: Effect, model: str = "hydroelastic") -> Scenario:
+    scenario = load_scenario("removal", [f"contact.model={model}"])
+    scenario.effects = list(effects)
+    return scenario
+
+
+def test_every_name_makes_its_station() -> None:
+    assert STATIONS == ("cell", "twin", "hardware")
+    hardware = make_station(
+        "hardware", _scenario(), config=HardwareConfig(), lcm=DrakeLcm("memq://")
+    )
+    assert isinstance(hardware, HardwareStation)
+    assert isinstance(make_station("twin", _scenario(model="impact")), TwinStation)
+
+
+def test_hardware_takes_the_path_of_a_file() -> None:
+    file = Path(__file__).parents[3] / "models" / "hardware" / "cell.yaml"
+    station = make_station(
+        "hardware", _scenario(), config=file, dry_run=True, lcm=DrakeLcm("memq://")
+    )
+    assert isinstance(station, HardwareStation) and station.dry_run
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("twinn", {}, r"no station 'twinn'; did you mean 'twin'\?"),
+        ("robot", {}, "no station 'robot'; known: cell, twin, hardware"),
+        ("hardware", {}, r"where its devices are; give config.*models/hardware"),
+        ("hardware", {"config": "none.yaml"}, r"none\.yaml: No such file"),
+        ("cell", {"dry_run": True}, "station 'cell': takes no option 'dry_run'"),
+    ],
+)
+def test_bad_input_is_one_clear_error(name: str, options: dict, message: str) -> None:
+    with pytest.raises(DisasmError, match=message):
+        make_station(name, _scenario(), **options)
+
+
+REFUSED = [
+    ("twin", "hydroelastic", TorqueOffset("iiwa_joint_4", 1.0), "--station cell"),
+    ("twin", "hydroelastic", ContactExponent(0.5), "contact.model to impact"),
+    ("cell", "hydroelastic", ContactExponent(0.5), "--station twin"),
+    ("twin", "impact", SoftHead(0.5), "head_modulus.*contact.model to hydroelastic"),
+    ("twin", "hydroelastic", Magnetism(0.5), "derive it from one of"),
+    ("cell", "hydroelastic", Magnetism(0.5), "derive it from one of"),
+    ("cell", "hydroelastic", HotGear(size=0.5), "the cell does not simulate"),
+    ("hardware", "hydroelastic", GroovePose(ry=0.1), "hardware has its own effects"),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "model", "effect", "remedy"),
+    REFUSED,
+    ids=lambda value: value if isinstance(value, str) else type(value).__name__,
+)
+def test_an_effect_that_a_station_cannot_carry_is_named(
+    name: str, model: str, effect: Effect, remedy: str
+) -> None:
+    options = {"config": HardwareConfig()} if name == "hardware" else {}
+    with pytest.raises(DisasmError, match=f"{type(effect).__name__}.*{remedy}"):
+        make_station(name, _scenario(effect, model=model), **options)
+
+
+@pytest.mark.parametrize("effect", [Magnetism(0.5), ContactExponent(0.5)])
+@pytest.mark.parametrize("name", ["cell", "twin"])
+def test_neither_can_it_be_set_later(
+    name: str, effect: Effect, request: pytest.FixtureRequest
+) -> None:
+    station: SimulatedStation = request.getfixturevalue(name)
+    for change in (station.set_effects, station.begin):
+        with pytest.raises(DisasmError, match=type(effect).__name__):
+            change(station.CreateDefaultContext(), [effect])
+
+
+def test_the_same_effect_is_carried_where_it_belongs() -> None:
+    station = make_station("twin", _scenario(ContactExponent(0.5), model="impact"))
+    assert isinstance(station, TwinStation)
+    conditions = station.impact_conditions(station.CreateDefaultContext())
+    nominal = station.scenario.contact.impact.exponent
+    assert conditions.law.exponent == pytest.approx(nominal + 0.5)
+
+
+def test_the_cell_names_the_station_that_has_the_contact() -> None:
+    with pytest.raises(DisasmError, match=r"contact\.model: 'impact'.*--station twin"):
+        CellStation(_scenario(model="impact"))
