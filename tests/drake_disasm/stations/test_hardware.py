@@ -6,6 +6,9 @@ import numpy as np
 import psutil
 import pytest
 from pydrake.lcm import DrakeLcm
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import GroovePose
@@ -79,9 +82,35 @@ def test_what_hardware_cannot_do_is_named_when_it_is_built(
 
 def test_devices_that_do_not_answer_are_named(station: HardwareStation) -> None:
     with station, pytest.raises(DisasmError) as caught:
-        station.begin(station.CreateDefaultContext(), [])
+        station.begin(station.CreateDefaultContext())
     for words in ("iiwa is NO_DATA", "gripper is NO_DATA", "ft_sensor is NO_DATA"):
         assert words in str(caught.value)
+
+
+def _simulated(station: HardwareStation, *left_out: str) -> Simulator:
+    """Returns the program of a user who never heard of TaskSimulation."""
+    builder = DiagramBuilder()
+    builder.AddSystem(station)
+    commands = {"iiwa.position": station.start, "gripper.position": [0.0]}
+    for name in commands.keys() - set(left_out):
+        source = builder.AddSystem(ConstantVectorSource(commands[name]))
+        builder.Connect(source.get_output_port(), station.GetInputPort(name))
+    return Simulator(builder.Build())
+
+
+def test_it_does_not_run_before_it_is_connected(station: HardwareStation) -> None:
+    """One clear error, neither NaN nor a hang; its default Context knows no start."""
+    with pytest.raises(DisasmError, match=r"not connected.*station\.begin\(context\)"):
+        _simulated(station).AdvanceTo(0.1)
+    with pytest.raises(DisasmError, match=r"where its arm is.*station\.begin"):
+        _ = station.initial_state
+
+
+def test_it_does_not_run_without_the_grippers_command(
+    station: HardwareStation,
+) -> None:
+    with pytest.raises(DisasmError, match=r"gripper\.position is not connected"):
+        _simulated(station, "gripper.position").Initialize()
 
 
 def test_effects_cannot_be_set_later_either(station: HardwareStation) -> None:
