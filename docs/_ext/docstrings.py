@@ -138,16 +138,26 @@ def _process(
 
 
 def _tidy(app: "Sphinx", doctree: "nodes.document") -> None:
-    """Calls attributes so, and leaves out that a class is an object."""
+    """Tidies a page of the reference, before its table of contents is collected.
+
+    Attributes are called so; that a class is an object is left out; in the sidebar a
+    module has its own name, without those of its packages.
+    """
     for node in list(doctree.findall()):
-        if node.tagname == "paragraph" and node.astext() == "Bases: object":
+        if node.tagname == "toctree":
+            node["entries"] = [(_short(*entry), entry[1]) for entry in node["entries"]]
+        elif node.tagname == "paragraph" and node.astext() == "Bases: object":
             node.parent.remove(node)
         elif node.tagname == "field_name" and node.astext() == "Variables":
             node[0] = type(node[0])("Attributes")
 
 
+def _short(title: str | None, page: str) -> str | None:
+    return page.rpartition(".")[2] if "api/" in page and "." in page else title
+
+
 def setup(app: "Sphinx") -> dict[str, bool]:
     """Registers the hooks; that on docstrings comes before napoleon's."""
     app.connect("autodoc-process-docstring", _process, priority=400)
-    app.connect("doctree-read", _tidy)
+    app.connect("doctree-read", _tidy, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
