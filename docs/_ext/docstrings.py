@@ -2,8 +2,7 @@
 
 A system's ports stand in its docstring between `@system` and `@endsystem`, as in
 Drake; here they become a block with inputs on the left and outputs on the right. A
-dataclass whose fields are made by `quantity` gets a table of them: default, unit,
-bounds, meaning.
+dataclass whose fields state unit and meaning in their metadata gets a table of them.
 """
 
 import dataclasses
@@ -70,31 +69,53 @@ def _escaped_bar(match: re.Match[str]) -> str:
     return match.group(1) or r"\|"
 
 
-def quantity_table(cls: type) -> list[str]:
-    """Returns a table of a dataclass's fields that were made by `quantity`."""
+def field_table(cls: type) -> list[str]:
+    """Returns a table of a dataclass's fields that explain themselves.
+
+    Those made by `quantity` have a `doc` and bounds, those of settings a `reason` and
+    what was `measured`.
+    """
     if not dataclasses.is_dataclass(cls):
         return []
-    fields = [f for f in dataclasses.fields(cls) if "doc" in f.metadata]
-    if not fields:
-        return []
-    rows = [("field", "default", "unit", "bounds", "meaning")]
-    rows += [_quantity_row(field) for field in fields]
-    return ["", *_list_table(rows, "quantities"), ""]
+    fields = dataclasses.fields(cls)
+    quantities = [_quantity_row(f) for f in fields if "doc" in f.metadata]
+    settings = [_setting_row(f) for f in fields if "reason" in f.metadata]
+    lines = []
+    if quantities:
+        head = ("field", "default", "unit", "bounds", "meaning")
+        lines += ["", *_list_table([head, *quantities], "quantities"), ""]
+    if settings:
+        head = ("setting", "default", "unit", "reason", "measured")
+        lines += ["", *_list_table([head, *settings], "settings"), ""]
+    return lines
 
 
 def _quantity_row(field: dataclasses.Field[Any]) -> tuple[str, ...]:
+    metadata = field.metadata
+    bounds = (metadata.get("low", -math.inf), metadata.get("high", math.inf))
+    choices = metadata.get("choices")
+    return (
+        *_name_default_unit(field),
+        _words(choices) if choices else _range(*bounds),
+        _text(metadata["doc"]),
+    )
+
+
+def _setting_row(field: dataclasses.Field[Any]) -> tuple[str, ...]:
+    reason, measured = field.metadata["reason"], field.metadata.get("measured", "")
+    return (*_name_default_unit(field), _text(reason), _text(measured))
+
+
+def _name_default_unit(field: dataclasses.Field[Any]) -> tuple[str, str, str]:
     default = field.default
     if field.default_factory is not dataclasses.MISSING:
         default = field.default_factory()
-    metadata = field.metadata
-    bounds = (metadata.get("low", -math.inf), metadata.get("high", math.inf))
-    return (
-        f"``{field.name}``",
-        "" if default is dataclasses.MISSING else f"``{default!r}``",
-        str(metadata.get("unit", "")),
-        _words(metadata["choices"]) if metadata.get("choices") else _range(*bounds),
-        str(metadata["doc"]).replace("*", r"\*").replace("|", r"\|"),
-    )
+    shown = "" if default is dataclasses.MISSING else f"``{default!r}``"
+    return f"``{field.name}``", shown, _text(field.metadata.get("unit", ""))
+
+
+def _text(value: Any) -> str:
+    return str(value).replace("*", r"\*").replace("|", r"\|")
 
 
 def _words(choices: Sequence[str]) -> str:
@@ -134,7 +155,7 @@ def _process(
         lines.clear()
     lines[:] = system_block(without_substitutions(literal_blocks(lines)))
     if what == "class":
-        lines += quantity_table(obj)
+        lines += field_table(obj)
 
 
 def _tidy(app: "Sphinx", doctree: "nodes.document") -> None:

@@ -8,6 +8,7 @@ import types
 import pytest
 
 from drake_disasm.common.quantity import quantity
+from sysid.effect_selection.settings import SelectionSettings
 from tests.docs.pages import ROOT
 
 
@@ -45,10 +46,16 @@ class _Spring:
 
 
 def test_quantities_become_a_table() -> None:
-    text = "\n".join(docstrings.quantity_table(_Spring))
+    text = "\n".join(docstrings.field_table(_Spring))
     assert all(t in text for t in ("``stiffness``", "``2.5``", "N/m", "≥ 0", "coil"))
     assert "``flat``, ``hook``" in text
-    assert docstrings.quantity_table(int) == []
+    assert docstrings.field_table(int) == []
+
+
+def test_settings_become_a_table() -> None:
+    text = "\n".join(docstrings.field_table(SelectionSettings))
+    names = [field.name for field in dataclasses.fields(SelectionSettings)]
+    assert all(f"``{name}``" in text for name in names) and "binomial" in text
 
 
 def test_absolute_values_are_text_apart_from_literals() -> None:
