@@ -45,9 +45,8 @@ from drake_disasm.common.timing import boundary
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import ActionMap, LearnedPolicy, Network, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
-from drake_disasm.stations import TwinStation
+from drake_disasm.stations import make_station
 from drake_disasm.stations.hardware_config import load_hardware_config
-from drake_disasm.stations.simulated import copy_state
 from drake_disasm.task.diagram import add_motion
 from drake_disasm.task.simulation import TaskSimulation
 
@@ -89,31 +88,33 @@ def _episode(simulation: TaskSimulation, seed: int) -> tuple[float, int]:
     return time.perf_counter() - start, steps
 
 
-def measure_speed(model: str) -> Iterator[Figure]:
-    """Yields real-time factor and steps per second of a model."""
-    simulation = _simulation(model)
+def measure_speed(station: str) -> Iterator[Figure]:
+    """Yields real-time factor and steps per second of a station."""
+    simulation = _simulation(station)
     _episode(simulation, 0)  # warms up
     runs = [_episode(simulation, seed) for seed in range(_REPEATS)]
     per_step = statistics.median(wall / steps for wall, steps in runs)
     period = simulation.scenario.task.period
     yield Figure(
-        f"{model}_real_time_factor",
+        f"{station}_real_time_factor",
         period / per_step,
         "1",
         "real time",
         period / per_step,
     )
-    yield Figure(f"{model}_steps_per_s", 1.0 / per_step, "1/s", "10 Hz", 0.1 / per_step)
+    yield Figure(
+        f"{station}_steps_per_s", 1.0 / per_step, "1/s", "10 Hz", 0.1 / per_step
+    )
 
 
-def measure_reset(model: str) -> Iterator[Figure]:
+def measure_reset(station: str) -> Iterator[Figure]:
     """Yields the cost of a reset in place, beside building the diagram anew."""
-    simulation = _simulation(model)
+    simulation = _simulation(station)
     simulation.reset(0)
     reset = _median_time(lambda: simulation.reset(1), 50)
-    build = _median_time(lambda: _simulation(model).reset(0), _REPEATS)
+    build = _median_time(lambda: _simulation(station).reset(0), _REPEATS)
     yield Figure(
-        f"{model}_reset_ms", 1e3 * reset, "ms", "building and settling", reset / build
+        f"{station}_reset_ms", 1e3 * reset, "ms", "building and settling", reset / build
     )
 
 
@@ -152,15 +153,12 @@ def _commanded_rates(simulation: TaskSimulation) -> list[np.ndarray]:
 def _replay(scenario: Scenario, rates: list[np.ndarray]) -> float:
     """Returns the wall time [s] that Drake alone takes for the same motion."""
     builder = DiagramBuilder()
-    station = builder.AddNamedSystem("station", TwinStation(scenario))
+    station = builder.AddNamedSystem("station", make_station("twin", scenario))
     source = builder.AddNamedSystem("rate", ConstantVectorSource(np.zeros(6)))
     add_motion(builder, source.get_output_port(), station)
     simulator = Simulator(builder.Build())
-    root = simulator.get_mutable_context()
-    mine = station.GetMyMutableContextFromRoot(root)
-    station.set_effects(mine, scenario.effects)
-    copy_state(station.settled(scenario.effects), mine)
     simulator.Initialize()
+    root = simulator.get_mutable_context()
     value = source.get_mutable_source_value(source.GetMyMutableContextFromRoot(root))
     start = time.perf_counter()
     for k, commanded in enumerate(rates):
@@ -193,7 +191,7 @@ def measure_latency() -> Iterator[Figure]:
 
 def measure_memory() -> Iterator[Figure]:
     """Yields the peak memory of the programs, beside importing what they build on."""
-    tools = Path(__file__).parent
+    tools = Path(__file__).parents[1] / "tools"
     peak = _peak_mib([sys.executable, str(tools / "simulate.py"), "--no-meshcat"])
     bare = _peak_mib([sys.executable, "-c", "import pydrake.all"])
     yield Figure("peak_mib_simulate", peak, "MiB", "import pydrake.all", peak / bare)
@@ -271,8 +269,8 @@ def _peak_mib(command: list[str]) -> float:
     return peak / 2**20
 
 
-def _simulation(model: str) -> TaskSimulation:
-    return TaskSimulation(load_scenario(_SCENARIO), model, make_policy(_POLICY))
+def _simulation(station: str) -> TaskSimulation:
+    return TaskSimulation(load_scenario(_SCENARIO), station, make_policy(_POLICY))
 
 
 def measure_inference() -> Iterator[Figure]:

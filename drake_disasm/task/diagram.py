@@ -124,7 +124,9 @@ def add_task(
     """Adds the task of a station's scenario to a diagram that holds the station.
 
     The diagram's default Context is then the start of an episode: a Simulator may
-    advance it as it is. See `TaskSystems.begin` for other effects, and for hardware.
+    advance it as it is. `station.attach(simulator)` keeps effects up to date that
+    depend on the bolt's motion. See `TaskSystems.begin` for other effects, and for
+    hardware, and `TaskSystems.set_seed` for noise.
 
     Args:
         builder: of the diagram; the station has been added to it.
