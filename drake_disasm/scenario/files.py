@@ -120,6 +120,7 @@ def _override(scenario: Scenario, override: str) -> Scenario:
     source = f"--set {override}"
     try:
         scenario, path = resolve(copy.deepcopy(scenario), key.strip())
+        find_field(scenario, path, key.strip())
     except DisasmError as error:
         raise DisasmError(f"{source}: {error}") from None
     _set_text(scenario, path, value, source)

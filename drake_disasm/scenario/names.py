@@ -20,6 +20,8 @@ from drake_disasm.common.quantity import closest
 from drake_disasm.effects import Effect, JointEffect, registered_effects
 from drake_disasm.scenario.schema import Scenario
 
+_SECTIONS = frozenset(field.name for field in dataclasses.fields(Scenario))
+
 
 @dataclasses.dataclass(frozen=True)
 class Field:
@@ -61,15 +63,17 @@ class Field:
 def resolve(scenario: Scenario, name: str) -> tuple[Scenario, str]:
     """Returns the path that a name stands for, and the scenario that has it.
 
-    It is the scenario itself, or one with one more effect, at null.
+    It is the scenario itself, or one with one more effect, at null. Whether the path
+    leads somewhere is for `find_field` to say.
 
     Raises:
-        DisasmError: the name is ambiguous, or leads nowhere; names the nearest.
+        DisasmError: the name fits several effects, or does not say at which joint.
     """
     word, _, rest = name.partition(".")
+    if word in _SECTIONS:
+        return scenario, name
     kinds = {effect.__name__: effect for effect in registered_effects()}
     if word not in kinds:
-        find_field(scenario, name)
         return scenario, name
     kind, place = kinds[word], {}
     if issubclass(kind, JointEffect) and "." in rest:
@@ -82,9 +86,7 @@ def resolve(scenario: Scenario, name: str) -> tuple[Scenario, str]:
         )
     if not numbers:
         scenario, numbers = _with_effect(scenario, kind, place, name)
-    path = f"effects.{numbers[0]}.{rest}"
-    find_field(scenario, path, name)
-    return scenario, path
+    return scenario, f"effects.{numbers[0]}.{rest}"
 
 
 def _is_at(effect: Effect, kind: type[Effect], place: Mapping[str, str]) -> bool:

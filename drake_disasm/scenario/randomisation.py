@@ -40,7 +40,7 @@ def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
     drawn.randomisation = []
     for name, value in values.items():
         drawn, path = resolve(drawn, name)
-        find_field(drawn, path).set(value)
+        find_field(drawn, path, name).set(value)
     return drawn
 
 
