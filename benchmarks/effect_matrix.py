@@ -21,10 +21,10 @@ from sysid.models.twin import TwinModel
 from sysid.validation.blind_tests import (
     Answer,
     Case,
-    answers,
     left_out_cases,
     null_cases,
     pair_cases,
+    run_cases,
     single_cases,
 )
 from sysid.validation.synthetic_logs import transitions_log
@@ -61,7 +61,7 @@ def run_matrix(folder: Path, seeds: int, nulls: int, pairs: int) -> str:
         ProgressBar(unit="log") as bar,
         WorkerPool(os.cpu_count() or 1, progress=bar) as pool,
     ):
-        found = answers(cases, pool, FinishedWork(folder))
+        found = run_cases(cases, pool, FinishedWork(folder))
     by_key = {a.case.key: a for a in found}
     text = in_words({n: [by_key[c.key] for c in g] for n, g in groups.items()})
     write_text(folder / "effects.md", text + "\n")

@@ -30,7 +30,7 @@ class Parameter:
             decades.
         path: where it stands in a scenario, such as `effects.0.ry`; the name itself
             if it is left out.
-        is_shape: whether it says how an effect looks and not how large it is.
+        is_shape: whether it is a shape parameter of an effect, not an amplitude.
     """
 
     name: str

@@ -26,7 +26,7 @@ class Request:
         name: as `drake_disasm.scenario.names` says; `Effect.field` adds the effect at
             null if the scenario has none.
         low, high: bounds.
-        nominal: where the search begins.
+        nominal: where the search starts.
         scale: "linear" or "log".
     """
 
@@ -45,7 +45,7 @@ def read_requests(words: Sequence[str]) -> list[Request]:
             scale}`, each of which may be left out.
 
     Raises:
-        DisasmError: an unreadable file, an unknown key, a value that is no number,
+        DisasmError: an unreadable file, an unknown key, a value that is not a number,
             a name given twice.
     """
     requests = [
@@ -72,13 +72,13 @@ def read_requests(words: Sequence[str]) -> list[Request]:
 def scenario_parameters(
     scenario: Scenario, requests: Sequence[Request]
 ) -> tuple[Scenario, tuple[Parameter, ...]]:
-    """Returns the parameters asked for, and the scenario that has them all.
+    """Returns the requested parameters, and the scenario that has them all.
 
     The scenario has one more effect for each that was named and not there, at its
     null value.
 
     Raises:
-        DisasmError: there is no such number, or its bounds can't be.
+        DisasmError: there is no such number, or its bounds are impossible.
     """
     found = []
     for request in requests:
@@ -129,7 +129,7 @@ def _read_file(path: Path) -> list[Request]:
         raise DisasmError(f"{path}: not YAML ({text}); correct it") from None
     if not isinstance(raw, dict) or not raw:
         raise DisasmError(
-            f"{path}: is no mapping; write lines of `contact.friction: "
+            f"{path}: is not a mapping; write lines of `contact.friction: "
             "{low: 0.0, high: 1.0}`"
         )
     return [_request(str(name), entry, path) for name, entry in raw.items()]
@@ -139,7 +139,7 @@ def _request(name: str, entry: Any, path: Path) -> Request:
     entry = entry or {}
     if not isinstance(entry, dict):
         raise DisasmError(
-            f"{path}: {name}: is no mapping; write {{low: ..., high: ...}}"
+            f"{path}: {name}: is not a mapping; write {{low: ..., high: ...}}"
         )
     for key, value in entry.items():
         if key not in _KEYS:

@@ -23,13 +23,13 @@ from pydrake.math import RigidTransform
 
 from drake_disasm.effects.fields import amplitudes
 
-#: What an effect remembers from one step to the next: six numbers.
+#: What an effect keeps from one step to the next: six numbers.
 Memory = np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
 class Environment:
-    """The part of the world that can differ without rebuilding the diagram.
+    """The part of the world that can change without rebuilding the diagram.
 
     Attributes:
         X_GnG: pose of the true groove frame in the groove's nominal frame.
@@ -38,7 +38,7 @@ class Environment:
         dissipation: Hunt-Crossley dissipation of the contact [s/m].
         clearance: slot width minus neck diameter [m].
         impact_stiffness, impact_exponent: IMPACT's k [N/mm^e] and e.
-        force_Gn: (fx, fy, fz) that pulls on the bolt at Bo beside the contact, in
+        force_Gn: (fx, fy, fz) that pulls on the bolt at Bo besides the contact, in
             Gn [N].
     """
 
@@ -55,9 +55,9 @@ class Environment:
 
 @dataclasses.dataclass(frozen=True)
 class BoltMotion:
-    """Where the bolt is, and how fast it is to go: what its surroundings depend on.
+    """Position and commanded velocity of the bolt, which its surroundings depend on.
 
-    It is that of the beginning of a step of the MDP, and holds for the whole step.
+    As at the beginning of a step of the MDP; constant for the whole step.
 
     Attributes:
         p: (3,) Bo in Gn [m].
@@ -68,7 +68,7 @@ class BoltMotion:
     v: np.ndarray
 
 
-#: As an episode begins: at A, at rest.
+#: As an episode starts: at A, at rest.
 AT_REST = BoltMotion(np.zeros(3), np.zeros(3))
 
 
@@ -82,7 +82,7 @@ class Sensing:
         time: (...,) seconds since the episode (or the log) began.
         R_WS: (..., 3, 3) orientation of the sensor in the world.
         g_W: gravity vector, (3,) [m/s^2].
-        mass: of what is known to hang on the sensor [kg].
+        mass: of the payload on the sensor, as the tool data have it [kg].
         p_SoScm_S: (3,) its centre of mass [m].
     """
 
@@ -145,7 +145,7 @@ class MotionEffect(Effect, abc.ABC):
     """Acts between the pose that is commanded and the one that the arm goes for.
 
     Both are displacements from the start, (6,) position and rotation vector of B in
-    G, at the boundaries of the MDP's steps; between them the arm moves evenly.
+    G, at the boundaries of the MDP's steps; between them the velocity is constant.
 
     Attributes:
         stage: where on the way from command to arm: 0 scale, 1 time, 2 gears,
@@ -158,12 +158,12 @@ class MotionEffect(Effect, abc.ABC):
     def execute(
         self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
     ) -> tuple[np.ndarray, Memory]:
-        """Returns what is executed (6,), and what to remember for the next step.
+        """Returns what is executed (6,), and the memory for the next step.
 
         Args:
             commanded: (6,) for the end of the step [m, rad].
-            wrench: (6,) [f; tau] on the bolt at Bo in G, measured at its beginning.
-            memory: (6,) of the step before; zeros at first.
+            wrench: (6,) [f; tau] on the bolt at Bo in G, measured as the step begins.
+            memory: (6,) of the step before; zeros at the start.
             period: of the MDP [s].
         """
 
@@ -200,19 +200,19 @@ class SensorEffect(Effect, abc.ABC):
 
 
 class SensorMemoryEffect(SensorEffect, abc.ABC):
-    """A sensor effect that depends on what was there before.
+    """A sensor effect that depends on earlier loads.
 
-    A sensor goes from sample to sample: `remember`, then `read`. Readings at rest know
-    nothing of it.
+    The sensor goes from sample to sample: `remember`, then `read`. Readings at rest do
+    not show it.
     """
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
-        """Returns the readings as they are after long rest."""
+        """Returns readings after a long rest."""
         return wrench_S
 
     @abc.abstractmethod
     def begin(self, wrench_S: np.ndarray) -> np.ndarray:
-        """Returns the memory (..., 6) after long rest under a load (..., 6)."""
+        """Returns the memory (..., 6) after a long rest under a load (..., 6)."""
 
     @abc.abstractmethod
     def remember(
@@ -261,4 +261,4 @@ class JointEffect(ArmEffect, abc.ABC):
 
     @abc.abstractmethod
     def torque(self, samples: JointSamples) -> np.ndarray:
-        """Returns what the measured torque has beside the rigid bodies', (n,) [N m]."""
+        """Returns what it adds to the torque of the rigid bodies, (n,) [N m]."""

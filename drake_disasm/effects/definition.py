@@ -83,7 +83,7 @@ def _field_faults(field: dataclasses.Field) -> Iterator[str]:
         or not all(map(math.isfinite, bounds))
     ):
         yield (
-            f"field '{field.name}' is no number with unit and bounds; make it by "
+            f"field '{field.name}' is not a number with unit and bounds; make it by "
             "amplitude(unit, low, high, doc) or shape_parameter(...), of type float"
         )
     elif not all(bounds[0] <= v <= bounds[1] for v in (default, *metadata["grid"])):

@@ -1,4 +1,4 @@
-"""Scenarios: typed YAML files that each denote one diagram.
+"""Scenarios: typed YAML files, each of which defines one diagram.
 
 `load_scenario` reads a file (strictly: an unknown key is an error), applies
 overrides such as `lock.clearance=0.0003`, and checks every value against its

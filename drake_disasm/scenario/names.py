@@ -134,7 +134,7 @@ def find_number(scenario: Scenario, path: str, name: str = "") -> Field:
     field = find_field(scenario, path, name)
     if not field.can_vary:
         raise DisasmError(
-            f"{name or path}: is no number that can vary; name one such as "
+            f"{name or path}: is not a number that can vary; name one such as "
             "contact.friction, twin.stiffness.0 or GroovePose.ry"
         )
     return field

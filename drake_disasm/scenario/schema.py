@@ -1,4 +1,4 @@
-"""What a scenario may say: a plain dataclass for each part, with valid defaults."""
+"""The schema of a scenario: a dataclass for each part, with valid defaults."""
 
 import dataclasses
 
@@ -68,8 +68,8 @@ class ImpactConfig:
 class ContactConfig:
     """How bolt and groove touch.
 
-    Hydroelastic: the groove is rigid, the bolt's neck and head yield. `impact` is
-    the thesis's law instead, with the friction of this section.
+    Hydroelastic: the groove is rigid, the bolt's neck and head are compliant.
+    `impact` is the thesis's law instead, with the friction of this section.
     """
 
     model: str = quantity(
@@ -217,16 +217,16 @@ class ObservationConfig:
 
 @dataclasses.dataclass
 class Range:
-    """A number that every episode draws anew, uniformly (domain randomisation)."""
+    """A number that each episode draws uniformly (domain randomisation)."""
 
-    parameter: str = quantity("", "", "path, as `effects.0.ry` or `lock.clearance`")
+    parameter: str = quantity("", "", "name, as `GroovePose.ry` or `lock.clearance`")
     low: float = quantity(0.0, "", "in the parameter's own unit")
     high: float = quantity(0.0, "", "in the parameter's own unit")
 
 
 @dataclasses.dataclass
 class Scenario:
-    """Everything that denotes one diagram, or a family of them."""
+    """Everything that defines one diagram, or a family of them."""
 
     name: str = "removal"
     simulation: SimulationConfig = dataclasses.field(default_factory=SimulationConfig)

@@ -1,6 +1,6 @@
 """Strict YAML: every key, shape and word is checked, and named when it is wrong.
 
-Drake's own reader does the conversion. The walk before it is there for the message:
+Drake's own reader does the conversion. The checks before it are there for the message:
 which key, in which line, and what to write instead.
 """
 
@@ -42,10 +42,10 @@ def parse(
 
     Args:
         text: a YAML mapping.
-        defaults: what holds where the text is silent.
+        defaults: values of what the text leaves out.
         source: where the text is from, for messages.
         path: where the dataclass stands in a scenario, for messages.
-        line_numbers: whether lines mean something to whoever wrote the text.
+        line_numbers: whether messages give lines; no for text that no file has.
 
     Raises:
         DisasmError: in one line, what is wrong and what to write instead.
@@ -76,7 +76,7 @@ def parse(
 def _check_section(node: yaml.Node, schema: type, path: str) -> None:
     """Checks a mapping that stands for a dataclass, and what is below it."""
     if not isinstance(node, yaml.MappingNode):
-        here = f"{path}: is empty or no section" if path else "is no mapping of keys"
+        here = f"{path}: is empty or not a section" if path else "is not a mapping"
         raise _NodeError(
             node, f"{here}; write key: value pairs below it, or leave it out"
         )
@@ -129,7 +129,7 @@ def _check_scalar(node: yaml.Node, kind: type, path: str, metadata: Any) -> None
 def _check_effects(node: yaml.Node) -> None:
     if not isinstance(node, yaml.SequenceNode):
         raise _NodeError(
-            node, "effects: is no list; write [] or lines of `- !Name {...}`"
+            node, "effects: is not a list; write [] or lines of `- !Name {...}`"
         )
     for number, item in enumerate(node.value):
         path, name = f"effects.{number}", item.tag.removeprefix("!")
@@ -150,7 +150,7 @@ def _check_ranges(node: yaml.Node) -> None:
     if not isinstance(node, yaml.SequenceNode):
         raise _NodeError(
             node,
-            "randomisation: is no list; write [] or lines of "
+            "randomisation: is not a list; write [] or lines of "
             "`- {parameter: effects.0.ry, low: -0.03, high: 0.03}`",
         )
     for number, item in enumerate(node.value):
@@ -158,7 +158,7 @@ def _check_ranges(node: yaml.Node) -> None:
 
 
 def _unknown(name: str, schema: type, path: str) -> str:
-    """Returns the message for a key that does not belong here."""
+    """Returns the message for an unknown key."""
     if not name:
         return f"{path or 'a key'}: a key must be a word; {_MODEL}"
     fields = [field.name for field in dataclasses.fields(schema)]

@@ -1,4 +1,4 @@
-"""Whether a scenario can be: values in their bounds, and fitting one another."""
+"""Checks of scenarios: values within bounds, and consistent with each other."""
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import check
@@ -29,7 +29,7 @@ def validate(scenario: Scenario) -> None:
 
 
 def _validate_one(scenario: Scenario) -> None:
-    """Checks one diagram's scenario, whatever its ranges."""
+    """Checks the scenario of one diagram, without its ranges."""
     check(scenario)
     _refuse_unregistered(scenario)
     _refuse_broken_periods(scenario)
@@ -46,7 +46,7 @@ def _refuse_unregistered(scenario: Scenario) -> None:
         if type(effect) is not known:
             raise DisasmError(
                 f"effects.{number}: {known.__name__} has been registered again since "
-                "this one was made; make it anew"
+                "this one was made; make it again"
             )
 
 
@@ -66,7 +66,7 @@ def _refuse_broken_periods(scenario: Scenario) -> None:
 
 
 def _refuse_impossible_lock(lock: LockConfig) -> None:
-    """A head that the lips do not hold is no lock, and it must fit its own hole."""
+    """The lips must hold the head, and the keyhole must let it through."""
     slot = lock.neck_diameter + lock.clearance
     if lock.head_diameter <= slot:
         raise DisasmError(

@@ -1,1 +1,1 @@
-"""Logs with effects that nobody declares, and how often they are found."""
+"""Logs with undeclared effects, and how often closing the loop names them."""

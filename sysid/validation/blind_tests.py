@@ -1,4 +1,4 @@
-"""How often an effect that nobody declared gets its name: the confusion matrix."""
+"""How often closing the loop names an undeclared effect: the confusion matrix."""
 
 import json
 import tempfile
@@ -24,10 +24,10 @@ from drake_disasm.scenario import Scenario
 from sysid.effect_selection.close_loop import close_loop
 from sysid.models.twin import TwinModel
 from sysid.objective import pseudo_residual, rms
-from sysid.validation.random_effects import drawn
+from sysid.validation.random_effects import random_effect
 from sysid.validation.synthetic_logs import transitions_log
 
-_SMALL = (3, 25)  # episodes and steps of the log by which a size is found
+_SMALL = (3, 25)  # episodes and steps of the log by which an amplitude is chosen
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class Case:
     Attributes:
         effects: names of the classes that are put in; none for a null log.
         level: rms that each leaves, in units of the noise.
-        seed: of all that is drawn.
-        left_out: names of classes that the search does not know.
+        seed: of everything that is drawn.
+        left_out: names of classes that the library lacks.
         correlation: of the noise from step to step.
     """
 
@@ -50,7 +50,7 @@ class Case:
 
     @property
     def key(self) -> str:
-        """A text that tells cases apart."""
+        """A text that identifies the case."""
         return json.dumps(asdict(self))
 
 
@@ -59,10 +59,10 @@ class Answer:
     """What closing the loop said of a case.
 
     Attributes:
-        case: the same as asked.
-        drawn: what was put in, as text.
+        case: that was run.
+        drawn: the effects that were put in, as text.
         ending: "none", "explained" or "unexplained"; "refused" for a log that is
-            said to be too short.
+            judged too short.
         names: found, the most important first.
         ties: of each.
         before, after: error on held-out episodes, in units of the noise.
@@ -84,20 +84,20 @@ class Answer:
 
     @property
     def in_tie(self) -> bool:
-        """Whether each effect is named or in a tie with what is."""
+        """Whether each effect is named, or tied with one that is."""
         said = set(self.names) | {name for tie in self.ties for name in tie}
         return set(self.case.effects) <= said
 
 
 def nominal() -> Scenario:
-    """Returns what the logs state: the thesis's task, with the contact that is fast."""
+    """Returns what the logs state: the thesis's task, with the fast contact model."""
     scenario = Scenario()
     scenario.contact.model = "impact"
     return scenario
 
 
-def traceable() -> tuple[type[Effect], ...]:
-    """Returns the effects that transitions of the twin can show."""
+def observable_effects() -> tuple[type[Effect], ...]:
+    """Returns the effects that show in transitions of the twin."""
     acts = (EnvironmentEffect, MotionEffect, SensorEffect)
     return tuple(
         effect
@@ -106,13 +106,15 @@ def traceable() -> tuple[type[Effect], ...]:
     )
 
 
-def answer(case: Case) -> Answer:
-    """Returns what closing the loop says of a case's log, which states nothing."""
+def run_case(case: Case) -> Answer:
+    """Returns what closing the loop says of a case's log, which declares no effect."""
     kinds = {effect.__name__: effect for effect in registered_effects()}
     random = np.random.default_rng([case.seed, len(case.effects)])
     with tempfile.TemporaryDirectory() as folder:
         effects = [
-            drawn(kinds[name], random, case.level, lambda e: residual(e, folder))
+            random_effect(
+                kinds[name], random, case.level, lambda e: residual(e, folder)
+            )
             for name in case.effects
         ]
         log = Path(folder) / "log"
@@ -138,37 +140,37 @@ def residual(effect: Effect, folder: str) -> float:
     """Returns the rms residual of the nominal twin on a small log with an effect.
 
     In units of the noise; the log has none. The loss is Huber's, as in the objective:
-    else the one row in which the bolt misses an edge would be all.
+    else the one row in which the bolt misses an edge would dominate.
     """
-    silent = nominal()
-    silent.ft_sensor.noise = [0.0] * 6
+    noiseless = nominal()
+    noiseless.ft_sensor.noise = [0.0] * 6
     episodes, steps = _SMALL
     log = Path(folder) / f"probe_{len(list(Path(folder).iterdir()))}"
-    transitions_log(log, silent, [effect], 0, episodes, steps)
+    transitions_log(log, noiseless, [effect], 0, episodes, steps)
     model = TwinModel([read_log(log)], nominal(), ())
     measured = model.measurements
     error = model.predictions(np.zeros(0)) - measured.values
     return rms(pseudo_residual(error / measured.noise, model.default_huber_delta))
 
 
-def answers(
+def run_cases(
     cases: Sequence[Case], pool: WorkerPool, finished: FinishedWork
 ) -> list[Answer]:
-    """Returns the answers to cases; those that are kept are not asked for again.
+    """Returns the answers to cases; those that are kept are not run again.
 
     Args:
-        cases: to ask.
+        cases: to run.
         pool: does the work.
-        finished: gets each answer when it is there.
+        finished: keeps each answer.
     """
     open_cases = [case for case in cases if finished.get(case.key) is None]
-    for case, found in pool.run(_answer, open_cases):
+    for case, found in pool.run(_run_one, open_cases):
         finished.keep(case.key, asdict(found))
     return [_answer_of(finished.get(case.key)) for case in cases]
 
 
-def _answer(case: Case, progress: Progress) -> Answer:
-    found = answer(case)
+def _run_one(case: Case, progress: Progress) -> Answer:
+    found = run_case(case)
     progress(ProgressUpdate("blind tests", 1, 1))
     return found
 
@@ -192,7 +194,7 @@ def single_cases(levels: Sequence[float], seeds: Sequence[int]) -> list[Case]:
     """Returns every effect at every level with every seed."""
     return [
         Case((effect.__name__,), level, seed)
-        for effect in traceable()
+        for effect in observable_effects()
         for level in levels
         for seed in seeds
     ]
@@ -211,17 +213,17 @@ def null_cases(correlations: Sequence[float], seeds: Sequence[int]) -> list[Case
 
 
 def left_out_cases(level: float, seeds: Sequence[int]) -> list[Case]:
-    """Returns effects that the search does not know."""
+    """Returns every effect, each missing in the library."""
     return [
         Case((effect.__name__,), level, seed, left_out=(effect.__name__,))
-        for effect in traceable()
+        for effect in observable_effects()
         for seed in seeds
     ]
 
 
 def _pairs() -> Iterator[tuple[str, str]]:
-    """Yields pairs of different effects in a random order that is always the same."""
-    names = [effect.__name__ for effect in traceable()]
+    """Yields pairs of different effects in a random, repeatable order."""
+    names = [effect.__name__ for effect in observable_effects()]
     random = np.random.default_rng(0)
     while True:
         first, second = random.choice(len(names), 2, replace=False)

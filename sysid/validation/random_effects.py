@@ -1,4 +1,4 @@
-"""Draws effects of a wanted size, whatever their fields mean."""
+"""Draws effects that leave a residual of a given size."""
 
 import dataclasses
 from collections.abc import Callable
@@ -7,25 +7,25 @@ import numpy as np
 
 from drake_disasm.effects import Effect, amplitudes, shape_parameters
 
-_FIRST = 1e-3  # of the range of a field, where the search for its size begins
+_FIRST = 1e-3  # of a field's range, where the search for its value starts
 _MOST_FIELDS = 2
-_ROUNDS = 6  # that come close; more only to reach the wanted size at all
+_ROUNDS = 6  # to come close; more only to reach the given size at all
 _MOST_ROUNDS = 15
 _ATTEMPTS = 4
-_ENOUGH = 0.5  # of the wanted size
-_CLOSE = 0.05  # of the wanted size
+_ENOUGH = 0.5  # of the given size
+_CLOSE = 0.05  # of the given size
 
 
-def drawn(
+def random_effect(
     kind: type[Effect],
     random: np.random.Generator,
     level: float,
     residual: Callable[[Effect], float],
 ) -> Effect:
-    """Returns an effect that leaves a residual of about a wanted size.
+    """Returns an effect that leaves a residual of about a given size.
 
-    One or two of its fields, of random signs where both are allowed, in a random
-    shape within the grid's range.
+    One or two of its amplitudes, of random signs where both are allowed, with shape
+    parameters drawn within their grids' ranges.
 
     Args:
         kind: of effect.
@@ -49,7 +49,7 @@ def _attempt(
     level: float,
     residual: Callable[[Effect], float],
 ) -> tuple[Effect, float]:
-    """Returns an effect of about a wanted size, and the size that was reached."""
+    """Returns an effect and the size of the residual that it leaves."""
     fields = {f.name: f.metadata for f in dataclasses.fields(kind)}
     names = amplitudes(kind)
     count = int(random.integers(1, min(_MOST_FIELDS, len(names)) + 1))
@@ -66,20 +66,20 @@ def _attempt(
     for number in range(1, _MOST_ROUNDS + 1):
         effect = kind(**look, **_within(fields, unit, scale))
         if effect == before:
-            break  # its sizes are at their bounds
+            break  # its amplitudes are at their bounds
         found = residual(effect)
         if abs(found / level - 1.0) < _CLOSE:
             break
         if number >= _ROUNDS and found >= _ENOUGH * level:
             break
-        # Contact answers late and then steeply, hence no more than threefold at once.
+        # Contact sets in late and then steeply: never more than threefold at once.
         scale *= float(np.clip(level / max(found, 1e-9), 0.3, 3.0 if found else 10.0))
         before = effect
     return effect, found
 
 
 def _within(fields: dict, unit: dict[str, float], scale: float) -> dict[str, float]:
-    """Returns sizes that a scenario may have."""
+    """Returns amplitudes within their bounds."""
     return {
         name: float(np.clip(scale * value, fields[name]["low"], fields[name]["high"]))
         for name, value in unit.items()

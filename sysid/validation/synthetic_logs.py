@@ -1,8 +1,8 @@
-"""Logs of transitions that carry effects nobody declared; simulated, and called that.
+"""Simulated logs of transitions with undeclared effects.
 
-Episodes run side by side: all that happens in a period is one batch of the replay that
-steps the twin with IMPACT (`ImpactReplay`), so that a log of hundreds of steps takes a
-second. `tests` hold it against the diagram.
+Episodes run in parallel: each period is one batch of the replay that steps the twin
+with IMPACT (`ImpactReplay`), so that a log of hundreds of steps takes a second. Tests
+compare it with the diagram.
 """
 
 import copy
@@ -31,13 +31,13 @@ from sysid.models.commands import twin_coordinates
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 
 _FORWARD, _BACK = 2.2e-3, -1.2e-3  # m per step, on average
-_ACROSS, _TURN = 1.6e-4, 6e-3  # m, rad: how far commands stray
-_FORGETS = 0.6  # of where a command strayed to, per step
+_ACROSS, _TURN = 1.6e-4, 6e-3  # m, rad: standard deviation of commands
+_FORGETS = 0.6  # share of a command's deviation that is left after a step
 
 
 @dataclass(frozen=True)
 class Rollout:
-    """What episodes of n steps gave, E of them side by side.
+    """What E parallel episodes of n steps measured.
 
     Attributes:
         commanded: (E, n + 1, 6) position and rotation vector of B in G.
@@ -59,14 +59,14 @@ def transitions_log(
     steps: int = 25,
     correlation: float = 0.0,
 ) -> None:
-    """Writes a log that states a scenario and was made with effects beside it.
+    """Writes a log that states a scenario and was recorded with more effects.
 
     Args:
         folder: of the log.
         scenario: with IMPACT contact.
-        effects: that nobody declares.
+        effects: that the log does not declare.
         seed: of commands and noise.
-        episodes, steps: how much.
+        episodes, steps: number of episodes, and steps of each.
         correlation: of the noise from one step to the next.
     """
     random = np.random.default_rng(seed)
@@ -84,7 +84,7 @@ def transitions_log(
 def commands(random: np.random.Generator, episodes: int, steps: int) -> Array:
     """Returns commanded displacements (E, n + 1, 6): strokes forth and back.
 
-    Several speeds, both directions, pressing to all sides: what tells effects apart.
+    Several speeds, both directions, pressing to all sides: so that effects differ.
     """
     stroke = np.zeros((episodes, steps))
     for e in range(episodes):
@@ -128,7 +128,7 @@ def rollout(
 
     Args:
         scenario: with IMPACT contact.
-        effects: beside the scenario's.
+        effects: in addition to the scenario's.
         commanded: (E, n + 1, 6), from rest at A.
         noise: (E, n + 1, 6) of the sensor.
     """

@@ -11,7 +11,7 @@ _NOTHING = ("none", "unexplained", "refused")
 
 
 def table(answers: Sequence[Answer]) -> str:
-    """Returns what became of each effect, level by level, as Markdown.
+    """Returns how often each effect was named, level by level, as Markdown.
 
     Args:
         answers: to cases of one effect each.
@@ -55,7 +55,7 @@ def errors_table(answers: Sequence[Answer]) -> str:
 
 
 def confusion_figure(answers: Sequence[Answer]) -> Figure:
-    """Returns which effect was named first where which was put in, over all levels."""
+    """Returns which effect was named first for each one put in, over all levels."""
     rows = _effects(answers)
     said = [_said(a) for a in answers]
     others = sorted({s for s in said if s not in rows and s not in _NOTHING})

@@ -79,9 +79,9 @@ def test_an_effect_that_is_there_is_used():
         (Request("contact.fricton"), "did you mean 'friction'"),
         (Request("GroovePse.ry"), "did you mean 'GroovePose'"),
         (Request("GroovePose.rw"), "GroovePose.rw: .* known: rx, ry"),
-        (Request("task.success"), "no number"),
+        (Request("task.success"), "not a number"),
         (Request("twin.stiffness.6"), "count from 0"),
-        (Request("lock"), "no number"),
+        (Request("lock"), "not a number"),
         (Request("lock.clearance", high=0.5), "go beyond"),
         (Request("lock.clearance", low=8e-4, high=3e-4), "swap"),
         (Request("contact.friction", high=np.inf), "finite"),
@@ -110,11 +110,11 @@ def test_reads_names_and_files(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[a, b]", "no mapping"),
+        ("[a, b]", "not a mapping"),
         ("contact.friction: {lower: 0}", "unknown key 'lower'"),
         ("contact.friction: {low: 1e-3}", "YAML reads"),
         ("contact.friction: {scale: cubic}", "linear or log"),
-        ("contact.friction: 3", "no mapping"),
+        ("contact.friction: 3", "not a mapping"),
         ("a: {", "not YAML"),
     ],
 )

@@ -71,7 +71,7 @@ def _sensing(rpy: tuple[float, float, float], time: float = 1.0) -> Sensing:
 
 @pytest.mark.parametrize("effect", registered_effects())
 def test_is_declared_in_full(effect: type[Effect]) -> None:
-    """A size is zero at null; a shape has a grid within its bounds."""
+    """An amplitude is zero at null; a shape parameter has a grid within its bounds."""
     assert "Equation:" in (effect.__doc__ or "")
     assert "Where it acts:" in (effect.__doc__ or "")
     assert amplitudes(effect)

@@ -148,10 +148,12 @@ _FAULTY = {
     "has no apply": dataclasses.dataclass(type("Own", (SensorEffect,), {})),
     "has no torque": dataclasses.dataclass(type("Own", (JointEffect,), {})),
     "has no amplitude": dataclasses.dataclass(type("Own", (_Reads,), {})),
-    "'fx' is no number with unit and bounds": _own(fx=0.0),
-    "'fy' is no number with unit": _own(**_GOOD, fy=amplitude("", -1, 1, "nothing")),
-    "'fz' is no number with unit": _own(**_GOOD, fz=amplitude("N", -1, np.inf, "far")),
-    "'k' is no number with unit": _own(**_GOOD, k=dataclasses.field(default=1)),
+    "'fx' is not a number with unit and bounds": _own(fx=0.0),
+    "'fy' is not a number with unit": _own(**_GOOD, fy=amplitude("", -1, 1, "nothing")),
+    "'fz' is not a number with unit": _own(
+        **_GOOD, fz=amplitude("N", -1, np.inf, "far")
+    ),
+    "'k' is not a number with unit": _own(**_GOOD, k=dataclasses.field(default=1)),
     "'fx': 0 or its grid is not within": _own(fx=amplitude("N", 1.0, 2.0, "never 0")),
     "'T': 1 or its grid is not within": _own(
         **_GOOD, T=shape_parameter(1.0, "s", 0.1, 2.0, "time", (1.0, 3.0))

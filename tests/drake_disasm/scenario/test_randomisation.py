@@ -61,13 +61,13 @@ def test_ranges_survive_files_and_mappings(tmp_path: Path) -> None:
     [
         (RANGE.format("lock.clearence", 0, 1), "did you mean 'clearance'"),
         (RANGE.format("effects.3.ry", 0, 1), "there is no number 3 of 1"),
-        (RANGE.format("lock", 0, 1), "is no number that can vary"),
-        (RANGE.format("gripper.hold", 0, 1), "is no number that can vary"),
+        (RANGE.format("lock", 0, 1), "is not a number that can vary"),
+        (RANGE.format("gripper.hold", 0, 1), "is not a number that can vary"),
         (RANGE.format("contact.friction", 0.3, 0.1), "is above high"),
         (RANGE.format("contact.friction", 0.1, 5), "with every high end"),
         (RANGE.format("contact.friction", "a", 5), "is not a number"),
         (RANGE.format("lock.travel", 0.02, 0.01), "is above high"),
-        ("randomisation=3", "randomisation: is no list"),
+        ("randomisation=3", "randomisation: is not a list"),
         ("randomisation=[{paramter: a}]", "unknown key 'paramter'"),
         (
             "randomisation=[{parameter: imprecision, low: 0, high: 0},"

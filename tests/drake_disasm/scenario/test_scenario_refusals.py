@@ -24,7 +24,7 @@ BAD = {
     "lock: {clearance: abc}": ["line 1", "'abc'", "number"],
     "lock: {clearance: .nan}": ["lock.clearance", "nan"],
     "lock: {clearance: [1]}": ["wrong shape", "clearance"],
-    "lock: 3": ["line 1", "lock", "no section"],
+    "lock: 3": ["line 1", "lock", "not a section"],
     "name: a\neffects: [!GroovePos {ry: 1}]": ["line 2", "'GroovePos'", "'GroovePose'"],
     "effects: [!GroovePose {ry: 1}]": ["effects.0.ry", "-0.2 to 0.2"],
     "effects: [{}]": ["effects.0", "no name", "GroovePose"],

@@ -13,15 +13,15 @@ from sysid.models.twin import TwinModel
 from sysid.validation.blind_tests import (
     Answer,
     Case,
-    answer,
-    answers,
     nominal,
+    observable_effects,
     pair_cases,
     residual,
+    run_case,
+    run_cases,
     single_cases,
-    traceable,
 )
-from sysid.validation.random_effects import drawn
+from sysid.validation.random_effects import random_effect
 from sysid.validation.synthetic_logs import transitions_log
 from sysid.validation.tables import confusion_figure, errors_table, table
 
@@ -43,19 +43,19 @@ class _Here(Executor):
     "name", ["GrooveFriction", pytest.param("CommandGain", marks=pytest.mark.slow)]
 )
 def test_an_effect_at_twice_the_noise_gets_its_name(name):
-    found = answer(Case((name,), 2.0, 0))
+    found = run_case(Case((name,), 2.0, 0))
     assert found.named_first and found.ending == "explained"
     assert found.after < found.before
 
 
 def test_nothing_is_found_where_nothing_is():
-    assert answer(Case((), 0.0, 1)).ending == "none"
+    assert run_case(Case((), 0.0, 1)).ending == "none"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", single_cases((5.0,), (0,)), ids=lambda c: c.effects[0])
 def test_the_whole_library_at_five_times_the_noise(case):
-    assert answer(case).in_tie
+    assert run_case(case).in_tie
 
 
 def test_a_log_states_nothing_of_what_was_put_in(tmp_path):
@@ -80,7 +80,9 @@ def test_a_model_with_the_effects_explains_a_blind_log(tmp_path):
 
 def test_effects_are_drawn_by_the_residual_they_leave(tmp_path):
     random = np.random.default_rng(0)
-    effect = drawn(SensorBias, random, 2.0, lambda e: residual(e, str(tmp_path)))
+    effect = random_effect(
+        SensorBias, random, 2.0, lambda e: residual(e, str(tmp_path))
+    )
     assert residual(effect, str(tmp_path)) == pytest.approx(2.0, rel=0.1)
 
 
@@ -88,16 +90,16 @@ def test_answers_are_kept_and_not_asked_for_again(tmp_path):
     cases = single_cases((1.0, 2.0), (0,))
     executor = _Here()
     with WorkerPool(executor=executor) as pool:
-        first = answers(cases[:3], pool, FinishedWork(tmp_path))
-        second = answers(cases[:5], pool, FinishedWork(tmp_path))
+        first = run_cases(cases[:3], pool, FinishedWork(tmp_path))
+        second = run_cases(cases[:5], pool, FinishedWork(tmp_path))
         assert executor.done == 5
         assert second[:3] == first
-        assert answers(cases[:5], pool, FinishedWork(tmp_path)) == second
+        assert run_cases(cases[:5], pool, FinishedWork(tmp_path)) == second
     assert executor.done == 5
 
 
 def test_pairs_are_of_two_effects_that_can_show():
-    names = {effect.__name__ for effect in traceable()}
+    names = {effect.__name__ for effect in observable_effects()}
     for case in pair_cases(3.0, range(20)):
         assert len(set(case.effects)) == 2 and set(case.effects) <= names
 
