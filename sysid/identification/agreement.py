@@ -99,6 +99,6 @@ def _text_of_ambiguity(
     return (
         f"{names[0]} and {names[1]} reach the same objective with different parameters "
         f"(in standard deviations: {listed or 'all together'}): the log determines "
-        "these less precisely than the intervals say. Take the distance between the "
+        "these less precisely than the intervals state. Take the distance between the "
         "two as the uncertainty, freeze one, or record motions that separate them."
     )

@@ -105,7 +105,7 @@ class Assessment:
         notes += [f"at the result: {line}" for line in self._sensitivity.complaints]
         if self._held_out is None:
             notes.append(
-                "no episode was held out: nothing tells whether the fit carries over; "
+                "no episode was held out: whether the fit generalises is unknown; "
                 "record several episodes"
             )
         for reason in dict.fromkeys(text for _, text in self._full.failures):
@@ -150,7 +150,7 @@ def noise_floor(huber_delta: float) -> float:
 
 
 def _linearised(objective: Objective, u: Array) -> Linearisation:
-    """Returns the linearisation with fitting steps, which a first one tells."""
+    """Returns the linearisation with fitting steps, which a first one gives."""
     return linearise(objective, u, fitting_steps(linearise(objective, u)))
 
 

@@ -17,7 +17,7 @@ from sysid.models.base import LogModel
 from sysid.objective import Objective
 from sysid.workers import Workers
 
-#: Share of the episodes that judge a fit, where nothing else is said.
+#: Share of the episodes that is held out by default.
 HELD_OUT_SHARE = 0.25
 
 _THIN_ROWS = (64, 220)  # that a global search and a first descent simulate
@@ -33,16 +33,16 @@ def identify(
     journal: Journal | None = None,
     progress: Progress | None = None,
 ) -> Identification:
-    """Fits a model to some episodes of its log, and judges it on the others.
+    """Fits a model to some episodes of its log and evaluates it on the others.
 
     Two global searches, which check each other, are followed by Gauss-Newton on more
     and more rows; docs/identification.md has the reasons.
 
     Args:
         model: of the whole log.
-        train, test: numbers of the episodes to fit, and to judge the fit by, the
-            latter perhaps empty. One that is left out is all that the other leaves;
-            without both, a quarter of the episodes judges.
+        train, test: numbers of the episodes to fit and of those held out; `test` may
+            be empty. If one is omitted, it is all episodes that are not in the other;
+            if both are, a quarter of the episodes is held out.
         settings: methods, how they search, and the loss.
         workers: evaluate the model; by default this process.
         journal: keeps what was evaluated, to resume; by default nothing is kept.
@@ -62,8 +62,8 @@ def identify(
     _refuse_small_logs(fitted)
     _refuse_unknown_profiles(fitted, settings.profiles)
     progress(ProgressUpdate("sensitivities", 0, 1))
-    whole = Objective(fitted, workers, huber_delta)
-    before = sensitivity(whole, whole.start)
+    objective = Objective(fitted, workers, huber_delta)
+    before = sensitivity(objective, objective.start)
     frozen = _to_freeze(before, fitted, settings)
     model, fitted = model.freeze(frozen), fitted.freeze(frozen)
     objectives = [Objective(m, workers, huber_delta) for m in thinned(fitted)]
@@ -72,7 +72,8 @@ def identify(
         for name in settings.methods
     }
     progress(ProgressUpdate("uncertainty", 0, 1))
-    judge = Objective(model.of_episodes(test), workers, huber_delta) if test else None
+    held_out = model.of_episodes(test) if test else None
+    judge = Objective(held_out, workers, huber_delta) if held_out else None
     assessment = Assessment(objectives[-1], judge, methods)
     profiles = [name for name in settings.profiles if name not in frozen]
     return Identification(

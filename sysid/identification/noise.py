@@ -20,8 +20,8 @@ def with_estimated_noise(
     Weighted least squares as usual for arms: all channels of one unit have the same
     weight in a first fit, and then each that of its own residual there. (Iterated, the
     channel that happens to fit best would outweigh the others.) What the model lacks
-    counts as noise here, so the objective ends near 1 by construction and says
-    nothing about the model; look at the residual's whiteness instead.
+    counts as noise here, so the objective ends near 1 by construction and is no
+    measure of the model; look at the residual's whiteness instead.
     """
     measured = model.measurements
     unknown = np.isnan(measured.noise)

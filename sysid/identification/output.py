@@ -8,7 +8,7 @@ from sysid.identification.result import Comparison, Identification, MethodResult
 
 
 def to_mapping(found: Identification) -> dict[str, Any]:
-    """Returns everything that a program may want of a result."""
+    """Returns the whole result as plain data, for `result.json`."""
     names = found.sensitivity_after.names
     return {
         "parameters": _parameters(found),

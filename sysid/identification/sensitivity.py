@@ -59,7 +59,7 @@ class Combination:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What a log says about parameters, by the derivatives at one point.
+    """What a log determines about parameters, by the derivatives at one point.
 
     Attributes:
         names: of the parameters.

@@ -60,9 +60,9 @@ class LogModel(abc.ABC):
         affine: whether predictions are affine in the parameters, and in the
             amplitudes of effects: least squares then has one exact solution.
         effect_types: base classes of the effects that `predict` applies.
-        held_out_share: share of the episodes on which closing the loop judges a
-            model instead of fitting it; 0 judges on contiguous blocks of rows in
-            turn, each predicted by a fit to all others.
+        held_out_share: share of the episodes that closing the loop holds out; with 0,
+            contiguous blocks of rows are held out in turn, each predicted by a fit to
+            all others.
         has_commands: whether rows are commanded steps of an arm, which `displaced`
             can move: the arm may then scatter about its commands.
     """
@@ -214,7 +214,7 @@ class LogModel(abc.ABC):
 
     @property
     def costly(self) -> bool:
-        """Whether an evaluation takes seconds: a search is then to ask for few rows."""
+        """Whether an evaluation takes seconds: searches then evaluate fewer rows."""
         return False
 
     def surrogate(self) -> Self:
