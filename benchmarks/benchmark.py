@@ -108,7 +108,7 @@ def measure_speed(station: str) -> Iterator[Figure]:
 
 
 def measure_reset(station: str) -> Iterator[Figure]:
-    """Yields the cost of a reset in place, beside building the diagram anew."""
+    """Yields the cost of a reset in place, compared with a new diagram."""
     simulation = _simulation(station)
     simulation.reset(0)
     reset = _median_time(lambda: simulation.reset(1), 50)
@@ -168,7 +168,7 @@ def _replay(scenario: Scenario, rates: list[np.ndarray]) -> float:
 
 
 def measure_latency() -> Iterator[Figure]:
-    """Yields what 99 % of samples and commands keep to, beside what is too late.
+    """Yields the 99 % quantile of ages and delays, compared with what is stale.
 
     Of the hardware station with a fake cell in another process, in real time.
     """
@@ -189,10 +189,14 @@ def measure_latency() -> Iterator[Figure]:
     yield Figure("hardware_echo_ms", 1e3 * echo, "ms", "a stale arm", echo / stale)
 
 
+def tool(name: str) -> list[str]:
+    """Returns the command that runs a program of tools/."""
+    return [sys.executable, str(Path(__file__).parents[1] / "tools" / f"{name}.py")]
+
+
 def measure_memory() -> Iterator[Figure]:
-    """Yields the peak memory of the programs, beside importing what they build on."""
-    tools = Path(__file__).parents[1] / "tools"
-    peak = _peak_mib([sys.executable, str(tools / "simulate.py"), "--no-meshcat"])
+    """Yields peak memory of the programs, compared with bare imports."""
+    peak = _peak_mib([*tool("simulate"), "--no-meshcat"])
     bare = _peak_mib([sys.executable, "-c", "import pydrake.all"])
     yield Figure("peak_mib_simulate", peak, "MiB", "import pydrake.all", peak / bare)
     with tempfile.TemporaryDirectory() as folder:
@@ -204,7 +208,7 @@ def measure_memory() -> Iterator[Figure]:
             "--out",
             f"{folder}/out",
         ]
-        peak = _peak_mib([sys.executable, str(tools / "train.py"), *training])
+        peak = _peak_mib([*tool("train"), *training])
     bare = _peak_mib([sys.executable, "-c", "import torch, pydrake.all"])
     yield Figure(
         "peak_mib_train", peak, "MiB", "import torch, pydrake.all", peak / bare
@@ -212,8 +216,7 @@ def measure_memory() -> Iterator[Figure]:
     with recorded_log(100) as log, tempfile.TemporaryDirectory() as folder:
         options = ["--preset", "thesis", "--cycles", "2", "--workers", "1"]
         fitting = ["--log", str(log), "--parameters", "contact.friction", *options]
-        program = [sys.executable, str(tools / "identify.py"), *fitting]
-        peak = _peak_mib([*program, "--out", f"{folder}/out"])
+        peak = _peak_mib([*tool("identify"), *fitting, "--out", f"{folder}/out"])
     bare = _peak_mib([sys.executable, "-c", "import scipy.stats, pydrake.all"])
     yield Figure(
         "peak_mib_identify", peak, "MiB", "import scipy, pydrake.all", peak / bare
@@ -221,7 +224,7 @@ def measure_memory() -> Iterator[Figure]:
 
 
 def measure_objective(contact: str, prefix: str) -> Iterator[Figure]:
-    """Yields the time of one evaluation of the objective, beside the thesis's."""
+    """Yields the time of evaluating the objective, compared with the thesis's."""
     with recorded_log(max(SIZES)) as log:
         both = {}
         for size in SIZES:
@@ -242,7 +245,7 @@ def measure_closing(contact: str, key: str) -> Iterator[Figure]:
 
 
 def measure_update_speed(name: str) -> Iterator[Figure]:
-    """Yields DDPG updates per second of a preset, beside stable-baselines3's."""
+    """Yields DDPG updates per second of a preset, compared with stable-baselines3."""
     ours, theirs = measure_updates(name)
     ratio = ours / theirs if theirs else None
     reference = "stable-baselines3" if theirs else "(stable-baselines3 is not there)"
@@ -274,7 +277,7 @@ def _simulation(station: str) -> TaskSimulation:
 
 
 def measure_inference() -> Iterator[Figure]:
-    """Yields the time of one call of a trained policy, beside torch's network alone."""
+    """Yields the time of one call of a policy, compared with torch's network alone."""
     generator = np.random.default_rng(0)
     sizes = list(zip(_WIDTHS[1:], _WIDTHS, strict=False))
     network = Network(

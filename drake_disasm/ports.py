@@ -89,7 +89,7 @@ def check_ports(system: System, table: tuple[Port, ...]) -> None:
     """Raises DisasmError unless the system has each port of the table, and size.
 
     Ports that only a simulation has carry no dot-name from the table and are
-    not vector ports of a device; they are allowed beside it.
+    not vector ports of a device; they are allowed in addition.
     """
     differences = port_differences(system, table)
     if differences:

@@ -54,7 +54,7 @@ class Surroundings:
 
 @dataclasses.dataclass(frozen=True)
 class ImpactConditions:
-    """All that the contact depends on beside the state.
+    """All that the contact depends on except the state.
 
     Attributes:
         law: of the normal force.

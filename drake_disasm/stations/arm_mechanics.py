@@ -88,7 +88,7 @@ class ArmMechanics:
 
     Viscous friction is a joint's damping, which the solver takes implicitly; a
     rotor's inertia and the payload are Drake's own as well. Drake's joints have no
-    dry friction, so a system beside the plant adds it as a generalized force in each
+    dry friction, so a separate system adds it as a generalized force in each
     of the plant's steps. It is made of the effects' own equations as symbolic
     expressions, which Drake evaluates without Python.
 

@@ -90,7 +90,7 @@ def _axis_joint(axis: int, parent: Frame, child: Frame) -> Joint:
 
 
 def _inertia(twin: TwinConfig, axis: int) -> float:
-    """Returns what an axis moves beside the bolt [kg or kg m^2]."""
+    """Returns what an axis moves in addition to the bolt [kg or kg m^2]."""
     return twin.mass if axis < 3 else twin.inertia
 
 

@@ -39,7 +39,7 @@ class ContactStrategy(abc.ABC):
     Attributes:
         quantities: fields of an Environment that it has.
         remedy: what to do about an effect that needs others.
-        outside_force: adds what pulls on the bolt beside the contact.
+        outside_force: adds forces on the bolt other than contact.
     """
 
     quantities: ClassVar[frozenset[str]]

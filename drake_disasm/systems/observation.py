@@ -57,7 +57,7 @@ def contact_wrench(
 
     Args:
         reading: (6,) raw [f; tau] at So in S.
-        offset: (6,) what is left of the reading at zeroing beside the weight.
+        offset: (6,) the reading at zeroing less the payload's weight.
         R_GB: measured orientation of the bolt.
         mounting: geometry and payload.
     """

@@ -1,4 +1,4 @@
-"""What pulls on the bolt beside the contact."""
+"""A force on the bolt other than contact, such as a chain's pull."""
 
 import numpy as np
 from pydrake.common.value import Value

@@ -5,6 +5,7 @@ import math
 import subprocess
 from pathlib import Path
 
+import benchmark
 import pytest
 
 from tests.tools.programs import run_program
@@ -35,6 +36,11 @@ def test_unknown_key_is_one_line() -> None:
     assert done.returncode == 2
     assert "error: --only twin_reset: no such figure" in done.stderr
     assert "twin_reset_ms" in done.stderr
+
+
+@pytest.mark.parametrize("name", ["simulate", "train", "identify"])
+def test_programs_whose_memory_is_measured_are_there(name: str) -> None:
+    assert Path(benchmark.tool(name)[-1]).is_file()
 
 
 @pytest.mark.slow

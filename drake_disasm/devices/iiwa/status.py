@@ -1,4 +1,4 @@
-"""Whether the arm's driver sends, beside what Drake's receiver makes of it."""
+"""Whether the arm's driver still sends, which Drake's receiver does not say."""
 
 import time
 

@@ -193,7 +193,7 @@ class RobotiqClient:
     def _cycle(self) -> None:
         status = self._read_status()
         complaint = _complaint(status)
-        if complaint:  # a position beside one is no sample
+        if complaint:  # a position with a complaint is no sample
             self._mailbox.count(received=1)
             self._mailbox.complain(complaint)
             self._continue_activation(status)
