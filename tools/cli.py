@@ -3,7 +3,7 @@
 import argparse
 import importlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from drake_disasm.common.errors import DisasmError
@@ -71,74 +71,32 @@ def add_station_argument(
         "--station",
         default=default,
         metavar="|".join(STATIONS if hardware else SIMULATED_STATIONS),
-        action=_StationAction if hardware else _SimulatedStationAction,
+        type=_station if hardware else _simulated_station,
         help=f"{text} (default: {default})",
     )
-    add("--model", action=_ModelAction, help=argparse.SUPPRESS)
+    add("--model", type=_former_model, help=argparse.SUPPRESS)
 
 
-class _StationAction(argparse.Action):
-    """Takes the name of a station, and refuses any other."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: str | Sequence[Any] | None,
-        option_string: str | None = None,
-    ) -> None:
-        """Stores the name.
-
-        Raises:
-            DisasmError: there is no such station.
-        """
-        if values not in STATIONS:
-            raise DisasmError(
-                f"--station {values}: does not exist; "
-                f"{closest(str(values), list(STATIONS))}"
-            )
-        setattr(namespace, self.dest, values)
+def _station(name: str) -> str:
+    """Returns the name of a station, for an argument's type."""
+    if name not in STATIONS:
+        raise DisasmError(
+            f"--station {name}: does not exist; {closest(name, list(STATIONS))}"
+        )
+    return name
 
 
-class _SimulatedStationAction(_StationAction):
-    """Takes the name of a simulated station, and refuses any other."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: str | Sequence[Any] | None,
-        option_string: str | None = None,
-    ) -> None:
-        """Stores the name.
-
-        Raises:
-            DisasmError: there is no such station, or it is not a simulated one.
-        """
-        super().__call__(parser, namespace, values, option_string)
-        if values == "hardware":
-            raise DisasmError(
-                "--station hardware: this program simulates; use cell or twin, or run "
-                "a policy on the devices by tools/simulate.py --station hardware"
-            )
+def _simulated_station(name: str) -> str:
+    if _station(name) == "hardware":
+        raise DisasmError(
+            "--station hardware: this program simulates; use cell or twin, or run "
+            "a policy on the devices by tools/simulate.py --station hardware"
+        )
+    return name
 
 
-class _ModelAction(argparse.Action):
-    """Refuses the name that --station had."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: str | Sequence[Any] | None,
-        option_string: str | None = None,
-    ) -> None:
-        """Refuses it.
-
-        Raises:
-            DisasmError: always; names the new option.
-        """
-        raise DisasmError(f"--model {values}: is --station {values} now")
+def _former_model(name: str) -> str:
+    raise DisasmError(f"--model {name}: is --station {name} now")
 
 
 def add_workers_argument(parser: argparse.ArgumentParser, more: str = "") -> None:
