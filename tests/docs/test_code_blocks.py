@@ -7,6 +7,7 @@ import functools
 import importlib
 import importlib.util
 import re
+import subprocess
 import sys
 import types
 
@@ -32,6 +33,13 @@ def test_python_compiles_and_its_imports_resolve(block: Block) -> None:
             module = importlib.import_module(node.module or "")
             missing = [a.name for a in node.names if not hasattr(module, a.name)]
             assert not missing, f"{block}: {node.module} has no {missing}"
+
+
+@pytest.mark.parametrize("block", blocks("python"), ids=str)
+def test_python_defines_what_it_uses(block: Block) -> None:
+    command = [sys.executable, "-m", "ruff", "check", "--isolated", "--select=F", "-"]
+    checked = subprocess.run(command, input=block.text, capture_output=True, text=True)
+    assert checked.returncode == 0, f"{block}: {checked.stdout}"
 
 
 @pytest.mark.parametrize("block", _SHELL, ids=str)
