@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
-    ContactExponent,
     Effect,
     EnvironmentEffect,
     MotionEffect,
@@ -134,8 +133,11 @@ class TwinModel(ScenarioModel):
         return not self._has_impact
 
     def applicable_effects(self, library: Sequence[type[Effect]]) -> list[Effect]:
-        """See LogModel; IMPACT alone has an exponent."""
-        acting = [k for k in library if self._has_impact or k is not ContactExponent]
+        """See LogModel; some effects act in one model of contact alone."""
+        contact = self.scenario.contact.model
+        acting = [
+            k for k in library if contact in getattr(k, "contact_models", contact)
+        ]
         return super().applicable_effects(acting)
 
     def surrogate(self) -> Self:

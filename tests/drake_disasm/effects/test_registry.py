@@ -12,6 +12,9 @@ from drake_disasm.common import executors
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.executors import WorkerPool
 from drake_disasm.effects import (
+    BoltMotion,
+    Effect,
+    Environment,
     EnvironmentEffect,
     JointEffect,
     JointSamples,
@@ -34,6 +37,7 @@ from drake_disasm.scenario import (
     scenario_to_mapping,
     validate,
 )
+from drake_disasm.task.simulation import TaskSimulation
 from sysid.scenario_parameters import Request, scenario_parameters
 
 _FILE = '''
@@ -106,6 +110,52 @@ def test_a_registered_effect_comes_last_and_everywhere(tmp_path: Path) -> None:
         load_scenario("removal", ["effects=[!Own {fz: 2}]"])
     added, (parameter,) = scenario_parameters(Scenario(), [Request("Own.fx")])
     assert added.effects == [own()] and parameter.high == 1.0
+
+
+@pytest.mark.parametrize(
+    "model", ["twin", pytest.param("cell", marks=pytest.mark.slow)]
+)
+def test_a_registered_effect_acts_in_a_station(model: str) -> None:
+    """Around the bolt and in the sensor, beside effects of the library."""
+
+    @register_effect
+    @dataclasses.dataclass
+    class Lifts(EnvironmentEffect):
+        """A constant force out of the plate."""
+
+        fy: float = amplitude("N", -10.0, 10.0, "along y_G")
+
+        def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
+            """Adds the force."""
+            return dataclasses.replace(environment, force_Gn=(0.0, self.fy, 0.0))
+
+    @register_effect
+    @dataclasses.dataclass
+    class Doubles(_Reads):
+        """A reading that is too large."""
+
+        share: float = amplitude("1", -1.0, 1.0, "relative error")
+        stage = 2
+
+        def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+            """Scales the reading."""
+            return (1.0 + self.share) * wrench_S
+
+    contact = ["contact.model=impact"] if model == "twin" else []
+    scenario = load_scenario(
+        "removal", [*contact, "ft_sensor.noise=[0, 0, 0, 0, 0, 0]", "Lifts.fy=10"]
+    )
+    simulation = TaskSimulation(scenario, model)
+
+    def force(effects: list[Effect] | None) -> np.ndarray:
+        """Returns the measured force after one step."""
+        simulation.reset(0, effects)
+        return simulation.step(np.array([1e-3, 0, 0, 0, 0, 0])).observation[6:9]
+
+    lifted, plain = force(None), force([])
+    doubled = force([*scenario.effects, Doubles(share=1.0)])
+    assert np.abs(lifted - plain).max() > 0.02
+    np.testing.assert_allclose(doubled, 2.0 * lifted, rtol=0.02, atol=2e-3)
 
 
 def test_a_derived_effect_keeps_its_own_tag() -> None:
