@@ -1,6 +1,7 @@
 """NLopt's controlled random search, and SBPLX to polish its result."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import nlopt  # type: ignore[import-untyped]
 import numpy as np
@@ -42,35 +43,56 @@ def nlopt_search(
         callback: called after every evaluation.
     """
     trace = trace if trace is not None else Trace()
-    last = trace.evaluations + evaluations
-
-    errors: list[BaseException] = []
-
-    def value(x: Array, gradient: Array) -> float:
-        """Evaluates one point for NLopt."""
-        if errors or trace.evaluations >= last:  # some overrun their own limit
-            solver.force_stop()
-            return np.inf
-        try:
-            point = box.clip(x)[None]
-            trace.add(point, function(point))
-            if callback:
-                callback(trace)
-        except BaseException as error:  # Ctrl-C too: it must not get lost in C++
-            errors.append(error)
-            solver.force_stop()
-            return np.inf
-        return trace.values[-1]
-
     solver = _solver(algorithm, box, evaluations, step * box.width)
-    solver.set_min_objective(value)
+    limit = trace.evaluations + evaluations
+    evaluator = _Evaluator(function, box, solver, trace, limit, callback)
+    solver.set_min_objective(evaluator)
     nlopt.srand(seed)
     begin = (box.low + box.high) / 2 if start is None else start
     trace.stopped = _outcome(solver, box.clip(begin))
-    if errors:
-        raise errors[0]
+    if evaluator.errors:
+        raise evaluator.errors[0]
     trace.cycle_ends.append(trace.evaluations)
     return trace
+
+
+@dataclass
+class _Evaluator:
+    """Evaluates points for NLopt, one at a time.
+
+    Attributes:
+        function, box, solver: of the search.
+        trace: gets each evaluation.
+        limit: of its evaluations; some algorithms overrun their own.
+        callback: called after each.
+        errors: what was raised, Ctrl-C too: it must not get lost in C++.
+    """
+
+    function: BatchFunction
+    box: Box
+    solver: nlopt.opt
+    trace: Trace
+    limit: int
+    callback: Callable[[Trace], None] | None
+    errors: list[BaseException] = field(default_factory=list)
+
+    def __call__(self, x: Array, gradient: Array) -> float:
+        """Returns the value at x (p,), or stops the solver."""
+        if self.errors or self.trace.evaluations >= self.limit:
+            return self._stop()
+        try:
+            point = self.box.clip(x)[None]
+            self.trace.add(point, self.function(point))
+            if self.callback:
+                self.callback(self.trace)
+        except BaseException as error:
+            self.errors.append(error)
+            return self._stop()
+        return self.trace.values[-1]
+
+    def _stop(self) -> float:
+        self.solver.force_stop()
+        return np.inf
 
 
 def _solver(algorithm: str, box: Box, evaluations: int, step: Array) -> nlopt.opt:
