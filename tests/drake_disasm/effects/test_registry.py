@@ -29,6 +29,7 @@ from drake_disasm.effects import (
     registry,
     shape_parameter,
 )
+from drake_disasm.logs import read_log
 from drake_disasm.scenario import (
     Scenario,
     dump_scenario,
@@ -39,6 +40,7 @@ from drake_disasm.scenario import (
 )
 from drake_disasm.task.simulation import TaskSimulation
 from sysid.scenario_parameters import Request, scenario_parameters
+from tests.tools.programs import run_program
 
 _FILE = '''
 import dataclasses
@@ -292,6 +294,31 @@ def test_a_missing_file_or_module_is_named() -> None:
         import_effects("nowhere.py")
     with pytest.raises(DisasmError, match=r"nowhere: can't be imported"):
         import_effects("nowhere")
+
+
+@pytest.mark.parametrize(
+    "program",
+    ["simulate", "fake_cell", "train", "evaluate", "identify", "close_loop"]
+    + ["transfer_study"],
+)
+def test_every_program_that_reads_scenarios_imports_effects(
+    program: str, tmp_path: Path
+) -> None:
+    done = run_program(program, "--import", "nowhere.py", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "nowhere.py: no such file; name a Python file" in done.stderr
+
+
+def test_a_program_simulates_an_imported_effect_and_logs_it(tmp_path: Path) -> None:
+    file = _file(tmp_path, "own_program", _FILE.format(name="Simulated"))
+    done = run_program(
+        "simulate", "--import", file, "--set", "Simulated.fx=0.05", "--set",
+        "task.steps=2", "--set", "contact.model=impact", "--station", "twin",
+        "--policy", "straight", "--no-meshcat", "--record", "log", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    stated = scenario_from_mapping(read_log(tmp_path / "log").header.scenario)
+    assert stated.effects == [find_effect("Simulated")(fx=0.05)]
 
 
 def test_an_entry_point_is_loaded_once_when_effects_are_asked_for(
