@@ -298,7 +298,15 @@ def test_a_missing_file_or_module_is_named() -> None:
 
 @pytest.mark.parametrize(
     "program",
-    "simulate fake_cell train evaluate identify close_loop transfer_study".split(),
+    [
+        "simulate",
+        "fake_cell",
+        "train",
+        "evaluate",
+        "identify",
+        "close_loop",
+        "transfer_study",
+    ],
 )
 def test_every_program_that_reads_scenarios_imports_effects(
     program: str, tmp_path: Path
