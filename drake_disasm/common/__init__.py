@@ -1,1 +1,1 @@
-"""What every other package uses: errors, files, quantities, work in parallel."""
+"""What all other packages use: errors, files, progress, work in parallel, resuming."""
