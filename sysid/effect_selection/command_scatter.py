@@ -97,7 +97,7 @@ class _Likelihood:
     def _posterior(self, std: Array) -> tuple[Array, Array, Array]:
         """Returns M (n, 3, 3), b (n, 3) and M^-1 b, in units of `std`.
 
-        The displacements' precision, what residuals say of them, and their mean.
+        The displacements' precision, their information vector, and their mean.
         """
         JD = self.J * std
         M = np.eye(3) + np.einsum("nci,ncj->nij", JD, JD)

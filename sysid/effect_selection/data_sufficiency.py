@@ -12,7 +12,7 @@ def refuse_few_rows(model: LogModel, settings: SelectionSettings) -> None:
     """Refuses logs that the model's own parameters could fit exactly.
 
     Raises:
-        DisasmError: there are too few readings; it says how many are needed.
+        DisasmError: there are too few rows; states how many are needed.
     """
     rows, channels = model.measurements.values.shape
     count = len(model.parameters)
@@ -30,13 +30,13 @@ def refuse_short_logs(last: Fit) -> None:
     There half of the blocks have a loss several times as large when they are predicted
     by a fit to all others as in the fit to all: whatever is added to the model overfits
     them. The excess is in proportion to the parameters over the independent data
-    (Akaike's final prediction error), so it says how much more is needed.
+    (Akaike's final prediction error), from which follows how much more is needed.
 
     Args:
         last: the fit with all effects that were found.
 
     Raises:
-        DisasmError: there are too few; it says how much more is needed.
+        DisasmError: there are too few rows; states how many more are needed.
     """
     regression = last.regression()
     alone = regression.held_out_losses(np.arange(len(last.theta)))

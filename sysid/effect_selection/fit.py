@@ -1,4 +1,4 @@
-"""A fitted model with effects, and what the fit says of its parameters."""
+"""A fitted model with effects, and which of its parameters are significant."""
 
 import dataclasses
 from collections.abc import Sequence

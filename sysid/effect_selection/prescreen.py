@@ -1,7 +1,8 @@
-"""Far from the data: every effect is fitted to a few rows, to see which is worth more.
+"""Prescreening far from the data: every effect is fitted to a few rows.
 
-A bolt that the model has inside the wall says how hard the wall is, not where; there a
-linear account of what effects would do is worthless.
+Where the model places the bolt inside the groove's wall, the residual reflects the
+stiffness of the wall, and derivatives at null predict nothing of what an effect would
+explain.
 """
 
 import dataclasses

@@ -1,7 +1,7 @@
 """Adds one effect at a time; where effects are not linear, fits decide which.
 
-The linear account of a survey only says which candidates are worth a fit. Far from
-the data it says nothing: there every effect is fitted roughly (`prescreen`).
+The linear ranking of a survey only selects which candidates are worth a fit. Far from
+the data it is of no use: there every effect is fitted to a few rows (`prescreen`).
 """
 
 import dataclasses

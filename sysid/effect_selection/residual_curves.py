@@ -2,7 +2,7 @@
 
 One curve (a cubic and a step) of one covariate in one channel. Where such a curve
 explains what no effect of the library does, the ending is "unexplained", and the curve
-says where to look.
+shows where to look.
 """
 
 from dataclasses import dataclass

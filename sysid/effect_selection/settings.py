@@ -63,8 +63,8 @@ class SelectionSettings:
     idle_block_gain: float = _setting(
         0.1,
         "of the blocks' mean absolute gain",
-        "a contact effect says nothing of blocks in which the bolt touches nothing: "
-        "blocks that change by less have no vote",
+        "a contact effect does nothing to blocks in which the bolt touches nothing: "
+        "blocks that change by less are not counted",
         _NULL_LOGS,
     )
 
@@ -93,7 +93,7 @@ class SelectionSettings:
         10.0,
         "huber_delta",
         "rows missed by more lose their influence altogether: there contact is made "
-        "or broken, and a derivative says nothing",
+        "or broken, and a derivative is meaningless",
         _BLIND_LOGS,
     )
     leverage_quantile: float = _setting(
@@ -114,14 +114,14 @@ class SelectionSettings:
     parsimony_tolerance: float = _setting(
         0.05,
         "of the best gain",
-        "the candidate with the fewest parameters is taken if it loses less than "
-        "this against the best; chosen as less than candidates typically differ by",
+        "the candidate with the fewest parameters is taken if it gains at most this "
+        "much less than the best; chosen as a few per cent",
         _BLIND_LOGS,
     )
     tie_min_gain: float = _setting(
         0.5,
         "of the best gain",
-        "what gains less than half is no rival, even if few blocks can't tell",
+        "what gains less than half is no rival, even where too few blocks decide",
     )
     pair_pool: int = _setting(
         8,
@@ -168,7 +168,7 @@ class SelectionSettings:
         "half of the blocks then cost twice as much when they are not fitted: each "
         "shows something else (Akaike's final prediction error at as many parameters "
         "as a third of the independent data)",
-        "tells a short log from a correlated residual in the logs of commit 4d1afab; "
+        "distinguishes short logs from correlated residuals in commit 4d1afab; "
         "the length of the correlation did not",
     )
     max_extrapolation: int = _setting(

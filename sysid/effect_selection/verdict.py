@@ -65,7 +65,7 @@ class Tie:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the log says of the model.
+    """What a log shows of its model.
 
     Attributes:
         ending: "none", "explained" or "unexplained".
@@ -148,7 +148,7 @@ def _scatter_values(scatter: CommandScatter | None) -> tuple[ParameterValue, ...
 def _excess(last: Fit, scatter: CommandScatter | None) -> float:
     """Returns the objective, if it is more than noise; else 0.
 
-    Only where the noise is known: estimated from a fit it says nothing.
+    Only where the noise is known: one estimated from a fit is always matched.
     """
     objective = scatter.objective if scatter else last.objective
     limit = last.settings.max_objective_at_noise
