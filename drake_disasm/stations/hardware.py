@@ -1,50 +1,33 @@
 """The real cell: the simulated one's ports, with devices behind them."""
 
-import dataclasses
 import time
 from collections.abc import Callable, Sequence
 from typing import Self
 
 import numpy as np
-from drake import lcmt_iiwa_command, lcmt_iiwa_status
 from pydrake.lcm import DrakeLcm
-from pydrake.manipulation import (
-    IiwaCommandSender,
-    IiwaControlMode,
-    IiwaStatusReceiver,
-)
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, DiagramBuilder, InputPort
-from pydrake.systems.lcm import (
-    LcmInterfaceSystem,
-    LcmPublisherSystem,
-    LcmSubscriberSystem,
-)
-from pydrake.systems.primitives import Gain, PassThrough
+from pydrake.systems.primitives import PassThrough
 
 from drake_disasm.cell.parsing import add_arm
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.timing import COMMAND_DELAY
-from drake_disasm.devices.iiwa import IiwaStatusMonitor
-from drake_disasm.devices.onrobot_hex import HexClient
 from drake_disasm.devices.reading import Clock, Reading
-from drake_disasm.devices.robotiq import RobotiqClient, RobotiqSettings
 from drake_disasm.effects import Effect
 from drake_disasm.ports import CELL_PORTS, Health, check_ports
 from drake_disasm.safety import Mode, Supervisor, guards
 from drake_disasm.scenario import ArmConfig, Scenario, validate
+from drake_disasm.stations.arm_over_lcm import export_status, send_commands
 from drake_disasm.stations.base import InitialState, Station, refuse_twins_contact
 from drake_disasm.stations.capabilities import refuse_on_hardware
+from drake_disasm.stations.cell_devices import CellDevices
 from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.stations.wiring import export_required
 from drake_disasm.systems.connection_check import ConnectionCheck
-from drake_disasm.systems.device_reader import DeviceReader, Readable
+from drake_disasm.systems.device_reader import DeviceReader
 from drake_disasm.systems.gripper_writer import GripperWriter
 from drake_disasm.systems.safety_filter import SafetyFilter
 
-#: drake-iiwa-driver refuses commands within 0.25 s of its first status.
-_LISTENS_FIRST = 0.3
-_POLL = 0.001  # s: LCM keeps one message of a channel, the newest
 _GRIPPER_PERIOD = 0.05  # s
 _SIZES = {"iiwa": 7, "gripper": 2, "ft_sensor": 6}
 _VALUES = {
@@ -117,16 +100,15 @@ class HardwareStation(Station):
         validate(scenario)
         refuse_what_is_simulated(scenario)
         self.scenario, self.config, self.dry_run = scenario, config, dry_run
-        self._clock, self._wait = clock, wait
-        self._lcm = lcm or DrakeLcm(config.iiwa.lcm_url)
-        self._checked = DrakeLcm("memq://")  # what the monitor has found good
+        self._cell = CellDevices(config, not dry_run, clock, wait, lcm)
+        self.devices = self._cell.clients
         self._set_cell_geometry()
         self.g_W = MultibodyPlant(0.0).gravity_field().gravity_vector()
         self.grip_command = 0.0  # closes until the fingers stall on the bolt
-        self._connect_devices()
         self.supervisor = _supervisor(scenario.arm, config)
         builder = DiagramBuilder()
-        self._wire_arm(builder)
+        export_status(builder, self._cell, config.iiwa)
+        self._wire_command(builder)
         self._wire_gripper(builder)
         for name in self.devices:
             self._export_reader(builder, name)
@@ -161,10 +143,10 @@ class HardwareStation(Station):
         self.refuse_effects(effects or ())
         self.check()
         self.connect()
-        self._await_ready()
+        self._cell.await_ready()
         position = self.devices["iiwa"].read().values
         self._refuse_far_start(position)
-        reading = self._tare()
+        reading = self._cell.mean_wrench()
         self.safety_filter.zero(reading)
         self.safety_filter.begin()
         self.supervisor.begin()
@@ -185,15 +167,11 @@ class HardwareStation(Station):
 
     def healths(self) -> dict[str, Health]:
         """Returns how each device is now."""
-        now, limits = self._clock(), self.config.safety
-        return {
-            name: device.read().health(now, limits.stale_after(name))
-            for name, device in self.devices.items()
-        }
+        return self._cell.healths()
 
     def readings(self) -> dict[str, Reading]:
         """Returns the newest reading of each device."""
-        return {name: device.read() for name, device in self.devices.items()}
+        return self._cell.readings()
 
     def measured(self) -> dict[str, np.ndarray]:
         """Returns the newest values of each device, by the port that has them."""
@@ -204,14 +182,12 @@ class HardwareStation(Station):
 
     def connect(self) -> None:
         """Begins to listen to the devices; once more, the sensor streams anew."""
-        self._hex.start()
-        self._gripper.start()
+        self._cell.connect()
 
     def close(self) -> None:
         """Leaves the devices alone: no thread and no socket stays."""
         self._connection.is_connected = False
-        self._hex.stop()
-        self._gripper.stop()
+        self._cell.close()
 
     def __enter__(self) -> Self:
         return self
@@ -221,67 +197,12 @@ class HardwareStation(Station):
 
     def pump(self) -> None:
         """Takes what the arm has sent, where no simulator does."""
-        for lcm in (self._lcm, self._checked):
-            while lcm.HandleSubscriptions(0):
-                pass
-
-    def _connect_devices(self) -> None:
-        config, sensor = self.config, self.config.ft_sensor
-        self._hex = HexClient(
-            sensor.address, sensor.port, sensor.period, sensor.filter_hz, self._clock
-        )
-        grip = dataclasses.replace(
-            config.gripper, activate=config.gripper.activate and not self.dry_run
-        )
-        settings = RobotiqSettings(**dataclasses.asdict(grip))
-        self._gripper = RobotiqClient(settings, self._clock)
-        iiwa = config.iiwa
-        self._monitor = IiwaStatusMonitor(
-            self._lcm,
-            self._checked,
-            iiwa.status_channel,
-            iiwa.status_period,
-            self._clock,
-        )
-        self.devices: dict[str, Readable] = {
-            "iiwa": self._monitor,
-            "gripper": self._gripper,
-            "ft_sensor": self._hex,
-        }
-
-    def _wire_arm(self, builder: DiagramBuilder) -> None:
-        add, connect, iiwa = builder.AddNamedSystem, builder.Connect, self.config.iiwa
-        add("lcm", LcmInterfaceSystem(self._lcm))
-        add("lcm_checked", LcmInterfaceSystem(self._checked))
-        status = add(
-            "iiwa_status",
-            LcmSubscriberSystem.Make(
-                iiwa.status_channel,
-                lcmt_iiwa_status,
-                self._checked,
-                use_cpp_serializer=True,
-            ),
-        )
-        receiver = add("iiwa_receiver", IiwaStatusReceiver())
-        connect(status.get_output_port(), receiver.get_input_port())
-        for quantity in (
-            "position_commanded",
-            "velocity_estimated",
-            "torque_external",
-        ):
-            builder.ExportOutput(receiver.GetOutputPort(quantity), f"iiwa.{quantity}")
-        for quantity in ("torque_commanded", "torque_measured"):
-            # The driver sends these two with KUKA's sign (drake/manipulation/README).
-            drakes = add(f"iiwa_{quantity}", Gain(-1.0, 7))
-            connect(receiver.GetOutputPort(quantity), drakes.get_input_port())
-            builder.ExportOutput(drakes.get_output_port(), f"iiwa.{quantity}")
-        self._wire_command(builder)
+        self._cell.pump()
 
     def _wire_command(self, builder: DiagramBuilder) -> None:
         """Wires the way of a command: through the safety filter, then to the arm."""
-        add, connect = builder.AddNamedSystem, builder.Connect
         period = self.control_period
-        self.safety_filter = add(
+        self.safety_filter = builder.AddNamedSystem(
             "safety_filter",
             SafetyFilter(
                 self.supervisor,
@@ -289,7 +210,7 @@ class HardwareStation(Station):
                 self.coordinates,
                 self.mounting,
                 period,
-                self._clock,
+                self._cell.clock,
             ),
         )
         export_required(
@@ -300,20 +221,8 @@ class HardwareStation(Station):
         )
         if self.dry_run:
             return
-        sender = add("iiwa_sender", IiwaCommandSender(7, IiwaControlMode.kPositionOnly))
-        publisher = add(
-            "iiwa_command",
-            LcmPublisherSystem.Make(
-                self.config.iiwa.command_channel,
-                lcmt_iiwa_command,
-                self._lcm,
-                publish_period=period,
-                publish_offset=COMMAND_DELAY,
-                use_cpp_serializer=True,
-            ),
-        )
-        connect(self.safety_filter.get_output_port(), sender.get_input_port(0))
-        connect(sender.get_output_port(), publisher.get_input_port())
+        sent = self.safety_filter.get_output_port()
+        send_commands(builder, sent, self._cell, self.config.iiwa, period)
 
     def _wire_gripper(self, builder: DiagramBuilder) -> None:
         if self.dry_run:
@@ -322,7 +231,7 @@ class HardwareStation(Station):
             return
         writer = builder.AddNamedSystem(
             "gripper_writer",
-            GripperWriter(self._gripper.command, self.supervisor, _GRIPPER_PERIOD),
+            GripperWriter(self._cell.gripper.command, self.supervisor, _GRIPPER_PERIOD),
         )
         self._export_grip(builder, writer.get_input_port())
 
@@ -346,40 +255,13 @@ class HardwareStation(Station):
                 _SIZES[name],
                 self.control_period,
                 self.config.safety.stale_after(name),
-                self._clock,
+                self._cell.clock,
             ),
         )
         port = reader.GetOutputPort("values")
         builder.ExportOutput(port, f"{name}.{_VALUES[name]}")
         for quantity in ("health", "time_measured"):
             builder.ExportOutput(reader.GetOutputPort(quantity), f"{name}.{quantity}")
-
-    def _await_ready(self) -> None:
-        """Waits until all have sent, the arm for so long that its driver listens."""
-        begun = self._clock()
-        while True:
-            self.pump()
-            health = self.healths()
-            waited = self._clock() - begun
-            not_ready = [n for n, h in health.items() if h is not Health.READY]
-            if not not_ready and waited >= _LISTENS_FIRST:
-                return
-            if waited > self.config.ready_timeout:
-                raise DisasmError(self._silence(not_ready))
-            self._wait(_POLL)
-
-    def _silence(self, names: Sequence[str]) -> str:
-        """Returns what devices that are not ready say of themselves."""
-        readings, health = self.readings(), self.healths()
-        each = [
-            f"{name} is {health[name].name}"
-            + (f" ({readings[name].error})" if readings[name].error else "")
-            for name in names
-        ]
-        return (
-            f"not ready after {self.config.ready_timeout:g} s: {'; '.join(each)}; "
-            "see docs/hardware.md, what to check first"
-        )
 
     def _refuse_far_start(self, position: np.ndarray) -> None:
         away = np.abs(position - self.start)
@@ -390,19 +272,6 @@ class HardwareStation(Station):
                 f"joint {joint + 1} is {np.rad2deg(away[joint]):.2f} degrees from "
                 f"where an episode starts; jog the arm to {start} degrees"
             )
-
-    def _tare(self) -> np.ndarray:
-        """Returns the mean (6,) of readings, each of another time."""
-        taken: dict[float, np.ndarray] = {}
-        deadline = self._clock() + self.config.ready_timeout
-        while len(taken) < self.config.tare_samples:
-            if self._clock() > deadline:
-                raise DisasmError(self._silence(["ft_sensor"]))
-            self._wait(_POLL)
-            self.pump()
-            reading = self.devices["ft_sensor"].read()
-            taken[reading.time] = reading.values
-        return np.asarray(np.mean(list(taken.values()), axis=0))
 
 
 def refuse_what_is_simulated(scenario: Scenario) -> None:

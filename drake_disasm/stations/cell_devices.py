@@ -1,0 +1,144 @@
+"""The clients of the real cell's devices: connected, waited for, and zeroed."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from pydrake.lcm import DrakeLcm
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.devices.iiwa import IiwaStatusMonitor
+from drake_disasm.devices.onrobot_hex import HexClient
+from drake_disasm.devices.reading import Clock, Reading
+from drake_disasm.devices.robotiq import RobotiqClient, RobotiqSettings
+from drake_disasm.ports import Health
+from drake_disasm.stations.hardware_config import HardwareConfig
+from drake_disasm.systems.device_reader import Readable
+
+#: drake-iiwa-driver refuses commands within 0.25 s of its first status.
+_LISTENS_FIRST = 0.3
+_POLL = 0.001  # s: LCM keeps one message of a channel, the newest
+
+
+class CellDevices:
+    """Arm, force/torque sensor and gripper, each behind its client.
+
+    Attributes:
+        clients: by the device's name.
+        gripper: the client that takes commands.
+        lcm: by which the arm is reached.
+        checked_lcm: what its monitor has found good.
+        clock: tells when samples come [s].
+
+    Args:
+        config: where the devices are, and limits.
+        activate: whether the gripper may be activated, which moves it.
+        clock: see above.
+        wait: lets a time [s] pass while devices answer.
+        lcm: see above; None is the configured one.
+    """
+
+    def __init__(
+        self,
+        config: HardwareConfig,
+        activate: bool,
+        clock: Clock,
+        wait: Callable[[float], None],
+        lcm: DrakeLcm | None,
+    ) -> None:
+        self._config, self.clock, self._wait = config, clock, wait
+        self.lcm = lcm or DrakeLcm(config.iiwa.lcm_url)
+        self.checked_lcm = DrakeLcm("memq://")
+        sensor, iiwa = config.ft_sensor, config.iiwa
+        self._sensor = HexClient(
+            sensor.address, sensor.port, sensor.period, sensor.filter_hz, clock
+        )
+        grip = dataclasses.replace(
+            config.gripper, activate=config.gripper.activate and activate
+        )
+        settings = RobotiqSettings(**dataclasses.asdict(grip))
+        self.gripper = RobotiqClient(settings, clock)
+        arm = IiwaStatusMonitor(
+            self.lcm, self.checked_lcm, iiwa.status_channel, iiwa.status_period, clock
+        )
+        self.clients: dict[str, Readable] = {
+            "iiwa": arm,
+            "gripper": self.gripper,
+            "ft_sensor": self._sensor,
+        }
+
+    def connect(self) -> None:
+        """Begins to listen to the devices; once more, the sensor streams anew."""
+        self._sensor.start()
+        self.gripper.start()
+
+    def close(self) -> None:
+        """Leaves the devices alone: no thread and no socket stays."""
+        self._sensor.stop()
+        self.gripper.stop()
+
+    def pump(self) -> None:
+        """Takes what the arm has sent, where no simulator does."""
+        for lcm in (self.lcm, self.checked_lcm):
+            while lcm.HandleSubscriptions(0):
+                pass
+
+    def readings(self) -> dict[str, Reading]:
+        """Returns the newest reading of each device."""
+        return {name: device.read() for name, device in self.clients.items()}
+
+    def healths(self) -> dict[str, Health]:
+        """Returns how each device is now."""
+        now, limits = self.clock(), self._config.safety
+        return {
+            name: reading.health(now, limits.stale_after(name))
+            for name, reading in self.readings().items()
+        }
+
+    def await_ready(self) -> None:
+        """Waits until all have sent, the arm for so long that its driver listens.
+
+        Raises:
+            DisasmError: one of them does not become ready in time.
+        """
+        begun = self.clock()
+        while True:
+            self.pump()
+            health = self.healths()
+            waited = self.clock() - begun
+            not_ready = [n for n, h in health.items() if h is not Health.READY]
+            if not not_ready and waited >= _LISTENS_FIRST:
+                return
+            if waited > self._config.ready_timeout:
+                raise DisasmError(self._silence(not_ready))
+            self._wait(_POLL)
+
+    def mean_wrench(self) -> np.ndarray:
+        """Returns the mean (6,) of the sensor's readings, each of another time.
+
+        Raises:
+            DisasmError: the sensor does not send enough of them in time.
+        """
+        taken: dict[float, np.ndarray] = {}
+        deadline = self.clock() + self._config.ready_timeout
+        while len(taken) < self._config.tare_samples:
+            if self.clock() > deadline:
+                raise DisasmError(self._silence(["ft_sensor"]))
+            self._wait(_POLL)
+            self.pump()
+            reading = self.clients["ft_sensor"].read()
+            taken[reading.time] = reading.values
+        return np.asarray(np.mean(list(taken.values()), axis=0))
+
+    def _silence(self, names: Sequence[str]) -> str:
+        """Returns what devices that are not ready say of themselves."""
+        readings, health = self.readings(), self.healths()
+        each = [
+            f"{name} is {health[name].name}"
+            + (f" ({readings[name].error})" if readings[name].error else "")
+            for name in names
+        ]
+        return (
+            f"not ready after {self._config.ready_timeout:g} s: {'; '.join(each)}; "
+            "see docs/hardware.md, what to check first"
+        )
