@@ -16,7 +16,7 @@ from pydrake.multibody.tree import (
     WeldJoint,
 )
 
-from drake_disasm.cell.lock import bolt_inertia, lip_height
+from drake_disasm.cell.lock_dimensions import bolt_inertia, lip_height
 from drake_disasm.cell.parsing import add_model, model_frame
 from drake_disasm.scenario import Scenario
 

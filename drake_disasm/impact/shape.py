@@ -8,7 +8,7 @@ import dataclasses
 
 import numpy as np
 
-from drake_disasm.cell.lock import groove_boxes, head_top, lip_height
+from drake_disasm.cell.lock_dimensions import groove_boxes, head_top, lip_height
 from drake_disasm.scenario import LockConfig
 
 _RIM_POINTS = 8

@@ -19,7 +19,7 @@ from pydrake.systems.primitives import (
     StateInterpolatorWithDiscreteDerivative,
 )
 
-from drake_disasm.cell.lock import bolt_inertia
+from drake_disasm.cell.lock_dimensions import bolt_inertia
 from drake_disasm.cell.parsing import add_arm
 from drake_disasm.cell.tool import FINGERS
 from drake_disasm.effects import ArmEffect

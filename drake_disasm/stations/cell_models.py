@@ -7,7 +7,8 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, ModelInstanceIndex
 
-from drake_disasm.cell.lock import Lock, add_lock, plate_bottom
+from drake_disasm.cell.lock import Lock, add_lock
+from drake_disasm.cell.lock_dimensions import plate_bottom
 from drake_disasm.cell.parsing import add_arm, add_model
 from drake_disasm.cell.tool import ToolModels, add_tool, grasp_pose
 from drake_disasm.effects import Environment

@@ -18,11 +18,11 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
 from drake_disasm.cell.lock import (
     Lock,
-    has_same_material,
     reshape_groove,
     set_environment,
     set_pose,
 )
+from drake_disasm.cell.lock_materials import has_same_material
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Effect, Environment, EnvironmentEffect, environment_at
 from drake_disasm.impact import ImpactConditions, ImpactLaw, LockShape, Surroundings

@@ -7,11 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import (
-    AddMultibodyPlant,
-    MultibodyPlant,
-    MultibodyPlantConfig,
-)
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, WeldJoint
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder, System
@@ -43,7 +39,7 @@ from drake_disasm.stations.contact import (
     refuse_without_quantity,
 )
 from drake_disasm.stations.local_effects import LocalEffectsMonitor
-from drake_disasm.stations.wiring import export_bolt_pose, wire_sensor
+from drake_disasm.stations.wiring import add_plant, export_bolt_pose, wire_sensor
 from drake_disasm.systems.effects_in_force import EffectsInForce
 from drake_disasm.systems.outside_force import OutsideForce
 
@@ -88,13 +84,7 @@ class SimulatedStation(Station):
         """Adds plant and scene graph; returns the groove's nominal frame."""
         self.time_step = time_step
         simulation = self.scenario.simulation
-        config = MultibodyPlantConfig(
-            time_step=time_step,
-            stiction_tolerance=simulation.stiction_tolerance,
-            discrete_contact_approximation=simulation.contact_approximation,
-            contact_model="hydroelastic_with_fallback",
-        )
-        self.plant, self.scene_graph = AddMultibodyPlant(config, builder)
+        self.plant, self.scene_graph = add_plant(builder, simulation, time_step)
         self.g_W = self.plant.gravity_field().gravity_vector()
         self.X_WG = nominal_groove_pose(self.scenario.placement)
         return add_nominal_groove(self.plant, self.X_WG)
@@ -278,7 +268,7 @@ class SimulatedStation(Station):
             return self._initial
         settled = self.settled(wanted)
         self.set_effects(context, wanted)
-        copy_state(settled, context)
+        _copy_state(settled, context)
         plant_context = self.part_context(self.plant, context)
         self.plant.SetVelocities(plant_context, np.zeros(self.plant.num_velocities()))
         return InitialState(self.start, self.reading_at_zeroing(settled))
@@ -322,7 +312,7 @@ def _acting(effects: Sequence[Effect]) -> list[Effect]:
     return [effect for effect in effects if not effect.is_null]
 
 
-def copy_state(source: Context, target: Context) -> None:
+def _copy_state(source: Context, target: Context) -> None:
     """Copies discrete and abstract state between Contexts of one system.
 
     Drake's own copy (SetTimeStateAndParametersFrom) takes root Contexts only, and

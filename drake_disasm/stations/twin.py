@@ -10,7 +10,8 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Multiplexer
 
 from drake_disasm.cell.coordinates import BoltCoordinates
-from drake_disasm.cell.lock import GROOVE_FIELDS, add_lock, nominal_environment
+from drake_disasm.cell.lock import add_lock, nominal_environment
+from drake_disasm.cell.lock_dimensions import GROOVE_FIELDS
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import ArmEffect

@@ -2,16 +2,42 @@
 
 import numpy as np
 from pydrake.common import RandomDistribution
+from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.plant import (
+    AddMultibodyPlant,
+    MultibodyPlant,
+    MultibodyPlantConfig,
+)
 from pydrake.systems.framework import DiagramBuilder, InputPort
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor
 from drake_disasm.ports import Health
+from drake_disasm.scenario import SimulationConfig
 from drake_disasm.systems.body_pose import BodyPose
 from drake_disasm.systems.required_input import RequiredInput
 from drake_disasm.systems.step_clock import StepClock
+
+
+def add_plant(
+    builder: DiagramBuilder, simulation: SimulationConfig, time_step: float
+) -> tuple[MultibodyPlant, SceneGraph]:
+    """Returns plant and scene graph, added to a station.
+
+    Args:
+        builder: of the station.
+        simulation: how contact is solved.
+        time_step: of the discrete plant [s].
+    """
+    config = MultibodyPlantConfig(
+        time_step=time_step,
+        stiction_tolerance=simulation.stiction_tolerance,
+        discrete_contact_approximation=simulation.contact_approximation,
+        contact_model="hydroelastic_with_fallback",
+    )
+    plant, scene_graph = AddMultibodyPlant(config, builder)
+    return plant, scene_graph
 
 
 def export_required(

@@ -24,7 +24,7 @@ from pydrake.systems.primitives import (
     RandomSource,
 )
 
-from drake_disasm.cell.lock import lift_needed
+from drake_disasm.cell.lock_dimensions import lift_needed
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Effect, motion_chain
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES, action_bounds

@@ -17,7 +17,7 @@ from pydrake.systems.framework import (
     System,
 )
 
-from drake_disasm.cell.lock import lift_needed
+from drake_disasm.cell.lock_dimensions import lift_needed
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.timing import MOTION_DELAY, POLICY_DELAY, boundary
 from drake_disasm.effects import BoltMotion, Effect, is_local

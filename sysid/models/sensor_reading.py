@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import UniformGravityFieldElement
 from scipy.spatial.transform import Rotation
 
-from drake_disasm.cell.lock import bolt_inertia
+from drake_disasm.cell.lock_dimensions import bolt_inertia
 from drake_disasm.cell.tool import Tool
 from drake_disasm.devices.sensor_chain import (
     Payload,

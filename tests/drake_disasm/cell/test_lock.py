@@ -6,7 +6,8 @@ import itertools
 import numpy as np
 import pytest
 
-from drake_disasm.cell.lock import (
+from drake_disasm.cell.lock import set_environment
+from drake_disasm.cell.lock_dimensions import (
     bolt_inertia,
     facet_length,
     groove_boxes,
@@ -14,7 +15,6 @@ from drake_disasm.cell.lock import (
     lift_needed,
     lip_height,
     plate_bottom,
-    set_environment,
 )
 from drake_disasm.scenario import LockConfig
 from drake_disasm.stations import SimulatedStation

@@ -1,0 +1,94 @@
+"""What the lock's parts are made of, as a scene graph's proximity properties.
+
+The groove is rigid and the bolt's neck and head are compliant. Drake takes the
+contact's normals from the rigid side: from the groove they are those of its flat
+faces, while a rigid round neck would offer its facets' normals, and the discrete
+solver then resists sliding by a tenth of the normal force at the shipped time step
+even without friction (docs/physics.md).
+"""
+
+import dataclasses
+
+from pydrake.geometry import (
+    AddCompliantHydroelasticProperties,
+    AddContactMaterial,
+    AddRigidHydroelasticProperties,
+    ProximityProperties,
+)
+from pydrake.multibody.plant import CoulombFriction
+
+from drake_disasm.cell.lock_dimensions import facet_length
+from drake_disasm.effects import Environment
+from drake_disasm.scenario import LockConfig
+
+_FRICTION_STEP = 1e-4  # below the scatter of any measurement
+_PAD_FRICTION = 0.8  # steel on rubber, as on the gripper's pads
+
+
+def has_same_material(one: Environment, other: Environment) -> bool:
+    """Returns whether environments differ in pose and pull alone, or not noticeably.
+
+    Other materials are made anew in the scene graph, which takes milliseconds.
+    """
+    same = dataclasses.replace(
+        other, X_GnG=one.X_GnG, force_Gn=one.force_Gn, friction=one.friction
+    )
+    return one == same and abs(one.friction - other.friction) < _FRICTION_STEP
+
+
+def _surface(environment: Environment) -> ProximityProperties:
+    """Returns what the surfaces of groove, neck and head have in common."""
+    properties = ProximityProperties()
+    AddContactMaterial(
+        dissipation=environment.dissipation,
+        friction=CoulombFriction(environment.friction, environment.friction),
+        properties=properties,
+    )
+    # Speculative contact within a margin would be a quarter of the play here, and it
+    # changes nothing but the speed (docs/physics.md).
+    properties.AddProperty("hydroelastic", "margin", 0.0)
+    return properties
+
+
+def groove_material(environment: Environment) -> ProximityProperties:
+    """Returns the groove's material: rigid, with the environment's friction."""
+    properties = _surface(environment)
+    AddRigidHydroelasticProperties(resolution_hint=1.0, properties=properties)
+    return properties
+
+
+def bolt_materials(
+    environment: Environment, lock: LockConfig, resolution: float
+) -> dict[str, ProximityProperties]:
+    """Returns the materials of neck and head by name.
+
+    The head may be much softer and coarser than the neck: it touches with flat faces
+    or where there is room, and only the neck's place in the slot asks for precision.
+
+    Args:
+        environment: friction, moduli and dissipation.
+        lock: dimensions.
+        resolution: edge length on the neck's mesh [m].
+    """
+    neck, head = _surface(environment), _surface(environment)
+    neck_edge = facet_length(lock.neck_diameter, resolution)
+    head_edge = facet_length(lock.head_diameter, 2 * resolution)
+    AddCompliantHydroelasticProperties(neck_edge, environment.modulus, neck)
+    AddCompliantHydroelasticProperties(head_edge, environment.head_modulus, head)
+    return {"neck": neck, "head": head}
+
+
+def grip_material(dissipation: float) -> ProximityProperties:
+    """Returns the material of the bolt's grip, with the friction of the pads on it.
+
+    Args:
+        dissipation: Hunt-Crossley [s/m].
+    """
+    properties = ProximityProperties()
+    AddContactMaterial(
+        dissipation=dissipation,
+        friction=CoulombFriction(_PAD_FRICTION, _PAD_FRICTION),
+        properties=properties,
+    )
+    AddRigidHydroelasticProperties(resolution_hint=1.0, properties=properties)
+    return properties
