@@ -105,8 +105,8 @@ def reshape_groove(
 ) -> None:
     """Gives the groove other dimensions in a scene graph's Context, in place.
 
-    The shapes lose nothing but their size; `set_environment` is to follow, since
-    the proximity representation is made anew with the material.
+    Only the size of the shapes changes; call `set_environment` next, which rebuilds
+    the proximity representation with the material.
 
     Args:
         lock: whose groove.

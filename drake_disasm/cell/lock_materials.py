@@ -28,7 +28,7 @@ _PAD_FRICTION = 0.8  # steel on rubber, as on the gripper's pads
 def has_same_material(one: Environment, other: Environment) -> bool:
     """Returns whether environments differ in pose and pull alone, or not noticeably.
 
-    Other materials are made anew in the scene graph, which takes milliseconds.
+    Reassigning materials in the scene graph takes milliseconds.
     """
     same = dataclasses.replace(
         other, X_GnG=one.X_GnG, force_Gn=one.force_Gn, friction=one.friction

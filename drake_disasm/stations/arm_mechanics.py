@@ -1,4 +1,4 @@
-"""What effects on the arm do in the cell: to its plant, as friction, to its sensors."""
+"""How the cell simulates effects on the arm."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -97,8 +97,8 @@ class ArmMechanics:
     a step can follow: 9 N m at joint 4 to 0.007 rad/s. Faster than that nothing
     changes; slower, and at rest, the joint gives way at that speed.
 
-    What a torque sensor reads wrongly shows in `torque_measured` alone; the cell's
-    drives do not go by it, and `torque_external` is what truly pushes.
+    Torque sensor errors appear in `torque_measured` only: the cell's drives do not use
+    it, and `torque_external` is the true external torque.
 
     Args:
         plant: with the arm, not yet finalized.
@@ -136,10 +136,10 @@ class ArmMechanics:
     def wire(
         self, builder: DiagramBuilder, velocity: OutputPort, torque: OutputPort
     ) -> OutputPort:
-        """Adds friction and sensor to the diagram, behind ports of all joints.
+        """Adds friction and torque sensor to the diagram.
 
-        Their parameters come from sources: Drake's own symbolic parameters have no
-        default.
+        Their parameters are inputs from constant sources, since the parameters of a
+        SymbolicVectorSystem are NaN by default.
 
         Args:
             builder: of the station, whose plant is finalized.

@@ -27,7 +27,7 @@ Parts = Callable[[System], Context]
 
 @dataclasses.dataclass(frozen=True)
 class InitialState:
-    """Where an episode begins, as what processes commands and readings must know it.
+    """Start of an episode, for the systems that process commands and readings.
 
     Attributes:
         position: (n,) coordinates from which motion is commanded.
@@ -39,7 +39,7 @@ class InitialState:
 
 
 class Station(Diagram):
-    """A diagram with station ports, and what the task layer must know of it.
+    """A diagram with the station's ports, and the data that the task layer needs.
 
     Attributes:
         scenario: what it was built from.
@@ -75,7 +75,7 @@ class Station(Diagram):
 
     @property
     def payload(self) -> Payload:
-        """What is known to hang on the sensor."""
+        """The payload that the sensor is known to carry."""
         return Payload(self.payload_mass, self.p_SoScm_S, self.g_W)
 
     @functools.cached_property
@@ -91,7 +91,7 @@ class Station(Diagram):
 
     @property
     def random_sources(self) -> tuple[RandomSource, ...]:
-        """What is random in it: seeded anew in each episode."""
+        """Sources of randomness, reseeded at the start of each episode."""
         return ()
 
     @property
@@ -99,7 +99,7 @@ class Station(Diagram):
         """Where an episode begins by the default Context.
 
         Raises:
-            DisasmError: nobody knows before `begin`, as on hardware.
+            DisasmError: it is known only after `begin`, as on hardware.
         """
         raise NotImplementedError  # Drake's metaclass leaves no room for ABC's
 
@@ -124,42 +124,42 @@ class Station(Diagram):
     def attach(self, simulator: Simulator) -> None:
         """Keeps effects that depend on the bolt's motion up to date in a simulation.
 
-        Once a period of the task they are told where the bolt is and how it is
-        commanded to move. A monitor that the simulator already has is called as
-        before; one that is set later takes this one's place.
+        They are updated once per task period, from the bolt's pose and its commanded
+        velocity, by a simulator monitor. A monitor that the simulator already has
+        stays in use; one that is set later replaces this one.
 
         Args:
             simulator: of the diagram with this station, before it is initialised.
         """
 
-    def leave_local_effects(self, simulator: Simulator) -> None:
-        """Notes that the caller calls `update_local_effects` itself, in each period.
+    def register_caller_updates(self, simulator: Simulator) -> None:
+        """Declares that the caller calls `update_local_effects` itself, every period.
 
         Args:
             simulator: of the diagram with this station, before it is initialised.
         """
 
-    def leave_motion_effects(self) -> None:
-        """Notes that the diagram around the station applies effects on the motion."""
+    def register_motion_effects(self) -> None:
+        """Declares that the diagram around the station applies motion effects."""
 
     def effects_in_force(self, context: Context) -> tuple[Effect, ...]:
-        """Returns the effects that this station's Context has."""
+        """Returns the effects that are in force in this station's Context."""
         return ()
 
     def update_local_effects(
         self, context: Context, effects: Sequence[Effect], bolt: BoltMotion
     ) -> None:
-        """Brings what depends on the bolt's motion up to date; see the simulated."""
+        """Updates effects that depend on the bolt's motion; see SimulatedStation."""
 
     def bolt_is_out(self, context: Context, lift_needed: float) -> bool:
-        """Returns whether the bolt truly has risen so far [m]; False: nobody knows."""
+        """Returns whether the bolt has truly risen that far [m]; False if unknown."""
         return False
 
     def check(self) -> None:
-        """Raises DisasmError if the station does not obey any more."""
+        """Raises DisasmError if the station no longer accepts commands."""
 
     def _set_cell_geometry(self) -> Tool:
-        """Takes from the scenario where arm, tool and lock are; returns the tool."""
+        """Sets the geometry of arm, tool and lock; returns the tool."""
         scenario, tool = self.scenario, Tool.from_models(self.scenario)
         self.control_period = scenario.arm.control_period
         self.X_WG = nominal_groove_pose(scenario.placement)
@@ -180,7 +180,7 @@ def refuse_twins_contact(scenario: Scenario) -> None:
     """
     if scenario.contact.model != "hydroelastic":
         raise DisasmError(
-            f"contact.model: '{scenario.contact.model}' is of the twin alone; "
+            f"contact.model: '{scenario.contact.model}' is available on the twin only; "
             "use hydroelastic for the cell, or --station twin"
         )
 

@@ -43,13 +43,13 @@ def refuse_arm_effects(effects: Sequence[ArmEffect]) -> None:
 
 
 def refuse_on_hardware(effects: Sequence[Effect]) -> None:
-    """Refuses effects: they act on a simulated plant, and reality has its own.
+    """Refuses effects: they act on a simulated plant; a real one has its own.
 
     Raises:
         DisasmError: names the first.
     """
     if effects:
         raise DisasmError(
-            f"effects.0 (!{type(effects[0]).__name__}): acts on a simulated plant, and "
-            "hardware has its own effects; take it out for --station hardware"
+            f"effects.0 (!{type(effects[0]).__name__}): acts on a simulated plant; "
+            "hardware has its own effects; remove it for --station hardware"
         )

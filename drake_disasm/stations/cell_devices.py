@@ -1,4 +1,4 @@
-"""The clients of the real cell's devices: connected, waited for, and zeroed."""
+"""Clients of the real cell's devices: connecting, waiting, zeroing."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -27,7 +27,7 @@ class CellDevices:
         clients: by the device's name.
         gripper: the client that takes commands.
         lcm: by which the arm is reached.
-        checked_lcm: what its monitor has found good.
+        checked_lcm: carries the messages that the arm's monitor has accepted.
         clock: tells when samples come [s].
 
     Args:
@@ -68,17 +68,17 @@ class CellDevices:
         }
 
     def connect(self) -> None:
-        """Begins to listen to the devices; once more, the sensor streams anew."""
+        """Starts the clients; calling it again restarts the sensor's stream."""
         self._sensor.start()
         self.gripper.start()
 
     def close(self) -> None:
-        """Leaves the devices alone: no thread and no socket stays."""
+        """Stops the clients: no thread and no socket stays."""
         self._sensor.stop()
         self.gripper.stop()
 
     def pump(self) -> None:
-        """Takes what the arm has sent, where no simulator does."""
+        """Handles the arm's messages while no simulator does."""
         for lcm in (self.lcm, self.checked_lcm):
             while lcm.HandleSubscriptions(0):
                 pass
@@ -88,7 +88,7 @@ class CellDevices:
         return {name: device.read() for name, device in self.clients.items()}
 
     def healths(self) -> dict[str, Health]:
-        """Returns how each device is now."""
+        """Returns the present health of each device."""
         now, limits = self.clock(), self._config.safety
         return {
             name: reading.health(now, limits.stale_after(name))
@@ -96,7 +96,7 @@ class CellDevices:
         }
 
     def await_ready(self) -> None:
-        """Waits until all have sent, the arm for so long that its driver listens.
+        """Waits until all devices are ready, and until the arm's driver takes commands.
 
         Raises:
             DisasmError: one of them does not become ready in time.
@@ -131,7 +131,7 @@ class CellDevices:
         return np.asarray(np.mean(list(taken.values()), axis=0))
 
     def _silence(self, names: Sequence[str]) -> str:
-        """Returns what devices that are not ready say of themselves."""
+        """Returns the message for devices that are not ready."""
         readings, health = self.readings(), self.healths()
         each = [
             f"{name} is {health[name].name}"

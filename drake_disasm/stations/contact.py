@@ -1,8 +1,8 @@
-"""What the simulated contact between bolt and groove is made of: two strategies.
+"""Contact between bolt and groove: one strategy for each contact model.
 
-A strategy knows which quantities of an `Environment` it has, how they are put into a
-Context, and what it adds to the diagram. Contexts are handed in as `Parts`, which finds
-that of any system in the station.
+A strategy states which quantities of an `Environment` it models, writes them into a
+Context, and adds its systems to the diagram. `Parts` maps a system of the station to
+its Context.
 """
 
 import abc
@@ -37,8 +37,8 @@ class ContactStrategy(abc.ABC):
     """How bolt and groove push on each other.
 
     Attributes:
-        quantities: fields of an Environment that it has.
-        remedy: what to do about an effect that needs others.
+        quantities: fields of an Environment that it models.
+        remedy: for an effect that changes only other fields.
         outside_force: adds forces on the bolt other than contact.
     """
 
@@ -57,7 +57,7 @@ class ContactStrategy(abc.ABC):
 
     @abc.abstractmethod
     def add_forces(self, builder: DiagramBuilder, forces: OutputPort) -> OutputPort:
-        """Adds what computes the contact, if that is not the plant itself.
+        """Adds the system that computes the contact, if that is not the plant.
 
         Args:
             forces: that act on the bolt from outside.
@@ -68,14 +68,14 @@ class ContactStrategy(abc.ABC):
 
     @abc.abstractmethod
     def reconfigure(self, lock: Lock, contact: ContactConfig, parts: Parts) -> None:
-        """Takes another lock and contact; `set_environment` is to follow."""
+        """Changes lock and contact; `set_environment` must be called next."""
 
     @abc.abstractmethod
     def set_environment(self, environment: Environment, parts: Parts) -> None:
-        """Puts the world around the bolt into a Context."""
+        """Writes the bolt's environment into a Context."""
 
     def change_environment(self, environment: Environment, parts: Parts) -> None:
-        """Puts what has changed of the world around the bolt into a Context."""
+        """Writes what has changed of the bolt's environment into a Context."""
         self.set_environment(environment, parts)
 
 
@@ -105,7 +105,7 @@ class HydroelasticContact(ContactStrategy):
         self._reshape(lock.config, parts)
 
     def set_environment(self, environment: Environment, parts: Parts) -> None:
-        """See ContactStrategy: makes the materials anew, which takes milliseconds."""
+        """See ContactStrategy; reassigns all materials, which takes milliseconds."""
         outside = parts(self.outside_force)
         if environment.clearance != self.outside_force.material(outside).clearance:
             clearance = environment.clearance
@@ -122,7 +122,7 @@ class HydroelasticContact(ContactStrategy):
         )
 
     def change_environment(self, environment: Environment, parts: Parts) -> None:
-        """See ContactStrategy: leaves materials that have not changed noticeably."""
+        """See ContactStrategy; skips materials that have not changed noticeably."""
         outside = parts(self.outside_force)
         if has_same_material(self.outside_force.material(outside), environment):
             set_pose(self._lock, environment, parts(self._plant))
@@ -195,8 +195,8 @@ class ImpactContactForce(ContactStrategy):
     def reconfigure(self, lock: Lock, contact: ContactConfig, parts: Parts) -> None:
         """See ContactStrategy.
 
-        The scene graph keeps the old shapes: new ones would forget that bolt and
-        groove do not collide there.
+        The scene graph keeps the old shapes: changing them would drop the collision
+        filter between bolt and groove.
         """
         self._lock, self._contact = lock, contact
 
@@ -227,7 +227,7 @@ class ImpactContactForce(ContactStrategy):
         )
 
     def _exclude_from_scene_graph(self) -> None:
-        """Leaves the contact between bolt and groove to the law."""
+        """Filters collisions of bolt and groove in the scene graph."""
         bolt, groove = (
             GeometrySet(list(ids))
             for ids in (self._lock.bolt_ids.values(), self._lock.groove_ids)
@@ -246,7 +246,7 @@ CONTACTS: dict[str, type[ContactStrategy]] = {
 def refuse_without_quantity(
     model: str, nominal: Environment, effects: Sequence[Effect]
 ) -> None:
-    """Refuses effects on what a contact model does not have.
+    """Refuses effects on quantities that a contact model does not have.
 
     Args:
         model: the scenario's `contact.model`.

@@ -1,4 +1,4 @@
-"""The load on the arm's flange that no tool data know of, as a body of its own."""
+"""A payload on the flange that the controller's tool data do not include."""
 
 from collections.abc import Sequence
 

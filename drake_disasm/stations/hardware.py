@@ -44,8 +44,9 @@ class HoldError(DisasmError):
 class HardwareStation(Station):
     """KUKA iiwa, OnRobot HEX and Robotiq 2F-140 behind their own protocols.
 
-    Commands reach the arm through a SafetyFilter. Devices are connected by `begin`,
-    and left alone by `close`. A dry run reads them and sends nothing.
+    Commands reach the arm through a SafetyFilter. `begin` connects the devices, and
+    `close` disconnects them; a simulation before `begin` is refused. A dry run reads
+    the devices and sends nothing.
 
     @system
     name: HardwareStation
@@ -74,7 +75,7 @@ class HardwareStation(Station):
         devices: clients by name.
 
     Args:
-        scenario: of the task; it may have no effects: reality has its own.
+        scenario: of the task; without effects, which act on simulated plants.
         config: where the devices are, and limits.
         dry_run: whether nothing is sent to any device that moves.
         clock: tells when samples come [s].
@@ -162,11 +163,12 @@ class HardwareStation(Station):
             )
 
     def resume(self) -> None:
-        """Ends a hold; nothing moves until all is ready and nothing would leap."""
+        """Ends a hold; the arm moves again once all devices are ready and the next
+        command is close to where it is."""
         self.supervisor.resume()
 
     def healths(self) -> dict[str, Health]:
-        """Returns how each device is now."""
+        """Returns the present health of each device."""
         return self._cell.healths()
 
     def readings(self) -> dict[str, Reading]:
@@ -181,11 +183,11 @@ class HardwareStation(Station):
         }
 
     def connect(self) -> None:
-        """Begins to listen to the devices; once more, the sensor streams anew."""
+        """Starts the clients; calling it again restarts the sensor's stream."""
         self._cell.connect()
 
     def close(self) -> None:
-        """Leaves the devices alone: no thread and no socket stays."""
+        """Stops the clients: no thread and no socket stays."""
         self._connection.is_connected = False
         self._cell.close()
 
@@ -196,7 +198,7 @@ class HardwareStation(Station):
         self.close()
 
     def pump(self) -> None:
-        """Takes what the arm has sent, where no simulator does."""
+        """Handles the arm's messages while no simulator does."""
         self._cell.pump()
 
     def _wire_command(self, builder: DiagramBuilder) -> None:

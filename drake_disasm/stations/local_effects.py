@@ -1,4 +1,4 @@
-"""Effects that depend on the bolt's motion, kept up to date in any simulation."""
+"""A simulator monitor that updates effects which depend on the bolt's motion."""
 
 from collections.abc import Callable
 
@@ -15,17 +15,16 @@ _ROUNDING = 1e-9  # s
 
 
 class LocalEffectsMonitor:
-    """Tells a station's local effects, once a period of the task, of the bolt's motion.
+    """Updates a station's motion-dependent effects once per task period.
 
-    It is a simulator's monitor, since a scene graph's proximity properties can't be
-    changed by a system's event. In each period the commanded velocity is what the
-    command moves by during the first control period after the policy has acted; the
-    bolt's pose is the true one then. When a simulation begins, or its time was set
-    back, the bolt is at rest.
+    A monitor, since an event of a LeafSystem can't change the scene graph's proximity
+    properties. In each period the commanded velocity is estimated over the first
+    control period after the policy has acted, and the bolt's true pose is read then.
+    At the start of a simulation, or after its time was reset, the velocity is zero.
 
     Args:
-        station: whose effects are kept up to date.
-        before: a monitor that was there before; it is called first.
+        station: whose effects are updated.
+        before: the simulator's previous monitor, called first; or None.
     """
 
     def __init__(self, station: Station, before: Monitor | None) -> None:
@@ -34,7 +33,7 @@ class LocalEffectsMonitor:
         self._command: tuple[float, np.ndarray] | None = None
 
     def __call__(self, root: Context) -> EventStatus | None:
-        """Is what the simulator calls after each of its steps."""
+        """Called by the simulator after each of its steps."""
         status = self._before(root) if self._before else None
         context = self._station.GetMyMutableContextFromRoot(root)
         if is_local(self._station.effects_in_force(context)):
@@ -58,7 +57,7 @@ class LocalEffectsMonitor:
         self._update(context, np.zeros(3))
 
     def _measure(self, context: Context, time: float) -> None:
-        """Takes the command; a control period later, updates by how it has moved."""
+        """Samples the command twice, a control period apart, then updates."""
         p_GnB = self._commanded_position(context)
         if self._command is None:
             self._command = time, p_GnB

@@ -1,4 +1,4 @@
-"""The cell where devices say that it is: what a view of the real one shows."""
+"""The cell's geometry posed by measurements, for a view of the real cell."""
 
 import dataclasses
 

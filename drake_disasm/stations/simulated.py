@@ -55,7 +55,7 @@ class SimulatedStation(Station):
     (X_GnB, true), `contact_results`, and the applied spatial forces input.
     """
 
-    #: How long the station is left alone before an episode begins [s].
+    #: Time to settle at the start, before an episode begins [s].
     settling_time: float
 
     #: Of the discrete plant [s].
@@ -72,7 +72,7 @@ class SimulatedStation(Station):
         super().__init__()
         validate(scenario)
         self.scenario = scenario
-        # A copy, so that a later change to the same objects is noticed.
+        # A copy, so that a later change to the scenario's list is detected.
         self._default_effects = copy.deepcopy(list(scenario.effects))
         self._acting_by_default = _acting(self._default_effects)
         self._nominal = nominal_environment(scenario.lock, scenario.contact)
@@ -133,13 +133,13 @@ class SimulatedStation(Station):
         builder.Connect(forces, applied)
 
     def _make_contact(self, outside_force: OutsideForce) -> ContactStrategy:
-        """Returns how bolt and groove push on each other."""
+        """Returns the contact strategy for bolt and groove."""
         return HydroelasticContact(
             self.plant, self.scene_graph, self.lock, outside_force
         )
 
     def _settle_by_default(self) -> None:
-        """Makes the bolt at rest at A, in the scenario's effects, the default."""
+        """Makes the settled start, with the scenario's effects, the default Context."""
         plant = self.plant
         unsettled = plant.CreateDefaultContext()
         self._place_at_start(unsettled)
@@ -170,9 +170,9 @@ class SimulatedStation(Station):
         """Raises DisasmError for effects on the arm that the station can't carry."""
 
     def set_effects(self, context: Context, effects: Sequence[Effect]) -> None:
-        """Puts effects into this station's Context; nothing is rebuilt.
+        """Puts effects into this station's Context, without a rebuild.
 
-        The bolt stays where it was: `settled` gives a state that fits them.
+        The state is unchanged: `settled` returns one that is consistent with them.
 
         Raises:
             DisasmError: the station can't carry one of them.
@@ -195,7 +195,7 @@ class SimulatedStation(Station):
     def update_local_effects(
         self, context: Context, effects: Sequence[Effect], bolt: BoltMotion
     ) -> None:
-        """Brings what depends on the bolt's motion up to date, if anything does.
+        """Updates effects that depend on the bolt's motion, if there are any.
 
         Args:
             context: this station's, in which `effects` are set.
@@ -211,16 +211,16 @@ class SimulatedStation(Station):
         simulator.set_monitor(LocalEffectsMonitor(self, simulator.get_monitor()))
         self._in_force.note_updated(simulator)
 
-    def leave_local_effects(self, simulator: Simulator) -> None:
+    def register_caller_updates(self, simulator: Simulator) -> None:
         """See Station."""
         self._in_force.note_updated(simulator)
 
-    def leave_motion_effects(self) -> None:
+    def register_motion_effects(self) -> None:
         """See Station."""
         self._in_force.motion_is_applied = True
 
     def _set_arm_effects(self, context: Context, effects: Sequence[ArmEffect]) -> None:
-        """Puts an arm's effects, and no others, into this station's Context."""
+        """Puts these effects on the arm, and no others, into this station's Context."""
 
     def at_start(self, effects: Sequence[Effect]) -> Simulator:
         """Returns a simulator of this station alone, commanded to stay at A.
@@ -294,14 +294,14 @@ class SimulatedStation(Station):
         return self.GetMutableSubsystemContext(part, context)
 
     def _parts(self, context: Context) -> Parts:
-        """Returns what finds the Context of a part in this station's."""
+        """Returns a function from a part to its Context within this station's."""
         return functools.partial(self.part_context, context=context)
 
     def _place_at_start(self, plant_context: Context) -> None:
-        """Puts the plant where settling begins, if not at its default positions."""
+        """Sets the positions from which settling starts, if not the default ones."""
 
     def _prepare(self, context: Context) -> None:
-        """Puts into a default Context what the station has become since it was made."""
+        """Applies to a default Context what `reconfigure` has changed."""
 
     def _fix_commands(self, context: Context) -> None:
         """Commands the start, for a station that stands alone."""

@@ -77,7 +77,7 @@ class TwinStation(SimulatedStation):
         return _structure(scenario) == _structure(self.scenario)
 
     def reconfigure(self, context: Context, scenario: Scenario) -> None:
-        """Turns this station into that of another scenario without a rebuild.
+        """Changes this station to another scenario without a rebuild.
 
         Identification asks for hundreds of parameter sets; in place, one costs a few
         milliseconds and leaves nothing behind, and every bit is as after a rebuild.
@@ -109,7 +109,7 @@ class TwinStation(SimulatedStation):
         self.set_effects(context, scenario.effects)
 
     def impact_conditions(self, context: Context) -> ImpactConditions:
-        """Returns what IMPACT depends on now.
+        """Returns the present inputs of the IMPACT law.
 
         Raises:
             DisasmError: the contact is hydroelastic.

@@ -1,4 +1,4 @@
-"""No simulation of devices that nobody has connected."""
+"""A check that the real devices are connected before a simulation starts."""
 
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 

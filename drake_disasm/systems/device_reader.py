@@ -1,4 +1,4 @@
-"""Puts a device's newest sample on ports; what reads the device is elsewhere."""
+"""A device's newest sample as output ports; its client reads the device."""
 
 from typing import Protocol
 
@@ -21,7 +21,7 @@ class Readable(Protocol):
 
 
 class DeviceReader(LeafSystem):
-    """Looks at a device once a period: values, health, and when they were taken.
+    """Samples a device's client once per period: values, health, and sample time.
 
     `time_measured` is in the diagram's time. Before the first sample values are NaN
     and `health` says NO_DATA.

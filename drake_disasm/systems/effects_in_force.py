@@ -1,4 +1,4 @@
-"""Which effects a station simulates, and whether something keeps them up to date."""
+"""The effects that a station simulates, and a check that each of them can act."""
 
 import weakref
 from collections.abc import Sequence
@@ -14,10 +14,9 @@ from drake_disasm.effects import Effect, is_local, motion_chain
 class EffectsInForce(LeafSystem):
     """Holds the effects of a station's Context; refuses those that would not act.
 
-    Effects that depend on the bolt's motion need something that tells them of it,
-    outside of Drake's events, since proximity properties can't be changed by one.
-    Effects on the motion act before the station. Where neither is there, a simulator's
-    initialisation fails: an effect never goes missing silently.
+    Effects that depend on the bolt's motion must be updated from outside the diagram
+    (see LocalEffectsMonitor), and motion effects act before the station. If either is
+    missing, the simulator's initialisation fails: no effect is silently ignored.
 
     @system
     name: EffectsInForce
@@ -42,7 +41,7 @@ class EffectsInForce(LeafSystem):
         self.DeclareInitializationUnrestrictedUpdateEvent(self._check)
 
     def set(self, context: Context, effects: Sequence[Effect]) -> None:
-        """Notes the effects that are in force in this system's Context."""
+        """Sets the effects that are in force in this system's Context."""
         parameter = context.get_mutable_abstract_parameter(self._effects)
         parameter.set_value(tuple(effects))
 
@@ -51,11 +50,11 @@ class EffectsInForce(LeafSystem):
         return context.get_abstract_parameter(self._effects).get_value()
 
     def note_updated(self, simulator: Simulator) -> None:
-        """Notes a simulator whose local effects somebody keeps up to date."""
+        """Registers a simulator whose motion-dependent effects are updated."""
         self._updated.add(simulator)
 
     def note_at_rest(self, simulator: Simulator) -> None:
-        """Notes a simulator in which the bolt rests at A: no effect has to follow."""
+        """Registers a simulator of the bolt at rest at A, which needs no updates."""
         self._at_rest.add(simulator)
 
     def _check(self, context: Context, state: State) -> EventStatus:
@@ -81,7 +80,7 @@ class EffectsInForce(LeafSystem):
     def _is_of(
         self, context: Context, simulators: "weakref.WeakSet[Simulator]"
     ) -> bool:
-        """Returns whether a Context of this system belongs to one of simulators."""
+        """Returns whether a Context of this system belongs to one of the simulators."""
         return any(self._context_in(s) is context for s in list(simulators))
 
     def _context_in(self, simulator: Simulator) -> Context | None:

@@ -1,4 +1,4 @@
-"""Hands the wanted opening to the gripper's client."""
+"""Sends the commanded opening to the gripper's client."""
 
 from collections.abc import Callable
 
@@ -10,7 +10,7 @@ from drake_disasm.safety import Mode, Supervisor
 class GripperWriter(LeafSystem):
     """Commands the opening while the supervisor lets commands through.
 
-    In a hold the gripper keeps what it was last told: opening would drop the bolt.
+    In a hold the gripper keeps its last command: opening would drop the bolt.
 
     @system
     name: GripperWriter

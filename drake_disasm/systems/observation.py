@@ -20,7 +20,7 @@ _ZERO = np.zeros(3)
 
 @dataclasses.dataclass(frozen=True)
 class Mounting:
-    """How the sensor sits between bolt and robot, and what it carries.
+    """How the sensor is mounted between bolt and robot, and its payload.
 
     Attributes:
         X_SB: the bolt in the sensor frame, as grasped.

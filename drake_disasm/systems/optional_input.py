@@ -5,7 +5,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 
 class OptionalInput(LeafSystem):
-    """Passes a vector on; while nothing is connected, a constant one.
+    """Passes a vector through; a constant one if nothing is connected.
 
     The output is cached by the input's ticket: Python is called when the input
     changes, not in each step of the plant.

@@ -12,10 +12,10 @@ from drake_disasm.effects import Environment
 
 
 class OutsideForce(LeafSystem):
-    """A force on the bolt at Bo, and what comes from outside.
+    """The environment's force on the bolt at Bo, and the station's force input.
 
-    The force is a parameter of the Context; what the plant gets is
-    computed when that changes, not in each step of the plant.
+    The force is a parameter of the Context; the output is computed when it changes,
+    not in each step of the plant.
 
     @system
     name: OutsideForce
@@ -57,12 +57,12 @@ class OutsideForce(LeafSystem):
         context.get_mutable_numeric_parameter(self._force).SetFromVector(f_Gn)
 
     def set_material(self, context: Context, environment: Environment) -> None:
-        """Notes in this system's Context whose material the scene graph has."""
+        """Records the environment whose material the scene graph's Context has."""
         parameter = context.get_mutable_abstract_parameter(self._material)
         parameter.set_value(environment)
 
     def material(self, context: Context) -> Environment:
-        """Returns what `set_material` noted."""
+        """Returns what `set_material` recorded."""
         return context.get_abstract_parameter(self._material).get_value()
 
     def _calc(self, context: Context, output: Value) -> None:

@@ -112,7 +112,7 @@ class PoseTarget(LeafSystem):
         """Puts effects, in the order of the chain, into this system's Context.
 
         Raises:
-            DisasmError: there are more than it can remember.
+            DisasmError: there are more than it has state for.
         """
         _refuse_too_many(effects)
         parameter = context.get_mutable_abstract_parameter(self._effects)

@@ -1,4 +1,4 @@
-"""An input without which nothing may be simulated."""
+"""A check that an input is connected."""
 
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
@@ -6,9 +6,9 @@ from drake_disasm.common.errors import DisasmError
 
 
 class RequiredInput(LeafSystem):
-    """Refuses, at a simulator's initialisation, that an input is not connected.
+    """Raises at a simulator's initialisation if its input is not connected.
 
-    It reads nothing; without it Drake would complain of some port deep inside.
+    It computes nothing; Drake's own message would name a port inside the station.
 
     @system
     name: RequiredInput

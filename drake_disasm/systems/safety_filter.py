@@ -1,4 +1,4 @@
-"""The supervisor as a system between what is wanted and what is sent."""
+"""The supervisor as a system between the policy's command and the arm."""
 
 from collections.abc import Mapping
 
@@ -71,7 +71,7 @@ class SafetyFilter(LeafSystem):
         self._offset = reading - weight
 
     def begin(self) -> None:
-        """Forgets when the last command was: between episodes there are none."""
+        """Resets the time of the last command: there are none between episodes."""
         self._before, self._then = np.full_like(self._before, np.nan), np.nan
 
     def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
@@ -84,8 +84,8 @@ class SafetyFilter(LeafSystem):
         sent = context.get_discrete_state(self._sent).value()
         if not np.isfinite(sent).all():
             raise DisasmError(
-                "nothing was measured yet, so nothing can be sent; call the station's "
-                "begin before the simulator's Initialize"
+                "no position has been measured yet, so no command can be sent; call "
+                "station.begin(context) before the simulator's Initialize"
             )
         output.SetFromVector(sent)
 

@@ -1,4 +1,4 @@
-"""When a discrete plant made its newest step."""
+"""The time of a discrete plant's newest step."""
 
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 

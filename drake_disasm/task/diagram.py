@@ -146,7 +146,7 @@ def add_task(
     monitor = _add_monitor(builder, station.scenario, processor)
     imprecision, noise = _add_imprecision(builder, station.scenario)
     pose_target = _add_pose_target(builder, station, imprecision, processor)
-    station.leave_motion_effects()  # the pose target applies them
+    station.register_motion_effects()  # the pose target applies them
     motion = add_motion(builder, pose_target.GetOutputPort("velocity"), station)
     _add_grip(builder, station)
     chooser, source, action = _add_policy(builder, policy, processor, station)

@@ -285,8 +285,8 @@ class ReplayDiagram:
         self._motion = add_motion(builder, self._source.get_output_port(), self.station)
         self.processor = add_observation(builder, self.station)
         self._simulator = Simulator(builder.Build())
-        self.station.leave_local_effects(self._simulator)
-        self.station.leave_motion_effects()  # the steps' commands have them
+        self.station.register_caller_updates(self._simulator)
+        self.station.register_motion_effects()  # the steps' commands have them
         self._clean: Context = self._simulator.get_context().Clone()
         self._observation = self.processor.GetOutputPort("observation")
         self._pose = self.processor.GetOutputPort("X_GB")

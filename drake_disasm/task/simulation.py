@@ -118,7 +118,7 @@ class TaskSimulation:
         self.diagram: Diagram = builder.Build()
         self.diagram.set_name(scenario.name)
         self.simulator = Simulator(self.diagram)
-        self.station.leave_local_effects(self.simulator)  # `step` updates them
+        self.station.register_caller_updates(self.simulator)  # `step` updates them
         self.simulator.set_target_realtime_rate(self._rate)
         self.context = self.simulator.get_mutable_context()
         self._ports: dict[tuple[int, str], tuple[OutputPort, Context]] = {}

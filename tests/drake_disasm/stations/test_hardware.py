@@ -69,7 +69,10 @@ def test_a_dry_run_has_nothing_that_sends(station: HardwareStation) -> None:
     [
         ("effects=[!GroovePose {ry: 0.01}]", "effects.0 (!GroovePose)"),
         ("effects=[!CommandGain {x: 0.01}]", "effects.0 (!CommandGain)"),
-        ("contact.model=impact", "contact.model: 'impact' is of the twin alone"),
+        (
+            "contact.model=impact",
+            "contact.model: 'impact' is available on the twin",
+        ),
     ],
 )
 def test_what_hardware_cannot_do_is_named_when_it_is_built(

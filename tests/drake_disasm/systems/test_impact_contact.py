@@ -75,5 +75,5 @@ def test_an_episode_ends_as_with_hydroelastic_contact():
 
 
 def test_it_is_of_the_twin_alone():
-    with pytest.raises(DisasmError, match="of the twin alone"):
+    with pytest.raises(DisasmError, match="on the twin only"):
         CellStation(load_scenario("removal", ["contact.model=impact"]))
