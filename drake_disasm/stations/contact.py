@@ -34,7 +34,7 @@ from drake_disasm.systems.outside_force import OutsideForce
 
 
 class ContactStrategy(abc.ABC):
-    """How bolt and groove push on each other.
+    """A model of the contact between bolt and groove.
 
     Attributes:
         quantities: fields of an Environment that it models.
