@@ -35,7 +35,7 @@ _NOISE = 1.5e-4  # m, of exploration
 
 @contextmanager
 def recorded_log(transitions: int) -> Iterator[Path]:
-    """Yields a log of the twin with at least so many transitions; it goes after."""
+    """Yields a temporary log of the twin with at least so many transitions."""
     scenario = load_scenario(_SCENARIO)
     policy = Exploring(make_policy("admittance"), _NOISE, 0)
     simulation = TaskSimulation(scenario, "twin", policy)
@@ -46,7 +46,7 @@ def recorded_log(transitions: int) -> Iterator[Path]:
 def evaluation_time(
     log: Path, transitions: int, workers: int, repeats: int, contact: str
 ) -> float:
-    """Returns the time [s] of one evaluation, the median of some; workers are warm.
+    """Returns the median time [s] of an evaluation, with workers already started.
 
     Args:
         log: of transitions.

@@ -55,7 +55,11 @@ class Objective:
             huber_delta: residual, in standard deviations, beyond which the loss is
                 linear.
             surrogate: a faster model with the same parameters, for derivatives.
+
+        Raises:
+            DisasmError: two parameters have the same name.
         """
+        _refuse_ambiguous_names(model)
         self.model, self.huber_delta = model, huber_delta
         self.scaling = Scaling(model.parameters)
         self.evaluations = 0
@@ -130,6 +134,15 @@ class Objective:
             )
         residual = (predicted - measured.values) / measured.noise
         return np.clip(residual, -FAILED_RESIDUAL, FAILED_RESIDUAL)
+
+
+def _refuse_ambiguous_names(model: LogModel) -> None:
+    names = [parameter.name for parameter in model.parameters]
+    for name in names:
+        if names.count(name) > 1:
+            raise DisasmError(
+                f"{type(model).__name__}: two parameters are named '{name}'; rename one"
+            )
 
 
 def pseudo_residual(residual: Array, huber_delta: float) -> Array:

@@ -50,9 +50,9 @@ class LogModel(abc.ABC):
             def select_rows(self, mask):
                 return self.replace(q=self.q[mask], v=self.v[mask])
 
-    Models are immutable: what changes one returns another. A model is pickled for the
-    processes that evaluate it; what it builds there, such as a diagram, it leaves out
-    of the pickle by `__getstate__`.
+    Models are immutable: methods return changed copies. A model is pickled for the
+    processes that evaluate it, which have to be able to import its class; what it
+    builds there, such as a diagram, it leaves out of the pickle by `__getstate__`.
 
     Attributes:
         parameters: what can be varied, in the order of theta.

@@ -5,7 +5,7 @@ python -m tests.sysid.measurements recovery twin    ten noise seeds, known truth
 python -m tests.sysid.measurements recovery cell
 python -m tests.sysid.measurements recovery impact  a twin with IMPACT
 python -m tests.sysid.measurements thesis FIGURE    the thesis's three settings
-python -m tests.sysid.measurements package          Bees beside bees_algorithm
+python -m tests.sysid.measurements package          our Bees and bees_algorithm
 python -m tests.sysid.measurements surrogate        with and without, equal budget
 """
 

@@ -168,6 +168,12 @@ def test_predictions_of_another_shape_are_refused(model):
         Objective(model, Workers())(np.array([[INERTIA, WEIGHT]]))
 
 
+def test_two_parameters_of_one_name_are_refused(model):
+    twice = model.replace(parameters=(*model.parameters, model.parameters[0]))
+    with pytest.raises(DisasmError, match="two parameters are named 'J'"):
+        Objective(twice)
+
+
 def test_measurements_of_another_shape_are_refused():
     with pytest.raises(DisasmError, match=r"give \(rows, 2\)"):
         Measurements.of_array(np.zeros(3), [Channel("a", "N"), Channel("b", "N")])
