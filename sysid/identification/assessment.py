@@ -1,8 +1,7 @@
 """From the optima that searches found to a result: how good it is, and how certain."""
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +16,11 @@ from sysid.identification.linearisation import (
     linearise,
 )
 from sysid.identification.profile import Profile, profile
-from sysid.identification.result import Comparison, MethodResult
-from sysid.identification.sensitivity import of_linearisation
+from sysid.identification.result import Comparison, Identification, MethodResult
+from sysid.identification.sensitivity import Sensitivity, of_linearisation
 from sysid.identification.uncertainty import uncertainty
 from sysid.identification.whiteness import ljung_box
+from sysid.models.base import LogModel
 from sysid.objective import Objective, pseudo_residual
 from sysid.parameters import nominal_values
 from sysid.workers import Workers
@@ -56,28 +56,53 @@ class Assessment:
         self._uncertainty = uncertainty(linearisation, episode)
         self._sensitivity = of_linearisation(linearisation, full.model.parameters)
 
-    def fields(self) -> dict[str, Any]:
-        """Returns those fields of `Identification` that follow from the optima."""
-        full, model, u = self._full, self._full.model, self._u
-        start, theta = nominal_values(model.parameters), full.scaling.from_unit(u)
+    def result(
+        self,
+        model: LogModel,
+        frozen: Mapping[str, float],
+        before: Sensitivity,
+        profiles: Sequence[Profile],
+        counts: tuple[int, int],
+        notes: Sequence[str],
+    ) -> Identification:
+        """Returns the result of the identification.
+
+        Args:
+            model: of the whole log.
+            frozen: values that were not fitted, by name.
+            before: sensitivity at the start.
+            profiles: that were asked for.
+            counts: parameter sets evaluated, and those that failed.
+            notes: warnings that are not about the optima.
+        """
+        full, u, held_out = self._full, self._u, self._held_out
+        warnings = self._notes(frozen)
+        start = nominal_values(full.model.parameters)
+        theta = full.scaling.from_unit(u)
         fitted = _comparison(full, start, theta)
-        residual = (fitted.after - fitted.measured) / model.measurements.noise
-        held_out = self._held_out
-        return {
-            "start": start,
-            "theta": theta,
-            "u": u,
-            "uncertainty": self._uncertainty,
-            "sensitivity_after": self._sensitivity,
-            "methods": self._methods,
-            "best_method": self._best.name,
-            "agreement": self._agreement(),
-            "fitted": fitted,
-            "held_out": _comparison(held_out, start, theta) if held_out else None,
-            "whiteness": np.array([ljung_box(column) for column in residual.T]),
-            "noise_floor": noise_floor(full.huber_delta),
-            "derived": self._derived(),
-        }
+        residual = (fitted.after - fitted.measured) / full.model.measurements.noise
+        return Identification(
+            model=model,
+            frozen=dict(frozen),
+            start=start,
+            theta=theta,
+            u=u,
+            uncertainty=self._uncertainty,
+            sensitivity_before=before,
+            sensitivity_after=self._sensitivity,
+            methods=self._methods,
+            best_method=self._best.name,
+            agreement=self._agreement(),
+            profiles=tuple(profiles),
+            fitted=fitted,
+            held_out=_comparison(held_out, start, theta) if held_out else None,
+            whiteness=np.array([ljung_box(column) for column in residual.T]),
+            noise_floor=noise_floor(full.huber_delta),
+            derived=self._derived(),
+            evaluations=counts[0],
+            failures=counts[1],
+            notes=[*warnings, *notes],
+        )
 
     def profile(self, name: str, workers: Workers, progress: Progress) -> Profile:
         """Returns the profile likelihood of a parameter about the optimum."""
@@ -92,7 +117,7 @@ class Assessment:
 
         return profile(self._full, workers, self._u, name, reach, callback=report)
 
-    def notes(self, frozen: Mapping[str, float]) -> list[str]:
+    def _notes(self, frozen: Mapping[str, float]) -> list[str]:
         """Returns what a reader should be warned of."""
         notes = [f"{name} was frozen at {value:g}" for name, value in frozen.items()]
         parameters = self._full.model.parameters

@@ -75,16 +75,16 @@ def identify(
     held_out = model.of_episodes(test) if test else None
     judge = Objective(held_out, workers, huber_delta) if held_out else None
     assessment = Assessment(objectives[-1], judge, methods)
-    profiles = [name for name in settings.profiles if name not in frozen]
-    return Identification(
-        model=model,
-        frozen=dict(frozen),
-        sensitivity_before=before,
-        profiles=tuple(assessment.profile(p, workers, progress) for p in profiles),
-        evaluations=sum(objective.evaluations for objective in objectives),
-        failures=sum(len(objective.failures) for objective in objectives),
-        notes=assessment.notes(frozen) + list(dict.fromkeys(workers.notes)),
-        **assessment.fields(),
+    profiles = [
+        assessment.profile(name, workers, progress)
+        for name in settings.profiles
+        if name not in frozen
+    ]
+    evaluations = sum(each.evaluations for each in objectives)
+    failures = sum(len(each.failures) for each in objectives)
+    notes = list(dict.fromkeys(workers.notes))
+    return assessment.result(
+        model, frozen, before, profiles, (evaluations, failures), notes
     )
 
 
