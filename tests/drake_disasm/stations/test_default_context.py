@@ -239,3 +239,16 @@ def test_a_diagram_that_lacks_a_command_is_one_clear_error(
         simulator.Initialize()
     message = str(caught.value)
     assert f"{port} is not connected" in message and remedy in message
+
+
+def test_a_reconfigured_twin_begins_as_a_new_one() -> None:
+    """Its default Context is the old scenario's; `begin` goes by the new one."""
+    other = load_scenario("removal_turned", [QUIET, "lock.clearance=3e-4"])
+    other.twin.stiffness = [2.0 * k for k in other.twin.stiffness]
+    reused, fresh = TwinStation(load_scenario("removal", [QUIET])), TwinStation(other)
+    context = reused.CreateDefaultContext()
+    reused.reconfigure(context, other)
+    begun = reused.begin(context)
+    np.testing.assert_array_equal(begun.reading, fresh.initial_state.reading)
+    X_GnG = fresh.true_groove_pose(fresh.CreateDefaultContext())
+    assert reused.true_groove_pose(context).IsExactlyEqualTo(X_GnG)
