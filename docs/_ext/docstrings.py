@@ -86,7 +86,8 @@ def field_table(cls: type) -> list[str]:
         lines += ["", *_list_table([head, *quantities], "quantities"), ""]
     if settings:
         head = ("setting", "default", "unit", "reason", "measured")
-        lines += ["", *_list_table([head, *settings], "settings"), ""]
+        table = _list_table([head, *settings], "settings", "24 9 13 32 22")
+        lines += ["", *table, ""]
     return lines
 
 
@@ -138,8 +139,11 @@ def _port_table(block: dict[str, Any]) -> list[str]:
     return ["", *_list_table(rows, "ports"), ""]
 
 
-def _list_table(rows: Sequence[Sequence[str]], css_class: str) -> list[str]:
-    lines = [".. list-table::", f"   :class: {css_class}", "   :header-rows: 1", ""]
+def _list_table(
+    rows: Sequence[Sequence[str]], css_class: str, widths: str = "auto"
+) -> list[str]:
+    lines = [".. list-table::", f"   :class: {css_class}", f"   :widths: {widths}"]
+    lines += ["   :header-rows: 1", ""]
     for row in rows:
         for i, cell in enumerate(row):
             first, *more = cell.split("\n")
