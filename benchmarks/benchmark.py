@@ -367,7 +367,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         metavar="DIR",
         help="instead: blind tests of closing the loop, each effect at three sizes, "
         "null logs, pairs, effects that the library lacks; takes hours, Ctrl-C and the "
-        "same command go on; writes answers.json, effects.md, confusion.png",
+        "same command go on; writes results.jsonl, effects.md, confusion.png",
     )
     for option, usual, words in (
         ("seeds", 5, "of each effect at each size"),
