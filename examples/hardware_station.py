@@ -30,9 +30,8 @@ def main(steps: int = 8) -> None:
         simulator = Simulator(builder.Build())
         fake.attach(simulator)
         context = simulator.get_mutable_context()
-        task.begin(
-            context
-        )  # waits for the devices, checks the start, zeroes the sensor
+        # Waits for the devices, checks the start, zeroes the sensor.
+        task.begin(context)
         print("step  x [mm]  force along x [N]")
         for step in range(1, steps + 1):
             simulator.AdvanceTo(boundary(step, scenario.task.period))

@@ -18,7 +18,7 @@ from drake_disasm.effects import (
 )
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import load_scenario
-from sysid.effect_selection.close_loop import close_loop
+from sysid.effect_selection import close_loop
 from sysid.models.twin import TwinModel
 from sysid.validation.synthetic_logs import transitions_log
 

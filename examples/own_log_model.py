@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from drake_disasm.effects import JointCoulombFriction, JointEffect, JointSamples
-from sysid.effect_selection.close_loop import close_loop
+from sysid.effect_selection import close_loop
 from sysid.identification import identify
 from sysid.models import Channel, LogModel, Measurements
 from sysid.parameters import Parameter

@@ -42,8 +42,8 @@ class CellStation(SimulatedStation):
     Position control is a spring and damper in each joint about the commanded
     angle, which the discrete solver takes implicitly, plus gravity compensation
     by Drake's InverseDynamics with the tool's data: what KUKA's position mode
-    feels like from outside, its stiffness being that of the drives. Fingers hold
-    their commanded place likewise.
+    feels like from outside, its stiffness being that of the drives. The fingers
+    are position-controlled likewise.
 
     @system
     name: CellStation

@@ -33,7 +33,7 @@ from sysid.effect_selection.survey import Survey
 from sysid.effect_selection.verdict import Verdict, judge
 from sysid.effect_selection.verdict_text import verdict_text
 from sysid.identification.noise import with_estimated_noise
-from sysid.identification.split import split_episodes
+from sysid.identification.split import train_and_test
 from sysid.models.base import LogModel
 from sysid.workers import Workers
 
@@ -112,7 +112,9 @@ def close_loop(
             library can act on the model.
     """
     library = registered_effects() if library is None else library
-    train, test = _split(model, train, test)
+    train, test = train_and_test(
+        model.measurements.names, train, test, model.held_out_share
+    )
     delta = model.default_huber_delta if huber_delta is None else huber_delta
     workers = workers or Workers()
     base = with_estimated_noise(model.of_episodes(train), workers, delta)
@@ -170,20 +172,6 @@ def _judged(
     return ClosedLoop(
         verdict, errors, first, last, found.rounds, found.begin, end, scatter
     )
-
-
-def _split(
-    model: LogModel, train: Sequence[int] | None, test: Sequence[int] | None
-) -> tuple[Sequence[int], Sequence[int]]:
-    """Returns the episodes to fit and to hold out; see `close_loop`."""
-    names = model.measurements.names
-    if train is None and test is None:
-        return split_episodes(names, model.held_out_share)
-    if train is None:
-        train = [i for i in range(len(names)) if i not in (test or ())]
-    if test is None:
-        test = [i for i in range(len(names)) if i not in train]
-    return train, test
 
 
 def _affordable(base: LogModel, settings: SelectionSettings) -> LogModel:
