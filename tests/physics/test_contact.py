@@ -55,8 +55,15 @@ def test_play_converges_with_the_mesh() -> None:
         assert found == pytest.approx(finer, rel=excess)
 
 
-@pytest.mark.parametrize(("model", "step"), [("twin", 0.005), ("cell", 0.0025)])
-@pytest.mark.parametrize("policy", ["admittance", "straight"])
+@pytest.mark.parametrize(
+    ("model", "step", "policy"),
+    [
+        ("twin", 0.005, "admittance"),
+        ("cell", 0.0025, "straight"),
+        pytest.param("twin", 0.005, "straight", marks=pytest.mark.slow),
+        pytest.param("cell", 0.0025, "admittance", marks=pytest.mark.slow),
+    ],
+)
 def test_half_the_time_step_gives_the_same(
     model: str, step: float, policy: str
 ) -> None:

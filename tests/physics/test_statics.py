@@ -38,13 +38,16 @@ def _expected(station: CellStation, R_WS: RotationMatrix) -> np.ndarray:
 
 @pytest.mark.parametrize("posture", POSTURES)
 def test_sensor_reads_the_tools_weight(
-    welded: CellStation, posture: list[float], monkeypatch: pytest.MonkeyPatch
+    welded: CellStation, posture: list[float]
 ) -> None:
-    monkeypatch.setattr(welded, "start", np.array(posture))
-    context = welded.settled([AWAY])
+    simulator = welded.at_start([AWAY])
+    context = simulator.get_mutable_context()
     plant = welded.plant
     frame_S = welded.tool_models.frame_S
     plant_context = welded.part_context(plant, context)
+    plant.SetPositions(plant_context, welded.iiwa, posture)
+    welded.GetInputPort("iiwa.position").FixValue(context, posture)
+    simulator.AdvanceTo(welded.settling_time)
     R_WS = frame_S.CalcPoseInWorld(plant_context).rotation()
     reading = welded.reading_at_zeroing(context)
     difference = np.abs(reading - _expected(welded, R_WS))

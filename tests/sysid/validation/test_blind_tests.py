@@ -39,9 +39,8 @@ class _Here(Executor):
         return future
 
 
-@pytest.mark.parametrize(
-    "name", ["GrooveFriction", pytest.param("CommandGain", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow  # tests/sysid/effect_selection and examples/ name effects, too
+@pytest.mark.parametrize("name", ["CommandGain", "GrooveFriction"])
 def test_an_effect_at_twice_the_noise_gets_its_name(name):
     found = run_case(Case((name,), 2.0, 0))
     assert found.named_first and found.ending == "explained"
