@@ -75,17 +75,18 @@ def identify(
     held_out = model.of_episodes(test) if test else None
     judge = Objective(held_out, workers, huber_delta) if held_out else None
     assessment = Assessment(objectives[-1], judge, methods)
-    profiles = [
-        assessment.profile(name, workers, progress)
-        for name in settings.profiles
-        if name not in frozen
-    ]
-    evaluations = sum(each.evaluations for each in objectives)
-    failures = sum(len(each.failures) for each in objectives)
+    wanted = [name for name in settings.profiles if name not in frozen]
+    profiles = [assessment.profile(name, workers, progress) for name in wanted]
     notes = list(dict.fromkeys(workers.notes))
     return assessment.result(
-        model, frozen, before, profiles, (evaluations, failures), notes
+        model, frozen, before, profiles, _counts(objectives), notes
     )
+
+
+def _counts(objectives: Sequence[Objective]) -> tuple[int, int]:
+    """Returns how many parameter sets were evaluated, and how many failed."""
+    evaluations = sum(each.evaluations for each in objectives)
+    return evaluations, sum(len(each.failures) for each in objectives)
 
 
 def thinned(model: LogModel) -> list[LogModel]:
