@@ -63,6 +63,7 @@ def test_refuses_what_is_not_there(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_fits_with_which_the_same_command_goes_on(tmp_path):
     hidden = [CommandGain(x=0.03)]
     transitions_log(tmp_path / "log", nominal(), hidden, 0, episodes=6, steps=12)

@@ -152,7 +152,7 @@ def _episodes(out: Path) -> int:
     return len(list(out.glob("seed_000/log/episode_*")))
 
 
-@pytest.mark.parametrize("seeds", [1, 2])
+@pytest.mark.parametrize("seeds", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_ctrl_c_keeps_what_is_finished(seeds: int, tmp_path: Path) -> None:
     out, count = tmp_path / "out", f"--seeds={seeds}"
     process = subprocess.Popen(

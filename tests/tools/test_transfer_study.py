@@ -110,6 +110,7 @@ def test_resuming_a_finished_study_changes_nothing(
     assert (out / "from_after/seed_001/policy.npz").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_goes_on_to_the_same_result(
     study: tuple[Path, str], scenarios: dict[str, Path], tmp_path: Path
 ) -> None:

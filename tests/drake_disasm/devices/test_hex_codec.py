@@ -135,11 +135,12 @@ def _mutated(rng: np.random.Generator, datagram: bytes) -> bytes:
     return bytes(changed)[: rng.integers(2 * len(changed))]
 
 
-def test_no_datagram_raises_anything_else() -> None:
+@pytest.mark.parametrize("count", [5_000, pytest.param(50_000, marks=pytest.mark.slow)])
+def test_no_datagram_raises_anything_else(count: int) -> None:
     rng = np.random.default_rng(0)
     valid = [bytes.fromhex(text) for text, _ in [*REQUESTS, *SAMPLES]]
     decoded = 0
-    for number in range(50_000):
+    for number in range(count):
         mutated = _mutated(rng, valid[number % len(valid)])
         for datagram in (rng.bytes(number % 45), mutated):
             with contextlib.suppress(CodecError):
@@ -148,4 +149,4 @@ def test_no_datagram_raises_anything_else() -> None:
             with contextlib.suppress(CodecError):
                 assert encode_request(decode_request(datagram)) == datagram
                 decoded += 1
-    assert decoded > 1000
+    assert decoded > 0.02 * count

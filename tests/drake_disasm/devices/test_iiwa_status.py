@@ -51,11 +51,14 @@ def test_other_arms_and_nan_are_refused() -> None:
         decode_status(b"")
 
 
-def test_random_and_mutated_messages_raise_nothing_else() -> None:
+@pytest.mark.parametrize(
+    "count", [10_000, pytest.param(100_000, marks=pytest.mark.slow)]
+)
+def test_random_and_mutated_messages_raise_nothing_else(count: int) -> None:
     random = np.random.default_rng(0)
     good = np.frombuffer(status().encode(), dtype=np.uint8)
     refused = 0
-    for number in range(100_000):
+    for number in range(count):
         if number % 4:
             data = good.copy()
             where = random.integers(len(data), size=3)
@@ -67,7 +70,7 @@ def test_random_and_mutated_messages_raise_nothing_else() -> None:
             decode_status(data.tobytes())
         except CodecError:
             refused += 1
-    assert 25_000 < refused < 100_000
+    assert 0.25 * count < refused < count
 
 
 def test_what_is_lost_late_or_broken_is_counted_and_only_good_ones_get_on() -> None:

@@ -192,14 +192,8 @@ def test_updates_are_those_of_stable_baselines3(
         )
 
 
-@pytest.mark.parametrize(
-    "algorithm",
-    [
-        "sac",  # compiling takes ten seconds each
-        pytest.param("ddpg", marks=pytest.mark.slow),
-        pytest.param("td3", marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.slow  # compiling takes ten seconds each
+@pytest.mark.parametrize("algorithm", ["ddpg", "td3", "sac"])
 def test_a_compiled_update_is_the_same_law(algorithm: str) -> None:
     config = dataclasses.replace(
         preset("chapter3", algorithm), layer_norm=True, hidden=[16], critics=2

@@ -121,6 +121,7 @@ def test_effects_cannot_be_set_later_either(station: HardwareStation) -> None:
         station.begin(station.CreateDefaultContext(), [GroovePose(ry=0.01)])
 
 
+@pytest.mark.slow
 def test_the_policy_slides_the_bolt_out_as_in_simulation() -> None:
     scenario = load_scenario("removal", REPEATABLE)
     policy = load_policy(find_policy("removal_randomised"))

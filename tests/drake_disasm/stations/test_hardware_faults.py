@@ -36,11 +36,16 @@ def check(device: str, fault: str) -> None:
     assert run.moved < 2e-3  # on the way to where it is held
 
 
+def test_a_silent_gripper_is_a_hold() -> None:
+    check("gripper", "silent")
+
+
 @pytest.mark.parametrize(("device", "fault"), QUICK)
 def test_a_fault_of_arm_or_sensor(device: str, fault: str) -> None:
     check(device, fault)
 
 
+@pytest.mark.slow  # its client polls in real time
 @pytest.mark.parametrize(("device", "fault"), SLOW)
 def test_a_fault_of_the_gripper(device: str, fault: str) -> None:
     check(device, fault)

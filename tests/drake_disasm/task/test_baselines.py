@@ -42,7 +42,7 @@ def test_admittance_removes_the_bolt_in_the_twin(angle_deg: float) -> None:
     _assert_removed(_episodes("twin", "admittance", angle_deg, range(2)))
 
 
-@pytest.mark.parametrize("angle_deg", (0.0, 4.0))
+@pytest.mark.parametrize("angle_deg", (pytest.param(0.0, marks=pytest.mark.slow), 4.0))
 def test_admittance_removes_the_bolt_in_the_cell(angle_deg: float) -> None:
     _assert_removed(_episodes("cell", "admittance", angle_deg, range(1)))
 

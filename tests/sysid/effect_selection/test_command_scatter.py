@@ -42,7 +42,12 @@ def test_finds_by_how_much_commands_scatter(tmp_path):
 
 @pytest.mark.parametrize(
     "effects",
-    [[], [CommandGain(z=0.3)], [GrooveFriction(0.1)], [SensorBias(fy=0.5)]],
+    [
+        [],
+        pytest.param([CommandGain(z=0.3)], marks=pytest.mark.slow),
+        pytest.param([GrooveFriction(0.1)], marks=pytest.mark.slow),
+        [SensorBias(fy=0.5)],
+    ],
     ids=lambda effects: "".join(type(e).__name__ for e in effects) or "nothing",
 )
 def test_what_follows_on_something_is_no_scatter(effects, tmp_path):

@@ -39,6 +39,7 @@ def test_finds_the_truth_and_both_methods_agree(tmp_path):
     assert not found.notes
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_truth_as_often_as_they_say(tmp_path):
     """95 % of 3 x 60 intervals, give or take; single method to be quick."""
     settings = Settings(

@@ -72,6 +72,7 @@ def test_workers_and_chunks_do_not_change_a_bit(log, turned, monkeypatch):
         assert a.tobytes() == b.tobytes() == c.tobytes()
 
 
+@pytest.mark.slow
 def test_recovers_parameters_from_nearby(log, turned):
     start = dataclasses.replace(turned, effects=[])
     model = make(log, start, ["contact.friction", "GroovePose.ry"], coarse=False)
@@ -81,6 +82,7 @@ def test_recovers_parameters_from_nearby(log, turned):
     np.testing.assert_allclose(found, [0.2, 0.0349], rtol=0.03)
 
 
+@pytest.mark.slow
 def test_recovers_the_stiffness_of_impact(impact_log, impact):
     names = ["contact.impact.stiffness"]
     objective = Objective(make(impact_log, impact, names, coarse=False), Workers())

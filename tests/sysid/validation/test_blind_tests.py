@@ -47,6 +47,7 @@ def test_an_effect_at_twice_the_noise_gets_its_name(name):
     assert found.after < found.before
 
 
+@pytest.mark.slow
 def test_nothing_is_found_where_nothing_is():
     assert run_case(Case((), 0.0, 1)).ending == "none"
 
