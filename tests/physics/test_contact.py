@@ -59,7 +59,7 @@ def test_play_converges_with_the_mesh() -> None:
     ("model", "step", "policy"),
     [
         ("twin", 0.005, "admittance"),
-        ("cell", 0.0025, "straight"),
+        pytest.param("cell", 0.0025, "straight", marks=pytest.mark.slow),
         pytest.param("twin", 0.005, "straight", marks=pytest.mark.slow),
         pytest.param("cell", 0.0025, "admittance", marks=pytest.mark.slow),
     ],
