@@ -57,6 +57,7 @@ def rewrite(text: str, folder: str, page: str) -> str:
     """
 
     def replaced(match: re.Match[str]) -> str:
+        """Returns one link as the site needs it."""
         label, target, anchor = match.groups()
         found = site_target(target, folder)
         if found is None:
