@@ -48,7 +48,7 @@ def column_names(data: bytes, path: Path) -> list[str]:
     if path.suffix == ".csv":
         return _csv_names(data)
     try:
-        return list(pq.read_schema(pa.BufferReader(data)).names)
+        return list(pq.read_schema(_stream(data)).names)
     except (pa.ArrowException, OSError) as error:
         raise _unreadable(path, error, data) from error
 
@@ -72,7 +72,7 @@ def read_table(
         if path.suffix == ".csv":
             table = _read_csv(data, booleans)
         else:
-            table = pq.ParquetFile(pa.BufferReader(data)).read()
+            table = pq.ParquetFile(_stream(data)).read(use_threads=False)
     except (pa.ArrowException, OSError) as error:
         raise _unreadable(path, error, data) from error
     return {name: table[name].to_numpy() for name in table.column_names}
@@ -91,12 +91,24 @@ def _read_csv(data: bytes, booleans: Collection[str]) -> pa.Table:
     if not body.strip():
         return pa.schema(list(types.items())).empty_table()
     return pa_csv.read_csv(
-        pa.BufferReader(body),
-        read_options=pa_csv.ReadOptions(column_names=names),
+        _stream(body),
+        read_options=pa_csv.ReadOptions(column_names=names, use_threads=False),
         convert_options=pa_csv.ConvertOptions(
             column_types=types, true_values=_TRUE, false_values=_FALSE
         ),
     )
+
+
+def _stream(data: bytes) -> pa.BufferReader:
+    """Returns what PyArrow reads the bytes from: a copy in memory of its own.
+
+    One of PyArrow's threads may let go of the memory when the table has long been
+    returned. If it were Python's, that needs the interpreter; where the interpreter
+    is ending just then, the process aborts ("terminate called ...").
+    """
+    owned = pa.BufferOutputStream()
+    owned.write(data)
+    return pa.BufferReader(owned.getvalue())
 
 
 def _unreadable(path: Path, error: Exception, data: bytes) -> DisasmError:
