@@ -37,7 +37,7 @@ from pydrake.systems.primitives import ConstantVectorSource
 from tqdm import tqdm
 from update_speed import measure_updates
 
-from drake_disasm.common import program
+from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, write_json
 from drake_disasm.common.quantity import closest
@@ -376,7 +376,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     ):
         parser.add_argument(
             f"--{option}",
-            type=int,
+            type=options.count,
             default=usual,
             metavar="N",
             help=f"with --effects: {words} (default: {usual})",

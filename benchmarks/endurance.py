@@ -21,6 +21,7 @@ import psutil
 from pydrake.systems.framework import Context
 from tqdm import tqdm
 
+from drake_disasm.common import options
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.stations.hardware_config import load_hardware_config
@@ -155,7 +156,7 @@ def main() -> None:
     """Plays the cell in another process, and runs."""
     tqdm.monitor_interval = 0  # a thread of its own
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--minutes", type=float, default=10.0, metavar="N")
+    parser.add_argument("--minutes", type=options.above_zero, default=10.0, metavar="N")
     parser.add_argument("--meshcat", action="store_true", help="with a page, unwatched")
     args = parser.parse_args()
     views = [MeshcatView(start_meshcat())] if args.meshcat else []

@@ -6,8 +6,10 @@ import os
 from collections.abc import Callable
 from typing import Any
 
+from drake_disasm.common import options
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
+from drake_disasm.common.text import clipped
 from drake_disasm.effects import import_effects
 from drake_disasm.policies import (
     SCRIPTED,
@@ -103,7 +105,7 @@ def add_workers_argument(parser: argparse.ArgumentParser, more: str = "") -> Non
     """Adds --workers, with more to say about it."""
     parser.add_argument(
         "--workers",
-        type=positive,
+        type=options.positive,
         default=os.cpu_count() or 1,
         metavar="N",
         help=f"processes (default: one per core){more}",
@@ -138,20 +140,14 @@ def named_policy(name: str, scenario: Scenario) -> Policy:
 def _imported(name: str) -> Policy:
     module, _, attribute = name.partition(":")
     try:
+        if not all(word.isidentifier() for word in (*module.split("."), attribute)):
+            raise ImportError("is no module and a name in it")
         policy = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError) as error:
         raise DisasmError(
-            f"policy {name}: {error}; write {'|'.join(SCRIPTED)}, an .npz file or "
-            "module:callable"
+            f"policy {clipped(name)}: {clipped(str(error))}; write "
+            f"{'|'.join(SCRIPTED)}, an .npz file or module:callable"
         ) from None
     if not callable(policy):
         raise DisasmError(f"policy {name}: is not callable; it maps (12,) to (6,)")
     return policy
-
-
-def positive(text: str) -> int:
-    """Returns a whole number above zero, for an argument's type."""
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
-    return value

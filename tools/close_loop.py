@@ -15,8 +15,7 @@ from pathlib import Path
 
 import cli
 
-from drake_disasm.common import program
-from drake_disasm.common.errors import DisasmError
+from drake_disasm.common import options, program
 from drake_disasm.common.files import make_folder, write_json, write_text
 from drake_disasm.logs import Log, read_logs
 from drake_disasm.scenario import dump_scenario, load_scenario
@@ -74,7 +73,7 @@ def _add_model_arguments(add: Callable[..., object]) -> None:
     )
     add(
         "--huber",
-        type=float,
+        type=options.above_zero_or_inf,
         metavar="K",
         help="residual, in standard deviations, beyond which the loss is linear; inf "
         "for least squares (default: 3 for transitions, else inf)",
@@ -84,8 +83,6 @@ def _add_model_arguments(add: Callable[..., object]) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
-    if args.huber is not None and not args.huber > 0.0:
-        raise DisasmError("--huber: give a number above zero, or inf")
     model = _model(args, read_logs(args.log))
     share = model.held_out_share
     train, test = split_episodes(model.measurements.names, args.held_out or share)

@@ -15,7 +15,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import cli
 
-from drake_disasm.common import program
+from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.executors import WorkerPool
 from drake_disasm.common.files import make_folder, write_json
@@ -70,7 +70,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     cli.add_station_argument(add, "cell", "what the policies act on")
     add(
         "--psi",
-        type=float,
+        type=options.nonnegative,
         metavar="M",
         help="imprecision of the robot [m], e.g. 0.0003 (default: the scenario's)",
     )
@@ -79,10 +79,16 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         metavar="KEY=V1,V2,...",
         help="one line for each value of a field of the scenario",
     )
-    add("--episodes", type=cli.positive, default=10, metavar="N", help="(default: 10)")
+    add(
+        "--episodes",
+        type=options.positive,
+        default=10,
+        metavar="N",
+        help="(default: 10)",
+    )
     add(
         "--seed",
-        type=int,
+        type=options.seed,
         default=0,
         help="of the first episode; the next ones count on (default: 0)",
     )

@@ -21,7 +21,7 @@ import cli
 from pydrake.common.yaml import yaml_dump_typed
 from pydrake.lcm import DrakeLcm
 
-from drake_disasm.common import program
+from drake_disasm.common import options, program
 from drake_disasm.common.files import write_text
 from drake_disasm.fakes import hex_box, robotiq_gripper
 from drake_disasm.fakes.cell import IIWA_FAULTS, FakeCell
@@ -50,7 +50,12 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         help="is written, for simulate.py --hardware-config (default: fake_cell.yaml)",
     )
     add("--lcm-url", default=_LCM, metavar="URL", help=f"(default: {_LCM})")
-    add("--seed", type=int, default=0, help="of the sensor's noise (default: 0)")
+    add(
+        "--seed",
+        type=options.seed,
+        default=0,
+        help="of the sensor's noise (default: 0)",
+    )
     return parser.parse_args(arguments)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import cli
 import numpy as np
 
-from drake_disasm.common import program
+from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_json, write_text
 from drake_disasm.logs import Log, read_logs
@@ -126,13 +126,13 @@ def _add_search_arguments(add: Callable[..., object]) -> None:
     )
     add(
         "--cycles",
-        type=cli.positive,
+        type=options.positive,
         metavar="N",
         help="of the Bees Algorithm, instead of --budget",
     )
     add(
         "--budget",
-        type=cli.positive,
+        type=options.positive,
         metavar="N",
         help="evaluations of each method's global search (default: 400)",
     )
@@ -141,7 +141,7 @@ def _add_search_arguments(add: Callable[..., object]) -> None:
         action="store_true",
         help="a Gaussian process proposes points in place of the bees' scouts",
     )
-    add("--seed", type=int, default=0, help="of the searches (default: 0)")
+    add("--seed", type=options.seed, default=0, help="of the searches (default: 0)")
     add(
         "--fine",
         action="store_true",
@@ -161,7 +161,7 @@ def _add_judgement_arguments(add: Callable[..., object]) -> None:
     )
     add(
         "--huber",
-        type=float,
+        type=options.above_zero_or_inf,
         metavar="K",
         help="the loss is linear for residuals beyond K standard deviations; inf for "
         "least squares as in eq. 4.8 (default: 3 for transitions, inf for static "

@@ -14,7 +14,7 @@ from pathlib import Path
 import cli
 import hardware
 
-from drake_disasm.common import program
+from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder
 from drake_disasm.logs import LogWriter, flat_columns
@@ -70,14 +70,14 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
     )
     add(
         "--episodes",
-        type=cli.positive,
+        type=options.positive,
         default=1,
         metavar="N",
         help="how many (default: 1)",
     )
     add(
         "--seed",
-        type=int,
+        type=options.seed,
         default=0,
         help="of the first episode; the next ones count on (default: 0)",
     )
@@ -107,7 +107,7 @@ def _add_log_arguments(add: Callable[..., object]) -> None:
     )
     add(
         "--explore",
-        type=float,
+        type=options.nonnegative,
         default=0.0,
         metavar="MM",
         help="add Gaussian noise to the policy's actions, so that the log shows more: "
@@ -138,7 +138,7 @@ def _add_view_arguments(add: Callable[..., object]) -> None:
     )
     add(
         "--realtime-rate",
-        type=float,
+        type=options.nonnegative,
         metavar="X",
         help="1 is real time, 0 full speed (default: 1 if somebody watches, else 0)",
     )
@@ -204,8 +204,6 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
     Raises:
         DisasmError: names the first.
     """
-    if args.explore < 0.0:
-        raise DisasmError(f"--explore {args.explore:g}: give millimetres, 0 or more")
     if args.resume and not args.record:
         raise DisasmError("--resume: say which log by --record DIR")
     if args.station != "hardware":

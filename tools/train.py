@@ -15,7 +15,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # processes work in parallel, not
 
 import cli
 
-from drake_disasm.common import program
+from drake_disasm.common import options, program
 from drake_disasm.learning.experiment import (
     Experiment,
     open_experiment,
@@ -65,7 +65,7 @@ def _add_task_arguments(add: Callable[..., object]) -> None:
     )
     add(
         "--psi",
-        type=float,
+        type=options.nonnegative,
         metavar="M",
         help="imprecision of the robot [m], e.g. 0.0003 (default: the scenario's)",
     )
@@ -84,7 +84,12 @@ def _add_agent_arguments(add: Callable[..., object]) -> None:
         default="",
         help="algorithm (default: ddpg; of the preset best: sac)",
     )
-    add("--episodes", type=int, metavar="N", help="per seed (default: the preset's)")
+    add(
+        "--episodes",
+        type=options.positive,
+        metavar="N",
+        help="per seed (default: the preset's)",
+    )
     add(
         "--hyper",
         nargs="+",
@@ -106,7 +111,7 @@ def _add_data_arguments(add: Callable[..., object]) -> None:
     )
     add(
         "--updates",
-        type=cli.positive,
+        type=options.positive,
         metavar="N",
         help="with --from-logs: gradient updates (default: one per transition)",
     )
@@ -132,22 +137,22 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
     add("--out", type=Path, required=True, metavar="DIR", help="folder for all results")
     add(
         "--seeds",
-        type=cli.positive,
+        type=options.positive,
         default=1,
         metavar="N",
         help="how many trainings (default: 1)",
     )
-    add("--first-seed", type=int, default=0, metavar="S", help="(default: 0)")
+    add("--first-seed", type=options.seed, default=0, metavar="S", help="(default: 0)")
     add(
         "--validation",
-        type=cli.positive,
+        type=options.positive,
         default=10,
         metavar="N",
         help="greedy episodes after each training (default: 10)",
     )
     add(
         "--threads",
-        type=cli.positive,
+        type=options.positive,
         default=1,
         metavar="N",
         help="of the updates of each seed; 2 pays for one seed with large batches "

@@ -17,7 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # processes work in parallel, not
 
 import cli
 
-from drake_disasm.common import program
+from drake_disasm.common import options, program
 from drake_disasm.common.executors import WorkerPool
 from drake_disasm.common.progress import Progress
 from drake_disasm.learning.experiment import Experiment, open_experiment
@@ -77,21 +77,21 @@ def _add_agent_arguments(add: Callable[..., object]) -> None:
     )
     add(
         "--episodes",
-        type=cli.positive,
+        type=options.positive,
         default=150,
         metavar="N",
         help="on the twins (default: 150, as in the thesis)",
     )
     add(
         "--stand-in-episodes",
-        type=cli.positive,
+        type=options.positive,
         default=100,
         metavar="N",
         help="in the stand-in (default: 100, as on the thesis's robot)",
     )
     add(
         "--rehearsal",
-        type=float,
+        type=options.share,
         default=0.5,
         metavar="SHARE",
         help="of each batch in the stand-in that comes from the twin's replay memory "
@@ -101,11 +101,11 @@ def _add_agent_arguments(add: Callable[..., object]) -> None:
 
 def _add_run_arguments(add: Callable[..., object]) -> None:
     add("--out", type=Path, required=True, metavar="DIR", help="folder for all results")
-    add("--seeds", type=cli.positive, default=3, metavar="N", help="(default: 3)")
-    add("--first-seed", type=int, default=0, metavar="S", help="(default: 0)")
+    add("--seeds", type=options.positive, default=3, metavar="N", help="(default: 3)")
+    add("--first-seed", type=options.seed, default=0, metavar="S", help="(default: 0)")
     add(
         "--validation",
-        type=cli.positive,
+        type=options.positive,
         default=10,
         metavar="N",
         help="greedy episodes before and after training in the stand-in (default: 10)",

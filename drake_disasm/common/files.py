@@ -1,21 +1,24 @@
-"""Writing files atomically: text, JSON, arrays, figures."""
+"""Writing files atomically, and reading them within limits."""
 
 import contextlib
 import json
 import os
 import signal
+import stat
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
 from typing import IO, TYPE_CHECKING, Any
 
-import numpy as np
-
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.plain_data import check_like
+from drake_disasm.common.text import clipped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure  # slow to import
+
+_MOST_JSON = 2**28  # bytes
 
 
 def make_folder(folder: Path) -> None:
@@ -30,6 +33,60 @@ def make_folder(folder: Path) -> None:
         raise DisasmError(
             f"{folder}: no such folder can be made ({error.strerror}); name another"
         ) from error
+
+
+def read_bytes(path: Path, remedy: str, most: int) -> bytes:
+    """Returns the content of a file.
+
+    Args:
+        path: of a regular file: a pipe or a device could block for ever.
+        remedy: for messages.
+        most: bytes that it may have.
+
+    Raises:
+        DisasmError: it can't be read, is something else, or is larger.
+    """
+    try:
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as f:
+            mode = os.fstat(f.fileno()).st_mode
+            if not stat.S_ISREG(mode):
+                raise DisasmError(f"{path}: is no regular file; {remedy}")
+            data = f.read(most + 1)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise DisasmError(f"{path}: can't be read ({why}); {remedy}") from None
+    if len(data) > most:
+        raise DisasmError(f"{path}: has more than {most / 2**20:g} MiB; {remedy}")
+    return data
+
+
+def read_text(path: Path, remedy: str, most: int) -> str:
+    """Returns the content of a text file in UTF-8; see `read_bytes`."""
+    try:
+        return read_bytes(path, remedy, most).decode()
+    except UnicodeDecodeError:
+        raise DisasmError(f"{path}: is not text in UTF-8; {remedy}") from None
+
+
+def read_json(path: Path, remedy: str, example: dict[str, Any]) -> dict[str, Any]:
+    """Returns the mapping that a JSON file holds.
+
+    Args:
+        path: of the file.
+        remedy: for messages.
+        example: what must be in it, as in `plain_data.check_like`.
+
+    Raises:
+        DisasmError: as `read_bytes`, or it is damaged.
+    """
+    text = read_text(path, remedy, _MOST_JSON)
+    try:
+        content = json.loads(text)
+        check_like(content, example)
+    except (DisasmError, ValueError, RecursionError) as error:
+        why = clipped(str(error))
+        raise DisasmError(f"{path}: is damaged ({why}); {remedy}") from None
+    return content
 
 
 def write_atomically(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
@@ -80,11 +137,6 @@ def write_json(path: Path, content: Any, indent: int | None = 2) -> None:
         indent: spaces per level; None for one line.
     """
     write_text(path, json.dumps(content, indent=indent) + "\n")
-
-
-def write_npz(path: Path, **arrays: Any) -> None:
-    """Writes arrays under their names; see `write_atomically`."""
-    write_atomically(path, lambda stream: np.savez(stream, **arrays))
 
 
 def write_figure(path: Path, figure: "Figure", dpi: float = 120.0) -> None:

@@ -13,12 +13,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.common.archive import ArchiveKind, load_archive, save_archive
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import make_folder, write_json, write_npz, write_text
+from drake_disasm.common.files import (
+    make_folder,
+    read_json,
+    read_text,
+    write_json,
+    write_text,
+)
+from drake_disasm.common.text import clipped
 
 Arrays = Mapping[str, NDArray[Any]]
 
 _IDENTITY, _RESULTS = "identity.json", "results.jsonl"
+_NEW = "name a new folder"
+_REMEDY = "delete it to find its results again"
+_MOST_BYTES = 2**31  # of a file
+_ARRAYS = ArchiveKind(
+    "result", _REMEDY, _REMEDY, _MOST_BYTES, most_members=1000, checksum=False
+)
 
 
 def is_resumed(folder: Path, marker: str, what: str, resume: bool) -> bool:
@@ -102,7 +116,7 @@ class FinishedWork:
 
         Raises:
             DisasmError: the folder holds something else, results that depend on
-                something else, or results and `resume` is false.
+                something else, damaged ones, or results and `resume` is false.
         """
         self._folder = folder
         self._results: dict[str, Any] = {}
@@ -142,11 +156,10 @@ class FinishedWork:
         name = hashlib.sha256(json.dumps(key).encode()).hexdigest()
         path = self._folder / f"{name[:32]}.npz"
         if path.exists():
-            with np.load(path) as data:
-                return dict(data)
+            return load_archive(path, _ARRAYS)[0]
         found = find()
         make_folder(self._folder)
-        write_npz(path, **found)
+        save_archive(path, {n: np.asarray(a) for n, a in found.items()}, {"key": key})
         return found
 
     def _check_identity(
@@ -155,20 +168,24 @@ class FinishedWork:
         path = folder / _IDENTITY
         wanted = json.loads(json.dumps(identity))
         if is_resumed(folder, _IDENTITY, what, resume):
-            refuse_difference(folder, json.loads(path.read_text()), wanted)
+            refuse_difference(folder, read_json(path, _NEW, {}), wanted)
         else:
             write_json(path, wanted)
 
     def _read(self, folder: Path) -> None:
-        """Reads what is whole: a killed run may have left half a line."""
+        """Reads what is whole: a killed run may have left half a last line."""
         path = folder / _RESULTS
         if not path.exists():
             return
-        lines = path.read_text().splitlines(keepends=True)
+        lines = read_text(path, _REMEDY, _MOST_BYTES).splitlines(keepends=True)
         for i, line in enumerate(lines):
             try:
                 entry = json.loads(line)
-            except json.JSONDecodeError:
+                self._results[json.dumps(entry["key"])] = entry["result"]
+            except (ValueError, LookupError, TypeError, RecursionError) as error:
+                if i < len(lines) - 1 or line.endswith("\n"):
+                    raise DisasmError(
+                        f"{path}: line {i + 1} is damaged ({clipped(str(error))}); "
+                        f"{_REMEDY}"
+                    ) from None
                 write_text(path, "".join(lines[:i]))
-                return
-            self._results[json.dumps(entry["key"])] = entry["result"]

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from types import FrameType
-from typing import Any, Self
+from typing import Any, NoReturn, Self
 
 from tqdm import tqdm
 
@@ -63,17 +63,27 @@ def status(main: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> in
         return EXIT_INTERRUPTED
 
 
+class _Parser(argparse.ArgumentParser):
+    """Refuses a command line as everything else is refused: in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raises DisasmError."""
+        raise DisasmError(f"{' '.join(message.split())}; see --help")
+
+
 def argument_parser(
     name: str, description: str | None, epilog: str
 ) -> argparse.ArgumentParser:
     """Returns a parser whose help shows both texts line by line.
+
+    What it refuses is a DisasmError.
 
     Args:
         name: of the program, without `.py`.
         description: its docstring.
         epilog: examples.
     """
-    return argparse.ArgumentParser(
+    return _Parser(
         prog=f"{name}.py",
         description=description,
         epilog=epilog,

@@ -1,7 +1,7 @@
 """A training's state on disk, written atomically after every episode."""
 
-import json
-import zipfile
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +9,34 @@ import numpy as np
 import torch
 from torch.utils._pytree import tree_flatten, tree_unflatten
 
+from drake_disasm.common.archive import (
+    ArchiveKind,
+    Arrays,
+    ArraySpec,
+    check_arrays,
+    load_archive,
+    save_archive,
+)
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import write_npz
+from drake_disasm.common.plain_data import check_like
 from drake_disasm.learning.agent import Agent
-from drake_disasm.learning.replay import Replay
+from drake_disasm.learning.replay import WIDTH, Replay
+
+AGAIN = "delete it to start anew"
+#: A memory of ten million transitions has 1.3 GB. Older versions wrote no checksum; a
+#: training that they began goes on.
+CHECKPOINT = ArchiveKind(
+    "checkpoint",
+    AGAIN,
+    AGAIN,
+    most_bytes=2**31,
+    most_members=5000,
+    checksum=False,
+)
+_OTHER = (
+    "is of an agent with other networks ({}); resume with the hyper-parameters that "
+    "the training was started with"
+)
 
 
 def save_checkpoint(
@@ -23,23 +47,34 @@ def save_checkpoint(
     Raises:
         DisasmError: the system refuses to write.
     """
-    leaves, _ = tree_flatten(agent.state)
     rows, following = replay.contents()
-    arrays = {f"state_{i:03d}": leaf.numpy() for i, leaf in enumerate(leaves)}
     own = {"updates": agent.updates, "following": following, "notes": notes}
-    text = np.frombuffer(json.dumps(own).encode(), dtype=np.uint8)
-    write_npz(path, text=text, replay=rows, **arrays)
+    arrays = {name: leaf.numpy() for name, leaf in _leaves(agent).items()}
+    save_archive(path, arrays | {"replay": rows}, own)
 
 
-def load_checkpoint(path: Path, agent: Agent, replay: Replay) -> dict[str, Any]:
+def load_checkpoint(
+    path: Path, agent: Agent, replay: Replay, example: dict[str, Any]
+) -> dict[str, Any]:
     """Restores an agent and its memory, and returns the notes.
 
+    Args:
+        path: of the file.
+        agent: of the same hyper-parameters.
+        replay: large enough.
+        example: what the notes must be like (`plain_data.check_like`).
+
     Raises:
-        DisasmError: the file is damaged, or of another kind of agent.
+        DisasmError: the file is damaged, or of another kind of agent. Neither has
+            changed then.
     """
-    arrays, own = _read(path)
-    _restore_state(path, agent, arrays)
-    replay.restore(arrays["replay"], own["following"])
+    arrays, own = load_archive(path, CHECKPOINT)
+    with _named(path):
+        check_like(own, {"updates": 0, "following": 0, "notes": example})
+        rows = _rows(arrays)
+        _check_state(agent, arrays)
+        replay.restore(rows, own["following"])
+    _restore_state(agent, arrays)
     agent.updates = own["updates"]
     return own["notes"]
 
@@ -50,43 +85,62 @@ def load_agent(path: Path, agent: Agent) -> None:
     Raises:
         DisasmError: the file is damaged, or of another kind of agent.
     """
-    arrays, _ = _read(path)
-    _restore_state(path, agent, arrays)
+    arrays, _ = load_archive(path, CHECKPOINT)
+    with _named(path):
+        _rows(arrays)
+        _check_state(agent, arrays)
+    _restore_state(agent, arrays)
 
 
 def load_memory(path: Path) -> Replay:
-    """Returns the replay memory of a training.
+    """Returns the replay memory of a training, to draw from.
 
     Raises:
         DisasmError: the file is damaged.
     """
-    arrays, own = _read(path)
-    replay = Replay(max(1, len(arrays["replay"])))
-    replay.restore(arrays["replay"], own["following"])
+    arrays, _ = load_archive(path, CHECKPOINT)
+    with _named(path):
+        rows = _rows(arrays)
+        replay = Replay(max(1, len(rows)))
+        replay.restore(rows, 0)
     return replay
 
 
-def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Returns the arrays of a checkpoint and the text among them."""
+@contextlib.contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Puts a file's name before what is wrong with it."""
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        return arrays, json.loads(arrays["text"].tobytes())
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise DisasmError(
-            f"{path}: is not a complete checkpoint ({error}); delete it to start anew"
-        ) from None
+        yield
+    except DisasmError as error:
+        raise DisasmError(f"{path}: {error}") from None
 
 
-def _restore_state(path: Path, agent: Agent, arrays: dict[str, np.ndarray]) -> None:
-    leaves, structure = tree_flatten(agent.state)
-    found = [arrays.get(f"state_{i:03d}") for i in range(len(leaves))]
-    if any(
-        new is None or new.shape != tuple(old.shape)
-        for new, old in zip(found, leaves, strict=True)
-    ):
-        raise DisasmError(
-            f"{path}: is of an agent with other networks; resume with the "
-            "hyper-parameters that the training was started with"
-        )
-    agent.state = tree_unflatten([torch.from_numpy(a) for a in found], structure)
+def _rows(arrays: Arrays) -> np.ndarray:
+    """Takes the memory's rows out of the arrays, and returns them."""
+    wanted = {"replay": ArraySpec("float32", (None, WIDTH))}
+    found = {"replay": arrays.pop("replay")} if "replay" in arrays else {}
+    check_arrays(found, wanted, AGAIN)
+    return found["replay"]
+
+
+def _leaves(agent: Agent) -> dict[str, torch.Tensor]:
+    leaves, _ = tree_flatten(agent.state)
+    return {f"state_{i:03d}": leaf for i, leaf in enumerate(leaves)}
+
+
+def _check_state(agent: Agent, arrays: Arrays) -> None:
+    """Refuses arrays that are not the state of an agent like this one."""
+    leaves = _leaves(agent)
+    for name, leaf in leaves.items():
+        if name in arrays and arrays[name].shape != tuple(leaf.shape):
+            raise DisasmError(_OTHER.format(f"{name} of {arrays[name].shape}"))
+    if len(arrays) != len(leaves):
+        raise DisasmError(_OTHER.format(f"{len(arrays)} arrays, not {len(leaves)}"))
+    wanted = {n: ArraySpec(str(leaf.numpy().dtype)) for n, leaf in leaves.items()}
+    check_arrays(arrays, wanted, AGAIN)
+
+
+def _restore_state(agent: Agent, arrays: Arrays) -> None:
+    _, structure = tree_flatten(agent.state)
+    found = [torch.from_numpy(arrays[name]) for name in _leaves(agent)]
+    agent.state = tree_unflatten(found, structure)

@@ -14,14 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import write_json
+from drake_disasm.common.files import read_json, write_json
 from drake_disasm.common.finished_work import is_resumed, refuse_difference
 from drake_disasm.learning.hyperparameters import Hyperparameters
 from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.learning.training import TrainingSpec
 from drake_disasm.scenario import Scenario, scenario_to_mapping
+
+_AGAIN = "delete it, and resume the training"
+_FIGURES = ("episodes", "successes", "performance", "mean_force", "peak_force", "steps")
+_EVALUATION = dict.fromkeys(_FIGURES, 0.0)
+_RESULT: dict[str, Any] = {"seed": 0, "validation": _EVALUATION}
+_ONLINE: dict[str, Any] = {"training": _EVALUATION, "first_success": None}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,7 +87,7 @@ def open_experiment(experiment: Experiment, folder: Path, resume: bool) -> Exper
     if not is_resumed(folder, path.name, "a training", resume):
         write_json(path, wanted)
         return experiment
-    found = _with_station(read_json(path))
+    found = _with_station(read_training(folder, {"provenance": {}}))
     del wanted["provenance"]
     refuse_difference(folder, found, wanted)
     return dataclasses.replace(experiment, provenance=found["provenance"])
@@ -95,23 +100,47 @@ def _with_station(found: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def read_json(path: Path) -> dict[str, Any]:
-    """Returns the content of one of a training's JSON files.
+def read_training(folder: Path, example: dict[str, Any]) -> dict[str, Any]:
+    """Returns what the seeds of a training have in common, as plain data.
+
+    Args:
+        folder: of the training.
+        example: what is needed of it, as in `plain_data.check_like`.
 
     Raises:
-        DisasmError: it can't be read.
+        DisasmError: it can't be read, or is damaged.
     """
-    try:
-        return json.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise DisasmError(
-            f"{path}: can't be read ({error}); give a new folder"
-        ) from None
+    return read_json(folder / "training.json", "give a new folder", example)
+
+
+def read_evaluation(path: Path) -> dict[str, Any]:
+    """Returns the figures of an `Evaluation` from a JSON file.
+
+    Raises:
+        DisasmError: they can't be read, or are damaged.
+    """
+    return read_json(path, _AGAIN, _EVALUATION)
+
+
+def read_result(path: Path, online: bool = False) -> dict[str, Any]:
+    """Returns the content of a seed's `result.json`.
+
+    Args:
+        path: of the file.
+        online: whether it must be of a training that acted.
+
+    Raises:
+        DisasmError: it can't be read, or is damaged.
+    """
+    result = read_json(path, _AGAIN, _RESULT)
+    if online or "training" in result:
+        return read_json(path, _AGAIN, _RESULT | _ONLINE)
+    return result
 
 
 def write_summary(folder: Path) -> str:
     """Writes summary and learning curve of the finished seeds; returns them as text."""
-    results = [read_json(path) for path in sorted(folder.glob("seed_*/result.json"))]
+    results = [read_result(path) for path in sorted(folder.glob("seed_*/result.json"))]
     if not results:
         return "no seed is finished yet"
     summary = _summarised(results)
@@ -120,7 +149,7 @@ def write_summary(folder: Path) -> str:
     if all(len(episodes) > 1 for episodes in seeds):
         from drake_disasm.learning.learning_curve import plot_learning_curves
 
-        name = read_json(folder / "training.json")
+        name = read_training(folder, {"config": {"algorithm": ""}, "preset": ""})
         label = f"{name['config']['algorithm']}, {name['preset']}"
         plot_learning_curves({label: seeds}, folder / "learning_curve.png")
     return _table(results, summary)
@@ -129,7 +158,7 @@ def write_summary(folder: Path) -> str:
 def _summarised(results: list[dict[str, Any]]) -> dict[str, Any]:
     """Returns success of trainings, first successes, P and validation over seeds."""
     summary: dict[str, Any] = {"seeds": [r["seed"] for r in results]}
-    if "training" in results[0]:
+    if all("training" in r for r in results):
         first = [r["first_success"] for r in results]
         won = sum(f is not None for f in first)
         summary["trained"] = won

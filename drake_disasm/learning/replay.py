@@ -6,6 +6,7 @@ import numpy as np
 from torch import Tensor
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.text import shown
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 
 _STATES, _ACTIONS = len(STATE_NAMES), len(ACTION_NAMES)
@@ -109,8 +110,14 @@ class Replay:
         """
         if len(rows) > len(self._rows) or rows.shape[1:] != (WIDTH,):
             raise DisasmError(
-                f"a memory of {rows.shape} does not fit one of {self._rows.shape}; "
-                "resume with the hyper-parameters that the training was started with"
+                f"has a memory of {rows.shape}, which does not fit one of "
+                f"{self._rows.shape}; resume with the hyper-parameters that the "
+                "training was started with"
+            )
+        if not 0 <= following < len(self._rows):
+            raise DisasmError(
+                f"has a memory whose next row is {shown(following)}; delete it to "
+                "start anew"
             )
         self.size, self._next = len(rows), following
         self._rows[: self.size] = rows

@@ -19,8 +19,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import make_folder, write_json, write_text
+from drake_disasm.common.files import make_folder, read_text, write_json, write_text
+from drake_disasm.common.plain_data import check_like
 from drake_disasm.common.progress import Progress, ProgressUpdate
+from drake_disasm.common.text import clipped
 from drake_disasm.learning.evaluation import summed_up, validate_policy
 from drake_disasm.learning.policy import trained_policy
 from drake_disasm.learning.training import Purpose, Training, seed_for
@@ -29,6 +31,8 @@ from drake_disasm.policies import save_policy
 from drake_disasm.task.episode import EpisodeSummary
 from drake_disasm.task.recording import EpisodeRecorder
 
+_AGAIN = "delete it, and resume the training"
+_MOST_BYTES = 2**28
 _SHOWN = 20  # latest episodes over which progress is averaged
 _PATIENCE = 10.0  # s until the workers of a killed run have noticed
 
@@ -171,12 +175,22 @@ def write_episodes(path: Path, summaries: list[EpisodeSummary]) -> None:
 
 
 def read_episodes(path: Path) -> list[dict[str, Any]]:
-    """Returns the rows that `write_episodes` wrote, numbers as numbers."""
-    with path.open(newline="") as file:
-        return [
-            {name: _number(text) for name, text in row.items()}
-            for row in csv.DictReader(file)
+    """Returns the rows that `write_episodes` wrote, numbers as numbers.
+
+    Raises:
+        DisasmError: the file can't be read, or is damaged.
+    """
+    text = io.StringIO(read_text(path, _AGAIN, _MOST_BYTES), newline="")
+    try:
+        rows = [
+            {name: _number(cell) for name, cell in row.items()}
+            for row in csv.DictReader(text, strict=True)
         ]
+        check_like(rows, [{"reward": 0.0, "outcome": ""}])
+    except (csv.Error, TypeError, DisasmError) as error:  # a row of another length
+        why = clipped(str(error))
+        raise DisasmError(f"{path}: is damaged ({why}); {_AGAIN}") from None
+    return rows
 
 
 def _number(text: str) -> Any:

@@ -19,6 +19,7 @@ import torch
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.agent import Agent
 from drake_disasm.learning.checkpoint import (
+    AGAIN,
     load_agent,
     load_checkpoint,
     save_checkpoint,
@@ -31,6 +32,13 @@ from drake_disasm.policies import ActionMap, Network, make_policy
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.episode import EpisodeSummary
 from drake_disasm.task.recording import EpisodeRecorder
+
+#: What a checkpoint's notes hold.
+_NOTES = {
+    "episodes": [dataclasses.asdict(EpisodeSummary(0)) | {"outcome": 0}],
+    "rounds": 0,
+    "seconds": {"simulation": 0.0, "updates": 0.0, "saving": 0.0},
+}
 
 
 class Purpose(enum.IntEnum):
@@ -129,8 +137,11 @@ class Training:
         Raises:
             DisasmError: it is damaged or of another agent.
         """
-        notes = load_checkpoint(path, self.agent, self._own_memory())
-        self.summaries = [_summary(row) for row in notes["episodes"]]
+        notes = load_checkpoint(path, self.agent, self._own_memory(), _NOTES)
+        try:
+            self.summaries = [_summary(row) for row in notes["episodes"]]
+        except (ValueError, TypeError) as error:
+            raise DisasmError(f"{path}: has odd notes ({error}); {AGAIN}") from None
         self.rounds, self.seconds = notes["rounds"], notes["seconds"]
 
     def save(self, path: Path) -> None:

@@ -13,12 +13,19 @@ from pathlib import Path
 from typing import Any
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.learning.experiment import Experiment, read_json
+from drake_disasm.common.files import read_bytes
+from drake_disasm.learning.checkpoint import CHECKPOINT
+from drake_disasm.learning.experiment import Experiment, read_training
 
 _NETWORKS = ("algorithm", "hidden", "layer_norm", "critics")
 _SCALES = ("position_scale", "rotation_scale", "force_scale", "torque_scale")
 _ACTIONS = ("base", "residual")
 _TASK = ("period", "max_translation", "max_rotation")
+#: What must be known of the other training; None is any value.
+_NEEDED = {
+    "config": dict.fromkeys((*_NETWORKS, *_SCALES, *_ACTIONS)),
+    "scenario": {"task": dict.fromkeys(_TASK), "observation": {"variant": None}},
+}
 
 
 def start_checkpoint(folder: Path | str, seed: int) -> Path:
@@ -28,7 +35,9 @@ def start_checkpoint(folder: Path | str, seed: int) -> Path:
 
 def start_hash(folder: Path | str, seed: int) -> str:
     """Returns the SHA-256 of that file."""
-    return hashlib.sha256(start_checkpoint(folder, seed).read_bytes()).hexdigest()
+    path = start_checkpoint(folder, seed)
+    data = read_bytes(path, "train it there first", CHECKPOINT.most_bytes)
+    return hashlib.sha256(data).hexdigest()
 
 
 def check_start(experiment: Experiment, seeds: Sequence[int]) -> None:
@@ -48,7 +57,7 @@ def check_start(experiment: Experiment, seeds: Sequence[int]) -> None:
                 f"{experiment.start}: has not finished seed {seed}; train it there "
                 "first (tools/train.py), or give another folder"
             )
-    before = read_json(Path(experiment.start) / "training.json")
+    before = read_training(Path(experiment.start), _NEEDED)
     for name, then, now in _compared(before, experiment.to_mapping()):
         if then != now:
             raise DisasmError(

@@ -16,14 +16,19 @@ import math
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from drake_disasm.common.archive import (
+    ArchiveKind,
+    Arrays,
+    ArraySpec,
+    check_arrays,
+    load_archive,
+    save_archive,
+)
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import write_bytes
 from drake_disasm.common.quantity import closest
 from drake_disasm.common.resources import models_dir
+from drake_disasm.common.text import clipped, shown
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
-from drake_disasm.policies.archive import AGAIN, Arrays, pack, unpack
 from drake_disasm.policies.network import (
     ActionMap,
     LearnedPolicy,
@@ -35,6 +40,13 @@ from drake_disasm.scenario import Scenario, scenario_to_mapping
 
 FORMAT = "drake_disasm/policy/1"
 
+AGAIN = "copy it again, or train it again (tools/train.py)"
+#: Two hundred layers, and 64 MiB: a hundred times what the shipped ones have.
+POLICY = ArchiveKind(
+    "policy", "give one that tools/train.py wrote", AGAIN, 2**26, most_members=400
+)
+
+_PARTS = ("weight_", "bias_")  # of each layer
 #: What the format calls fields of PolicyDescription that have another name.
 _ENTRIES = {"station": "model"}
 
@@ -68,7 +80,7 @@ def save_policy(path: Path, policy: LearnedPolicy) -> None:
         }
     except DisasmError as error:
         raise DisasmError(f"policy {path}: is not written, it {error}") from None
-    write_bytes(path, pack(arrays, text))
+    save_archive(path, arrays, text)
 
 
 def load_policy(path: Path) -> LearnedPolicy:
@@ -78,14 +90,11 @@ def load_policy(path: Path) -> LearnedPolicy:
         DisasmError: no such file, or it is damaged, or not such a policy.
     """
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise DisasmError(
-            f"policy {path}: can't be read ({error.strerror}); check the path, or "
-            f"name a shipped one ({', '.join(shipped_policies()) or 'none yet'})"
-        ) from None
+        arrays, text = load_archive(path, POLICY)
+    except DisasmError as error:
+        raise DisasmError(f"policy {error}") from None
     try:
-        return _policy(*unpack(data))
+        return _policy(arrays, text)
     except DisasmError as error:
         raise DisasmError(f"policy {path}: {error}") from None
 
@@ -116,8 +125,8 @@ def _arrays(policy: LearnedPolicy) -> Arrays:
 def _policy(arrays: Arrays, text: dict[str, Any]) -> LearnedPolicy:
     if text.get("format") != FORMAT:
         raise DisasmError(
-            f"has format {text.get('format')!r}, this program reads '{FORMAT}'; use "
-            "the version of drake_disasm that wrote it, or train anew"
+            f"has format {shown(text.get('format'))}, this program reads '{FORMAT}'; "
+            "use the version of drake_disasm that wrote it, or train anew"
         )
     layers = _check(arrays)
     network = Network(
@@ -134,49 +143,26 @@ def _policy(arrays: Arrays, text: dict[str, Any]) -> LearnedPolicy:
 
 def _check(arrays: Arrays) -> int:
     """Refuses arrays that are no policy's; returns how many layers there are."""
-    layers = _count_layers(arrays)
-    for name, values in arrays.items():
-        kind = np.dtype(np.float64 if name.endswith("scale") else np.float32)
-        if values.dtype != kind:
-            raise DisasmError(f"has {name} of {values.dtype}, not {kind}; train anew")
-        if not np.isfinite(values).all():
-            raise DisasmError(f"has NaN or infinity in {name}; train anew")
-    _check_shapes(arrays, layers)
+    layers = max(1, *(sum(n.startswith(part) for n in arrays) for part in _PARTS))
+    check_arrays(arrays, _wanted(arrays, layers), AGAIN)
     if arrays["observation_scale"].min() <= 0.0 or arrays["action_scale"].min() < 0.0:
         raise DisasmError("has a scale that is zero or negative; train anew")
     return layers
 
 
-def _count_layers(arrays: Arrays) -> int:
-    """Refuses arrays that lack one or have one too many."""
-    parts = ("weight_", "bias_")
-    counts = [sum(name.startswith(part) for name in arrays) for part in parts]
-    layers = max(1, *counts)
-    wanted = {f"{part}{i}" for part in parts for i in range(layers)}
-    wanted |= {"observation_scale", "action_scale"}
-    for name in sorted(wanted ^ arrays.keys()):
-        verb = "lacks" if name in wanted else "has an unknown"
-        raise DisasmError(f"{verb} array '{name}'; {AGAIN}")
-    return layers
-
-
-def _check_shapes(arrays: Arrays, layers: int) -> None:
-    """Refuses layers that do not chain from states to actions."""
+def _wanted(arrays: Arrays, layers: int) -> dict[str, ArraySpec]:
+    """Returns what the arrays must be: layers that lead from states to actions."""
     states, actions = len(STATE_NAMES), len(ACTION_NAMES)
-    widths = [states, *(arrays[f"bias_{i}"].size for i in range(layers - 1)), actions]
-    wanted: dict[str, tuple[int, ...]] = {
-        "observation_scale": (states,),
-        "action_scale": (actions,),
+    hidden = (arrays.get(f"bias_{i}") for i in range(layers - 1))
+    widths = [states, *(0 if b is None else b.size for b in hidden), actions]
+    wanted = {
+        "observation_scale": ArraySpec("float64", (states,)),
+        "action_scale": ArraySpec("float64", (actions,)),
     }
     for i in range(layers):
-        wanted[f"weight_{i}"] = (widths[i + 1], widths[i])
-        wanted[f"bias_{i}"] = (widths[i + 1],)
-    for name, shape in wanted.items():
-        if arrays[name].shape != shape:
-            raise DisasmError(
-                f"has {name} of shape {arrays[name].shape}, {shape} is what leads "
-                f"from {states} states to {actions} actions; train anew"
-            )
+        wanted[f"weight_{i}"] = ArraySpec("float32", (widths[i + 1], widths[i]))
+        wanted[f"bias_{i}"] = ArraySpec("float32", (widths[i + 1],))
+    return wanted
 
 
 def _entries(description: PolicyDescription) -> dict[str, Any]:
@@ -225,11 +211,15 @@ def _base_from_mapping(mapping: Any) -> Straight | Admittance | None:
         raise DisasmError(f"has a base policy without parameters; {AGAIN}")
     name, parameters = str(mapping.get("name")), mapping["parameters"]
     if name not in SCRIPTED:
-        raise DisasmError(f"has base policy '{name}'; {closest(name, list(SCRIPTED))}")
+        raise DisasmError(
+            f"has base policy '{clipped(name)}'; {closest(name, list(SCRIPTED))}"
+        )
     known = [field.name for field in dataclasses.fields(SCRIPTED[name])]
     for key, value in parameters.items():
         if key not in known:
-            raise DisasmError(f"sets '{key}' of '{name}'; {closest(key, known)}")
-        if type(value) not in (int, float) or not math.isfinite(value):
-            raise DisasmError(f"sets {key} of '{name}' to {value!r}; train anew")
+            raise DisasmError(
+                f"sets '{clipped(key)}' of '{name}'; {closest(key, known)}"
+            )
+        if type(value) not in (int, float) or not abs(value) < math.inf:
+            raise DisasmError(f"sets {key} of '{name}' to {shown(value)}; train anew")
     return SCRIPTED[name](**parameters)

@@ -22,7 +22,11 @@ import numpy as np
 from drake_disasm.common.files import write_json
 from drake_disasm.common.progress import Progress
 from drake_disasm.learning.evaluation import evaluate, summed_up
-from drake_disasm.learning.experiment import Experiment, read_json
+from drake_disasm.learning.experiment import (
+    Experiment,
+    read_evaluation,
+    read_result,
+)
 from drake_disasm.learning.learning_curve import plot_learning_curves
 from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.training import Purpose, seed_for
@@ -158,8 +162,9 @@ def results(folder: Path) -> list[dict[str, Any]]:
 
 
 def _figures(branch: Branch, paths: Sequence[Path]) -> dict[str, Any]:
-    ends = [read_json(path) for path in paths]
-    first = [read_json(p.with_name("deployed.json")) for p in paths if branch.start]
+    ends = [read_result(path, online=True) for path in paths]
+    deployed = [p.with_name("deployed.json") for p in paths if branch.start]
+    first = [read_evaluation(path) for path in deployed]
     return {
         "folder": branch.folder,
         "label": branch.label,

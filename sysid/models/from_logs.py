@@ -1,6 +1,7 @@
 """The model for each kind of log."""
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -110,7 +111,7 @@ def _with_noise(model: LogModel, noise: dict[str, float]) -> LogModel:
                 f"--noise {name}: no such channel, the model does not predict it; "
                 f"{closest(name, known)}"
             )
-        if not value > 0.0:
+        if not 0.0 < value < math.inf:
             raise DisasmError(f"--noise {name}={value:g}: give a number above zero")
     channels = tuple(
         dataclasses.replace(channel, noise=noise[channel.name], origin="as given")

@@ -8,7 +8,6 @@ life, and without lives it is abandoned.
     trace = bees.run(lambda x: (x**2).sum(axis=1), cycles=50)
 """
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -19,11 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import write_json
+from drake_disasm.common.files import read_json, write_json
+from drake_disasm.common.text import clipped
 from sysid.optimise.coordinates import BatchFunction, Box
 from sysid.optimise.trace import Trace
 
 Array = NDArray[np.float64]
+
+
+_REMEDY = "delete it to start anew"
+_SITE = {"centre": [0.0], "value": 0.0, "edge": [0.0], "lives": 0}
+_TRACE = {"points": [[0.0]], "values": [0.0], "cycle_ends": [0], "stopped": ""}
+#: What a checkpoint holds, besides the search's identity.
+_STATE = {"sites": [_SITE], "trace": _TRACE, "generator": {}}
 
 
 @dataclass(frozen=True)
@@ -186,7 +193,7 @@ class BeesAlgorithm:
         """
         stop = stop or Stop(cycles=cycles)
         if checkpoint and checkpoint.exists():
-            self.restore(json.loads(checkpoint.read_text()))
+            self._resume(checkpoint)
         while not (reason := self._reason(stop)):
             self._cycle(function)
             if checkpoint:
@@ -231,6 +238,16 @@ class BeesAlgorithm:
         ]
         self.trace = Trace.from_mapping(state["trace"])
         self._generator.bit_generator.state = state["generator"]
+
+    def _resume(self, path: Path) -> None:
+        """Restores the search that a file holds."""
+        state = read_json(path, _REMEDY, _STATE)
+        try:
+            self.restore(state)
+        except (ValueError, TypeError, LookupError) as error:  # NumPy's generator's
+            raise DisasmError(
+                f"{path}: is damaged ({clipped(str(error))}); {_REMEDY}"
+            ) from None
 
     def _identity(self) -> dict[str, Any]:
         bounds = [self.box.low.tolist(), self.box.high.tolist()]

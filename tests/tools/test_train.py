@@ -243,7 +243,7 @@ def test_a_start_that_does_not_fit_is_named(undisturbed: Path, tmp_path: Path) -
         (["--hyper", "gama=1"], "did you mean 'gamma'"),
         (["--from-logs", "nowhere"], "nowhere"),
         (["--hyper", "demonstrations=0.5"], "--demonstrations DIR"),
-        (["--episodes=0"], "episodes: 0 is out of range"),
+        (["--episodes=0"], "--episodes: '0' is not a whole number from 1"),
     ],
 )
 def test_bad_input_is_one_line(

@@ -1,8 +1,10 @@
-"""Writing files atomically."""
+"""Writing files atomically, and reading them within limits."""
 
 import json
 import os
 import signal
+import stat
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,10 +12,12 @@ from matplotlib.figure import Figure
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import (
+    read_bytes,
+    read_json,
+    read_text,
     write_atomically,
     write_figure,
     write_json,
-    write_npz,
     write_text,
 )
 
@@ -43,19 +47,63 @@ def test_nothing_is_left_of_what_failed(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_text_json_arrays_and_figures_come_back(tmp_path):
+def test_text_json_and_figures_come_back(tmp_path):
     write_text(tmp_path / "text", "20 µm\n")
     write_json(tmp_path / "json", {"a": [1, 0.1]})
-    write_npz(tmp_path / "npz", a=np.arange(3), b=np.eye(2))
     write_figure(tmp_path / "png", Figure(figsize=(1, 1)))
     assert (tmp_path / "text").read_text("utf-8") == "20 µm\n"
     assert json.loads((tmp_path / "json").read_text()) == {"a": [1, 0.1]}
-    with np.load(tmp_path / "npz") as data:
-        assert data["a"].tolist() == [0, 1, 2] and (data["b"] == np.eye(2)).all()
     assert (tmp_path / "png").read_bytes().startswith(b"\x89PNG")
-    assert len(list(tmp_path.iterdir())) == 4
+    assert len(list(tmp_path.iterdir())) == 3
 
 
 def test_a_folder_that_does_not_exist_is_named_with_a_remedy(tmp_path):
     with pytest.raises(DisasmError, match=r"no/text: cannot be written .*; check"):
         write_text(tmp_path / "no" / "text", "")
+
+
+def _refusal(call):
+    with pytest.raises(DisasmError) as caught:
+        call()
+    message = str(caught.value)
+    assert "\n" not in message and message.endswith("; copy it"), message
+    return message
+
+
+def test_pipes_devices_and_folders_are_refused_at_once(tmp_path):
+    """Opened as a file is, a pipe waits for a writer and /dev/zero never ends."""
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", Path("/dev/zero"), Path("/dev/null")):
+        assert not stat.S_ISREG(path.stat().st_mode)
+        message = _refusal(lambda path=path: read_bytes(path, "copy it", 100))
+        assert f"{path}: is no regular file" in message
+    assert "Is a directory" in _refusal(lambda: read_bytes(tmp_path, "copy it", 9))
+    assert "No such" in _refusal(lambda: read_bytes(tmp_path / "no", "copy it", 9))
+    assert "null" in _refusal(lambda: read_bytes(tmp_path / "a\0", "copy it", 9))
+
+
+def test_large_files_are_refused(tmp_path):
+    (tmp_path / "a").write_bytes(bytes(100))
+    assert len(read_bytes(tmp_path / "a", "copy it", 100)) == 100
+    assert "more than" in _refusal(lambda: read_bytes(tmp_path / "a", "copy it", 99))
+    with (tmp_path / "a").open("wb") as stream:
+        stream.truncate(2**40)  # takes no room on the disk
+    assert "more than" in _refusal(lambda: read_bytes(tmp_path / "a", "copy it", 99))
+
+
+def test_text_that_is_none_is_refused(tmp_path):
+    (tmp_path / "a").write_bytes(b"\xff\xfe")
+    assert "UTF-8" in _refusal(lambda: read_text(tmp_path / "a", "copy it", 99))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[1]", "{", '{"a": 1, "b": {}}', "[" * 10**5, '{"a": ' + "9" * 5000 + "}"],
+)
+def test_damaged_json_is_refused(tmp_path, text):
+    (tmp_path / "a").write_text(text)
+    example = {"a": 0, "b": {"c": 0.0}}
+    message = _refusal(lambda: read_json(tmp_path / "a", "copy it", example))
+    assert "is damaged" in message and len(message) < 300
+    (tmp_path / "a").write_text('{"a": 1, "b": {"c": 2}, "more": 3}')
+    assert read_json(tmp_path / "a", "", example)["more"] == 3

@@ -69,3 +69,31 @@ def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(DisasmError, match="not empty and does not hold a study"):
         FinishedWork(tmp_path, IDENTITY, what="a study")
+
+
+@pytest.mark.parametrize(
+    "line", ["{", '"key"', '{"key": 1}', "[" * 10**5, "\x00", '{"key": 1, "res']
+)
+def test_a_damaged_line_is_refused_and_nothing_is_lost(
+    tmp_path: Path, line: str
+) -> None:
+    """Only what is behind the last line's end is what a killed run leaves."""
+    FinishedWork(tmp_path).keep_all([("a", 1), ("b", 2)])
+    path = tmp_path / "results.jsonl"
+    whole = path.read_text()
+    path.write_text(f"{line}\n{whole}")
+    with pytest.raises(DisasmError, match=r"results.jsonl: line 1 is damaged .*; del"):
+        FinishedWork(tmp_path)
+    assert path.read_text() == f"{line}\n{whole}"
+
+
+@pytest.mark.parametrize("content", [b"", b"PK", b"\xff\xfe{}", b"[1]"])
+def test_damaged_files_are_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
+    FinishedWork(tmp_path, IDENTITY).arrays("key", lambda: {"u": np.ones(3)})
+    (kept,) = tmp_path.glob("*.npz")
+    kept.write_bytes(content)
+    with pytest.raises(DisasmError, match=r"npz: is .*; "):
+        FinishedWork(tmp_path, IDENTITY).arrays("key", dict)
+    (tmp_path / "identity.json").write_bytes(content)
+    with pytest.raises(DisasmError, match=r"identity.json: is .*; name a new folder"):
+        FinishedWork(tmp_path, IDENTITY)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drake_disasm.common.archive import Arrays, pack, unpack
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.resources import models_dir
 from drake_disasm.policies import (
@@ -24,8 +25,7 @@ from drake_disasm.policies import (
     scenario_hash,
     shipped_policies,
 )
-from drake_disasm.policies.archive import Arrays, pack, unpack
-from drake_disasm.policies.files import FORMAT
+from drake_disasm.policies.files import FORMAT, POLICY
 from drake_disasm.scenario import load_scenario
 
 MakeNetwork = Callable[..., Network]
@@ -187,7 +187,7 @@ BROKEN: dict[str, tuple[Change, list[str]]] = {
     ),
     "scalar bias": (
         lambda a, t: a.update(bias_0=np.array(1.0, np.float32)),
-        ["shape", "train anew"],
+        ["shape", "train it again"],
     ),
     "11 inputs": (
         lambda a, t: a.update(weight_0=np.ones((7, 11), np.float32)),
@@ -254,7 +254,7 @@ BROKEN: dict[str, tuple[Change, list[str]]] = {
 @pytest.mark.parametrize("name", BROKEN)
 def test_whole_file_with_broken_content_is_refused(file: Path, name: str) -> None:
     change, words = BROKEN[name]
-    arrays, text = unpack(file.read_bytes())
+    arrays, text = unpack(file.read_bytes(), POLICY)
     change(arrays, text)
     file.write_bytes(pack(arrays, text))
     message = _refusal(file)
@@ -262,7 +262,7 @@ def test_whole_file_with_broken_content_is_refused(file: Path, name: str) -> Non
 
 
 def test_text_that_is_no_mapping_is_refused(file: Path) -> None:
-    arrays, _ = unpack(file.read_bytes())
+    arrays, _ = unpack(file.read_bytes(), POLICY)
     file.write_bytes(pack(arrays, ["a", "list"]))  # type: ignore[arg-type]
     assert "no mapping" in _refusal(file)
 
@@ -289,14 +289,14 @@ def test_folder_that_is_not_there_is_refused(
 
 
 def test_two_arrays_of_one_name_are_refused(file: Path) -> None:
-    """The zip's last one wins, and the checksum knows it is another."""
+    """Else the zip's last one would win without a word."""
     data = io.BytesIO(file.read_bytes())
     with zipfile.ZipFile(data, "a") as archive, pytest.warns(UserWarning):
         content = io.BytesIO()
         np.lib.format.write_array(content, np.zeros(7, np.float32))
         archive.writestr("bias_0.npy", content.getvalue())
     file.write_bytes(data.getvalue())
-    assert "checksum" in _refusal(file)
+    assert "is there twice" in _refusal(file)
 
 
 def test_names_of_policies(tmp_path: Path) -> None:

@@ -1,0 +1,137 @@
+"""Checkpoints: whole, of this agent, finite; and those of older versions go on."""
+
+import copy
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from torch.utils._pytree import tree_leaves
+
+from drake_disasm.common.archive import Arrays, pack, unpack
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.learning.agent import Agent
+from drake_disasm.learning.checkpoint import (
+    CHECKPOINT,
+    load_agent,
+    load_checkpoint,
+    load_memory,
+    save_checkpoint,
+)
+from drake_disasm.learning.hyperparameters import Hyperparameters
+from drake_disasm.learning.replay import WIDTH, Replay
+
+CONFIG = Hyperparameters(hidden=[4], replay=20)
+NOTES = {"episodes": [1, 2]}
+
+
+def _agent(seed: int = 0) -> Agent:
+    return Agent(CONFIG, seed, compiled=False)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A checkpoint of an agent whose memory holds nine transitions."""
+    replay = Replay(20)
+    for _ in range(9):
+        replay.add(np.ones(12), np.zeros(6), 1.0, np.ones(12), False)
+    save_checkpoint(tmp_path / "c.npz", _agent(), replay, NOTES)
+    return tmp_path / "c.npz"
+
+
+def _load(path: Path) -> tuple[Agent, Replay]:
+    agent, replay = _agent(seed=1), Replay(20)
+    assert load_checkpoint(path, agent, replay, {"episodes": [0]}) == NOTES
+    return agent, replay
+
+
+def test_all_of_it_comes_back(path: Path) -> None:
+    agent, replay = _load(path)
+    for a, b in zip(tree_leaves(agent.state), tree_leaves(_agent().state), strict=True):
+        assert a.dtype == b.dtype and a.numpy().tobytes() == b.numpy().tobytes()
+    assert replay.size == 9 and replay.contents()[1] == 9
+    assert load_memory(path).size == 9
+
+
+def test_one_without_a_checksum_as_older_versions_wrote_it_is_read(path: Path) -> None:
+    with np.load(path) as file:
+        arrays = dict(file)
+    del arrays["sha256"]
+    np.savez(path, **arrays)  # type: ignore[arg-type]
+    assert _load(path)[1].size == 9
+
+
+Change = Callable[[Arrays, dict[str, Any]], Any]
+NAN = float("nan")
+#: What is done to a checkpoint before its checksum is made, and what is said about it.
+BROKEN: dict[str, tuple[Change, str]] = {
+    "NaN": (lambda a, t: a["state_000"].__setitem__(0, NAN), "NaN or inf.* state_000"),
+    "doubles": (
+        lambda a, t: a.update(state_000=a["state_000"].astype(float)),
+        "state_000 of float64, not float32",
+    ),
+    "singles": (
+        lambda a, t: a.update(
+            {k: v.astype("f4") for k, v in a.items() if v.dtype == "f8"}
+        ),
+        "of float32, not float64",
+    ),
+    "shape": (
+        lambda a, t: a.update(state_000=np.ones((3, 3), np.float32)),
+        "other networks",
+    ),
+    "missing": (lambda a, t: a.pop("state_001"), "other networks"),
+    "stranger": (
+        lambda a, t: a.update(spam=a.pop("state_001")),
+        "lacks|unknown",
+    ),
+    "no memory": (lambda a, t: a.pop("replay"), "lacks array 'replay'"),
+    "NaN in memory": (lambda a, t: a["replay"].__setitem__((0, 0), NAN), "NaN"),
+    "double memory": (
+        lambda a, t: a.update(replay=a["replay"].astype(float)),
+        "replay of float64",
+    ),
+    "narrow memory": (
+        lambda a, t: a.update(replay=np.ones((9, 3), np.float32)),
+        "replay of shape",
+    ),
+    "large memory": (
+        lambda a, t: a.update(replay=np.ones((21, WIDTH), np.float32)),
+        "does not fit one of",
+    ),
+    "next row": (lambda a, t: t.update(following=20), "next row is 20"),
+    "next row is a word": (lambda a, t: t.update(following="9"), "for following"),
+    "no updates": (lambda a, t: t.pop("updates"), "lacks 'updates'"),
+    "notes": (lambda a, t: t.update(notes={"episodes": ["a"]}), "notes.episodes.0"),
+    "other notes": (lambda a, t: t.update(notes={}), "lacks 'notes.episodes'"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_broken_content_is_one_line_and_changes_nothing(name: str, path: Path) -> None:
+    change, words = BROKEN[name]
+    arrays, text = unpack(path.read_bytes(), CHECKPOINT)
+    change(arrays, text)
+    path.write_bytes(pack(arrays, text))
+    agent, replay = _agent(), Replay(20)
+    before = copy.deepcopy(agent.state)
+    with pytest.raises(DisasmError, match=words) as caught:
+        load_checkpoint(path, agent, replay, {"episodes": [0]})
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ") and "\n" not in message
+    assert replay.size == 0 and agent.updates == 0
+    for a, b in zip(tree_leaves(before), tree_leaves(agent.state), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("load", [load_memory, lambda p: load_agent(p, _agent())])
+@pytest.mark.parametrize("name", ["NaN in memory", "no memory", "narrow memory"])
+def test_a_start_from_another_training_is_checked_too(
+    name: str, load: Callable[[Path], object], path: Path
+) -> None:
+    arrays, text = unpack(path.read_bytes(), CHECKPOINT)
+    BROKEN[name][0](arrays, text)
+    path.write_bytes(pack(arrays, text))
+    with pytest.raises(DisasmError, match=BROKEN[name][1]):
+        load(path)
