@@ -3,7 +3,9 @@
 import argparse
 import importlib
 import os
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 from drake_disasm.common import options
@@ -11,6 +13,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.common.text import clipped
 from drake_disasm.effects import import_effects
+from drake_disasm.logs import Log, read_logs
 from drake_disasm.policies import (
     SCRIPTED,
     find_policy,
@@ -151,3 +154,15 @@ def _imported(name: str) -> Policy:
     if not callable(policy):
         raise DisasmError(f"policy {name}: is not callable; it maps (12,) to (6,)")
     return policy
+
+
+def named_logs(folders: Iterable[str | Path]) -> tuple[Log, ...]:
+    """Returns the logs in some folders; says on stderr what of them is left out.
+
+    Raises:
+        DisasmError: one can't be read, or they are of different kinds.
+    """
+    logs = read_logs(folders)
+    for remark in (remark for log in logs for remark in log.remarks):
+        print(remark, file=sys.stderr)
+    return logs

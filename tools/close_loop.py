@@ -17,7 +17,7 @@ import cli
 
 from drake_disasm.common import options, program
 from drake_disasm.common.files import make_folder, write_json, write_text
-from drake_disasm.logs import Log, read_logs
+from drake_disasm.logs import Log
 from drake_disasm.scenario import dump_scenario, load_scenario
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.effect_selection.output import to_mapping
@@ -83,7 +83,7 @@ def _add_model_arguments(add: Callable[..., object]) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
-    model = _model(args, read_logs(args.log))
+    model = _model(args, cli.named_logs(args.log))
     share = model.held_out_share
     train, test = split_episodes(model.measurements.names, args.held_out or share)
     origin = program.provenance("close_loop", arguments, 0)

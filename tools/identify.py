@@ -16,7 +16,7 @@ import numpy as np
 from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_json, write_text
-from drake_disasm.logs import Log, read_logs
+from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
 from sysid.identification import (
     Identification,
@@ -186,7 +186,7 @@ def _add_judgement_arguments(add: Callable[..., object]) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
-    logs = read_logs(args.log)
+    logs = cli.named_logs(args.log)
     model = model_of(logs, _choice(args))
     train, test = split_episodes(model.measurements.names, _held_out(args))
     settings = _settings(args)

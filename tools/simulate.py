@@ -7,8 +7,9 @@ on the devices of a real cell; read docs/hardware.md first.
 """
 
 import argparse
+import contextlib
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import cli
@@ -229,25 +230,47 @@ def _run_one(
     writer: LogWriter | None,
     view: MeshcatView | None,
 ) -> EpisodeSummary:
-    """Runs, shows and records one episode; a policy's error keeps its rows so far."""
+    """Runs, shows and records one episode."""
     program.stop_if_interrupted()
-    recorder = EpisodeRecorder(simulation) if writer else None
     if view:
         view.begin_episode()
-    with program.ProgressBar("step") as progress:
-        try:
-            summary = run_episode(simulation, seed, recorder, progress)
-        except DisasmError:
-            _keep(writer, recorder)
-            raise
+    with (
+        program.ProgressBar("step") as progress,
+        _recorded(simulation, writer) as recorder,
+    ):
+        summary = run_episode(simulation, seed, recorder, progress)
     if view:
         view.end_episode()
-    _keep(writer, recorder)
     return summary
 
 
-def _keep(writer: LogWriter | None, recorder: EpisodeRecorder | None) -> None:
-    if writer and recorder and recorder.steps:
+@contextlib.contextmanager
+def _recorded(
+    simulation: TaskSimulation, writer: LogWriter | None
+) -> Iterator[EpisodeRecorder | None]:
+    """Yields what records an episode, whose rows are kept at the end.
+
+    On hardware they are on the disk as they come: nothing brings them back. A
+    simulation can be run again; there an episode counts if it ended, or if its policy
+    failed.
+    """
+    if writer is None:
+        yield None
+    elif simulation.station_name == "hardware":
+        with writer.begin_episode() as episode:
+            yield EpisodeRecorder(simulation, episode)
+    else:
+        recorder = EpisodeRecorder(simulation)
+        try:
+            yield recorder
+        except DisasmError:
+            _keep(writer, recorder)
+            raise
+        _keep(writer, recorder)
+
+
+def _keep(writer: LogWriter, recorder: EpisodeRecorder) -> None:
+    if recorder.steps:
         columns = recorder.columns()
         if writer.header.provenance["hidden"]:  # what was drawn would give it away
             columns = {k: v for k, v in columns.items() if not k.startswith("extra.")}
@@ -261,7 +284,10 @@ def _open_log(
     provenance = program.provenance("simulate", arguments, args.seed) | origin
     provenance["hidden"] = bool(args.hidden)
     header = transitions_header(scenario, args.station, provenance)
-    return LogWriter(args.record, header, resume=args.resume)
+    writer = LogWriter(args.record, header, resume=args.resume)
+    for remark in writer.remarks:
+        print(remark, flush=True)
+    return writer
 
 
 def _open_view(args: argparse.Namespace) -> MeshcatView | None:

@@ -29,7 +29,6 @@ from drake_disasm.learning.hyperparameters import (
 )
 from drake_disasm.learning.jobs import seed_jobs, train_seeds
 from drake_disasm.learning.warm_start import check_start
-from drake_disasm.logs import read_logs
 from drake_disasm.scenario import load_scenario
 
 _EXAMPLES = """examples:
@@ -208,7 +207,7 @@ def _hashes(folders: Sequence[Path]) -> dict[str, str]:
     """Returns the hash of each log's data; refuses a log that can't be read."""
     if not folders:
         return {}
-    return {str(log.folder): log.data_hash for log in read_logs(folders)}
+    return {str(log.folder): log.data_hash for log in cli.named_logs(folders)}
 
 
 if __name__ == "__main__":

@@ -146,19 +146,22 @@ def write_figure(path: Path, figure: "Figure", dpi: float = 120.0) -> None:
 
 @contextlib.contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Puts Ctrl-C off to the end: libraries make other errors of it halfway."""
-    before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or before is None:
-        yield  # there it does not come
+    """Puts Ctrl-C and SIGTERM off to the end: libraries make other errors of them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # there they do not come
         return
-    pressed: list[tuple[int, FrameType | None]] = []
-    signal.signal(signal.SIGINT, lambda *caught: pressed.append(caught))
+    handlers = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM)}
+    raising = {number: h for number, h in handlers.items() if callable(h)}
+    came: list[tuple[int, FrameType | None]] = []
+    for stop in raising:
+        signal.signal(stop, lambda *caught: came.append(caught))
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
-    if pressed and callable(before):
-        before(*pressed[0])
+        for stop, handler in raising.items():
+            signal.signal(stop, handler)
+    for number, frame in came[:1]:
+        raising[signal.Signals(number)](number, frame)
 
 
 @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""What every command-line program does: exit statuses, Ctrl-C, progress, provenance."""
+"""What every command-line program does: exit status, signals, progress, provenance."""
 
 import argparse
 import importlib.metadata
@@ -19,35 +19,43 @@ from drake_disasm.common.progress import ProgressUpdate
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
+EXIT_TERMINATED = 143
 
 
-class _Interrupt:
-    """Remembers Ctrl-C, since a KeyboardInterrupt can get lost on its way.
+class Terminated(KeyboardInterrupt):
+    """SIGTERM came; a program ends by it as by Ctrl-C."""
+
+
+class _Stop:
+    """Remembers Ctrl-C or SIGTERM, since what is raised can get lost on its way.
 
     Python raises it wherever it happens to be; in a callback that some library calls
     from C++, or in a finaliser, it is printed or dropped there and the run goes on.
     """
 
-    pressed = False
+    error: KeyboardInterrupt | None = None
 
-    def __call__(self, number: int, frame: FrameType | None) -> None:
-        self.pressed = True
-        signal.default_int_handler(number, frame)
+    def __call__(self, number: int, _: FrameType | None) -> None:
+        is_ctrl_c = number == signal.SIGINT
+        self.error = KeyboardInterrupt() if is_ctrl_c else Terminated("terminated")
+        raise self.error
 
 
-_interrupt = _Interrupt()
+_stop = _Stop()
 
 
 def stop_if_interrupted() -> None:
-    """Raises KeyboardInterrupt once more if Ctrl-C was pressed; call it in a loop."""
-    if _interrupt.pressed:
-        raise KeyboardInterrupt
+    """Raises Ctrl-C or SIGTERM once more if it came; call it in a loop."""
+    if _stop.error:
+        raise _stop.error
 
 
 def run(main: Callable[[Sequence[str]], int]) -> None:
     """Calls a program's main and exits; bad input is one line and status 2."""
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _interrupt)
+    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+    for number, handler in usual.items():
+        if signal.getsignal(number) is handler:
+            signal.signal(number, _stop)
     sys.exit(status(main, sys.argv[1:]))
 
 
@@ -58,6 +66,9 @@ def status(main: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> in
     except DisasmError as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_BAD_INPUT
+    except Terminated:
+        print("terminated; what was finished is kept", file=sys.stderr)
+        return EXIT_TERMINATED
     except KeyboardInterrupt:
         print("interrupted; what was finished is kept", file=sys.stderr)
         return EXIT_INTERRUPTED
@@ -99,7 +110,7 @@ class ProgressBar:
         with ProgressBar(unit="episode") as progress:
             train(..., progress=progress)
 
-    Ctrl-C is raised at the next update even where a library swallowed it.
+    Ctrl-C or SIGTERM is raised at the next update even where a library swallowed it.
     """
 
     def __init__(self, unit: str = "", keep: bool = False) -> None:

@@ -11,7 +11,6 @@ folder/
 import contextlib
 import csv
 import dataclasses
-import fcntl
 import io
 import time
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.file_lock import try_lock
 from drake_disasm.common.files import make_folder, read_text, write_json, write_text
 from drake_disasm.common.plain_data import check_like
 from drake_disasm.common.progress import Progress, ProgressUpdate
@@ -204,7 +204,7 @@ def _locked(folder: Path) -> Iterator[None]:
     """Holds the folder for this process; the system lets go when it dies."""
     with (folder / ".lock").open("w") as file:
         until = time.monotonic() + _PATIENCE
-        while not _try_lock(file):
+        while not try_lock(file):
             if time.monotonic() > until:
                 raise DisasmError(
                     f"{folder}: another program is training there; wait for it, or "
@@ -212,11 +212,3 @@ def _locked(folder: Path) -> Iterator[None]:
                 )
             time.sleep(0.1)
         yield
-
-
-def _try_lock(file: Any) -> bool:
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True

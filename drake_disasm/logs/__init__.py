@@ -14,6 +14,7 @@ the column or key, and the remedy.
 
 from drake_disasm.logs.columns import flat_columns
 from drake_disasm.logs.header import LogHeader
+from drake_disasm.logs.open_episode import OpenEpisode
 from drake_disasm.logs.reader import Episode, Log, read_log, read_logs
 from drake_disasm.logs.schema import KINDS, SCHEMA, SI_UNITS
 from drake_disasm.logs.static_wrench import (
@@ -31,6 +32,7 @@ __all__ = [
     "Log",
     "LogHeader",
     "LogWriter",
+    "OpenEpisode",
     "flat_columns",
     "read_log",
     "read_logs",

@@ -6,6 +6,7 @@ from pathlib import Path
 from drake_disasm.logs.refusal import refusal
 
 _EPISODE = re.compile(r"episode_(\d{4,})\.(parquet|csv)")
+_UNFINISHED = re.compile(r"\.episode_(\d{4,})\.unfinished\.csv")
 _TEMPORARY = re.compile(r"\..*\.tmp")
 
 
@@ -41,6 +42,17 @@ def _episode_number(path: Path) -> int:
             "rename it to the pattern episode_0000.csv or episode_0000.parquet",
         )
     return int(match[1])
+
+
+def unfinished_path(folder: Path, number: int) -> Path:
+    """The file that an episode's rows go to while it is recorded."""
+    return folder / f".episode_{number:04d}.unfinished.csv"
+
+
+def unfinished_files(folder: Path) -> dict[int, Path]:
+    """The episodes that are being recorded, or were when their program was killed."""
+    matches = ((_UNFINISHED.fullmatch(p.name), p) for p in sorted(folder.iterdir()))
+    return {int(match[1]): path for match, path in matches if match}
 
 
 def is_empty(folder: Path) -> bool:

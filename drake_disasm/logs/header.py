@@ -15,7 +15,7 @@ from drake_disasm.logs.schema import KINDS, SCHEMA, SI_UNITS, UNIT_SPELLINGS, Ki
 
 HEADER_NAME = "log.yaml"
 _REQUIRED = ("schema", "kind", "units", "frames", "task", "provenance")
-_KEYS = (*_REQUIRED, "period", "joints", "urdf", "scenario")
+_KEYS = (*_REQUIRED, "period", "joints", "urdf", "scenario", "notes")
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,8 @@ class LogHeader:
         joints: names of the joints, in the order of the columns `q.0`, `q.1`, ...
         urdf: the URDF that describes the arm, as `package://` or a path.
         scenario: the scenario, as plain data, so that a log describes itself.
+        notes: what is to be known of single episodes, by their numbers: `cut_off`
+            says why one was ended from outside; else free.
     """
 
     kind: str
@@ -43,6 +45,7 @@ class LogHeader:
     joints: tuple[str, ...] = ()
     urdf: str | None = None
     scenario: Mapping[str, Any] | None = None
+    notes: Mapping[int, Mapping[str, Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Fills in the frames that the kind leaves no choice about."""
@@ -62,8 +65,9 @@ class LogHeader:
             "urdf": self.urdf,
             "scenario": _plain(self.scenario),
             "provenance": _plain(self.provenance),
+            "notes": {n: dict(note) for n, note in self.notes.items()} or None,
         }
-        optional = ("joints", "urdf", "scenario")
+        optional = ("joints", "urdf", "scenario", "notes")
         return {k: v for k, v in values.items() if k not in optional or v is not None}
 
 
@@ -92,6 +96,7 @@ def parse_header(raw: object, where: str) -> LogHeader:
         scenario=_mapping(values, "scenario", where)
         if values.get("scenario") is not None
         else None,
+        notes=_checked_notes(values.get("notes") or {}, where),
     )
 
 
@@ -243,6 +248,19 @@ def _checked_joints(values: Mapping[str, Any], where: str) -> tuple[str, ...]:
             where, f"key 'joints' is {joints!r}", "give a list of different names"
         )
     return tuple(joints)
+
+
+def _checked_notes(notes: object, where: str) -> Mapping[int, Mapping[str, Any]]:
+    table: Mapping[Any, Any] = notes if isinstance(notes, Mapping) else {None: None}
+    for number, note in table.items():
+        is_number = type(number) is int and number >= 0
+        if not is_number or not isinstance(note, Mapping):
+            raise refusal(
+                where,
+                "key 'notes' is not a mapping of episodes' numbers to mappings",
+                "write lines such as '3: {cut_off: the gripper slipped}' below it",
+            )
+    return table
 
 
 def _text(values: Mapping[str, Any], key: str, where: str) -> str:

@@ -1,7 +1,7 @@
 """Reading logs: everything is checked, and refused by name, before use."""
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from drake_disasm.logs.checks import check_values
 from drake_disasm.logs.columns import arrange_names
-from drake_disasm.logs.files import episode_files, read_bytes
+from drake_disasm.logs.files import episode_files, read_bytes, unfinished_files
 from drake_disasm.logs.header import LogHeader, read_header
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.logs.schema import KINDS
 from drake_disasm.logs.tables import column_names, read_table
+from drake_disasm.logs.unfinished import is_being_written
 
 
 @dataclass(frozen=True)
@@ -75,18 +76,21 @@ class Log:
         header: what `log.yaml` says.
         episodes: its episodes in the order of their numbers, at least one.
         data_hash: what `sha256sum episode_* | sha256sum` prints in the folder.
+        remarks: what its reader should be told: episodes that are left out.
     """
 
     folder: Path
     header: LogHeader
     episodes: tuple[Episode, ...]
     data_hash: str
+    remarks: tuple[str, ...] = ()
 
 
 def read_log(folder: str | Path) -> Log:
     """Reads the log in a folder; `docs/log-format.md` describes the format.
 
-    Temporary files that a killed writer left behind are ignored.
+    Temporary files that a killed writer left behind are ignored. An episode that is
+    being recorded, or that a kill cut off, is left out with a remark.
 
     Raises:
         DisasmError: the folder is not a log, or something in it breaks the format;
@@ -95,14 +99,17 @@ def read_log(folder: str | Path) -> Log:
     folder = Path(folder)
     header = read_header(folder)
     paths = tuple(episode_files(folder).values())
+    remarks = tuple(_unfinished(folder))
     if not paths:
         raise refusal(
-            folder, "no episode_0000.parquet or .csv", "record at least one episode"
+            folder,
+            "no episode_0000.parquet or .csv",
+            remarks[0] if remarks else "record at least one episode",
         )
     hashes: dict[str, str] = {}
     episodes = tuple(_read_episode(header, path, hashes) for path in paths)
     _check_same_columns(episodes)
-    return Log(folder, header, episodes, _hash_of_hashes(hashes))
+    return Log(folder, header, episodes, _hash_of_hashes(hashes), remarks)
 
 
 def read_logs(folders: Iterable[str | Path]) -> tuple[Log, ...]:
@@ -123,6 +130,14 @@ def read_logs(folders: Iterable[str | Path]) -> tuple[Log, ...]:
                 "read logs of different kinds apart",
             )
     return logs
+
+
+def _unfinished(folder: Path) -> Iterator[str]:
+    for number, path in unfinished_files(folder).items():
+        what = "was cut off by a kill; recording with --resume keeps its rows"
+        if is_being_written(path):
+            what = "is being recorded"
+        yield f"{folder}: episode {number} is left out: it {what}"
 
 
 def _read_episode(header: LogHeader, path: Path, hashes: dict[str, str]) -> Episode:

@@ -215,7 +215,10 @@ TRANSITIONS = Kind(
         ),
         _EXTRA,
         _flag("terminated", "the episode ended here by success or failure"),
-        _flag("truncated", "the episode ended here by a limit, such as its steps"),
+        _flag(
+            "truncated",
+            "the episode ended here by a limit, such as its steps, or was cut off",
+        ),
     ),
     keys={
         "period": Rule.REQUIRED,

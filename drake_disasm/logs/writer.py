@@ -1,10 +1,11 @@
-"""Writing logs: an episode is there whole or not at all."""
+"""Writing logs: an episode is there whole or not at all, or its rows as they come."""
 
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from drake_disasm.common.files import make_folder, write_atomically
@@ -15,17 +16,26 @@ from drake_disasm.logs.files import (
     episode_path,
     is_empty,
     read_bytes,
+    unfinished_files,
+    unfinished_path,
 )
 from drake_disasm.logs.header import LogHeader, as_read, read_header, write_header
+from drake_disasm.logs.open_episode import OpenEpisode
 from drake_disasm.logs.reader import check_same_names
 from drake_disasm.logs.refusal import quoted, refusal
+from drake_disasm.logs.schema import KINDS
 from drake_disasm.logs.tables import FILE_FORMATS, column_names, write_table
+from drake_disasm.logs.unfinished import RowFile, is_being_written, read_rows
+
+_KILLED = "the program was killed"
 
 
 class LogWriter:
-    """Writes a log, one episode at a time; a killed run loses the running one only.
+    """Writes a log, one episode at a time.
 
-    It holds nothing open, so that it works with and without `with`.
+    A killed run loses the running episode if that is written at its end
+    (`write_episode`), and none of its rows if they are written as they come
+    (`begin_episode`). It holds nothing open, so that it works with and without `with`.
     """
 
     def __init__(
@@ -42,8 +52,9 @@ class LogWriter:
             header: what `log.yaml` will say.
             file_format: "parquet" or "csv".
             resume: continue the log in the folder, if there is one, after its last
-                episode. Its header must be the same, but for the provenance, of
-                which the first is kept.
+                episode, and close an episode that a kill cut off (`remarks` says
+                so). Its header must be the same, but for the provenance, of which
+                the first is kept, and the notes.
 
         Raises:
             DisasmError: the folder is not empty and `resume` is false, or it holds
@@ -59,6 +70,8 @@ class LogWriter:
         self._header = as_read(header, self._folder)
         self._names: list[str] | None = None
         self._next = 0
+        self._newest: int | None = None
+        self.remarks: list[str] = []
         make_folder(self._folder)
         self._start(resume)
 
@@ -91,14 +104,50 @@ class LogWriter:
                 is written then.
         """
         path = episode_path(self._folder, self._next, self._format)
-        names = arrange_names(self._header, list(columns), str(path))
-        check_same_names(self._names or names, names, path)
+        names = self._arranged(list(columns), path)
         ordered = {name: columns[name] for name in names}
         table = check_values(self._header, ordered, str(path))
         self._write(path, table)
-        self._names = list(names)
+        self._names, self._newest = names, self._next
         self._next += 1
         return path
+
+    def begin_episode(self) -> OpenEpisode:
+        """Begins the next episode, row by row; `write_episode` waits until it ends.
+
+        What is appended outlives the program: if it is killed, the next start with
+        `resume` closes the episode.
+        """
+        path = unfinished_path(self._folder, self._next)
+        self._newest = None
+
+        def begin(names: list[str]) -> RowFile:
+            self._newest = self._next
+            return RowFile(path, self._arranged(names, path))
+
+        return OpenEpisode(
+            self._header.kind, begin, lambda cut_off: self._keep(path, cut_off)
+        )
+
+    def note(self, **values: Any) -> None:
+        """Adds to what the header says of the episode begun or written last.
+
+        It rewrites `log.yaml`, so call it when no robot waits. If no episode has come
+        of what was begun last, there is nothing to note.
+
+        Args:
+            values: plain data by key; `cut_off` is the format's own.
+
+        Raises:
+            DisasmError: not plain data, or it can't be written.
+        """
+        if self._newest is None:
+            return
+        notes = {number: dict(note) for number, note in self._header.notes.items()}
+        notes[self._newest] = notes.get(self._newest, {}) | values
+        header = dataclasses.replace(self._header, notes=dict(sorted(notes.items())))
+        self._header = as_read(header, self._folder)
+        write_header(self._folder, self._header)
 
     def __enter__(self) -> Self:
         """Returns the writer."""
@@ -123,7 +172,7 @@ class LogWriter:
         found = read_header(self._folder)
         for field in dataclasses.fields(LogHeader):
             old, new = (getattr(h, field.name) for h in (found, self._header))
-            if field.name != "provenance" and old != new:
+            if field.name not in ("provenance", "notes") and old != new:
                 raise refusal(
                     self._folder / "log.yaml",
                     f"key '{field.name}' is {old!r}, the log to resume has {new!r}",
@@ -132,8 +181,60 @@ class LogWriter:
         self._header = found
         paths = episode_files(self._folder)
         if paths:
-            self._next = max(paths) + 1
-            self._names = _names_in(next(iter(paths.values())))
+            self._names = list(_names_in(next(iter(paths.values()))))
+        for number, path in unfinished_files(self._folder).items():
+            self._recover(number, path, number in paths)
+        self._next, self._newest = (
+            max(episode_files(self._folder), default=-1) + 1,
+            None,
+        )
+
+    def _recover(self, number: int, path: Path, is_written: bool) -> None:
+        """Closes an episode whose program was killed."""
+        if is_being_written(path):
+            raise refusal(
+                path, "is written by another program", "wait for it, or stop it"
+            )
+        if is_written:  # it was killed when only this was left to do
+            path.unlink()
+            return
+        self._next = self._newest = number  # for the note
+        kept = self._keep(path, _KILLED)
+        what = f"was cut off: {_KILLED}; its rows are kept as {kept and kept.name}"
+        if kept is None:
+            what = (
+                f"was cut off before its first step: {_KILLED}; nothing of it is kept"
+            )
+        self.remarks.append(f"{self._folder}: episode {number} {what}")
+
+    def _arranged(self, names: list[str], path: Path) -> list[str]:
+        """Returns the names in the declared order; refuses those of another log."""
+        arranged = arrange_names(self._header, names, str(path))
+        check_same_names(self._names or arranged, arranged, path)
+        return list(arranged)
+
+    def _keep(self, path: Path, cut_off: str | None) -> Path | None:
+        """Turns a file of rows into an episode; each order of its steps can be killed.
+
+        The note comes first, and the rows go last: a next start finds either and
+        does the rest.
+        """
+        kind = KINDS[self._header.kind]
+        table = read_rows(path, kind)
+        rows = len(next(iter(table.values()), ()))
+        if rows < kind.min_rows:
+            path.unlink()
+            self._newest = None
+            return None
+        flags = [table[name] for name in kind.boolean_columns if name in table]
+        if cut_off and not any(flag[-1] for flag in flags):
+            if "truncated" in table:
+                table["truncated"] = np.append(table["truncated"][:-1], True)
+            if "cut_off" not in self._header.notes.get(self._next, {}):
+                self.note(cut_off=cut_off)
+        episode = self.write_episode(table)
+        path.unlink()
+        return episode
 
     def _write(self, path: Path, table: Mapping[str, NDArray[Any]]) -> None:
         if path.exists():

@@ -8,12 +8,18 @@ import numpy as np
 
 from drake_disasm.logs.columns import flat_columns
 from drake_disasm.logs.header import LogHeader
+from drake_disasm.logs.open_episode import OpenEpisode
 from drake_disasm.logs.reader import Log, read_log
 from drake_disasm.logs.writer import LogWriter
+from drake_disasm.mdp import REWARD_TERMS, Outcome
 from drake_disasm.scenario import Scenario, scenario_to_mapping
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.simulation import StepResult, TaskSimulation
 
+_NO_STEP: dict[str, Any] = {
+    "action": np.zeros(6),
+    "action_executed": np.zeros(6),
+} | {f"reward.{name}": np.float64(0.0) for name in REWARD_TERMS}
 _JOINTS = tuple(f"iiwa_joint_{i}" for i in range(1, 8))
 
 
@@ -24,46 +30,62 @@ class EpisodeRecorder:
     from it; the last row is what was measured at the end, with no action.
     """
 
-    def __init__(self, simulation: TaskSimulation) -> None:
-        self._simulation = simulation
+    def __init__(
+        self, simulation: TaskSimulation, episode: OpenEpisode | None = None
+    ) -> None:
+        """Collects nothing yet.
+
+        Args:
+            simulation: whose episode it is.
+            episode: gets each row at once, too.
+        """
+        self._simulation, self._episode = simulation, episode
         self._rows: list[dict[str, Any]] = []
 
     def measure(self) -> None:
         """Opens a row with what is measured now."""
-        simulation, systems = self._simulation, self._simulation.systems
-        self._rows.append(
-            {
-                "time": np.float64(simulation.time),
-                "X_GB_measured": simulation.evaluate(systems.processor, "X_GB"),
-                "X_GB_commanded": simulation.evaluate(
-                    systems.pose_target, "X_GB_commanded"
-                ),
-                "wrench": simulation.observation()[6:],
-                "ft_sensor": simulation.evaluate(systems.station, "ft_sensor.wrench"),
-                "q": simulation.joint_positions(),
-                "action": np.zeros(6),
-                "action_executed": np.zeros(6),
-                "terminated": np.False_,
-                "truncated": np.False_,
-            }
-            | {
-                f"extra.{parameter}": np.float64(value)
-                for parameter, value in simulation.drawn.items()
-            }
-        )
+        self._open_row(Outcome.RUNNING, _NO_STEP)
 
     def acted(self, result: StepResult) -> None:
         """Completes the newest row with the step just done, and opens the next."""
-        row = self._rows[-1]
-        row["action"] = self._simulation.action()
-        row["action_executed"] = self._simulation.evaluate(
-            self._simulation.systems.pose_target, "action_executed"
-        )
-        for name, value in result.reward_terms.items():
-            row[f"reward.{name}"] = np.float64(value)
-        self.measure()
-        self._rows[-1]["terminated"] = np.bool_(result.outcome.terminated)
-        self._rows[-1]["truncated"] = np.bool_(result.outcome.truncated)
+        simulation, systems = self._simulation, self._simulation.systems
+        step = {
+            "action": simulation.action(),
+            "action_executed": simulation.evaluate(
+                systems.pose_target, "action_executed"
+            ),
+        } | {
+            f"reward.{name}": np.float64(value)
+            for name, value in result.reward_terms.items()
+        }
+        self._rows[-1] |= step
+        self._open_row(result.outcome, step)
+
+    def _open_row(self, outcome: Outcome, step: Mapping[str, Any]) -> None:
+        """Adds a row of the present measurements, to which a step has led."""
+        row = self._measured() | {
+            "terminated": np.bool_(outcome.terminated),
+            "truncated": np.bool_(outcome.truncated),
+        }
+        self._rows.append(row | _NO_STEP)
+        if self._episode:
+            self._episode.append(row, step)
+
+    def _measured(self) -> dict[str, Any]:
+        simulation, systems = self._simulation, self._simulation.systems
+        return {
+            "time": np.float64(simulation.time),
+            "X_GB_measured": simulation.evaluate(systems.processor, "X_GB"),
+            "X_GB_commanded": simulation.evaluate(
+                systems.pose_target, "X_GB_commanded"
+            ),
+            "wrench": simulation.observation()[6:],
+            "ft_sensor": simulation.evaluate(systems.station, "ft_sensor.wrench"),
+            "q": simulation.joint_positions(),
+        } | {
+            f"extra.{parameter}": np.float64(value)
+            for parameter, value in simulation.drawn.items()
+        }
 
     @property
     def steps(self) -> int:
@@ -73,11 +95,7 @@ class EpisodeRecorder:
     def columns(self) -> dict[str, np.ndarray]:
         """Returns the quantities, each (T + 1,) or (T + 1, n)."""
         names = self._rows[0].keys()
-        zero = np.float64(0.0)
-        return {
-            name: np.stack([row.get(name, zero) for row in self._rows])
-            for name in names
-        }
+        return {name: np.stack([row[name] for row in self._rows]) for name in names}
 
 
 def transitions_header(

@@ -67,6 +67,55 @@ def _skip_without_multicast() -> None:
         pytest.skip("LCM's multicast does not come back on this machine")
 
 
+_POLICY = """
+import numpy as np
+
+calls = 0
+
+def to_and_fro(state):
+    global calls
+    calls += 1
+    return np.array([3e-4 if calls % 2 else -3e-4, 0, 0, 0, 0, 0])
+"""
+
+
+@pytest.mark.slow
+def test_no_row_is_lost_however_a_run_is_stopped(
+    fake: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "slow_policy.py").write_text(_POLICY)
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}")
+    folder, seen = tmp_path / "log", []
+    stops = ((signal.SIGKILL, -9), (signal.SIGTERM, 143), (signal.SIGINT, 130))
+    for number, (stop, status) in enumerate(stops):
+        process = subprocess.Popen(
+            command(
+                "simulate", "--station", "hardware", "--hardware-config", fake,
+                "--policy", "slow_policy:to_and_fro", "--no-meshcat",
+                "--record", folder, "--resume",
+            ),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )  # fmt: skip
+        rows = folder / f".episode_{number:04d}.unfinished.csv"
+        while not (rows.exists() and rows.read_text().count("\n") > 6):
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.02)
+        seen.append(rows.read_text().count("\n") - 1)
+        process.send_signal(stop)
+        output, errors = process.communicate()
+        assert process.returncode == status, errors
+        assert ("episode 0 was cut off" in output) == (number == 1)
+    log = read_log(folder)
+    assert [note["cut_off"] for note in log.header.notes.values()] == [
+        "the program was killed", "terminated", "interrupted by Ctrl-C"
+    ]  # fmt: skip
+    assert len(log.episodes) == 3
+    for episode, count in zip(log.episodes, seen, strict=True):
+        assert episode.rows >= count and episode["truncated"][-1]
+
+
 @pytest.mark.slow
 def test_a_dry_run_shows_the_devices_and_commands_nothing(fake: Path) -> None:
     process = subprocess.Popen(

@@ -1,4 +1,8 @@
-"""Progress of library calls on the terminal."""
+"""Progress of library calls on the terminal, and how a program is ended."""
+
+import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -37,6 +41,43 @@ def test_a_message_without_a_count_is_a_line(
 def test_a_swallowed_ctrl_c_stops_at_the_next_update(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(program._interrupt, "pressed", True)
+    monkeypatch.setattr(program._stop, "error", KeyboardInterrupt())
     with ProgressBar() as progress, pytest.raises(KeyboardInterrupt):
         progress(ProgressUpdate("fitting", 1))
+
+
+RUNS_UNTIL_STOPPED = """
+import time
+from drake_disasm.common import program
+
+def main(arguments):
+    print("begun", flush=True)
+    try:
+        while True:
+            time.sleep(0.01)
+    finally:
+        print("tidied up", flush=True)
+
+program.run(main)
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "status", "words"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
+def test_a_program_that_is_stopped_tidies_up_and_says_so(
+    number: signal.Signals, status: int, words: str
+) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", RUNS_UNTIL_STOPPED],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout and process.stdout.readline() == "begun\n"
+    process.send_signal(number)
+    output, errors = process.communicate()
+    assert process.returncode == status
+    assert output == "tidied up\n"
+    assert errors == f"{words}; what was finished is kept\n"
