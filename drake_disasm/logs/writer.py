@@ -122,8 +122,9 @@ class LogWriter:
         self._newest = None
 
         def begin(names: list[str]) -> RowFile:
+            file = RowFile(path, self._arranged(names, path))
             self._newest = self._next
-            return RowFile(path, self._arranged(names, path))
+            return file
 
         return OpenEpisode(
             self._header.kind, begin, lambda cut_off: self._keep(path, cut_off)
@@ -184,10 +185,8 @@ class LogWriter:
             self._names = list(_names_in(next(iter(paths.values()))))
         for number, path in unfinished_files(self._folder).items():
             self._recover(number, path, number in paths)
-        self._next, self._newest = (
-            max(episode_files(self._folder), default=-1) + 1,
-            None,
-        )
+        self._next = max(episode_files(self._folder), default=-1) + 1
+        self._newest = None
 
     def _recover(self, number: int, path: Path, is_written: bool) -> None:
         """Closes an episode whose program was killed."""
