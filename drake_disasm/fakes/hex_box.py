@@ -84,10 +84,6 @@ class FakeHexBox:
         """Whether a client has requested the stream."""
         return self._started.is_set()
 
-    def wait_started(self, timeout: float = 5.0) -> bool:
-        """Waits [s] for a client's request to stream; returns whether it came."""
-        return self._started.wait(timeout)
-
     def send(self, wrench: Iterable[float]) -> None:
         """Sends the next sample, [f; tau] [N, N m], as the fault has it."""
         assert self.fault in FAULTS, self.fault

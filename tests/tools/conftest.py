@@ -32,7 +32,6 @@ def simulate_apart(tmp_path: Path) -> Runner:
             cwd=tmp_path,
             capture_output=True,
             text=True,
-            timeout=120,
             env={"PATH": "/usr/bin:/bin", "PYTHONPATH": str(tmp_path)},
             check=False,
         )

@@ -7,13 +7,13 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 
 from drake_disasm.common import program
+from tests.progress import running, wait_until
 
 ROOT = Path(__file__).parents[2]
 Runner = Callable[..., subprocess.CompletedProcess[str]]
@@ -66,7 +66,6 @@ def start_program(
         command(name, *arguments),
         capture_output=True,
         text=True,
-        timeout=280,
         cwd=cwd,
         check=False,
     )
@@ -74,16 +73,9 @@ def start_program(
 
 def interrupt(is_time: Callable[[], bool], name: str, *arguments: object) -> None:
     """Runs a program and presses Ctrl-C; it must say that what it has is kept."""
-    process = subprocess.Popen(
-        command(name, *arguments),
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    deadline = time.monotonic() + 200
-    while not is_time():
-        assert time.monotonic() < deadline and process.poll() is None
-        time.sleep(0.02)
-    os.kill(process.pid, signal.SIGINT)
-    _, errors = process.communicate(timeout=100)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with running(command(name, *arguments), **pipes) as process:
+        wait_until(is_time, process)
+        os.kill(process.pid, signal.SIGINT)
+        _, errors = process.communicate()
     assert process.returncode == 130 and "what was finished is kept" in errors

@@ -24,13 +24,12 @@ from tools import cli
 TOOLS = Path(__file__).parents[2] / "tools"
 
 SWALLOWS = """
-import os, signal, time
+import signal
 from drake_disasm.common import program
 
 def main(arguments):
     try:
-        os.kill(os.getpid(), signal.SIGINT)
-        time.sleep(1)
+        signal.raise_signal(signal.SIGINT)
     except KeyboardInterrupt:
         pass  # as a library's callback does
     program.stop_if_interrupted()

@@ -3,7 +3,6 @@
 import os
 import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pytest
 from pydrake.lcm import DrakeLcm
 
 from drake_disasm.logs import read_log
+from tests.progress import running, wait_until
 from tests.tools.programs import command, run_program
 
 _PORT = 20_000 + os.getpid() % 20_000  # nobody else's: tests run beside each other
@@ -44,18 +44,13 @@ def fake(tmp_path: Path) -> Iterator[Path]:
     """Plays a cell in real time; yields the file by which it is found."""
     _skip_without_multicast()
     config = tmp_path / "fake.yaml"
-    process = subprocess.Popen(
-        command("fake_cell", "--config", config, "--lcm-url", _LCM),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-    )
-    deadline = time.monotonic() + 60
-    while not config.exists():
-        assert time.monotonic() < deadline and process.poll() is None
-        time.sleep(0.05)
-    yield config
-    process.send_signal(signal.SIGINT)
-    assert process.wait(30) == 130
+    cell = command("fake_cell", "--config", config, "--lcm-url", _LCM)
+    streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL}
+    with running(cell, **streams) as process:
+        wait_until(config.exists, process)
+        yield config
+        process.send_signal(signal.SIGINT)
+        assert process.wait() == 130
 
 
 def _skip_without_multicast() -> None:
@@ -118,17 +113,14 @@ def test_no_row_is_lost_however_a_run_is_stopped(
 
 @pytest.mark.slow
 def test_a_dry_run_shows_the_devices_and_commands_nothing(fake: Path) -> None:
-    process = subprocess.Popen(
-        command(
-            "simulate", "--station", "hardware", "--hardware-config", fake, "--dry-run"
-        ),
-        stdout=subprocess.PIPE,
-        text=True,
+    dry_run = command(
+        "simulate", "--station", "hardware", "--hardware-config", fake, "--dry-run"
     )
-    assert process.stdout
-    lines = [process.stdout.readline() for _ in range(8)]
-    os.kill(process.pid, signal.SIGINT)
-    assert process.wait(30) == 130
+    with running(dry_run, stdout=subprocess.PIPE) as process:
+        assert process.stdout
+        lines = [process.stdout.readline() for _ in range(8)]
+        os.kill(process.pid, signal.SIGINT)
+        assert process.wait() == 130
     for name in ("iiwa", "gripper", "ft_sensor"):
         assert any(f"{name:10} READY" in line for line in lines), lines
 

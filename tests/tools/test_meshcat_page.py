@@ -36,7 +36,6 @@ def _chromium(action: str, url: str, folder: Path) -> str:
         check=True,
         capture_output=True,
         text=True,
-        timeout=120,
     ).stdout
 
 

@@ -1,10 +1,9 @@
 """tools/simulate.py: what it prints and writes, and how it refuses bad input."""
 
-import os
+import contextlib
 import signal
 import subprocess
-import sys
-import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,8 @@ from drake_disasm.policies import (
     save_policy,
 )
 from drake_disasm.scenario import load_scenario, scenario_from_mapping
-from tests.tools.programs import ROOT, Runner
+from tests.progress import running, wait_until
+from tests.tools.programs import Runner, command
 
 TWIN = ("--station", "twin")
 
@@ -179,35 +179,31 @@ def test_bad_policy_stops_the_episode_and_keeps_the_log(
     assert not episode["terminated"].any() and not episode["truncated"].any()
 
 
-def _start_long_run(folder: Path) -> subprocess.Popen[str]:
+@contextlib.contextmanager
+def _long_run(folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """Yields a run that has recorded three episodes and goes on."""
     arguments = ["--no-meshcat", *TWIN, "--episodes", "1000", "--record", "log"]
-    process = subprocess.Popen(
-        [sys.executable, str(ROOT / "tools/simulate.py"), *arguments],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
-    deadline = time.monotonic() + 60
-    while len(list(folder.glob("log/episode_*.parquet"))) < 3:
-        assert process.poll() is None and time.monotonic() < deadline
-        time.sleep(0.02)
-    return process
+    run = command("simulate", *arguments)
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with running(run, cwd=folder, **streams) as process:
+        wait_until(
+            lambda: len(list(folder.glob("log/episode_*.parquet"))) >= 3, process
+        )
+        yield process
 
 
 def test_kill_loses_the_running_episode_alone(tmp_path: Path) -> None:
-    process = _start_long_run(tmp_path)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
+    with _long_run(tmp_path) as process:
+        process.kill()
     log = read_log(tmp_path / "log")
     assert len(log.episodes) >= 3
     assert all(episode["terminated"][-1] for episode in log.episodes)
 
 
 def test_interrupt_prints_what_was_done(tmp_path: Path) -> None:
-    process = _start_long_run(tmp_path)
-    process.send_signal(signal.SIGINT)
-    output, _ = process.communicate(timeout=60)
+    with _long_run(tmp_path) as process:
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate()
     assert process.returncode == 130
     assert "episodes succeeded" in output
     assert len(read_log(tmp_path / "log").episodes) >= 3

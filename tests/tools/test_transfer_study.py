@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import subprocess
-import time
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import pytest
 from drake_disasm.logs import read_log
 from drake_disasm.mdp import REWARD_TERMS
 from drake_disasm.policies import load_policy
+from tests.progress import running, wait_until
 from tests.tools.programs import command, run_program
 
 _SMALL = [
@@ -116,15 +116,12 @@ def test_an_interrupted_study_goes_on_to_the_same_result(
 ) -> None:
     out = tmp_path / "out"
     arguments = _arguments(scenarios, out, "--station=twin")
-    process = subprocess.Popen(
-        command("transfer_study", *arguments), stderr=subprocess.PIPE, text=True
-    )
-    until = time.monotonic() + 120.0
-    while not (out / "untrained/seed_000/log/episode_0001.parquet").exists():
-        assert time.monotonic() < until and process.poll() is None
-        time.sleep(0.005)
-    os.kill(process.pid, signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
+    begun = out / "untrained/seed_000/log/episode_0001.parquet"
+    study = command("transfer_study", *arguments)
+    with running(study, stderr=subprocess.PIPE) as process:
+        wait_until(begun.exists, process)
+        os.kill(process.pid, signal.SIGINT)
+        _, errors = process.communicate()
     assert process.returncode == 130 and "Traceback" not in errors
     run = _run([*arguments, "--resume"])
     assert run.returncode == 0, run.stderr

@@ -2,8 +2,7 @@
 
 import os
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import psutil
@@ -14,6 +13,7 @@ from drake_disasm.devices.onrobot_hex import Command, HexClient, Request
 from drake_disasm.devices.reading import Counters
 from drake_disasm.fakes.hex_box import JUMP, FakeHexBox
 from drake_disasm.ports import Health
+from tests.progress import wait_until
 
 WRENCH = (1.0, -2.0, 3.0, 0.1, -0.2, 0.3)
 STREAM = [
@@ -21,7 +21,7 @@ STREAM = [
     Request(Command.PERIOD, 2),
     Request(Command.START, 0),
 ]
-PATIENT = 60.0  # [s], silence that a busy machine doesn't reach
+PATIENT = 1e6  # [s], silence that no machine reaches
 
 
 class _Clock:
@@ -31,13 +31,6 @@ class _Clock:
 
     def __call__(self) -> float:
         return self.now
-
-
-def _until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 10.0
-    while not condition():
-        assert time.monotonic() < deadline, "it never came true"
-        time.sleep(0.001)
 
 
 @pytest.fixture
@@ -54,7 +47,7 @@ def box(clock: _Clock) -> Iterator[FakeHexBox]:
 @pytest.fixture
 def client(box: FakeHexBox, clock: _Clock) -> Iterator[HexClient]:
     with HexClient("127.0.0.1", box.port, clock=clock, silence=PATIENT) as client:
-        assert box.wait_started()
+        wait_until(lambda: box.started)
         yield client
 
 
@@ -67,13 +60,13 @@ def _send(box: FakeHexBox, *faults: str) -> None:
 
 def _counted(client: HexClient, **expected: int) -> None:
     """Waits until the counters are as expected."""
-    _until(lambda: client.read().counters == Counters(**expected))
+    wait_until(lambda: client.read().counters == Counters(**expected))
 
 
 def test_settings_come_before_the_start(box: FakeHexBox, client: HexClient) -> None:
     assert box.requests == STREAM
     client.stop()
-    _until(lambda: not box.started)
+    wait_until(lambda: not box.started)
     assert box.requests == [*STREAM, Request(Command.STOP)]
 
 
@@ -109,7 +102,7 @@ def test_faults_are_counted(
     counters: Counters,
 ) -> None:
     _send(box, *faults)
-    _until(lambda: client.read().counters == counters)
+    wait_until(lambda: client.read().counters == counters)
     assert client.read().values[0] == newest
     assert not client.read().error
 
@@ -138,7 +131,7 @@ def test_a_bad_status_is_an_error_until_a_good_one(
     box: FakeHexBox, client: HexClient
 ) -> None:
     _send(box, "", "status")
-    _until(lambda: bool(client.read().error))
+    wait_until(lambda: bool(client.read().error))
     assert "HEX status 0x2: " in client.read().error
     assert client.read().values[0] == 1.0
     assert client.read().health(0.0, stale_after=0.1) == Health.ERROR
@@ -162,24 +155,24 @@ def test_numbers_wrap_and_begin_anew(box: FakeHexBox, client: HexClient) -> None
 
 def test_a_box_that_was_restarted_streams_again() -> None:
     with FakeHexBox() as old, HexClient("127.0.0.1", old.port, silence=0.02) as client:
-        assert old.wait_started()
+        wait_until(lambda: old.started)
         old.stop()
-        _until(lambda: client.read().counters.reconnects >= 2)
+        wait_until(lambda: client.read().counters.reconnects >= 2)
         with FakeHexBox(old.port) as box:
 
             def sends_until_read() -> bool:
                 box.send(WRENCH)
                 return client.read().counters.received > 0
 
-            assert box.wait_started()
-            _until(sends_until_read)
+            wait_until(lambda: box.started)
+            wait_until(sends_until_read)
     np.testing.assert_array_equal(client.read().values, WRENCH)
 
 
 def test_a_silent_box_is_asked_again() -> None:
     with FakeHexBox() as box, HexClient("127.0.0.1", box.port, silence=0.02) as client:
-        _until(lambda: client.read().counters.reconnects >= 2)
-        _until(lambda: len(box.requests) >= 6)
+        wait_until(lambda: client.read().counters.reconnects >= 2)
+        wait_until(lambda: len(box.requests) >= 6)
         assert box.requests[:6] == [*STREAM, *STREAM]
 
 

@@ -5,7 +5,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from drake_disasm.devices.robotiq import Activation, RobotiqClient, RobotiqSetti
 from drake_disasm.fakes.robotiq_gripper import FakeRobotiqGripper
 from drake_disasm.ports import Health
 from tests.fakes.serial_line import serial_line
+from tests.progress import wait_until
 
 OPEN = bytes.fromhex("09 10 03 E8 00 03 06 09 00 00 00 FF FF 72 19")
 RESET = bytes.fromhex("09 10 03 E8 00 03 06 00 00 00 00 00 00 73 30")
@@ -48,21 +49,25 @@ def _client(fake: FakeRobotiqGripper, activate: bool = False) -> RobotiqClient:
     return RobotiqClient(settings)
 
 
-def _wait_until(condition: Callable[[], object]) -> None:
-    deadline = time.monotonic() + 20.0
-    while not condition():
-        assert time.monotonic() < deadline, "it never came"
-        time.sleep(0.002)
-
-
 def _wait_for_polls(fake: FakeRobotiqGripper, number: int = 10) -> None:
     more = len(fake.frames) + number
-    _wait_until(lambda: len(fake.frames) >= more)
+    wait_until(lambda: len(fake.frames) >= more)
 
 
 def _wait_for_sample(client: RobotiqClient) -> None:
     now = time.monotonic()
-    _wait_until(lambda: client.read().time >= now)  # NaN is not
+    wait_until(lambda: client.read().time >= now)  # NaN is not
+
+
+def _wait_for_attempts(
+    client: RobotiqClient, monkeypatch: pytest.MonkeyPatch, number: int = 3
+) -> None:
+    """Waits until a client has tried again a few times."""
+    attempts, attempt = [], client._try_cycle
+    monkeypatch.setattr(
+        client, "_try_cycle", lambda: (attempts.append(None), attempt())[1]
+    )
+    wait_until(lambda: len(attempts) > number)
 
 
 def test_reads_without_writing(fake: FakeRobotiqGripper) -> None:
@@ -87,7 +92,7 @@ def test_dry_run_leaves_the_inactive_alone() -> None:
 def test_command_arrives_once_as_the_golden_frame(fake: FakeRobotiqGripper) -> None:
     with _client(fake) as client:
         client.command(1.0)
-        _wait_until(lambda: fake.writes)
+        wait_until(lambda: fake.writes)
         _wait_for_polls(fake)
     assert fake.writes == [OPEN]
 
@@ -106,21 +111,27 @@ def test_nan_is_refused(fake: FakeRobotiqGripper) -> None:
         _client(fake).command(np.nan)
 
 
-def test_follows_to_the_opening_with_a_rate(fake: FakeRobotiqGripper) -> None:
-    fake.rate = 1
-    with _client(fake) as client:
+def test_follows_to_the_opening_with_a_rate(
+    fake: FakeRobotiqGripper, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fake.rate = 20
+    client, rates = _client(fake), []
+    put = client._mailbox.put
+    monkeypatch.setattr(
+        client._mailbox, "put", lambda values: (rates.append(values[1]), put(values))
+    )
+    with client:
         client.command(0.070)
-        _wait_until(lambda: client.read().values[1] < 0.0)
-        fake.rate = 255
-        _wait_until(lambda: abs(client.read().values[0] - 0.070) < 0.0006)
-        _wait_until(lambda: client.read().values[1] == 0.0)
+        wait_until(lambda: abs(client.read().values[0] - 0.070) < 0.0006)
+        wait_until(lambda: client.read().values[1] == 0.0)
+    assert min(rates) < 0.0 and max(rates) == 0.0
 
 
 def test_an_object_stops_the_fingers(fake: FakeRobotiqGripper) -> None:
     fake.object_at = 100
     with _client(fake) as client:
         client.command(0.0)
-        _wait_until(lambda: fake.position == 100)
+        wait_until(lambda: fake.position == 100)
         _wait_for_sample(client)
         _wait_for_sample(client)
         assert client.read().values[0] == pytest.approx(0.140 * 130 / 227)
@@ -131,10 +142,10 @@ def test_activates_once_if_it_may() -> None:
         FakeRobotiqGripper(activated=False) as inactive,
         _client(inactive, activate=True) as client,
     ):
-        _wait_until(lambda: client.read().health(0.0, 9.0) is Health.READY)
+        wait_until(lambda: client.read().health(0.0, 9.0) is Health.READY)
         assert inactive.writes == [RESET, ACTIVATE]
         inactive.state = Activation.RESET  # somebody resets it in mid-run
-        _wait_until(lambda: "not activated" in client.read().error)
+        wait_until(lambda: "not activated" in client.read().error)
         _wait_for_polls(inactive)
         assert inactive.writes == [RESET, ACTIVATE]
 
@@ -144,9 +155,9 @@ def test_what_is_broken_is_no_sample(fake: FakeRobotiqGripper, fault: str) -> No
     with _client(fake) as client:
         _wait_for_sample(client)
         fake.fault = fault
-        _wait_until(lambda: client.read().counters.invalid > 0)
+        wait_until(lambda: client.read().counters.invalid > 0)
         stale = client.read()
-        _wait_until(lambda: client.read().counters.invalid > stale.counters.invalid)
+        wait_until(lambda: client.read().counters.invalid > stale.counters.invalid)
         assert client.read().time == stale.time
         assert client.read().health(stale.time + 1.0, 0.2) is Health.STALE
         fake.fault = ""
@@ -157,11 +168,11 @@ def test_what_is_broken_is_no_sample(fake: FakeRobotiqGripper, fault: str) -> No
 def test_commands_again_after_a_reconnect(fake: FakeRobotiqGripper) -> None:
     with _client(fake) as client:
         client.command(1.0)
-        _wait_until(lambda: fake.writes)
+        wait_until(lambda: fake.writes)
         fake.fault = "drop"
-        _wait_until(lambda: client.read().counters.invalid > 0)
+        wait_until(lambda: client.read().counters.invalid > 0)
         fake.fault = ""
-        _wait_until(lambda: len(fake.writes) > 1)
+        wait_until(lambda: len(fake.writes) > 1)
     assert set(fake.writes) == {OPEN}
 
 
@@ -173,7 +184,7 @@ def test_a_fault_is_said_in_words_and_stops_commands(fake: FakeRobotiqGripper) -
         assert "0x0E: overcurrent" in client.read().error
         assert fake.writes == []
         fake.fault = ""
-        _wait_until(lambda: fake.writes)
+        wait_until(lambda: fake.writes)
         assert client.read().error == ""
 
 
@@ -181,18 +192,18 @@ def test_a_major_fault_is_cleared_by_an_allowed_activation() -> None:
     with FakeRobotiqGripper() as fake:
         fake.fault = "status"
         with _client(fake, activate=True) as client:
-            _wait_until(lambda: RESET in fake.writes)
+            wait_until(lambda: RESET in fake.writes)
             fake.fault = ""
-            _wait_until(lambda: ACTIVATE in fake.writes)
-            _wait_until(lambda: client.read().error == "")
+            wait_until(lambda: ACTIVATE in fake.writes)
+            wait_until(lambda: client.read().error == "")
 
 
-def test_nobody_there() -> None:
+def test_nobody_there(monkeypatch: pytest.MonkeyPatch) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
     settings = dataclasses.replace(SETTINGS, port=port, period=0.001)
     with RobotiqClient(settings) as client:
-        time.sleep(0.05)  # some attempts
+        _wait_for_attempts(client, monkeypatch)
         assert client.read().health(0.0, 0.1) is Health.NO_DATA
 
 
@@ -205,7 +216,7 @@ def test_modbus_tcp() -> None:
             assert request[2:] == bytes.fromhex("0000 0006 09 03 07D0 0003")
             reply = bytes.fromhex("0000 0009 09 03 06 F900 0000 E600")
             connection.sendall(request[:2] + reply)  # the number comes back
-            _wait_until(lambda: not np.isnan(client.read().time))
+            wait_until(lambda: not np.isnan(client.read().time))
             assert client.read().values[0] == 0.0
 
 
@@ -215,7 +226,7 @@ def test_the_thread_survives_surprises(
     with _client(fake) as client:
         with monkeypatch.context() as patch:
             patch.setattr(client, "_cycle", lambda: 1 / 0)
-            _wait_until(lambda: "please report" in client.read().error)
+            wait_until(lambda: "please report" in client.read().error)
         _wait_for_sample(client)
         assert client.read().error == ""
 
@@ -252,23 +263,23 @@ def test_a_serial_line_carries_the_same_frames(fake: FakeRobotiqGripper) -> None
         _wait_for_sample(client)
         np.testing.assert_allclose(client.read().values, [0.140, 0.0])
         client.command(1.0)
-        _wait_until(lambda: fake.writes)
+        wait_until(lambda: fake.writes)
         _wait_for_polls(fake)
         assert fake.writes == [OPEN]
         assert client.read().counters.invalid == 0
         unplug()
-        _wait_until(lambda: client.read().counters.invalid)
+        wait_until(lambda: client.read().counters.invalid)
 
 
 def test_a_serial_device_that_is_not_there_is_waited_for(
-    fake: FakeRobotiqGripper, tmp_path: Path
+    fake: FakeRobotiqGripper, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     adapter = tmp_path / "adapter"
     with (
         serial_line(fake.port) as (path, _),
         RobotiqClient(_at(str(adapter))) as client,
     ):
-        time.sleep(0.1)
+        _wait_for_attempts(client, monkeypatch)
         assert client.read().health(0.0, 0.1) is Health.NO_DATA
         adapter.symlink_to(path)
         _wait_for_sample(client)

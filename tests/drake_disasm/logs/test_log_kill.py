@@ -1,9 +1,9 @@
 """An episode is there whole or not at all."""
 
+import contextlib
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ import pytest
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
+from tests.progress import running, wait_until
 
 ROOT = Path(__file__).parents[3]
 HEADER = LogHeader("joint_motion", "kill", {}, period=0.01, joints=("a", "b"))
@@ -38,11 +39,11 @@ for number in itertools.count():
 """
 
 
-def _start(folder: Path, file_format: str, kill_at: int) -> subprocess.Popen:
+def _writing(
+    folder: Path, file_format: str, kill_at: int
+) -> contextlib.AbstractContextManager[subprocess.Popen[str]]:
     arguments = [str(folder), file_format, str(kill_at)]
-    return subprocess.Popen(
-        [sys.executable, "-c", WRITE_UNTIL_KILLED, *arguments], cwd=ROOT
-    )
+    return running([sys.executable, "-c", WRITE_UNTIL_KILLED, *arguments], cwd=ROOT)
 
 
 def _assert_whole(folder: Path) -> int:
@@ -56,7 +57,8 @@ def _assert_whole(folder: Path) -> int:
 @pytest.mark.parametrize("file_format", ["parquet", "csv"])
 def test_killed_between_writing_and_renaming(file_format, tmp_path):
     folder = tmp_path / "log"
-    assert _start(folder, file_format, 3).wait(60) == -signal.SIGKILL
+    with _writing(folder, file_format, 3) as process:
+        assert process.wait() == -signal.SIGKILL
     assert (folder / f".episode_0003.{file_format}.tmp").exists()
     assert _assert_whole(folder) == 3
 
@@ -71,15 +73,9 @@ def test_killed_between_writing_and_renaming(file_format, tmp_path):
 
 def test_killed_at_any_time(tmp_path):
     folder = tmp_path / "log"
-    process = _start(folder, "csv", -1)
-    try:
-        end = time.monotonic() + 60
-        while not (folder / "episode_0004.csv").exists():
-            assert process.poll() is None and time.monotonic() < end
-            time.sleep(0.003)
-    finally:
+    with _writing(folder, "csv", -1) as process:
+        wait_until((folder / "episode_0004.csv").exists, process)
         process.kill()
-        process.wait()
     assert _assert_whole(folder) >= 5
 
 

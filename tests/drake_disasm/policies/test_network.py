@@ -153,7 +153,7 @@ assert not any(name.startswith("torch.") for name in sys.modules)
 def test_policy_runs_without_torch(policy: LearnedPolicy, tmp_path) -> None:
     save_policy(tmp_path / "p.npz", policy)
     command = [sys.executable, "-c", TORCHLESS, str(tmp_path / "p.npz")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
 
