@@ -56,12 +56,15 @@ def fake(tmp_path: Path) -> Iterator[Path]:
 def _skip_without_multicast() -> None:
     lcm, got = DrakeLcm(_LCM), []
     lcm.Subscribe("PROBE", got.append)
-    lcm.Publish("PROBE", b"-")
-    lcm.HandleSubscriptions(500)
-    if not got:
-        pytest.skip("LCM's multicast does not come back on this machine")
+    for _ in range(10):
+        lcm.Publish("PROBE", b"-")
+        lcm.HandleSubscriptions(500)
+        if got:
+            return
+    pytest.skip("LCM's multicast does not come back on this machine")
 
 
+_PIPES = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
 _POLICY = """
 import numpy as np
 
@@ -74,6 +77,10 @@ def to_and_fro(state):
 """
 
 
+def _lines(path: Path) -> int:
+    return path.read_text().count("\n") if path.exists() else 0
+
+
 @pytest.mark.slow
 def test_no_row_is_lost_however_a_run_is_stopped(
     fake: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -83,23 +90,17 @@ def test_no_row_is_lost_however_a_run_is_stopped(
     folder, seen = tmp_path / "log", []
     stops = ((signal.SIGKILL, -9), (signal.SIGTERM, 143), (signal.SIGINT, 130))
     for number, (stop, status) in enumerate(stops):
-        process = subprocess.Popen(
-            command(
-                "simulate", "--station", "hardware", "--hardware-config", fake,
-                "--policy", "slow_policy:to_and_fro", "--no-meshcat",
-                "--record", folder, "--resume",
-            ),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
+        run = command(
+            "simulate", "--station", "hardware", "--hardware-config", fake,
+            "--policy", "slow_policy:to_and_fro", "--no-meshcat",
+            "--record", folder, "--resume",
         )  # fmt: skip
         rows = folder / f".episode_{number:04d}.unfinished.csv"
-        while not (rows.exists() and rows.read_text().count("\n") > 6):
-            assert process.poll() is None, process.communicate()
-            time.sleep(0.02)
-        seen.append(rows.read_text().count("\n") - 1)
-        process.send_signal(stop)
-        output, errors = process.communicate()
+        with running(run, **_PIPES) as process:
+            wait_until(lambda rows=rows: _lines(rows) > 6, process)
+            seen.append(_lines(rows) - 1)
+            process.send_signal(stop)
+            output, errors = process.communicate()
         assert process.returncode == status, errors
         assert ("episode 0 was cut off" in output) == (number == 1)
     log = read_log(folder)
