@@ -1,6 +1,6 @@
 """Watching the task in Meshcat, live and as a page that plays offline."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,7 @@ from pydrake.systems.framework import (
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, write_text
 from drake_disasm.common.spatial import pose_from_vector
+from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.stations.base import Station
 from drake_disasm.stations.measured_cell import MEASURED_PORTS, MeasuredCell
 from drake_disasm.task.diagram import TaskSystems
@@ -72,7 +73,9 @@ class MeshcatView:
 
     def connect(self, builder: DiagramBuilder, systems: TaskSystems) -> None:
         """Adds Drake's visualisers and the wrench's."""
-        station = systems.station
+        station, stopwatch = systems.station, Stopwatch()
+        station.register_part("view", stopwatch)
+        builder.AddNamedSystem("view_begins", EachFrame(stopwatch.start))
         if station.HasOutputPort("query_object"):
             query = station.GetOutputPort("query_object")
             self._add_contact(builder, station.GetOutputPort("contact_results"), query)
@@ -86,6 +89,7 @@ class MeshcatView:
             builder.Connect(
                 systems.processor.GetOutputPort(port), self.wrench.GetInputPort(port)
             )
+        builder.AddNamedSystem("view_ends", EachFrame(stopwatch.stop))
         _look_at(self.meshcat, station.X_WG, self._close_up)
 
     def _add_contact(
@@ -188,6 +192,29 @@ def _look_at(meshcat: Meshcat, X_WG: RigidTransform, close_up: bool) -> None:
     else:
         eye, target = [0.50, -0.68, 0.40], [-0.22, 0.0, 0.16]
     meshcat.SetCameraPose(A + np.array(eye), A + np.array(target))
+
+
+class EachFrame(LeafSystem):
+    """Calls a function at each frame, in its place among the systems of a diagram.
+
+    @system
+    name: EachFrame
+    input_ports: []
+    output_ports: []
+    @endsystem
+
+    Args:
+        call: is called.
+    """
+
+    def __init__(self, call: Callable[[], None]) -> None:
+        super().__init__()
+        self._call = call
+        self.DeclarePeriodicPublishEvent(_FRAME_PERIOD, 0.0, self._publish)
+
+    def _publish(self, context: Context) -> EventStatus:
+        self._call()
+        return EventStatus.Succeeded()
 
 
 class WrenchVisualizer(LeafSystem):

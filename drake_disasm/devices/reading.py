@@ -9,6 +9,9 @@ import numpy as np
 
 from drake_disasm.ports import Health
 
+#: A sample that comes so long after it was taken has waited somewhere [s].
+QUEUED = 0.02
+
 #: Tells the time [s]; tests that run a cell in step with its fakes give their own.
 Clock = Callable[[], float]
 
@@ -22,6 +25,7 @@ class Counters:
         lost: that should have come between those that did.
         reordered: that came after newer ones, and were dropped.
         invalid: that were no packets of the protocol, and were dropped.
+        queued: that came long after they were taken, as all at once after a stall.
         reconnects: how often the connection had to be made again.
     """
 
@@ -29,6 +33,7 @@ class Counters:
     lost: int = 0
     reordered: int = 0
     invalid: int = 0
+    queued: int = 0
     reconnects: int = 0
 
     @property
@@ -44,7 +49,7 @@ class Reading:
 
     Attributes:
         values: (n,) SI; NaN before the first.
-        time: when it came, by the client's clock [s]; NaN before the first.
+        time: when it was taken, by the client's clock [s]; NaN before the first.
         error: what the device complains of, with the remedy; empty if of nothing.
         counters: what became of packets.
     """
@@ -80,11 +85,18 @@ class Mailbox:
         with self._lock:
             return self._reading
 
-    def put(self, values: np.ndarray) -> None:
-        """Takes a good sample: it came now, and clears the error."""
+    def put(self, values: np.ndarray, time: float | None = None) -> None:
+        """Takes a good sample, which clears the error.
+
+        Args:
+            values: of the sample.
+            time: when it was taken, by the clock [s]; None is now.
+        """
+        now = self.clock()
+        taken = now if time is None else time
         with self._lock:
-            counters = self._counted(received=1)
-            self._reading = Reading(np.array(values), self.clock(), "", counters)
+            counters = self._counted(received=1, queued=int(now - taken > QUEUED))
+            self._reading = Reading(np.array(values), taken, "", counters)
 
     def complain(self, error: str) -> None:
         """Takes an error; the newest sample stays as old as it is."""

@@ -64,6 +64,8 @@ class FakeCell:
         self.simulator.Initialize()
         self._steps = round(self.station.settling_time / self.station.control_period)
         self.simulator.AdvanceTo(boundary(self._steps, self.station.control_period))
+        self._start = self._context.Clone(), self._steps
+        self._force_at_start = self._evaluate("ft_sensor.wrench")[:3]
         self._lcm, self._channels = lcm, HardwareConfig().iiwa
         lcm.Subscribe(self._channels.command_channel, self._obey)
         self.time, self._first_status = 0.0, np.nan
@@ -87,6 +89,13 @@ class FakeCell:
         self.hex.stop()
         self.gripper.stop()
 
+    def jog_to_start(self) -> None:
+        """Puts the arm back to where an episode starts, the bolt gripped at A."""
+        start, self._steps = self._start
+        self._context.SetTimeStateAndParametersFrom(start)
+        self.simulator.Initialize()
+        self.commanded = self.station.start
+
     def clock(self) -> float:
         """Returns the virtual time [s]."""
         return self.time
@@ -95,7 +104,10 @@ class FakeCell:
         """Returns the configuration by which a hardware station finds it."""
         config = HardwareConfig()
         config.ft_sensor = dataclasses.replace(
-            config.ft_sensor, address="127.0.0.1", port=self.hex.port
+            config.ft_sensor,
+            address="127.0.0.1",
+            port=self.hex.port,
+            period=self.station.control_period,
         )
         config.gripper = dataclasses.replace(
             config.gripper, address="127.0.0.1", port=self.gripper.port
@@ -133,6 +145,10 @@ class FakeCell:
     def position_measured(self) -> np.ndarray:
         """Returns the arm's true joint angles (7,) [rad]."""
         return self._evaluate("iiwa.position_measured")
+
+    def load(self) -> np.ndarray:
+        """Returns the sensor's force (3,) since the start, in its axes [N]."""
+        return self._evaluate("ft_sensor.wrench")[:3] - self._force_at_start
 
     def _evaluate(self, port: str) -> np.ndarray:
         return self.station.GetOutputPort(port).Eval(self._context)

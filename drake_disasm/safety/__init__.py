@@ -1,7 +1,20 @@
 """What stands between the diagram and the robot: limits, guards, and the hold."""
 
 from drake_disasm.safety.guards import Guard, Situation, guards
+from drake_disasm.safety.lag import Lag, LagMonitor
 from drake_disasm.safety.limits import SafetyConfig
+from drake_disasm.safety.pacing import CommandPacer, PaceCounts
 from drake_disasm.safety.supervisor import Mode, Supervisor
 
-__all__ = ["Guard", "Mode", "SafetyConfig", "Situation", "Supervisor", "guards"]
+__all__ = [
+    "CommandPacer",
+    "Guard",
+    "Lag",
+    "LagMonitor",
+    "Mode",
+    "PaceCounts",
+    "SafetyConfig",
+    "Situation",
+    "Supervisor",
+    "guards",
+]

@@ -12,6 +12,7 @@ from pydrake.math import RigidTransform
 
 from drake_disasm.devices.reading import Reading
 from drake_disasm.ports import Health
+from drake_disasm.safety.lag import Lag
 from drake_disasm.safety.limits import SafetyConfig
 
 
@@ -21,7 +22,8 @@ class Situation:
 
     Attributes:
         now: by the devices' clock [s].
-        elapsed: since the last command [s]; zero before the first.
+        elapsed: since the last look [s]; zero before the first.
+        since_sent: since the last command left, one control period at most [s].
         q_wanted: (7,) what the diagram wants [rad].
         q_measured: (7,) [rad].
         q_before: (7,) what was measured at the last command; NaN before the first.
@@ -29,16 +31,19 @@ class Situation:
         load: (6,) [f; tau] on the bolt at Bo in the sensor's axes, zeroed; None
             while the sensor has not been zeroed.
         readings: of each device.
+        lag: how far the diagram fell behind of late.
     """
 
     now: float
     elapsed: float
+    since_sent: float
     q_wanted: np.ndarray
     q_measured: np.ndarray
     q_before: np.ndarray
     X_GB: RigidTransform
     load: np.ndarray | None
     readings: Mapping[str, Reading]
+    lag: Lag = dataclasses.field(default_factory=Lag)
 
 
 #: Returns why the robot must not go on; empty if it may.
@@ -65,6 +70,7 @@ def guards(
         finite,
         lambda s: no_jump(s, limits.max_jump),
         lambda s: in_time(s, limits.late_command),
+        lambda s: keeps_up(s, limits.max_lag),
         lambda s: within_joints(s, q_low + margin, q_high - margin),
         lambda s: near_measured(s, limits.max_lead),
         lambda s: within_workspace(s, limits),
@@ -103,10 +109,23 @@ def no_jump(s: Situation, limit: float) -> str:
 
 
 def in_time(s: Situation, limit: float) -> str:
-    """The diagram kept up: nothing in it took too long."""
+    """Nothing in the diagram took too long at once."""
     if s.elapsed <= limit:
         return ""
-    return f"the command came {s.elapsed:.3f} s after the last one; a policy is late"
+    return (
+        f"the command came {s.elapsed:.3f} s after the last one: "
+        f"{s.lag.slowest_in_words or 'the diagram is late'}"
+    )
+
+
+def keeps_up(s: Situation, limit: float) -> str:
+    """The diagram is not late by habit."""
+    if s.lag.slipped <= limit:
+        return ""
+    return (
+        f"the diagram lost {s.lag.slipped:.2f} s within {s.lag.window:.2f} s, it is "
+        f"too slow; of its time take: {s.lag.shares_in_words}"
+    )
 
 
 def within_joints(s: Situation, low: np.ndarray, high: np.ndarray) -> str:

@@ -60,6 +60,13 @@ class SafetyConfig:
         0.25, "s", "between two commands: a policy that thinks too long",
         low=0.01, high=5.0,
     )  # fmt: skip
+    lag_window: float = quantity(
+        2.0, "s", "over which lost time is added up", low=0.1, high=60.0
+    )
+    max_lag: float = quantity(
+        0.8, "s", "lost within the window: a diagram that is late by habit",
+        low=0.01, high=60.0,
+    )  # fmt: skip
 
     def stale_after(self, device: str) -> float:
         """Returns the age [s] at which a device's sample is stale."""

@@ -30,7 +30,7 @@ class Supervisor:
 
     Args:
         guards: asked in their order; the first that objects is the reason.
-        max_step: (7,) from one command to the next [rad].
+        max_velocity: (7,) of the joints, from one command to the next [rad/s].
         start_tolerance: between command and measurement when motion begins [rad].
         max_jump: of a measured joint between two looks, beyond which it is no place
             to hold at [rad].
@@ -39,16 +39,17 @@ class Supervisor:
     def __init__(
         self,
         guards: Sequence[Guard],
-        max_step: np.ndarray,
+        max_velocity: np.ndarray,
         start_tolerance: float,
         max_jump: float,
     ) -> None:
         self.mode, self.reason, self.clamped = Mode.WAITING, "not begun", 0
         self.held_since = np.nan
-        self._guards, self._max_step = tuple(guards), max_step
+        self._guards, self._max_velocity = tuple(guards), max_velocity
         self._tolerance, self._max_jump = start_tolerance, max_jump
         self._held: np.ndarray | None = None
         self._sent: np.ndarray | None = None
+        self._sent_before: np.ndarray | None = None
 
     def command(self, situation: Situation) -> np.ndarray:
         """Returns what to send (7,) [rad]; NaN while nothing was ever measured."""
@@ -59,8 +60,13 @@ class Supervisor:
         wanted = situation.q_wanted if self.mode is Mode.ACTIVE else self._held
         if wanted is None:
             return np.full_like(situation.q_measured, np.nan)
-        self._sent = self._within_step(wanted)
+        self._sent_before = self._sent
+        self._sent = self._within_reach(wanted, situation.since_sent)
         return self._sent
+
+    def withdraw(self) -> None:
+        """Takes note that the last command was not sent after all."""
+        self._sent = self._sent_before
 
     def begin(self) -> None:
         """Waits anew, wherever the arm was taken meanwhile; a hold stays one."""
@@ -99,11 +105,11 @@ class Supervisor:
             return ""
         return f"the command is {apart:.4f} rad from where the arm is"
 
-    def _within_step(self, wanted: np.ndarray) -> np.ndarray:
-        """Returns the way there, no further than one step may lead."""
+    def _within_reach(self, wanted: np.ndarray, since_sent: float) -> np.ndarray:
+        """Returns the way there, no further than the time since then allows."""
         assert self._sent is not None
-        step = wanted - self._sent
-        short = np.clip(step, -self._max_step, self._max_step)
+        step, most = wanted - self._sent, since_sent * self._max_velocity
+        short = np.clip(step, -most, most)
         self.clamped += int(not np.array_equal(step, short))
         return self._sent + short
 

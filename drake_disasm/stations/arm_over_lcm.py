@@ -1,20 +1,15 @@
 """The real arm in a diagram: its status and its commands, by LCM."""
 
-from drake import lcmt_iiwa_command, lcmt_iiwa_status
-from pydrake.manipulation import (
-    IiwaCommandSender,
-    IiwaControlMode,
-    IiwaStatusReceiver,
-)
-from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.lcm import (
-    LcmInterfaceSystem,
-    LcmPublisherSystem,
-    LcmSubscriberSystem,
-)
+from collections.abc import Callable
+
+import numpy as np
+from drake import lcmt_iiwa_status
+from pydrake.manipulation import IiwaStatusReceiver
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.lcm import LcmInterfaceSystem, LcmSubscriberSystem
 from pydrake.systems.primitives import Gain
 
-from drake_disasm.common.timing import COMMAND_DELAY
+from drake_disasm.devices.iiwa import encode_command
 from drake_disasm.stations.cell_devices import CellDevices
 from drake_disasm.stations.hardware_config import IiwaConnection
 
@@ -52,34 +47,18 @@ def export_status(
         builder.ExportOutput(drakes.get_output_port(), f"iiwa.{quantity}")
 
 
-def send_commands(
-    builder: DiagramBuilder,
-    position: OutputPort,
-    devices: CellDevices,
-    config: IiwaConnection,
-    period: float,
-) -> None:
-    """Sends positions to the arm's driver.
+def command_sender(
+    devices: CellDevices, config: IiwaConnection
+) -> Callable[[np.ndarray, float], None]:
+    """Returns what sends joint positions (7,) [rad] of a time [s] to the arm's driver.
 
     Args:
-        builder: of the station.
-        position: (7,) joint angles [rad].
         devices: whose LCM is used.
         config: the arm's channels.
-        period: between commands [s].
     """
-    add, connect = builder.AddNamedSystem, builder.Connect
-    sender = add("iiwa_sender", IiwaCommandSender(7, IiwaControlMode.kPositionOnly))
-    publisher = add(
-        "iiwa_command",
-        LcmPublisherSystem.Make(
-            config.command_channel,
-            lcmt_iiwa_command,
-            devices.lcm,
-            publish_period=period,
-            publish_offset=COMMAND_DELAY,
-            use_cpp_serializer=True,
-        ),
-    )
-    connect(position, sender.get_input_port(0))
-    connect(sender.get_output_port(), publisher.get_input_port())
+
+    def send(position: np.ndarray, time: float) -> None:
+        """Sends one command."""
+        devices.lcm.Publish(config.command_channel, encode_command(position, time))
+
+    return send

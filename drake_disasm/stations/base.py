@@ -15,6 +15,7 @@ from pydrake.systems.primitives import RandomSource
 from drake_disasm.cell.coordinates import ArmCoordinates, Coordinates
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.devices.sensor_chain import Payload
 from drake_disasm.effects import BoltMotion, Effect
 from drake_disasm.ports import Port
@@ -150,6 +151,12 @@ class Station(Diagram):
         self, context: Context, effects: Sequence[Effect], bolt: BoltMotion
     ) -> None:
         """Updates effects that depend on the bolt's motion; see SimulatedStation."""
+
+    def register_part(self, name: str, stopwatch: Stopwatch) -> None:
+        """Declares a part of the diagram around the station, by what it takes.
+
+        A station that keeps real time names the slow one when the diagram is late.
+        """
 
     def bolt_is_out(self, context: Context, lift_needed: float) -> bool:
         """Returns whether the bolt has truly risen that far [m]; False if unknown."""

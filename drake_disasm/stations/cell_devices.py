@@ -83,6 +83,11 @@ class CellDevices:
             while lcm.HandleSubscriptions(0):
                 pass
 
+    def let_pass(self, duration: float) -> None:
+        """Lets a time [s] pass, and handles the arm's messages."""
+        self._wait(duration)
+        self.pump()
+
     def readings(self) -> dict[str, Reading]:
         """Returns the newest reading of each device."""
         return {name: device.read() for name, device in self.clients.items()}
@@ -124,8 +129,7 @@ class CellDevices:
         while len(taken) < self._config.tare_samples:
             if self.clock() > deadline:
                 raise DisasmError(self._silence(["ft_sensor"]))
-            self._wait(_POLL)
-            self.pump()
+            self.let_pass(_POLL)
             reading = self.clients["ft_sensor"].read()
             taken[reading.time] = reading.values
         return np.asarray(np.mean(list(taken.values()), axis=0))

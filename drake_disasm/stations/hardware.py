@@ -1,5 +1,6 @@
 """The real cell: the simulated one's ports, with devices behind them."""
 
+import dataclasses
 import time
 from collections.abc import Callable, Sequence
 from typing import Self
@@ -12,23 +13,26 @@ from pydrake.systems.primitives import PassThrough
 
 from drake_disasm.cell.parsing import add_arm
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.devices.reading import Clock, Reading
 from drake_disasm.effects import Effect
 from drake_disasm.ports import CELL_PORTS, Health, check_ports
-from drake_disasm.safety import Mode, Supervisor, guards
+from drake_disasm.safety import CommandPacer, LagMonitor, Mode, Supervisor, guards
 from drake_disasm.scenario import ArmConfig, Scenario, validate
-from drake_disasm.stations.arm_over_lcm import export_status, send_commands
+from drake_disasm.stations.arm_over_lcm import command_sender, export_status
 from drake_disasm.stations.base import InitialState, Station, refuse_twins_contact
 from drake_disasm.stations.capabilities import refuse_on_hardware
 from drake_disasm.stations.cell_devices import CellDevices
 from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.stations.wiring import export_required
+from drake_disasm.systems.arm_command_writer import ArmCommandWriter
 from drake_disasm.systems.connection_check import ConnectionCheck
 from drake_disasm.systems.device_reader import DeviceReader
 from drake_disasm.systems.gripper_writer import GripperWriter
 from drake_disasm.systems.safety_filter import SafetyFilter
 
 _GRIPPER_PERIOD = 0.05  # s
+_LOOKS = 3.0  # samples of arm and sensor that are due before motion goes on
 _SIZES = {"iiwa": 7, "gripper": 2, "ft_sensor": 6}
 _VALUES = {
     "iiwa": "position_measured",
@@ -72,6 +76,7 @@ class HardwareStation(Station):
 
     Attributes:
         supervisor: lets commands through, or holds.
+        pacer: keeps commands at their rate, and counts what that costs.
         devices: clients by name.
 
     Args:
@@ -107,6 +112,13 @@ class HardwareStation(Station):
         self.g_W = MultibodyPlant(0.0).gravity_field().gravity_vector()
         self.grip_command = 0.0  # closes until the fingers stall on the bolt
         self.supervisor = _supervisor(scenario.arm, config)
+        self.pacer = CommandPacer(
+            self.control_period,
+            self._cell.clock,
+            self._cell.let_pass,
+            _LOOKS * max(config.iiwa.status_period, config.ft_sensor.period),
+        )
+        self._lag = LagMonitor(config.safety.lag_window)
         builder = DiagramBuilder()
         export_status(builder, self._cell, config.iiwa)
         self._wire_command(builder)
@@ -182,6 +194,18 @@ class HardwareStation(Station):
             for name, reading in self.readings().items()
         }
 
+    def register_part(self, name: str, stopwatch: Stopwatch) -> None:
+        """See Station."""
+        stopwatch.clock = self._cell.clock
+        self._lag.stopwatches[name] = stopwatch
+
+    def counts(self) -> dict[str, float]:
+        """Returns what keeping the robot safe has cost so far, by name."""
+        return {
+            **dataclasses.asdict(self.pacer.counts),
+            "clamped": self.supervisor.clamped,
+        }
+
     def connect(self) -> None:
         """Starts the clients; calling it again restarts the sensor's stream."""
         self._cell.connect()
@@ -208,11 +232,12 @@ class HardwareStation(Station):
             "safety_filter",
             SafetyFilter(
                 self.supervisor,
+                self.pacer,
+                self._lag,
                 self.devices,
                 self.coordinates,
                 self.mounting,
                 period,
-                self._cell.clock,
             ),
         )
         export_required(
@@ -223,8 +248,17 @@ class HardwareStation(Station):
         )
         if self.dry_run:
             return
-        sent = self.safety_filter.get_output_port()
-        send_commands(builder, sent, self._cell, self.config.iiwa, period)
+        writer = builder.AddNamedSystem(
+            "iiwa_command",
+            ArmCommandWriter(
+                command_sender(self._cell, self.config.iiwa),
+                self.pacer,
+                self.supervisor,
+                period,
+                self.coordinates.size,
+            ),
+        )
+        builder.Connect(self.safety_filter.get_output_port(), writer.get_input_port())
 
     def _wire_gripper(self, builder: DiagramBuilder) -> None:
         if self.dry_run:
@@ -300,7 +334,7 @@ def _supervisor(arm: ArmConfig, config: HardwareConfig) -> Supervisor:
     fastest = plant.GetVelocityUpperLimits() * limits.velocity_share
     return Supervisor(
         guards(limits, plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits()),
-        fastest * arm.control_period,
+        fastest,
         limits.start_tolerance,
         limits.max_jump,
     )

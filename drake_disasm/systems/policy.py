@@ -6,6 +6,7 @@ import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.common.timing import POLICY_DELAY
 from drake_disasm.systems.imprecision import clamped
 
@@ -24,6 +25,10 @@ class PolicySystem(LeafSystem):
     - action
     @endsystem
 
+    Attributes:
+        policy: that is asked.
+        stopwatch: what it takes.
+
     Args:
         policy: any callable from observation (12,) to action (6,). If it has a
             method `reset`, an episode's start calls it.
@@ -34,6 +39,7 @@ class PolicySystem(LeafSystem):
     def __init__(self, policy: Policy, period: float, bounds: np.ndarray) -> None:
         super().__init__()
         self.policy, self._bounds = policy, bounds
+        self.stopwatch = Stopwatch()
         self._observation = self.DeclareVectorInputPort("observation", 12)
         action = self.DeclareDiscreteState(6)
         self._action = action
@@ -41,7 +47,9 @@ class PolicySystem(LeafSystem):
         self.DeclareStateOutputPort("action", action)
 
     def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
-        action = ask(self.policy, self._observation.Eval(context), self._bounds)
+        observation = self._observation.Eval(context)
+        with self.stopwatch:
+            action = ask(self.policy, observation, self._bounds)
         state.set_value(self._action, action)
         return EventStatus.Succeeded()
 
@@ -60,6 +68,9 @@ class ActionHold(LeafSystem):
     - action_held
     @endsystem
 
+    Attributes:
+        stopwatch: what computing the action takes.
+
     Args:
         period: of the MDP [s].
         bounds: (6,) actions are clipped to [-bounds, bounds].
@@ -68,13 +79,16 @@ class ActionHold(LeafSystem):
     def __init__(self, period: float, bounds: np.ndarray) -> None:
         super().__init__()
         self._bounds = bounds
+        self.stopwatch = Stopwatch()
         self._action = self.DeclareVectorInputPort("action", 6)
         self._held = self.DeclareDiscreteState(6)
         self.DeclarePeriodicDiscreteUpdateEvent(period, POLICY_DELAY, self._update)
         self.DeclareStateOutputPort("action_held", self._held)
 
     def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
-        state.set_value(self._held, checked(self._action.Eval(context), self._bounds))
+        with self.stopwatch:  # where a policy's output is computed
+            action = self._action.Eval(context)
+        state.set_value(self._held, checked(action, self._bounds))
         return EventStatus.Succeeded()
 
 

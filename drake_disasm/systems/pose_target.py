@@ -21,6 +21,7 @@ from drake_disasm.common.spatial import (
     rotation_from_vector,
     rotation_vector,
 )
+from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.common.timing import MOTION_DELAY
 from drake_disasm.effects import MotionEffect
 
@@ -50,6 +51,9 @@ class PoseTarget(LeafSystem):
     - action_executed
     @endsystem
 
+    Attributes:
+        stopwatch: what inverse kinematics takes.
+
     Args:
         coordinates: the station's coordinates.
         start: (n,) coordinates at which an episode starts.
@@ -70,6 +74,7 @@ class PoseTarget(LeafSystem):
         super().__init__()
         _refuse_too_many(effects)
         self._coordinates, self._period = coordinates, period
+        self.stopwatch = Stopwatch()
         self._action = self.DeclareVectorInputPort("action", 6)
         self._observation = self.DeclareVectorInputPort("observation", 12)
         self._effects = self.DeclareAbstractParameter(Value[object](tuple(effects)))
@@ -96,7 +101,8 @@ class PoseTarget(LeafSystem):
         executed, memory = self._executed_pose(context, X_GB)
         state.set_value(self._memory, memory)
         state.set_value(self._from, near)
-        state.set_value(self._to, self._coordinates.solve(executed, near))
+        with self.stopwatch:
+            state.set_value(self._to, self._coordinates.solve(executed, near))
         state.set_value(self._pose, pose_to_vector(X_GB))
         state.set_value(self._executed, action)
         return EventStatus.Succeeded()

@@ -14,8 +14,7 @@ from pydrake.systems.framework import (
 
 from drake_disasm.cell.coordinates import Coordinates
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.devices.reading import Clock
-from drake_disasm.safety import Situation, Supervisor
+from drake_disasm.safety import CommandPacer, LagMonitor, Situation, Supervisor
 from drake_disasm.systems.device_reader import Readable
 from drake_disasm.systems.observation import Mounting, contact_wrench
 
@@ -33,25 +32,31 @@ class SafetyFilter(LeafSystem):
 
     Args:
         supervisor: decides; it outlives the Context, as the robot does.
+        pacer: lets each command wait for its turn, by the devices' clock.
+        lag: remembers how far the diagram fell behind.
         devices: by name; "iiwa" tells where the arm is, "ft_sensor" the load.
         coordinates: maps joint angles to X_GB.
         mounting: geometry and payload of the sensor.
         period: of the position interface [s].
-        clock: the devices'.
     """
 
     def __init__(
         self,
         supervisor: Supervisor,
+        pacer: CommandPacer,
+        lag: LagMonitor,
         devices: Mapping[str, Readable],
         coordinates: Coordinates,
         mounting: Mounting,
         period: float,
-        clock: Clock,
     ) -> None:
         super().__init__()
-        self._supervisor, self._devices = supervisor, devices
-        self._coordinates, self._mounting, self._clock = coordinates, mounting, clock
+        self._supervisor, self._pacer, self._lag = supervisor, pacer, lag
+        self._devices, self._coordinates, self._mounting = (
+            devices,
+            coordinates,
+            mounting,
+        )
         self._offset: np.ndarray | None = None
         self._before, self._then = np.full(coordinates.size, np.nan), np.nan
         self._wanted = self.DeclareVectorInputPort("position", coordinates.size)
@@ -73,6 +78,8 @@ class SafetyFilter(LeafSystem):
     def begin(self) -> None:
         """Resets the time of the last command: there are none between episodes."""
         self._before, self._then = np.full_like(self._before, np.nan), np.nan
+        self._pacer.begin()
+        self._lag.begin()
 
     def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
         situation = self._situation(context)
@@ -90,19 +97,21 @@ class SafetyFilter(LeafSystem):
         output.SetFromVector(sent)
 
     def _situation(self, context: Context) -> Situation:
-        now = self._clock()
+        now, pacer = self._pacer.await_turn(), self._pacer
         readings = {name: device.read() for name, device in self._devices.items()}
         q = readings["iiwa"].values
         X_GB = self._coordinates.pose(q)
         return Situation(
             now,
             0.0 if np.isnan(self._then) else now - self._then,
+            pacer.since_sent(now),
             self._wanted.Eval(context),
             q,
             self._before,
             X_GB,
             self._load(readings["ft_sensor"].values, X_GB),
             readings,
+            self._lag.update(now, pacer.counts.slipped, pacer.counts.waited),
         )
 
     def _load(self, reading: np.ndarray, X_GB: RigidTransform) -> np.ndarray | None:

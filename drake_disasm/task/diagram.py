@@ -147,6 +147,7 @@ def add_task(
     imprecision, noise = _add_imprecision(builder, station.scenario)
     pose_target = _add_pose_target(builder, station, imprecision, processor)
     station.register_motion_effects()  # the pose target applies them
+    station.register_part("inverse kinematics", pose_target.stopwatch)
     motion = add_motion(builder, pose_target.GetOutputPort("velocity"), station)
     _add_grip(builder, station)
     chooser, source, action = _add_policy(builder, policy, processor, station)
@@ -292,19 +293,21 @@ def _add_policy(
         return None, source, source.get_output_port()
     observation = processor.GetOutputPort("observation")
     if isinstance(policy, System):
-        held = _add_policy_system(builder, policy, observation, task)
-        return policy, None, held
+        hold = _add_policy_system(builder, policy, observation, task)
+        station.register_part("policy", hold.stopwatch)
+        return policy, None, hold.get_output_port()
     system = builder.AddNamedSystem(
         "policy", PolicySystem(policy, task.period, action_bounds(task))
     )
+    station.register_part("policy", system.stopwatch)
     builder.Connect(observation, system.get_input_port())
     return system, None, system.get_output_port()
 
 
 def _add_policy_system(
     builder: DiagramBuilder, policy: System, observation: OutputPort, task: TaskConfig
-) -> OutputPort:
-    """Returns the port that holds a policy system's action for a period at a time."""
+) -> ActionHold:
+    """Returns what holds a policy system's action for a period at a time."""
     chosen = _policy_ports(policy)
     if policy not in builder.GetSystems():
         builder.AddNamedSystem("policy", policy)
@@ -313,7 +316,7 @@ def _add_policy_system(
     )
     builder.Connect(observation, policy.GetInputPort("observation"))
     builder.Connect(chosen, hold.get_input_port())
-    return hold.get_output_port()
+    return hold
 
 
 def _policy_ports(policy: System) -> OutputPort:

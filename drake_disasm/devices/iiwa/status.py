@@ -7,9 +7,13 @@ from drake import lcmt_iiwa_status
 from pydrake.lcm import DrakeLcmInterface
 
 from drake_disasm.devices.codec_error import CodecError
+from drake_disasm.devices.device_clock import DeviceClock
 from drake_disasm.devices.reading import Clock, Mailbox, Reading
 
 JOINTS = 7
+#: A message this much older than the newest is not late: the driver has restarted [s].
+BEGUN_ANEW = 1.0
+
 _US = 1e6
 
 
@@ -54,7 +58,8 @@ class IiwaStatusMonitor:
         clock: Clock = time.monotonic,
     ) -> None:
         self._mailbox, self._period = Mailbox(JOINTS, clock), period
-        self._utime: int | None = None
+        self._device_clock = DeviceClock()
+        self._stamp: float | None = None  # of the newest, by the driver's clock [s]
         self._channel, self._checked = channel, checked
         lcm.Subscribe(channel, self._take)
 
@@ -69,12 +74,23 @@ class IiwaStatusMonitor:
             self._mailbox.count(invalid=1)
             self._mailbox.complain(f"{error}; check that the driver is this arm's")
             return
-        if self._utime is not None and message.utime <= self._utime:
-            self._mailbox.count(reordered=1)
+        stamp = message.utime / _US
+        if not self._is_newer(stamp):
             return
-        if self._utime is not None:
-            gap = (message.utime - self._utime) / _US
-            self._mailbox.count(lost=max(0, round(gap / self._period) - 1))
-        self._utime = message.utime
-        self._mailbox.put(np.array(message.joint_position_measured))
+        taken = self._device_clock.taken_at(stamp, self._mailbox.clock())
+        self._mailbox.put(np.array(message.joint_position_measured), taken)
         self._checked.Publish(self._channel, data)
+
+    def _is_newer(self, stamp: float) -> bool:
+        """Takes a message's time [s], and counts what it tells of others."""
+        gap = np.inf if self._stamp is None else stamp - self._stamp
+        if -BEGUN_ANEW < gap <= 0.0:
+            self._mailbox.count(reordered=1)
+            return False
+        if gap <= -BEGUN_ANEW:
+            self._device_clock.begin_anew()
+            self._mailbox.count(reconnects=1)
+        elif self._stamp is not None:
+            self._mailbox.count(lost=max(0, round(gap / self._period) - 1))
+        self._stamp = stamp
+        return True

@@ -10,6 +10,8 @@ import numpy as np
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.codec_error import CodecError
+from drake_disasm.devices.datagrams import receive, stamp_arrivals
+from drake_disasm.devices.device_clock import DeviceClock
 from drake_disasm.devices.onrobot_hex.codec import (
     PORT,
     Command,
@@ -70,7 +72,9 @@ class HexClient:
         )
         self._box, self._silence = (address, port), silence
         self._mailbox = Mailbox(6, clock)
+        self._period, self._device_clock = period, DeviceClock()
         self._newest: int | None = None  # sequence number
+        self._counted = 0  # samples since the box began to count
         self._stopping = threading.Event()
         self._running = contextlib.ExitStack()
 
@@ -110,6 +114,7 @@ class HexClient:
         box = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             box.settimeout(_POLL)
+            stamp_arrivals(box)
             box.connect(self._box)
         except (OSError, OverflowError) as error:
             box.close()
@@ -149,16 +154,16 @@ class HexClient:
     def _hear(self, box: socket.socket) -> bool:
         """Takes the next datagram; returns whether one came soon."""
         try:
-            datagram = box.recv(_LONGEST)
+            datagram, arrival = receive(box, _LONGEST, self._mailbox.clock)
         except TimeoutError:
             return False
         except OSError:  # at once, as where nothing listens
             self._stopping.wait(_POLL)
             return False
-        self._take(datagram)
+        self._take(datagram, arrival)
         return True
 
-    def _take(self, datagram: bytes) -> None:
+    def _take(self, datagram: bytes, arrival: float) -> None:
         try:
             sample = decode_sample(datagram)
         except CodecError:
@@ -172,7 +177,9 @@ class HexClient:
                 "check the load and the sensor's cable, then restart the box"
             )
         else:
-            self._mailbox.put(np.array(sample.wrench))
+            stamp = self._counted * self._period
+            taken = self._device_clock.taken_at(stamp, arrival)
+            self._mailbox.put(np.array(sample.wrench), taken)
 
     def _is_newer(self, number: int) -> bool:
         """Takes a datagram's number, and counts what it tells of others.
@@ -183,7 +190,11 @@ class HexClient:
         if -BEGUN_ANEW < step <= 0:
             self._mailbox.count(reordered=1)
             return False
-        if step > 1:
+        if self._newest is None or step <= -BEGUN_ANEW:
+            self._device_clock.begin_anew()
+            self._counted = 0
+        elif step > 1:
             self._mailbox.count(lost=step - 1)
+        self._counted += max(1, step)
         self._newest = number
         return True

@@ -7,12 +7,13 @@ import numpy as np
 from drake_disasm.safety import Mode, Situation, Supervisor
 from tests.drake_disasm.safety.test_guards import USUAL, Q
 
+PERIOD = 0.005  # s
 STEP = np.full(7, 0.004)
 
 
 def supervisor(stop: list[str]) -> Supervisor:
     """Returns one with a guard that says what is in a list."""
-    return Supervisor([lambda _: stop[0] if stop else ""], STEP, 0.002, 0.05)
+    return Supervisor([lambda _: stop[0] if stop else ""], STEP / PERIOD, 0.002, 0.05)
 
 
 def at(

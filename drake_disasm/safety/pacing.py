@@ -1,0 +1,138 @@
+"""The rate of commands: time that was lost stays lost.
+
+A simulator that runs in real time makes up for a stall as fast as it can. On a robot
+that is haste: commands at many times their rate, and motion at many times its speed.
+So the commands have a pace of their own, which no diagram can exceed. After a stall
+the diagram's time stays behind, and the motion goes on at its usual rate.
+"""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from drake_disasm.devices.reading import Clock
+
+#: No command leaves sooner after the one before, in control periods.
+MIN_GAP = 0.9
+#: A command that is later than this, in control periods, comes after a stall.
+STALL = 2.0
+
+_POLL = 0.001  # s, the longest wait at a time: LCM keeps one message, the newest
+_ROUNDING = 1e-9  # s
+
+
+@dataclasses.dataclass
+class PaceCounts:
+    """What keeping the pace cost.
+
+    Attributes:
+        slipped: by how much the diagram's time fell behind real time [s].
+        stalls: how often something took more than STALL periods.
+        longest_stall: of them, beyond the time that was due [s].
+        held: commands that were not sent, since a stall came between decision and
+            sending.
+        waited: for commands' turns [s].
+    """
+
+    slipped: float = 0.0
+    stalls: int = 0
+    longest_stall: float = 0.0
+    held: int = 0
+    waited: float = 0.0
+
+
+class CommandPacer:
+    """Makes each command wait for its turn, one control period after the last.
+
+    Commands that are a little late, as on any machine without a real-time kernel, are
+    made up for by gaps that are a little shorter, by no more than MIN_GAP allows.
+    After a stall the schedule begins anew, and some time passes first, in which the
+    devices' newest samples arrive: the guards look before the arm moves.
+
+    Attributes:
+        counts: what it cost so far.
+        turn: when the present command's turn came, by the clock [s]; NaN before.
+        last_sent: when the last command left [s]; NaN before the first.
+
+    Args:
+        period: of the commands [s].
+        clock: the devices'.
+        wait: lets a time [s] pass, and receives what comes.
+        look: time to pass after a stall [s], in which every device must send.
+    """
+
+    def __init__(
+        self,
+        period: float,
+        clock: Clock,
+        wait: Callable[[float], None],
+        look: float = 0.0,
+    ) -> None:
+        self._period, self._clock, self._wait = period, clock, wait
+        self._look = max(look, period)
+        self.counts = PaceCounts()
+        self.begin()
+
+    def begin(self) -> None:
+        """Forgets the schedule: no command was sent, as between episodes."""
+        self._due = self.turn = self.last_sent = np.nan
+
+    def await_turn(self) -> float:
+        """Waits until the next command is due; returns the time then [s]."""
+        while True:
+            now = self._clock()
+            if now - self._due > STALL * self._period:
+                self._count_stall(now)
+                self._begin_anew(now)
+            if not now < self._due - _ROUNDING:  # NaN before the first command
+                self.turn = now
+                return now
+            self._let_pass(self._due - now)
+
+    def await_gap(self) -> None:
+        """Waits until the last command is long enough ago for the next one to leave."""
+        least = MIN_GAP * self._period - _ROUNDING
+        while (passed := self._clock() - self.last_sent) < least:
+            self._let_pass(least - passed)
+
+    def sent(self) -> None:
+        """Takes note that the command has left now."""
+        self.last_sent = self._clock()
+        due = self.last_sent if np.isnan(self._due) else self._due
+        self._due = due + self._period
+
+    def refuse_late(self) -> bool:
+        """Returns whether a stall came since the turn; its command must not leave."""
+        now = self._clock()
+        if not now - self.turn > STALL * self._period:
+            return False
+        self.counts.held += 1
+        self._count_stall(now)
+        self._begin_anew(now)
+        return True
+
+    def since_sent(self, now: float) -> float:
+        """Returns how long after the last command the next one leaves [s].
+
+        No more than one period, however long the last one is ago.
+        """
+        passed = now - self.last_sent
+        if np.isnan(passed):
+            return self._period
+        return min(max(passed, MIN_GAP * self._period), self._period)
+
+    def _let_pass(self, duration: float) -> None:
+        begun = self._clock()
+        self._wait(min(_POLL, duration))
+        self.counts.waited += self._clock() - begun
+
+    def _count_stall(self, now: float) -> None:
+        due = self.turn if np.isnan(self._due) else self._due
+        self.counts.stalls += 1
+        self.counts.longest_stall = max(self.counts.longest_stall, now - due)
+
+    def _begin_anew(self, now: float) -> None:
+        due = self.turn if np.isnan(self._due) else self._due
+        self._due = now + self._look
+        self.counts.slipped += self._due - due
