@@ -22,7 +22,7 @@ class Situation:
 
     Attributes:
         now: by the devices' clock [s].
-        elapsed: since the last look [s]; zero before the first.
+        overdue: by how much a stall has made the command late [s].
         since_sent: since the last command left, one control period at most [s].
         q_wanted: (7,) what the diagram wants [rad].
         q_measured: (7,) [rad].
@@ -35,7 +35,7 @@ class Situation:
     """
 
     now: float
-    elapsed: float
+    overdue: float
     since_sent: float
     q_wanted: np.ndarray
     q_measured: np.ndarray
@@ -49,6 +49,7 @@ class Situation:
 #: Returns why the robot must not go on; empty if it may.
 Guard = Callable[[Situation], str]
 
+_STOOD_STILL = "the program stood still; give it a machine of its own"
 _REMEDY = {
     Health.NO_DATA: "has sent nothing yet",
     Health.STALE: "has stopped sending",
@@ -110,12 +111,11 @@ def no_jump(s: Situation, limit: float) -> str:
 
 def in_time(s: Situation, limit: float) -> str:
     """Nothing in the diagram took too long at once."""
-    if s.elapsed <= limit:
+    if s.overdue <= limit:
         return ""
-    return (
-        f"the command came {s.elapsed:.3f} s after the last one: "
-        f"{s.lag.slowest_in_words or 'the diagram is late'}"
-    )
+    part, took = s.lag.slowest
+    who = f"{part} took {took:.3f} s" if took > s.overdue / 2 else _STOOD_STILL
+    return f"the command is {s.overdue:.3f} s late: {who}"
 
 
 def keeps_up(s: Situation, limit: float) -> str:

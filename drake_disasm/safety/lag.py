@@ -37,12 +37,9 @@ class Lag:
         return ", ".join(f"{name} {100 * share:.0f} %" for name, share in ordered)
 
     @property
-    def slowest_in_words(self) -> str:
-        """The part that took longest since the last look; empty if none is known."""
-        if not self.took:
-            return ""
-        name, took = max(self.took.items(), key=lambda item: item[1])
-        return f"{name} took {took:.3f} s"
+    def slowest(self) -> tuple[str, float]:
+        """The part that took longest since the last look, and how long [s]."""
+        return max(self.took.items(), key=lambda item: item[1], default=(REST, 0.0))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -53,6 +53,8 @@ class CommandPacer:
     Attributes:
         counts: what it cost so far.
         turn: when the present command's turn came, by the clock [s]; NaN before.
+        overdue: by how much a stall had made the present command late, before the
+            devices were looked at [s]; zero without one.
         last_sent: when the last command left [s]; NaN before the first.
 
     Args:
@@ -77,16 +79,16 @@ class CommandPacer:
     def begin(self) -> None:
         """Forgets the schedule: no command was sent, as between episodes."""
         self._due = self.turn = self.last_sent = np.nan
+        self.overdue, self._stalled = 0.0, 0.0
 
     def await_turn(self) -> float:
         """Waits until the next command is due; returns the time then [s]."""
         while True:
             now = self._clock()
             if now - self._due > STALL * self._period:
-                self._count_stall(now)
-                self._begin_anew(now)
+                self._slip(now)
             if not now < self._due - _ROUNDING:  # NaN before the first command
-                self.turn = now
+                self.turn, self.overdue, self._stalled = now, self._stalled, 0.0
                 return now
             self._let_pass(self._due - now)
 
@@ -108,8 +110,7 @@ class CommandPacer:
         if not now - self.turn > STALL * self._period:
             return False
         self.counts.held += 1
-        self._count_stall(now)
-        self._begin_anew(now)
+        self._slip(now)
         return True
 
     def since_sent(self, now: float) -> float:
@@ -127,12 +128,12 @@ class CommandPacer:
         self._wait(min(_POLL, duration))
         self.counts.waited += self._clock() - begun
 
-    def _count_stall(self, now: float) -> None:
+    def _slip(self, now: float) -> None:
+        """Counts a stall, and begins the schedule anew."""
         due = self.turn if np.isnan(self._due) else self._due
-        self.counts.stalls += 1
-        self.counts.longest_stall = max(self.counts.longest_stall, now - due)
-
-    def _begin_anew(self, now: float) -> None:
-        due = self.turn if np.isnan(self._due) else self._due
+        late, counts = now - due, self.counts
+        self._stalled = max(self._stalled, late)
+        counts.stalls += 1
+        counts.longest_stall = max(counts.longest_stall, late)
         self._due = now + self._look
-        self.counts.slipped += self._due - due
+        counts.slipped += self._due - due

@@ -258,6 +258,7 @@ class HardwareStation(Station):
                 self.coordinates.size,
             ),
         )
+        self.register_part("sending", writer.stopwatch)
         builder.Connect(self.safety_filter.get_output_port(), writer.get_input_port())
 
     def _wire_gripper(self, builder: DiagramBuilder) -> None:

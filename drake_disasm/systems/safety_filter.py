@@ -58,7 +58,7 @@ class SafetyFilter(LeafSystem):
             mounting,
         )
         self._offset: np.ndarray | None = None
-        self._before, self._then = np.full(coordinates.size, np.nan), np.nan
+        self._before = np.full(coordinates.size, np.nan)
         self._wanted = self.DeclareVectorInputPort("position", coordinates.size)
         self._sent = self.DeclareDiscreteState(np.full(coordinates.size, np.nan))
         self.DeclareInitializationDiscreteUpdateEvent(self._update)
@@ -76,15 +76,15 @@ class SafetyFilter(LeafSystem):
         self._offset = reading - weight
 
     def begin(self) -> None:
-        """Resets the time of the last command: there are none between episodes."""
-        self._before, self._then = np.full_like(self._before, np.nan), np.nan
+        """Forgets the last command: there are none between episodes."""
+        self._before = np.full_like(self._before, np.nan)
         self._pacer.begin()
         self._lag.begin()
 
     def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
         situation = self._situation(context)
         state.set_value(self._sent, self._supervisor.command(situation))
-        self._before, self._then = situation.q_measured, situation.now
+        self._before = situation.q_measured
         return EventStatus.Succeeded()
 
     def _calc(self, context: Context, output: BasicVector) -> None:
@@ -103,7 +103,7 @@ class SafetyFilter(LeafSystem):
         X_GB = self._coordinates.pose(q)
         return Situation(
             now,
-            0.0 if np.isnan(self._then) else now - self._then,
+            pacer.overdue,
             pacer.since_sent(now),
             self._wanted.Eval(context),
             q,

@@ -8,14 +8,14 @@ from pydrake.math import RigidTransform
 
 from drake_disasm.devices.reading import Mailbox, Reading
 from drake_disasm.ports import Health
-from drake_disasm.safety import SafetyConfig, Situation, guards
+from drake_disasm.safety import Lag, SafetyConfig, Situation, guards
 
 Q = np.array([0.1, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0])
 NAMES = ("iiwa", "gripper", "ft_sensor")
 FRESH = Reading(np.zeros(6), time=1.0)
 USUAL = Situation(
     now=1.01,
-    elapsed=0.005,
+    overdue=0.0,
     since_sent=0.005,
     q_wanted=Q + 0.001,
     q_measured=Q,
@@ -59,7 +59,16 @@ def test_the_usual_passes():
         ({"q_wanted": joint(Q, 2, np.nan)}, "iiwa.position is not finite"),
         ({"load": np.full(6, np.nan)}, "ft_sensor.wrench is not finite"),
         ({"q_before": joint(Q, 3, -0.06)}, "joint 3 jumped by 0.060 rad"),
-        ({"elapsed": 0.3}, "0.300 s after the last one"),
+        ({"overdue": 0.3}, "0.300 s late: the program stood still"),
+        (
+            {"overdue": 0.3, "lag": Lag(took={"policy": 0.2})},
+            "0.300 s late: policy took 0.200 s",
+        ),
+        (
+            {"lag": Lag(2.0, 0.9, {"view": 0.3, "policy": 1.4})},
+            "lost 0.90 s within 2.00 s, it is too slow; of its time take: "
+            "policy 140 %, view 30 %",
+        ),
         ({"q_wanted": joint(Q, 4, -0.68)}, "joint 4 is sent 0.015 rad into"),
         ({"q_wanted": joint(Q, 5, 0.03)}, "joint 5 is sent 0.030 rad from where"),
         ({"X_GB": RigidTransform([0.0, 0.029, 0.0])}, "workspace at y = 29.0 mm"),

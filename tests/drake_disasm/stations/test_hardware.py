@@ -12,7 +12,7 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import GroovePose
-from drake_disasm.fakes.cell import FakeCell
+from drake_disasm.fakes.cell import FakeCell, arrival
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import find_policy, load_policy, make_policy
 from drake_disasm.ports import CELL_PORTS, Health, port_differences
