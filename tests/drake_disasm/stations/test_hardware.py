@@ -194,7 +194,8 @@ def test_a_policy_that_is_late_ends_in_a_hold() -> None:
     def thinks(s: np.ndarray) -> np.ndarray:
         """Takes 0.3 s of the devices' time over a far state."""
         if s[0] > 0.003:
-            cells[0].time += 0.3
+            for _ in range(60):
+                cells[0].advance(arrival(station.devices["ft_sensor"].read))
         return np.array([1e-3, 0, 0, 0, 0, 0])
 
     with in_lockstep(load_scenario("removal"), thinks) as (simulation, station, cell):
@@ -222,3 +223,63 @@ def test_the_driver_gets_no_command_before_it_listens() -> None:
     with FakeCell(load_scenario("removal"), lcm) as cell:
         cell.send_measurements()
         assert cell.commands == 0  # and it asserts that none comes within 0.25 s
+
+
+@pytest.mark.parametrize("stall", [0.05, 0.1, 0.24])
+def test_time_that_was_lost_stays_lost(stall: float) -> None:
+    """After a stall commands go on at their rate, and the joints at their speed."""
+    stalled: list[float] = []
+    sent: list[tuple[float, np.ndarray]] = []
+
+    def thinks(s: np.ndarray) -> np.ndarray:
+        """Takes its time over the third step."""
+        if len(sent) > 45 and not stalled:
+            stalled.append(cell.time)
+            for _ in range(round(stall / station.control_period)):
+                cell.advance(arrival(station.devices["ft_sensor"].read))
+        return np.array([1e-3, 0, 0, 0, 0, 0])
+
+    with in_lockstep(load_scenario("removal"), thinks) as (simulation, station, cell):
+        writer = station.GetSubsystemByName("iiwa_command")
+        send = writer.send
+
+        def noted(q: np.ndarray, time: float) -> None:
+            """Sends, and notes when by the devices' clock."""
+            sent.append((cell.time, q.copy()))
+            send(q, time)
+
+        writer.send = noted
+        simulation.reset(0)
+        for _ in range(8):
+            simulation.step()
+        assert station.supervisor.mode is Mode.ACTIVE, station.supervisor.reason
+        counts = station.counts()
+    times = np.array([when for when, _ in sent])
+    way = np.abs(np.diff([q for _, q in sent], axis=0)).max(axis=1)
+    speed = way / np.diff(times)
+    assert np.diff(times).min() > 0.0045  # never sooner than the period, nearly
+    after = times[1:] > stalled[0]
+    assert after.sum() > 50
+    assert speed[after].max() < 1.2 * speed[~after].max()
+    assert counts["stalls"] == 1
+    assert counts["slipped"] == pytest.approx(stall + 0.01, abs=0.011)
+    assert counts["longest_stall"] == pytest.approx(stall, abs=0.006)
+
+
+def test_a_diagram_that_is_late_by_habit_ends_in_a_hold() -> None:
+    """No gap alone is too long; together they are, and the policy is named."""
+
+    def thinks(s: np.ndarray) -> np.ndarray:
+        """Takes 0.1 s each time."""
+        for _ in range(20):
+            cell.advance(arrival(station.devices["ft_sensor"].read))
+        return np.array([5e-4, 0, 0, 0, 0, 0])
+
+    with in_lockstep(load_scenario("removal"), thinks) as (simulation, station, cell):
+        simulation.reset(0)
+        with pytest.raises(
+            HoldError, match=r"too slow; of its time take: policy \d+ %"
+        ):
+            for _ in range(40):
+                simulation.step()
+        assert station.counts()["longest_stall"] < 0.12

@@ -1,0 +1,110 @@
+"""Commands keep their pace, whatever stalls."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.safety import CommandPacer
+
+PERIOD = 0.005  # s
+
+
+class Time:
+    """A clock that moves when it is waited for, or when something stalls."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def wait(self, duration: float) -> None:
+        self.now += duration
+
+
+def paced(stalls: dict[int, float], where: str, n: int = 200) -> tuple:
+    """Returns when commands left (m,), those that were held, and the pacer.
+
+    Args:
+        stalls: duration [s] by the number of the command.
+        where: "before" its turn, or "sending": between decision and sending.
+        n: turns taken.
+    """
+    time = Time()
+    pacer = CommandPacer(PERIOD, time, time.wait, look=3 * PERIOD)
+    sent = []
+    for number in range(n):
+        time.now += 0.0003  # what a diagram takes
+        if where == "before":
+            time.now += stalls.get(number, 0.0)
+        pacer.await_turn()
+        time.now += 0.0007
+        if where == "sending":
+            time.now += stalls.get(number, 0.0)
+        if pacer.refuse_late():
+            continue
+        pacer.await_gap()
+        sent.append(time.now)
+        pacer.sent()
+    return np.array(sent), pacer
+
+
+def test_without_stalls_it_keeps_the_period_and_loses_nothing() -> None:
+    sent, pacer = paced({}, "before")
+    assert np.diff(sent)[1:] == pytest.approx(PERIOD, abs=1e-9)
+    assert pacer.counts.slipped == 0.0 and pacer.counts.stalls == 0
+
+
+def test_jitter_is_made_up_for_by_gaps_that_are_little_shorter() -> None:
+    sent, pacer = paced({20: 0.006, 40: 0.007, 41: 0.002}, "before")
+    assert np.diff(sent).min() >= 0.9 * PERIOD - 1e-6
+    assert sent[-1] - sent[0] == pytest.approx(199 * PERIOD, abs=1e-3)
+    assert pacer.counts.slipped == 0.0
+
+
+@pytest.mark.parametrize("stall", [0.02, 0.1, 1.0, 3.0])
+@pytest.mark.parametrize("where", ["before", "sending"])
+def test_lost_time_stays_lost(stall: float, where: str) -> None:
+    sent, pacer = paced({50: stall}, where)
+    assert np.diff(sent).min() >= 0.9 * PERIOD - 1e-6
+    windows = np.searchsorted(sent, sent + 0.1) - np.arange(len(sent))
+    assert windows.max() <= 1.2 * 0.1 / PERIOD
+    counts = pacer.counts
+    assert counts.stalls == 1 and counts.held == (where == "sending")
+    assert counts.slipped == pytest.approx(stall + 3 * PERIOD, abs=1.5 * PERIOD)
+    assert counts.longest_stall == pytest.approx(stall, abs=1.1 * PERIOD)
+
+
+def test_a_stall_is_told_of_once_at_the_next_turn() -> None:
+    time = Time()
+    pacer = CommandPacer(PERIOD, time, time.wait)
+    overdue = []
+    for number in range(6):
+        time.now += 0.3 if number == 3 else 0.0
+        pacer.await_turn()
+        overdue.append(pacer.overdue)
+        pacer.sent()
+    assert overdue == [0.0, 0.0, 0.0, pytest.approx(0.295), 0.0, 0.0]
+
+
+def test_a_stall_while_it_waits_is_one_too() -> None:
+    time = Time()
+    stalls = [0.0, 0.0, 0.0, 0.5]
+
+    def wait(duration: float) -> None:
+        time.now += duration + (stalls.pop() if stalls else 0.0)
+
+    pacer = CommandPacer(PERIOD, time, wait)
+    pacer.await_turn()
+    pacer.sent()
+    pacer.await_turn()
+    assert pacer.overdue == pytest.approx(0.496, abs=1e-3)
+
+
+def test_the_step_that_a_command_may_lead_is_of_the_time_since_the_last() -> None:
+    time = Time()
+    pacer = CommandPacer(PERIOD, time, time.wait)
+    assert pacer.since_sent(time.now) == PERIOD  # the first
+    pacer.await_turn()
+    pacer.sent()
+    assert pacer.since_sent(time.now + 0.001) == pytest.approx(0.9 * PERIOD)
+    assert pacer.since_sent(time.now + 3.0) == PERIOD
