@@ -51,8 +51,8 @@ import time
 from drake_disasm.common import program
 
 def main(arguments):
-    print("begun", flush=True)
     try:
+        print("begun", flush=True)
         while True:
             time.sleep(0.01)
     finally:
