@@ -32,6 +32,7 @@ class Situation:
             while the sensor has not been zeroed.
         readings: of each device.
         lag: how far the diagram fell behind of late.
+        foreign: why somebody else commands the arm; empty if nobody does.
     """
 
     now: float
@@ -44,6 +45,7 @@ class Situation:
     load: np.ndarray | None
     readings: Mapping[str, Reading]
     lag: Lag = dataclasses.field(default_factory=Lag)
+    foreign: str = ""
 
 
 #: Returns why the robot must not go on; empty if it may.
@@ -68,6 +70,7 @@ def guards(
     margin = limits.joint_margin
     return (
         lambda s: devices_ready(s, limits),
+        one_master,
         finite,
         lambda s: no_jump(s, limits.max_jump),
         lambda s: in_time(s, limits.late_command),
@@ -90,6 +93,11 @@ def devices_ready(s: Situation, limits: SafetyConfig) -> str:
             since = f" for {age:.3f} s" if np.isfinite(age) else ""
             return f"{name} {_REMEDY[health]}{since}; check its power and cable"
     return ""
+
+
+def one_master(s: Situation) -> str:
+    """Nobody else commands the arm."""
+    return s.foreign
 
 
 def finite(s: Situation) -> str:

@@ -58,7 +58,8 @@ def command_sender(
     """
 
     def send(position: np.ndarray, time: float) -> None:
-        """Sends one command."""
+        """Sends one command, and says so first: it comes back as others' do."""
+        devices.commands.sent(position)
         devices.lcm.Publish(config.command_channel, encode_command(position, time))
 
     return send

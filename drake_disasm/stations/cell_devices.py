@@ -7,11 +7,16 @@ import numpy as np
 from pydrake.lcm import DrakeLcm
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.devices.iiwa import IiwaStatusMonitor
+from drake_disasm.devices.iiwa import (
+    CommandChannel,
+    CommandMonitor,
+    IiwaStatusMonitor,
+)
 from drake_disasm.devices.onrobot_hex import HexClient
 from drake_disasm.devices.reading import Clock, Reading
 from drake_disasm.devices.robotiq import RobotiqClient, RobotiqSettings
 from drake_disasm.ports import Health
+from drake_disasm.safety.robot_lock import DeviceLocks, lcm_address
 from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.systems.device_reader import Readable
 
@@ -29,10 +34,12 @@ class CellDevices:
         lcm: by which the arm is reached.
         checked_lcm: carries the messages that the arm's monitor has accepted.
         clock: tells when samples come [s].
+        commands: knows what is sent to the arm, and whether others send, too.
 
     Args:
         config: where the devices are, and limits.
-        activate: whether the gripper may be activated, which moves it.
+        activate: whether the robot is commanded, and the gripper may be activated,
+            which moves it.
         clock: see above.
         wait: lets a time [s] pass while devices answer.
         lcm: see above; None is the configured one.
@@ -66,9 +73,20 @@ class CellDevices:
             "gripper": self.gripper,
             "ft_sensor": self._sensor,
         }
+        channel = CommandChannel(self.lcm, iiwa.command_channel)
+        self.commands = CommandMonitor(channel, lambda: arm.commanded)
+        self._is_commanded = activate
+        self._locks = DeviceLocks(_used(config, self.lcm.get_lcm_url(), activate))
 
     def connect(self) -> None:
-        """Starts the clients; calling it again restarts the sensor's stream."""
+        """Starts the clients; calling it again restarts the sensor's stream.
+
+        Raises:
+            DisasmError: another program on this machine has one of the devices.
+        """
+        self._locks.acquire()
+        if self._is_commanded:
+            self.commands.start()
         self._sensor.start()
         self.gripper.start()
 
@@ -76,6 +94,8 @@ class CellDevices:
         """Stops the clients: no thread and no socket stays."""
         self._sensor.stop()
         self.gripper.stop()
+        self.commands.stop()
+        self._locks.release()
 
     def pump(self) -> None:
         """Handles the arm's messages while no simulator does."""
@@ -104,13 +124,16 @@ class CellDevices:
         """Waits until all devices are ready, and until the arm's driver takes commands.
 
         Raises:
-            DisasmError: one of them does not become ready in time.
+            DisasmError: one of them does not become ready in time, or somebody else
+                commands the arm.
         """
         begun = self.clock()
         while True:
             self.pump()
             health = self.healths()
             waited = self.clock() - begun
+            if self._is_commanded and self.commands.foreign:
+                raise DisasmError(self.commands.foreign)
             not_ready = [n for n, h in health.items() if h is not Health.READY]
             if not not_ready and waited >= _LISTENS_FIRST:
                 return
@@ -146,3 +169,19 @@ class CellDevices:
             f"not ready after {self._config.ready_timeout:g} s: {'; '.join(each)}; "
             "see docs/hardware.md, what to check first"
         )
+
+
+def _used(config: HardwareConfig, lcm_url: str, is_commanded: bool) -> dict[str, str]:
+    """Returns the devices that are one program's alone: address to what it does.
+
+    Another program's dry run would take the sensor's stream, and break into the
+    gripper's requests.
+    """
+    arm = lcm_address(lcm_url, config.iiwa.command_channel)
+    sensor, gripper = config.ft_sensor, config.gripper
+    is_serial = gripper.transport == "serial"
+    port = "" if is_serial else f":{gripper.port}"
+    return ({arm: "commands this robot"} if arm and is_commanded else {}) | {
+        f"ft_sensor at {sensor.address}:{sensor.port}": "has the sensor's stream",
+        f"gripper at {gripper.address}{port}": "talks to the gripper",
+    }

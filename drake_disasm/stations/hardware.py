@@ -177,6 +177,7 @@ class HardwareStation(Station):
     def resume(self) -> None:
         """Ends a hold; the arm moves again once all devices are ready and the next
         command is close to where it is."""
+        self._cell.commands.forget()
         self.supervisor.resume()
 
     def healths(self) -> dict[str, Health]:
@@ -238,6 +239,7 @@ class HardwareStation(Station):
                 self.coordinates,
                 self.mounting,
                 period,
+                lambda: "" if self.dry_run else self._cell.commands.foreign,
             ),
         )
         export_required(

@@ -1,6 +1,6 @@
 """The supervisor as a system between the policy's command and the arm."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -38,6 +38,7 @@ class SafetyFilter(LeafSystem):
         coordinates: maps joint angles to X_GB.
         mounting: geometry and payload of the sensor.
         period: of the position interface [s].
+        foreign: returns why somebody else commands the arm; empty if nobody does.
     """
 
     def __init__(
@@ -49,9 +50,11 @@ class SafetyFilter(LeafSystem):
         coordinates: Coordinates,
         mounting: Mounting,
         period: float,
+        foreign: Callable[[], str] = lambda: "",
     ) -> None:
         super().__init__()
         self._supervisor, self._pacer, self._lag = supervisor, pacer, lag
+        self._foreign = foreign
         self._devices, self._coordinates, self._mounting = (
             devices,
             coordinates,
@@ -112,6 +115,7 @@ class SafetyFilter(LeafSystem):
             self._load(readings["ft_sensor"].values, X_GB),
             readings,
             self._lag.update(now, pacer.counts.slipped, pacer.counts.waited),
+            self._foreign(),
         )
 
     def _load(self, reading: np.ndarray, X_GB: RigidTransform) -> np.ndarray | None:

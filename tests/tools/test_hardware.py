@@ -1,5 +1,6 @@
 """simulate.py --station hardware, and fake_cell.py."""
 
+import dataclasses
 import os
 import signal
 import subprocess
@@ -7,9 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from drake import lcmt_iiwa_command
+from pydrake.common.yaml import yaml_dump_typed
 from pydrake.lcm import DrakeLcm
 
 from drake_disasm.logs import read_log
+from drake_disasm.stations.hardware_config import HardwareConfig, load_hardware_config
 from tests.progress import running, wait_until
 from tests.tools.programs import command, run_program
 
@@ -81,22 +85,38 @@ def _lines(path: Path) -> int:
     return path.read_text().count("\n") if path.exists() else 0
 
 
-@pytest.mark.slow
-def test_no_row_is_lost_however_a_run_is_stopped(
-    fake: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def moving(fake: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The command that moves the arm to and fro, and keeps a log of it.
+
+    For minutes, and where a busy machine stands still it goes on.
+    """
+    config = load_hardware_config(fake)
+    safety = dataclasses.replace(
+        config.safety, stale_arm=1.0, stale_sensor=1.0, stale_gripper=5.0,
+        late_command=5.0, max_force=25.0,
+    )  # fmt: skip
+    patient = dataclasses.replace(config, safety=safety)
+    fake.write_text(yaml_dump_typed(patient, schema=HardwareConfig))
     (tmp_path / "slow_policy.py").write_text(_POLICY)
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}")
+    return command(
+        "simulate", "--station", "hardware", "--hardware-config", fake,
+        "--policy", "slow_policy:to_and_fro", "--set", "task.steps=1000",
+        "--no-meshcat",
+        "--record", tmp_path / "log", "--resume",
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_no_row_is_lost_however_a_run_is_stopped(
+    moving: list[str], tmp_path: Path
+) -> None:
     folder, seen = tmp_path / "log", []
     stops = ((signal.SIGKILL, -9), (signal.SIGTERM, 143), (signal.SIGINT, 130))
     for number, (stop, status) in enumerate(stops):
-        run = command(
-            "simulate", "--station", "hardware", "--hardware-config", fake,
-            "--policy", "slow_policy:to_and_fro", "--no-meshcat",
-            "--record", folder, "--resume",
-        )  # fmt: skip
         rows = folder / f".episode_{number:04d}.unfinished.csv"
-        with running(run, **_PIPES) as process:
+        with running(moving, **_PIPES) as process:
             wait_until(lambda rows=rows: _lines(rows) > 6, process)
             seen.append(_lines(rows) - 1)
             process.send_signal(stop)
@@ -110,6 +130,33 @@ def test_no_row_is_lost_however_a_run_is_stopped(
     assert len(log.episodes) == 3
     for episode, count in zip(log.episodes, seen, strict=True):
         assert episode.rows >= count and episode["truncated"][-1]
+
+
+@pytest.mark.slow
+def test_one_program_alone_commands_the_robot(
+    fake: Path, moving: list[str], tmp_path: Path
+) -> None:
+    rows = tmp_path / "log" / ".episode_0000.unfinished.csv"
+    hardware = ("simulate", "--station", "hardware", "--hardware-config", fake)
+    with running(moving, **_PIPES) as process:
+        wait_until(lambda: _lines(rows) > 3, process)
+        for more, does in (
+            ((), "commands this robot"),
+            (("--dry-run",), "has the sensor's stream"),
+        ):
+            second = run_program(*hardware, "--no-meshcat", *more)
+            assert second.returncode == 2
+            assert f"another program {does} (" in second.stderr
+            assert f": simulate.py (pid {process.pid}, " in second.stderr
+        then = _lines(rows)
+        wait_until(lambda: _lines(rows) > then + 1, process)
+        lcm, message = DrakeLcm(_LCM), lcmt_iiwa_command()
+        lcm.Publish("IIWA_COMMAND", message.encode())
+        _, errors = process.communicate()
+    assert process.returncode == 2
+    reason = "a command that is not ours came on IIWA_COMMAND from "
+    assert reason in errors
+    assert reason in read_log(tmp_path / "log").header.notes[0]["cut_off"]
 
 
 @pytest.mark.slow

@@ -1,6 +1,13 @@
 """KUKA LBR iiwa behind drake-iiwa-driver, by LCM."""
 
 from drake_disasm.devices.iiwa.command import encode_command
+from drake_disasm.devices.iiwa.command_channel import CommandChannel
+from drake_disasm.devices.iiwa.command_monitor import CommandMonitor
 from drake_disasm.devices.iiwa.status import IiwaStatusMonitor
 
-__all__ = ["IiwaStatusMonitor", "encode_command"]
+__all__ = [
+    "CommandChannel",
+    "CommandMonitor",
+    "IiwaStatusMonitor",
+    "encode_command",
+]

@@ -41,6 +41,10 @@ class IiwaStatusMonitor:
     by an LcmInterfaceSystem or by hand. Good ones are passed on: a broken one would
     end the program in Drake's own subscriber.
 
+    Attributes:
+        commanded: (7,) joint angles that the arm obeys, by the newest good status
+            [rad]; None before the first.
+
     Args:
         lcm: where they come from.
         checked: where good messages are passed on, on the same channel.
@@ -61,6 +65,7 @@ class IiwaStatusMonitor:
         self._device_clock = DeviceClock()
         self._stamp: float | None = None  # of the newest, by the driver's clock [s]
         self._channel, self._checked = channel, checked
+        self.commanded: np.ndarray | None = None
         lcm.Subscribe(channel, self._take)
 
     def read(self) -> Reading:
@@ -78,6 +83,7 @@ class IiwaStatusMonitor:
         if not self._is_newer(stamp):
             return
         taken = self._device_clock.taken_at(stamp, self._mailbox.clock())
+        self.commanded = np.array(message.joint_position_commanded)
         self._mailbox.put(np.array(message.joint_position_measured), taken)
         self._checked.Publish(self._channel, data)
 

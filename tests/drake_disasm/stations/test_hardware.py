@@ -1,10 +1,13 @@
 """The hardware station against a fake cell: ports, trajectory, refusals, leftovers."""
 
+import os
 import threading
+from collections.abc import Callable
 
 import numpy as np
 import psutil
 import pytest
+from drake import lcmt_iiwa_command
 from pydrake.lcm import DrakeLcm
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -40,7 +43,8 @@ def station() -> HardwareStation:
     """A station whose devices nobody switches on."""
     config = HardwareConfig(ready_timeout=0.4)
     config.ft_sensor.address = config.gripper.address = "127.0.0.1"
-    config.ft_sensor.port, config.gripper.port = 9, 9
+    port = 20_000 + os.getpid() % 20_000  # nobody else's: each port is locked
+    config.ft_sensor.port, config.gripper.port = port, port
     return HardwareStation(load_scenario("removal"), config, lcm=DrakeLcm("memq://"))
 
 
@@ -283,3 +287,60 @@ def test_a_diagram_that_is_late_by_habit_ends_in_a_hold() -> None:
             for _ in range(40):
                 simulation.step()
         assert station.counts()["longest_stall"] < 0.12
+
+
+def _command(cell: FakeCell, away: float) -> None:
+    """Commands the arm as another program does: joint 2 away [rad] from where it is."""
+    message = lcmt_iiwa_command()
+    message.num_joints = 7
+    message.joint_position = (cell.commanded + away * np.eye(7)[1]).tolist()
+    cell._lcm.Publish("IIWA_COMMAND", message.encode())
+
+
+def test_another_commander_ends_in_a_hold_and_in_a_refusal_to_begin() -> None:
+    cells: list[FakeCell] = []
+
+    def is_joined(s: np.ndarray) -> np.ndarray:
+        """Has somebody else command a place very near by, once."""
+        if s[0] > 0.003 and cells:
+            _command(cells.pop(), 1e-5)
+        return np.array([1e-3, 0, 0, 0, 0, 0])
+
+    with in_lockstep(load_scenario("removal"), is_joined) as parts:
+        simulation, station, cell = parts
+        cells.append(cell)
+        simulation.reset(0)
+        with pytest.raises(HoldError, match="a command that is not ours came on IIWA"):
+            for _ in range(10):
+                simulation.step()
+        station.resume()
+        assert station.supervisor.mode is Mode.WAITING
+        advance = cell.advance
+
+        def joined(heard: Callable[[], bool] = lambda: True) -> None:
+            """Lets a period pass in which somebody else commands."""
+            _command(cell, 1e-5)
+            advance(heard)
+
+        cell.advance = joined  # type: ignore[method-assign]
+        with pytest.raises(DisasmError, match="another program commands this robot"):
+            simulation.reset(0)
+        cell.advance = advance  # type: ignore[method-assign]
+        simulation.reset(0)
+        simulation.step()
+        assert station.supervisor.mode is Mode.ACTIVE, station.supervisor.reason
+
+
+def test_a_sensor_whose_stream_another_program_has_is_left_alone(
+    station: HardwareStation,
+) -> None:
+    """Even by a dry run: the box streams to its last client."""
+    with station:
+        station.connect()
+        dry = HardwareStation(
+            station.scenario, station.config, dry_run=True, lcm=DrakeLcm("memq://")
+        )
+        with pytest.raises(DisasmError, match="has the sensor's stream"):
+            dry.connect()
+    with dry:
+        dry.connect()
