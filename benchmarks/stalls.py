@@ -190,7 +190,8 @@ def drive(pipe: Connection, ports: tuple[int, int]) -> None:
             scenario, lambda _: station, stallers["policy"].before(policy)
         )
         coordinates = station.coordinates
-        coordinates.solve = stallers["solver"].before(coordinates.solve)
+        solve = stallers["solver"].before(coordinates.solve)
+        coordinates.solve = solve  # type: ignore[method-assign, assignment]
         writer = station.GetSubsystemByName("iiwa_command")
         writer.send = stallers["sender"].before(writer.send)
         simulation.set_target_realtime_rate(1.0)

@@ -13,6 +13,7 @@ import types
 
 import pytest
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.scenario import load_scenario, shipped_scenarios
 from tests.docs.pages import ROOT, Block, blocks, commands, name_of, pages
 
@@ -71,6 +72,8 @@ def _check_program(path: str, arguments: list[str], where: str) -> None:
     except SystemExit as exit_:
         assert not exit_.code, f"{where}: refused by its own parser"
         return
+    except DisasmError as error:
+        raise AssertionError(f"{where}: refused by its own parser: {error}") from error
     scenario = getattr(parsed, "scenario", None)
     if scenario in shipped_scenarios():
         load_scenario(scenario, getattr(parsed, "overrides", ()))
