@@ -14,7 +14,7 @@ from drake_disasm.visualization import MeasuredView
 
 _EVERY = 0.5  # s, between two looks of a dry run
 _FRAMES = 10  # of the view, in that time
-_POLL = 0.001  # s: LCM keeps one message of a channel, the newest
+_POLL = 0.001  # s: LCM keeps one message of a channel and drops later ones
 
 
 def open_station(

@@ -18,7 +18,7 @@ MIN_GAP = 0.9
 #: A command that is later than this, in control periods, comes after a stall.
 STALL = 2.0
 
-_POLL = 0.001  # s, the longest wait at a time: LCM keeps one message, the newest
+_POLL = 0.001  # s, the longest wait at a time: LCM drops what comes behind a message
 _ROUNDING = 1e-9  # s
 
 

@@ -22,7 +22,7 @@ from drake_disasm.systems.device_reader import Readable
 
 #: drake-iiwa-driver refuses commands within 0.25 s of its first status.
 _LISTENS_FIRST = 0.3
-_POLL = 0.001  # s: LCM keeps one message of a channel, the newest
+_POLL = 0.001  # s: LCM keeps one message of a channel and drops later ones
 
 
 class CellDevices:

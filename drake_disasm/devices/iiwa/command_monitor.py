@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from drake_disasm.devices.iiwa.command_channel import CommandChannel
+from drake_disasm.devices.iiwa.status import JOINTS
 
 #: Commands that we are taken to have sent lately: 1 s of them, at 200 Hz.
 _KEPT = 200
@@ -34,7 +35,8 @@ class CommandMonitor:
     ) -> None:
         self._channel, self._reported = channel, reported
         self._messages: deque[bytes] = deque(maxlen=_KEPT)
-        self._positions: deque[np.ndarray] = deque(maxlen=_KEPT)
+        self._positions = np.full((_KEPT, JOINTS), np.nan)  # in any order
+        self._count = 0
         self._is_obeyed, self._foreign = False, ""
 
     def start(self) -> None:
@@ -53,8 +55,9 @@ class CommandMonitor:
 
     def sent(self, position: np.ndarray) -> None:
         """Takes note of a command (7,) [rad] that is about to be sent, to the bit."""
-        self._messages.appendleft(struct.pack(f">{len(position)}d", *position))
-        self._positions.append(np.array(position))
+        self._messages.appendleft(_encoded(position))
+        self._positions[self._count % _KEPT] = position
+        self._count += 1
 
     @property
     def foreign(self) -> str:
@@ -80,9 +83,12 @@ class CommandMonitor:
         It obeys something older until our first command has got there.
         """
         reported = self._reported()
-        if reported is None or not self._positions:
+        if reported is None or not self._count:
             return ""
-        ours = np.array(self._positions)
+        if _encoded(reported) in self._messages:  # as usual, and quick
+            self._is_obeyed = True
+            return ""
+        ours = self._positions[: self._count]
         low, high = ours.min(axis=0) - _TOLERANCE, ours.max(axis=0) + _TOLERANCE
         away = np.maximum(low - reported, reported - high)
         joint = int(np.argmax(away))
@@ -96,3 +102,8 @@ class CommandMonitor:
             f"{away[joint] + _TOLERANCE:.3f} rad from ours: another program commands "
             "this robot; stop it"
         )
+
+
+def _encoded(position: np.ndarray) -> bytes:
+    """Returns joint angles as LCM has them in a message."""
+    return struct.pack(f">{JOINTS}d", *position)
