@@ -49,7 +49,7 @@ if __name__ == "__main__":
     magnet = MagneticCatch(force=1.5, reach=0.008)
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log"  # states the scenario, and was made with a magnet
-        transitions_log(log, scenario, [magnet], seed=0, episodes=8, steps=20)
+        transitions_log(log, scenario, [magnet], seed=0, episodes=5, steps=12)
         model = TwinModel([read_log(log)], scenario, ())
     closed = close_loop(model)  # asks all registered effects: the library's, and this
     print(closed.text)

@@ -90,6 +90,7 @@ def test_groove_turned_the_other_way_mirrors_the_force() -> None:
     assert forces[0] == pytest.approx(-forces[1], rel=0.01)
 
 
+@pytest.mark.slow
 def test_twin_and_cell_jam_at_the_same_place() -> None:
     twin, cell = episode("twin", "straight"), episode("cell", "straight")
     assert twin["travel"] == pytest.approx(cell["travel"], rel=0.15)

@@ -34,9 +34,23 @@ def _groove_on_bolt(simulation: TaskSimulation) -> np.ndarray:
     return station.X_WG.rotation().matrix().T @ force
 
 
-@pytest.mark.parametrize("model", ["cell", "twin"])
-@pytest.mark.parametrize("ry_deg", [0.0, 2.0, -4.0])
-@pytest.mark.parametrize("offset", [[0, 0, 6e-4], [0, 6e-4, 0], [0, -6e-4, 0]])
+ANGLES_DEG = [0.0, 2.0, -4.0]
+OFFSETS = [[0, 0, 6e-4], [0, 6e-4, 0], [0, -6e-4, 0]]
+IN_TWIN = [("twin", angle, offset) for angle in ANGLES_DEG for offset in OFFSETS]
+IN_CELL = [("cell", *case) for _, *case in IN_TWIN]
+
+
+@pytest.mark.parametrize(
+    ("model", "ry_deg", "offset"),
+    [
+        *IN_TWIN,
+        IN_CELL[4],
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in IN_CELL[:4] + IN_CELL[5:]
+        ),
+    ],
+)
 def test_sliding_force_is_mu_n_anywhere(
     model: str, ry_deg: float, offset: list[float]
 ) -> None:

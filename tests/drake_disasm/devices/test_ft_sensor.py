@@ -50,7 +50,7 @@ def test_quantise() -> None:
 
 
 def test_noise_has_the_stated_deviation_and_is_counted() -> None:
-    scenario = load_scenario("removal")
+    scenario = load_scenario("removal", ["task.period=0.02"])
     simulation = TaskSimulation(scenario, "twin")
     simulation.reset(0)
     readings = []

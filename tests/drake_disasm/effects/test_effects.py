@@ -52,6 +52,7 @@ ORIENTATIONS = [(0, 0, 0), (np.pi, 0, 0), (0.3, -0.8, 2.0), (np.pi / 2, 0, 0)]
 ENVIRONMENT = Environment(
     RigidTransform([0.001, 0, 0]), 0.2, 1e9, 1e8, 20.0, 4e-4, 1e3, 1.0
 )
+STEPS = 10  # in contact from the third
 MOVING = BoltMotion(np.array([0.03, 0.001, -0.001]), np.array([0.02, 0.0, 0.005]))
 
 
@@ -118,14 +119,14 @@ def _trajectory(
 @pytest.fixture(scope="module")
 def without() -> np.ndarray:
     """The trajectory without the effect."""
-    return _trajectory([], 20)
+    return _trajectory([], STEPS)
 
 
 @pytest.mark.parametrize("effect", IN_CELL)
 def test_vanishes_at_null_bit_for_bit(
     effect: type[Effect], without: np.ndarray
 ) -> None:
-    assert np.array_equal(_trajectory([effect()], 20), without)
+    assert np.array_equal(_trajectory([effect()], STEPS), without)
 
 
 @pytest.mark.parametrize("effect", IN_CELL)
@@ -135,10 +136,10 @@ def test_shows_away_from_null(effect: type[Effect], without: np.ndarray) -> None
     if effect is ContactExponent:
         with pytest.raises(DisasmError, match="ContactExponent"):
             _trajectory([effect(**sized)], 1)
-        without = _trajectory([], 20, "impact")
-        with_effect = _trajectory([effect(**sized)], 20, "impact")
+        without = _trajectory([], STEPS, "impact")
+        with_effect = _trajectory([effect(**sized)], STEPS, "impact")
     else:
-        with_effect = _trajectory([effect(**sized)], 20)
+        with_effect = _trajectory([effect(**sized)], STEPS)
     assert not np.allclose(with_effect, without, atol=1e-6)
 
 

@@ -48,12 +48,12 @@ def test_imprecision_clips_at_bounds_plus_psi(sign: float) -> None:
 def test_imprecision_in_the_diagram_has_deviation_psi() -> None:
     psi = 3e-4
     simulation = TaskSimulation(
-        load_scenario("removal", [f"imprecision={psi}"]), "twin"
+        load_scenario("removal", [f"imprecision={psi}", "task.period=0.02"]), "twin"
     )
     executed = []
-    for seed in range(60):
+    for seed in range(10):
         simulation.reset(seed)
-        for _ in range(5):
+        for _ in range(30):
             simulation.step(np.zeros(6))
             executed.append(
                 simulation.evaluate(simulation.systems.pose_target, "action_executed")

@@ -24,7 +24,7 @@ def simulation(request: pytest.FixtureRequest) -> TaskSimulation:
     return TaskSimulation(scenario, request.param, make_policy("straight"))
 
 
-def _observations(simulation: TaskSimulation, seed: int, steps: int = 12) -> np.ndarray:
+def _observations(simulation: TaskSimulation, seed: int, steps: int = 6) -> np.ndarray:
     first = simulation.reset(seed, TURNED)
     return np.array([first, *(simulation.step().observation for _ in range(steps))])
 
@@ -52,7 +52,7 @@ def test_actions_from_outside_equal_a_policys(simulation: TaskSimulation) -> Non
     open_loop = TaskSimulation(simulation.scenario, simulation.station_name)
     open_loop.reset(3, TURNED)
     action = make_policy("straight")(np.zeros(12))
-    stepped = [open_loop.step(action).observation for _ in range(12)]
+    stepped = [open_loop.step(action).observation for _ in range(6)]
     np.testing.assert_array_equal(stepped, _observations(simulation, 3)[1:])
 
 
