@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from drake_disasm.common import bounded_yaml
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import read_text
 from drake_disasm.common.quantity import closest
+from drake_disasm.common.text import clipped, shown
 from drake_disasm.scenario import Scenario
 from drake_disasm.scenario.names import find_number, resolve
 from sysid.parameters import Parameter
@@ -118,21 +119,17 @@ def _refuse_beyond(
 
 
 def _read_file(path: Path) -> list[Request]:
+    text = read_text(path, "name a YAML file", bounded_yaml.MOST_BYTES)
     try:
-        raw = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise DisasmError(
-            f"{path}: can't be read ({error}); name a YAML file"
-        ) from None
-    except yaml.YAMLError as error:
-        text = " ".join(str(error).split())
-        raise DisasmError(f"{path}: not YAML ({text}); correct it") from None
+        raw = bounded_yaml.load(text)
+    except DisasmError as error:
+        raise DisasmError(f"{path}: {error}") from None
     if not isinstance(raw, dict) or not raw:
         raise DisasmError(
             f"{path}: is not a mapping; write lines of `contact.friction: "
             "{low: 0.0, high: 1.0}`"
         )
-    return [_request(str(name), entry, path) for name, entry in raw.items()]
+    return [_request(clipped(str(name)), entry, path) for name, entry in raw.items()]
 
 
 def _request(name: str, entry: Any, path: Path) -> Request:
@@ -144,18 +141,21 @@ def _request(name: str, entry: Any, path: Path) -> Request:
     for key, value in entry.items():
         if key not in _KEYS:
             raise DisasmError(
-                f"{path}: {name}: unknown key '{key}'; {closest(str(key), list(_KEYS))}"
+                f"{path}: {name}: unknown key '{clipped(str(key))}'; "
+                f"{closest(clipped(str(key)), list(_KEYS))}"
             )
         if key == "scale" and value not in _SCALES:
-            raise DisasmError(f"{path}: {name}: scale '{value}'; use linear or log")
+            raise DisasmError(
+                f"{path}: {name}: scale {shown(value)}; use linear or log"
+            )
         if key != "scale" and (isinstance(value, bool) or not _is_number(value)):
             raise DisasmError(
-                f"{path}: {name}: {key} is {value!r}; give a number (YAML reads 1e-3 "
-                "as a text, 1.0e-3 as a number)"
+                f"{path}: {name}: {key} is {shown(value)}; give a number (YAML reads "
+                "1e-3 as a text, 1.0e-3 as a number)"
             )
     numbers = {k: float(v) for k, v in entry.items() if k != "scale"}
     return Request(name, **numbers, scale=entry.get("scale"))
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float)
+    return isinstance(value, float) or (isinstance(value, int) and abs(value) < 2**63)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.text import clipped, shown
 
 
 def quantity(
@@ -73,7 +74,8 @@ def _is_list_of_sections(field: dataclasses.Field, value: Any) -> bool:
 def _check_leaf(name: str, value: Any, metadata: Any) -> None:
     if metadata.get("choices") and value not in metadata["choices"]:
         raise DisasmError(
-            f"{name}: '{value}' is not known; use one of {metadata['choices']}"
+            f"{name}: '{clipped(str(value))}' is not known; "
+            f"use one of {metadata['choices']}"
         )
     values = value if isinstance(value, list) else [value]
     if "length" in metadata and len(values) != metadata["length"]:
@@ -87,10 +89,11 @@ def _check_leaf(name: str, value: Any, metadata: Any) -> None:
 
 def _check_number(name: str, number: float, metadata: Any) -> None:
     low, high = metadata.get("low", -math.inf), metadata.get("high", math.inf)
-    if math.isfinite(number) and low <= number <= high:
+    if low <= number <= high and abs(number) < math.inf:
         return
     unit = metadata.get("unit", "")
-    value = f"{number:g}" if unit in ("", "1") else f"{number:g} {unit}"
+    given = f"{number:g}" if isinstance(number, float) else shown(number)
+    value = given if unit in ("", "1") else f"{given} {unit}"
     raise DisasmError(
         f"{name}: {value} is out of range; give a value from {low:g} to {high:g}"
     )

@@ -9,10 +9,10 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import yaml
-
+from drake_disasm.common import bounded_yaml
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import check, closest, quantity
+from drake_disasm.common.text import clipped
 
 ALGORITHMS = ("ddpg", "td3", "sac")
 SCHEDULES = ("delayed", "every_step")
@@ -249,7 +249,10 @@ def override(config: Hyperparameters, pairs: Sequence[str]) -> Hyperparameters:
 
 def _value(key: str, text: str, present: Any) -> Any:
     """Returns the text as a value of the same kind as the present one."""
-    value = yaml.safe_load(text)
+    try:
+        value = bounded_yaml.load(text)
+    except DisasmError as error:
+        raise DisasmError(f"hyper-parameter '{key}': {error}") from None
     if isinstance(present, list) and isinstance(value, list):
         return [_value(key, str(item), present[0]) for item in value]
     if isinstance(present, float) and isinstance(value, (int, str)):
@@ -261,7 +264,7 @@ def _value(key: str, text: str, present: Any) -> Any:
         value, type(present)
     ):
         raise DisasmError(
-            f"hyper-parameter '{key}': {text} is no {type(present).__name__}; it is "
-            f"{present} now"
+            f"hyper-parameter '{key}': {clipped(text)} is no "
+            f"{type(present).__name__}; it is {present} now"
         )
     return value

@@ -29,8 +29,9 @@ def check_values(
 
     Raises:
         DisasmError: a wrong type, mixed lengths, too few rows, NaN or infinity, a
-            quaternion that is not unit, time that does not increase or does not fit
-            the period, a flag or an action where there can't be one.
+            magnitude that nothing has, a quaternion that is not unit, time that does
+            not increase or does not fit the period, a flag or an action where there
+            can't be one.
     """
     kind = KINDS[header.kind]
     typed = {
@@ -97,7 +98,23 @@ def _check_finite(columns: Columns, where: str) -> None:
         )
 
 
+def _check_magnitudes(quantity: Quantity, columns: Columns, where: str) -> None:
+    for number, (name, values) in enumerate(columns.items()):
+        most = quantity.greatest(number)
+        bad = np.abs(values) > most
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise refusal(
+                where,
+                f"column '{name}' is {values[row]:.6g} in {_row(row)}, beyond "
+                f"{most:g} {quantity.unit_of(number)}",
+                "convert it to SI, or leave out rows that are damaged",
+            )
+
+
 def _check_quantity(quantity: Quantity, columns: Columns, where: str) -> None:
+    if not quantity.boolean:
+        _check_magnitudes(quantity, columns, where)
     if quantity.is_rotation:
         _check_quaternions(quantity.name, columns, where)
     if quantity.increasing:

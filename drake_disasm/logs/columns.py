@@ -1,5 +1,6 @@
 """Which columns a table must and may have, and vectors as columns."""
 
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
@@ -8,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from drake_disasm.logs.header import LogHeader
 from drake_disasm.logs.refusal import did_you_mean, quoted, refusal
-from drake_disasm.logs.schema import KINDS, Form, Kind, Quantity
+from drake_disasm.logs.schema import KINDS, MOST_COLUMNS, Form, Kind, Quantity
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -75,7 +76,9 @@ def arrange_names(
             of the joints have different numbers of columns.
     """
     kind = KINDS[header.kind]
+    _check_count(names, where)
     _check_unique(names, where)
+    names = dict.fromkeys(names).keys()  # looked up in, once for each column
     present = {name: _present(q, names, where) for name, q in _by_name(kind)}
     _check_one_of(kind, present, where)
     ordered = tuple(name for group in present.values() for name in group)
@@ -88,8 +91,17 @@ def _by_name(kind: Kind) -> Iterable[tuple[str, Quantity]]:
     return ((quantity.name, quantity) for quantity in kind.quantities)
 
 
+def _check_count(names: Collection[str], where: str) -> None:
+    if len(names) > MOST_COLUMNS:
+        raise refusal(
+            where,
+            f"{len(names)} columns",
+            f"give {MOST_COLUMNS} at most, one for each quantity and component",
+        )
+
+
 def _check_unique(names: Collection[str], where: str) -> None:
-    twice = sorted({n for n in names if list(names).count(n) > 1})
+    twice = sorted(name for name, count in Counter(names).items() if count > 1)
     if twice:
         raise refusal(where, f"column {quoted(twice)} is there twice", "remove one")
 

@@ -58,11 +58,3 @@ def unfinished_files(folder: Path) -> dict[int, Path]:
 def is_empty(folder: Path) -> bool:
     """Whether a folder holds nothing but what a killed writer may leave behind."""
     return all(_TEMPORARY.fullmatch(path.name) for path in folder.iterdir())
-
-
-def read_bytes(path: Path, remedy: str) -> bytes:
-    """The content of a file, or a refusal with this remedy."""
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise refusal(path, f"cannot be read ({error.strerror})", remedy) from error

@@ -1,6 +1,5 @@
 """`log.yaml`: what a log says about itself."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,12 +7,23 @@ from typing import Any
 
 import yaml
 
-from drake_disasm.common.files import write_bytes
-from drake_disasm.logs.files import read_bytes
+from drake_disasm.common import bounded_yaml
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import read_text, write_bytes
+from drake_disasm.common.text import shown
 from drake_disasm.logs.refusal import did_you_mean, quoted, refusal
-from drake_disasm.logs.schema import KINDS, SCHEMA, SI_UNITS, UNIT_SPELLINGS, Kind, Rule
+from drake_disasm.logs.schema import (
+    GREATEST,
+    KINDS,
+    SCHEMA,
+    SI_UNITS,
+    UNIT_SPELLINGS,
+    Kind,
+    Rule,
+)
 
 HEADER_NAME = "log.yaml"
+_MOST_BYTES, _MOST_VALUES = 2**21, 50_000  # notes of thousands of episodes fit
 _REQUIRED = ("schema", "kind", "units", "frames", "task", "provenance")
 _KEYS = (*_REQUIRED, "period", "joints", "urdf", "scenario", "notes")
 
@@ -103,12 +113,9 @@ def parse_header(raw: object, where: str) -> LogHeader:
 def read_header(folder: Path) -> LogHeader:
     """The header of the log in a folder; see `parse_header` for what is refused."""
     path = folder / HEADER_NAME
-    data = read_bytes(path, f"write the log's {HEADER_NAME}, see docs/log-format.md")
-    try:
-        raw = yaml.safe_load(data)
-    except yaml.YAMLError as error:
-        raise refusal(path, f"not YAML ({error})", "correct that line") from error
-    return parse_header(raw, str(path))
+    remedy = f"write the log's {HEADER_NAME}, see docs/log-format.md"
+    text = read_text(path, remedy, _MOST_BYTES)
+    return parse_header(_parsed(text, path), str(path))
 
 
 def write_header(folder: Path, header: LogHeader) -> None:
@@ -124,7 +131,15 @@ def as_read(header: LogHeader, folder: Path) -> LogHeader:
         DisasmError: as `parse_header`, or what is not plain data.
     """
     path = folder / HEADER_NAME
-    return parse_header(yaml.safe_load(_to_yaml(header, path)), str(path))
+    return parse_header(_parsed(_to_yaml(header, path).decode(), path), str(path))
+
+
+def _parsed(text: str, path: Path) -> Any:
+    """The plain data of a header's text, within the limits of reading."""
+    try:
+        return bounded_yaml.load(text, _MOST_VALUES)
+    except DisasmError as error:
+        raise DisasmError(f"{path}: {error}") from None
 
 
 def _to_yaml(header: LogHeader, path: Path) -> bytes:
@@ -160,7 +175,7 @@ def _checked_mapping(raw: object, where: str) -> Mapping[str, Any]:
     if raw.get("schema") != SCHEMA:
         raise refusal(
             where,
-            f"wrong schema: key 'schema' is {raw.get('schema')!r}",
+            f"wrong schema: key 'schema' is {shown(raw.get('schema'))}",
             f"convert the log to '{SCHEMA}', the one that is read here",
         )
     missing = [key for key in _REQUIRED if key not in raw]
@@ -178,8 +193,10 @@ def _checked_mapping(raw: object, where: str) -> Mapping[str, Any]:
 
 def _checked_kind(values: Mapping[str, Any], where: str) -> Kind:
     name = values["kind"]
-    if name not in KINDS:
-        raise refusal(where, f"key 'kind' is {name!r}", f"use one of {quoted(KINDS)}")
+    if not isinstance(name, str) or name not in KINDS:
+        raise refusal(
+            where, f"key 'kind' is {shown(name)}", f"use one of {quoted(KINDS)}"
+        )
     for key, rule in KINDS[name].keys.items():
         absent = values.get(key) in (None, [])
         if rule is Rule.REQUIRED and absent:
@@ -196,7 +213,7 @@ def _check_units(units: object, where: str) -> None:
         if UNIT_SPELLINGS.get(str(given), given) != unit:
             raise refusal(
                 where,
-                f"key 'units.{quantity}' is {given!r}",
+                f"key 'units.{quantity}' is {shown(given)}",
                 f"convert the columns to SI and write '{quantity}: {unit}'",
             )
     unknown = [str(key) for key in table if key not in SI_UNITS]
@@ -220,7 +237,7 @@ def _checked_frames(
         if frames.get(name) not in allowed:
             raise refusal(
                 where,
-                f"key 'frames.{name}' is {frames.get(name)!r}",
+                f"key 'frames.{name}' is {shown(frames.get(name))}",
                 f"express it in {' or '.join(allowed)} and say so",
             )
     return frames
@@ -231,10 +248,10 @@ def _checked_period(values: Mapping[str, Any], where: str) -> float | None:
     if period is None:
         return None
     number = isinstance(period, int | float) and not isinstance(period, bool)
-    if not number or not math.isfinite(period) or period <= 0:
+    if not number or not 0 < period <= GREATEST["s"]:
         raise refusal(
             where,
-            f"key 'period' is {period!r}",
+            f"key 'period' is {shown(period)}",
             "give seconds as a positive number, such as 0.005 or 5.0e-3",
         )
     return float(period)
@@ -245,7 +262,7 @@ def _checked_joints(values: Mapping[str, Any], where: str) -> tuple[str, ...]:
     names = isinstance(joints, list) and all(isinstance(j, str) for j in joints)
     if not names or len(set(joints)) != len(joints):
         raise refusal(
-            where, f"key 'joints' is {joints!r}", "give a list of different names"
+            where, f"key 'joints' is {shown(joints)}", "give a list of different names"
         )
     return tuple(joints)
 
@@ -266,12 +283,12 @@ def _checked_notes(notes: object, where: str) -> Mapping[int, Mapping[str, Any]]
 def _text(values: Mapping[str, Any], key: str, where: str) -> str:
     value = values[key]
     if not isinstance(value, str) or not value.strip():
-        raise refusal(where, f"key '{key}' is {value!r}", "give a text")
+        raise refusal(where, f"key '{key}' is {shown(value)}", "give a text")
     return value
 
 
 def _mapping(values: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
     value = values[key]
     if not isinstance(value, Mapping):
-        raise refusal(where, f"key '{key}' is {value!r}", "give a mapping, or {}")
+        raise refusal(where, f"key '{key}' is {shown(value)}", "give a mapping, or {}")
     return value

@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.common.files import read_bytes
 from drake_disasm.logs.checks import check_values
 from drake_disasm.logs.columns import arrange_names
-from drake_disasm.logs.files import episode_files, read_bytes, unfinished_files
+from drake_disasm.logs.files import episode_files, unfinished_files
 from drake_disasm.logs.header import LogHeader, read_header
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.logs.schema import KINDS
-from drake_disasm.logs.tables import column_names, read_table
+from drake_disasm.logs.tables import MOST_BYTES, column_names, read_table
 from drake_disasm.logs.unfinished import is_being_written
 
 
@@ -141,7 +142,7 @@ def _unfinished(folder: Path) -> Iterator[str]:
 
 
 def _read_episode(header: LogHeader, path: Path, hashes: dict[str, str]) -> Episode:
-    data = read_bytes(path, "check its permissions")
+    data = read_bytes(path, "split it", MOST_BYTES)
     hashes[path.name] = hashlib.sha256(data).hexdigest()
     names = arrange_names(header, column_names(data, path), str(path))
     table = read_table(data, path, KINDS[header.kind].boolean_columns)

@@ -5,6 +5,7 @@ W world (z up), G groove (nominal), B bolt, S sensor; Bo and So are their origin
 """
 
 import enum
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -16,6 +17,23 @@ SI_UNITS: Mapping[str, str] = MappingProxyType(
 UNIT_SPELLINGS: Mapping[str, str] = MappingProxyType(
     {"N*m": "N·m", "Nm": "N·m", "N m": "N·m"}
 )
+#: The greatest magnitude of a value, by its unit: far beyond any cell, and below what
+#: a damaged file gives.
+GREATEST: Mapping[str, float] = MappingProxyType(
+    {
+        "s": 1e11,  # 3000 years, so that time may be counted from 1970
+        "m": 1e4,
+        "rad": 1e6,
+        "rad/s": 1e6,
+        "rad/s\N{SUPERSCRIPT TWO}": 1e9,  # differentiated at some kHz
+        "N": 1e7,
+        "N\N{MIDDLE DOT}m": 1e7,
+        "1": 1e20,  # order may be nanoseconds since 1970
+        "any": math.inf,
+    }
+)
+MOST_COLUMNS = 10_000
+MOST_CELLS = 2 * 10**8  # of a table: 1.6 GB
 
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 QUATERNION = POSE[3:]
@@ -70,6 +88,15 @@ class Quantity:
     boolean: bool = False
     increasing: bool = False
     of_step: bool = False
+
+    def greatest(self, number: int) -> float:
+        """The greatest magnitude of its column of that number, in its unit."""
+        return GREATEST[self.unit_of(number)]
+
+    def unit_of(self, number: int) -> str:
+        """The unit of a column; the second of two begins with the fourth."""
+        first, _, second = self.unit.partition(", ")
+        return second if second and number >= 3 else first
 
     @property
     def is_rotation(self) -> bool:

@@ -13,9 +13,13 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.text import clipped
 from drake_disasm.logs.refusal import refusal
+from drake_disasm.logs.schema import MOST_CELLS
 
 FILE_FORMATS = ("parquet", "csv")
+MOST_BYTES = 2**30  # of an episode's file
+_LONGEST_LINE = 2**20  # bytes, of a CSV's column names
 
 # PyArrow strips blanks before numbers but not before these.
 _TRUE = [blank + word for blank in ("", " ") for word in ("true", "True", "TRUE", "1")]
@@ -46,7 +50,7 @@ def column_names(data: bytes, path: Path) -> list[str]:
         DisasmError: the content is not of that format.
     """
     if path.suffix == ".csv":
-        return _csv_names(data)
+        return _csv_names(data, path)
     try:
         return list(pq.read_schema(_stream(data)).names)
     except (pa.ArrowException, OSError) as error:
@@ -70,22 +74,47 @@ def read_table(
     """
     try:
         if path.suffix == ".csv":
-            table = _read_csv(data, booleans)
+            table = _read_csv(data, path, booleans)
         else:
-            table = pq.ParquetFile(_stream(data)).read(use_threads=False)
+            table = _read_parquet(data, path)
     except (pa.ArrowException, OSError) as error:
         raise _unreadable(path, error, data) from error
+    if len(set(table.column_names)) < len(table.column_names):
+        raise refusal(path, "columns of one name", "rename one of them")
     return {name: table[name].to_numpy() for name in table.column_names}
 
 
-def _csv_names(data: bytes) -> list[str]:
-    first = data.partition(b"\n")[0].decode("utf-8-sig", errors="replace")
-    rows = csv.reader(io.StringIO(first.rstrip("\r")), skipinitialspace=True)
-    return [name.strip() for name in next(rows, [])]
+def _csv_names(data: bytes, path: Path) -> list[str]:
+    line = data[:_LONGEST_LINE].partition(b"\n")[0]
+    first = line.decode("utf-8-sig", errors="replace").rstrip("\r")
+    rows = csv.reader(io.StringIO(first), skipinitialspace=True)
+    try:
+        if len(line) == _LONGEST_LINE:
+            raise csv.Error("the first line has no end")
+        return [name.strip() for name in next(rows, [])]
+    except csv.Error as error:
+        raise refusal(
+            path, f"not a table in CSV ({error})", "begin with column names"
+        ) from None
 
 
-def _read_csv(data: bytes, booleans: Collection[str]) -> pa.Table:
-    names = _csv_names(data)
+def _read_parquet(data: bytes, path: Path) -> pa.Table:
+    file = pq.ParquetFile(_stream(data))
+    for field in file.schema_arrow:
+        if not pa.types.is_primitive(field.type):
+            raise refusal(
+                path,
+                f"column '{clipped(field.name)}' is of type {clipped(str(field.type))}",
+                "write a number in every row, and true or false for flags",
+            )
+    cells = file.metadata.num_rows * len(file.schema_arrow)
+    if cells > MOST_CELLS:
+        raise refusal(path, f"{cells} values", f"split it: {MOST_CELLS} at most")
+    return file.read(use_threads=False)
+
+
+def _read_csv(data: bytes, path: Path, booleans: Collection[str]) -> pa.Table:
+    names = _csv_names(data, path)
     types = {name: pa.bool_() if name in booleans else pa.float64() for name in names}
     body = data.partition(b"\n")[2]
     if not body.strip():
@@ -112,12 +141,12 @@ def _stream(data: bytes) -> pa.BufferReader:
 
 
 def _unreadable(path: Path, error: Exception, data: bytes) -> DisasmError:
-    text = str(error).split("\n", 1)[0]
+    text = clipped(str(error).split("\n", 1)[0], 200)
     if path.suffix != ".csv":
         return refusal(path, f"not a whole Parquet file ({text})", "write it again")
     column = re.search(r"column #(\d+)", text)
     if column:
-        name = _csv_names(data)[int(column[1])]
+        name = _csv_names(data, path)[int(column[1])]
         remedy = "write numbers, and true or false for flags, in every row"
         return refusal(path, f"column '{name}': {text}", remedy)
     if "Expected" in text:

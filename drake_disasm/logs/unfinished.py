@@ -5,6 +5,7 @@ of their step, together with the next row's measurements, and stand in that row'
 reading moves them up to where the format has them.
 """
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,11 @@ from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.file_lock import lock, try_lock
+from drake_disasm.common.files import read_bytes
 from drake_disasm.logs.columns import columns_of
-from drake_disasm.logs.files import read_bytes
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.logs.schema import Kind
-from drake_disasm.logs.tables import read_table
+from drake_disasm.logs.tables import MOST_BYTES, read_table
 
 
 class RowFile:
@@ -93,12 +94,14 @@ def read_rows(path: Path, kind: Kind) -> dict[str, NDArray[Any]]:
     Raises:
         DisasmError: it can't be read, or is damaged.
     """
-    data = read_bytes(path, "check its permissions").partition(b"\0")[0]
+    data = read_bytes(path, "remove it", MOST_BYTES).partition(b"\0")[0]
     whole = data.rpartition(b"\n")[0]
     if b"\n" not in whole:
         return {}
     table = read_table(whole, path, kind.boolean_columns)
     floats = [v for name, v in table.items() if name not in kind.boolean_columns]
+    if not floats:
+        raise refusal(path, "no column of numbers", "remove it")
     finite = np.isfinite(np.column_stack(floats)).all(axis=1)
     rows = int(np.argmin(np.append(finite, False)))
     steps = {n for q in kind.quantities if q.of_step for n in columns_of(q, table)}
@@ -111,7 +114,7 @@ def read_rows(path: Path, kind: Kind) -> dict[str, NDArray[Any]]:
 def is_being_written(path: Path) -> bool:
     """Whether a program has a file of rows open."""
     try:
-        with path.open("rb") as file:
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
             return not try_lock(file)
     except OSError:  # it was finished meanwhile
         return False

@@ -8,14 +8,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drake_disasm.common.files import make_folder, write_atomically
+from drake_disasm.common.files import make_folder, read_bytes, write_atomically
 from drake_disasm.logs.checks import check_values
 from drake_disasm.logs.columns import arrange_names
 from drake_disasm.logs.files import (
     episode_files,
     episode_path,
     is_empty,
-    read_bytes,
     unfinished_files,
     unfinished_path,
 )
@@ -24,7 +23,7 @@ from drake_disasm.logs.open_episode import OpenEpisode
 from drake_disasm.logs.reader import check_same_names
 from drake_disasm.logs.refusal import quoted, refusal
 from drake_disasm.logs.schema import KINDS
-from drake_disasm.logs.tables import FILE_FORMATS, column_names, write_table
+from drake_disasm.logs.tables import FILE_FORMATS, MOST_BYTES, column_names, write_table
 from drake_disasm.logs.unfinished import RowFile, is_being_written, read_rows
 
 _KILLED = "the program was killed"
@@ -244,4 +243,4 @@ class LogWriter:
 
 
 def _names_in(path: Path) -> list[str]:
-    return column_names(read_bytes(path, "check its permissions"), path)
+    return column_names(read_bytes(path, "split it", MOST_BYTES), path)

@@ -9,9 +9,14 @@ from typing import Any
 import yaml
 from pydrake.common.yaml import yaml_dump_typed
 
+from drake_disasm.common.bounded_yaml import MOST_BYTES
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import read_text
+from drake_disasm.common.plain_data import check_like
 from drake_disasm.common.quantity import check, closest
 from drake_disasm.common.resources import models_dir
+from drake_disasm.common.text import clipped
+from drake_disasm.effects import find_effect
 from drake_disasm.scenario.effect_tags import tagged
 from drake_disasm.scenario.names import find_field, resolve
 from drake_disasm.scenario.schema import Scenario
@@ -48,7 +53,8 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
         DisasmError: missing file, unknown key, bad value; says which and where.
     """
     path = scenario_path(name)
-    scenario = parse(_read(path), Scenario(), str(path))
+    text = read_text(path, "give a scenario in YAML", MOST_BYTES)
+    scenario = parse(text, Scenario(), str(path))
     _checked(check, scenario, str(path))
     for override in overrides:
         scenario = _override(scenario, override)
@@ -84,10 +90,10 @@ def scenario_from_mapping(mapping: dict[str, Any]) -> Scenario:
     source = "scenario of the log"
     plain = {key: value for key, value in mapping.items() if key != "effects"}
     lines = [yaml.safe_dump(plain) if plain else "", "effects:"]
-    for effect in mapping.get("effects", []):
+    for effect in _effects(mapping, source):
         values = {key: value for key, value in effect.items() if key != "effect"}
         flow = yaml.safe_dump(values, default_flow_style=True, width=10**6).strip()
-        lines.append(f"- !{effect.get('effect')} {flow}")
+        lines.append(f"- !{effect['effect']} {flow}")
     if len(lines) == 2:
         lines[1] = "effects: []"
     scenario = parse("\n".join(lines), Scenario(), source, line_numbers=False)
@@ -95,13 +101,17 @@ def scenario_from_mapping(mapping: dict[str, Any]) -> Scenario:
     return scenario
 
 
-def _read(path: Path) -> str:
+def _effects(mapping: dict[str, Any], source: str) -> list[dict[str, Any]]:
+    """Returns the effects of a scenario as plain data, each with a name."""
+    effects = mapping.get("effects") or []
     try:
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise DisasmError(f"{path}: is not text in UTF-8; save it as such") from None
-    except OSError as error:
-        raise DisasmError(f"{path}: can't be read ({error.strerror})") from None
+        check_like(effects, [{"effect": ""}], "effects")
+    except DisasmError as error:
+        raise DisasmError(f"{source}: {error}; record it again") from None
+    for effect in effects:
+        if not effect["effect"].isidentifier():
+            find_effect(clipped(effect["effect"]))
+    return effects
 
 
 def _checked(

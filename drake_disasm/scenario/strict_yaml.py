@@ -5,6 +5,7 @@ which key, in which line, and what to write instead.
 """
 
 import dataclasses
+import re
 import typing
 from collections.abc import Callable
 from typing import Any
@@ -12,22 +13,27 @@ from typing import Any
 import yaml
 from pydrake.common.yaml import yaml_load_typed
 
+from drake_disasm.common import bounded_yaml
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.text import clipped
 from drake_disasm.effects import find_effect, registered_effects
 from drake_disasm.scenario.effect_tags import tagged
 from drake_disasm.scenario.names import remedy
 from drake_disasm.scenario.schema import Range
 
 _MODEL = "see models/scenarios/removal.yaml"
+_LINE = re.compile(r"^line \d+: ")
+_MOST_ITEMS = 100  # effects, ranges
+_LONGEST_WORD = 500  # characters: of a path, say
+_LONGEST_NUMBER = 100
 _NUMBERS: dict[type, Callable[[str], object]] = {int: int, float: float}
 
 
-class _NodeError(Exception):
+class _NodeError(DisasmError):
     """Something wrong at a node."""
 
     def __init__(self, node: yaml.Node, message: str) -> None:
-        super().__init__(message)
-        self.line = node.start_mark.line + 1
+        super().__init__(f"line {node.start_mark.line + 1}: {message}")
 
 
 def parse(
@@ -51,26 +57,34 @@ def parse(
         DisasmError: in one line, what is wrong and what to write instead.
     """
     try:
-        root = yaml.compose(text)
-        if root is None:
-            raise DisasmError(f"{source}: is empty; {_MODEL}")
-        _check_section(root, type(defaults), path)
+        _check(text, type(defaults), path)
         return yaml_load_typed(
             data=text, schema=tagged(type(defaults)), defaults=defaults
         )
-    except _NodeError as error:
-        line = f"line {error.line}: " if line_numbers else ""
-        raise DisasmError(f"{source}: {line}{error}") from None
+    except DisasmError as error:
+        message = str(error)
     except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f"line {mark.line + 1}: " if mark and line_numbers else ""
-        problem = getattr(error, "problem", None) or " ".join(str(error).split())
-        raise DisasmError(f"{source}: {line}not YAML ({problem})") from None
-    except (RuntimeError, ValueError, TypeError, AssertionError) as error:
-        reason = " ".join(str(error).split())
-        raise DisasmError(
-            f"{source}: a value has the wrong shape ({reason}); {_MODEL}"
-        ) from None
+        message = bounded_yaml.problem(error, text)
+    except Exception as error:  # Drake's reader raises whatever comes
+        reason = clipped(str(error) or type(error).__name__, 200)
+        message = f"a value has the wrong shape ({reason}); {_MODEL}"
+    if not line_numbers:
+        message = _LINE.sub("", message, count=1)
+    raise DisasmError(f"{source}: {message}")
+
+
+def _check(text: str, schema: type, path: str) -> None:
+    """Checks text against a dataclass.
+
+    Raises:
+        DisasmError: names the first key that is wrong.
+        yaml.YAMLError: it is no YAML.
+    """
+    bounded_yaml.check_bounds(text)
+    root = yaml.compose(text)
+    if root is None:
+        raise DisasmError(f"is empty; {_MODEL}")
+    _check_section(root, schema, path)
 
 
 def _check_section(node: yaml.Node, schema: type, path: str) -> None:
@@ -85,7 +99,7 @@ def _check_section(node: yaml.Node, schema: type, path: str) -> None:
     for key, value in node.value:
         name = key.value if isinstance(key, yaml.ScalarNode) else ""
         if name not in fields:
-            raise _NodeError(key, _unknown(name, schema, path))
+            raise _NodeError(key, _unknown(clipped(name), schema, path))
         if name in seen:
             raise _NodeError(key, f"key '{_join(path, name)}' is given twice; keep one")
         seen.add(name)
@@ -102,10 +116,18 @@ def _check_value(node: yaml.Node, field: dataclasses.Field, path: str) -> None:
     elif typing.get_origin(field.type) is list:
         if not isinstance(node, yaml.SequenceNode):
             raise _NodeError(node, f"{path}: has the wrong shape; write [a, b, ...]")
+        _check_length(node, path, field.metadata.get("length", _MOST_ITEMS))
         for item in node.value:
             _check_scalar(item, float, path, field.metadata)
     else:
         _check_scalar(node, typing.cast(type, field.type), path, field.metadata)
+
+
+def _check_length(node: yaml.SequenceNode, path: str, most: int = _MOST_ITEMS) -> None:
+    """Refuses a list that is too long, before each of its items is looked at."""
+    count = len(node.value)
+    if count > most:
+        raise _NodeError(node, f"{path}: {count} values given, {most} needed at most")
 
 
 def _check_scalar(node: yaml.Node, kind: type, path: str, metadata: Any) -> None:
@@ -116,13 +138,20 @@ def _check_scalar(node: yaml.Node, kind: type, path: str, metadata: Any) -> None
         wanted = "a whole number"
     if not isinstance(node, yaml.ScalarNode) or node.value == "":
         raise _NodeError(node, f"{path}: has the wrong shape; give {wanted}")
+    longest = _LONGEST_NUMBER if kind in _NUMBERS else _LONGEST_WORD
+    if len(node.value) > longest or not node.value.isprintable():
+        raise _NodeError(
+            node,
+            f"{path}: '{clipped(node.value)}' is not printable, or longer than "
+            f"{longest} characters; give {wanted}",
+        )
     try:
         _NUMBERS.get(kind, str)(
             node.value.replace(".inf", "inf").replace(".nan", "nan")
         )
     except ValueError:
         raise _NodeError(
-            node, f"{path}: '{node.value}' is not a number; give {wanted}"
+            node, f"{path}: '{clipped(node.value)}' is not a number; give {wanted}"
         ) from None
 
 
@@ -131,8 +160,9 @@ def _check_effects(node: yaml.Node) -> None:
         raise _NodeError(
             node, "effects: is not a list; write [] or lines of `- !Name {...}`"
         )
+    _check_length(node, "effects")
     for number, item in enumerate(node.value):
-        path, name = f"effects.{number}", item.tag.removeprefix("!")
+        path, name = f"effects.{number}", clipped(item.tag.removeprefix("!"))
         if not item.tag.startswith("!"):
             names = ", ".join(effect.__name__ for effect in registered_effects())
             raise _NodeError(
@@ -153,6 +183,7 @@ def _check_ranges(node: yaml.Node) -> None:
             "randomisation: is not a list; write [] or lines of "
             "`- {parameter: effects.0.ry, low: -0.03, high: 0.03}`",
         )
+    _check_length(node, "randomisation")
     for number, item in enumerate(node.value):
         _check_section(item, Range, f"randomisation.{number}")
 

@@ -3,7 +3,9 @@
 import dataclasses
 from pathlib import Path
 
+from drake_disasm.common.bounded_yaml import MOST_BYTES
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import read_text
 from drake_disasm.common.quantity import check, quantity
 from drake_disasm.safety import SafetyConfig
 from drake_disasm.scenario.strict_yaml import parse
@@ -77,12 +79,7 @@ def load_hardware_config(path: Path) -> HardwareConfig:
     Raises:
         DisasmError: missing file, unknown key, bad value; says which and where.
     """
-    try:
-        text = path.read_text()
-    except OSError as error:
-        raise DisasmError(
-            f"{path}: {error.strerror}; copy models/hardware/cell.yaml and fill it in"
-        ) from None
+    text = read_text(path, "copy models/hardware/cell.yaml and fill it in", MOST_BYTES)
     config: HardwareConfig = parse(text, HardwareConfig(), str(path))
     try:
         check(config)

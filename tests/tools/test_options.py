@@ -35,6 +35,7 @@ PROGRAMS: list[tuple[str, tuple[str, ...], list[str]]] = [
         LOG,
         ["--seed=-1", "--huber=nan", "--huber=0", "--cycles=0", "--budget=0"],
     ),
+    ("fuzz", (), ["--files=0", "--datagrams=x", "--seed=-1", "--case=-1"]),
     ("close_loop", LOG, ["--huber=nan", "--huber=-1", "--workers=0"]),
     (
         "transfer_study",

@@ -61,12 +61,13 @@ def _transitions(rng: np.random.Generator, rows: int) -> dict[str, Any]:
 
 
 def _static_wrench(rng: np.random.Generator, rows: int) -> dict[str, Any]:
-    wrench = rng.normal(size=(rows, 6))
-    wrench[: len(AWKWARD), 0] = AWKWARD[:rows]
+    awkward = rng.normal(size=rows)
+    awkward[: len(AWKWARD)] = AWKWARD[:rows]
     return {
         "order": np.arange(rows, dtype=float),
         "R_WS": _poses(rng, rows)[:, 3:],
-        "wrench": wrench,
+        "wrench": rng.normal(size=(rows, 6)),
+        "extra.awkward": awkward,
         "extra.temperature": 20.0 + rng.normal(size=rows),
     }
 

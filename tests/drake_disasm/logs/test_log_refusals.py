@@ -1,5 +1,8 @@
 """Bad logs are refused by name: one line with file, column or key, and remedy."""
 
+import os
+import time
+
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -397,3 +400,119 @@ def test_headers_are_checked_before_anything_is_written(tmp_path):
     header = LogHeader("static_wrench", "t", {})
     _refused(lambda: LogWriter(folder, header), "'frames.wrench'", "S or W")
     assert not folder.exists()
+
+
+def _words_of_header(folder, text, *words):
+    path = folder / "log.yaml"
+    path.write_text(text)
+    _refused(lambda: read_log(folder), str(path), *words)
+
+
+BOMB = "a0: &a0 [x]\n" + "".join(
+    f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 10)
+)
+#: What stood in a header, and what is said about it.
+HOSTILE_HEADERS = {
+    "date": ("date: 2020-13-45", "not YAML (month must be"),
+    "nesting": ("a: " + "[" * 5000, "nested deeper"),
+    "aliases": (f"{BOMB}task: *a9", "aliases written out"),
+    "list of kinds": ("schema: drake_disasm/log/1\nkind: [transitions]", "missing key"),
+}
+
+
+@pytest.mark.parametrize("case", HOSTILE_HEADERS)
+def test_headers_that_could_keep_a_reader_busy(case, written):
+    text, *words = HOSTILE_HEADERS[case]
+    _words_of_header(written("transitions"), text, *words)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("kind", ["transitions"]), ("period", 10**400), ("task", list(range(3000)))],
+)
+def test_values_in_messages_are_short(key, value, written):
+    folder = written("transitions")
+    path = _edit_header(folder, key, value)
+    with pytest.raises(DisasmError) as caught:
+        read_log(folder)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ") and f"'{key}'" in message
+    assert "\n" not in message and len(message) < len(str(path)) + 300
+
+
+def _pipe(path):
+    path.unlink()
+    os.mkfifo(path)
+
+
+@pytest.mark.parametrize("name", ["log.yaml", "episode_0000.csv"])
+def test_a_pipe_in_place_of_a_file_does_not_block(name, written):
+    folder = written("transitions")
+    _pipe(folder / name)
+    _refused(lambda: read_log(folder), f"{folder / name}: is no regular file")
+
+
+def test_a_cell_longer_than_the_csv_reader_takes(written):
+    path = written("joint_motion") / "episode_0000.csv"
+    path.write_text("x" * 200_000 + "\n1\n")
+    _refused(lambda: read_log(path.parent), "not a table in CSV", "begin with column")
+    path.write_text("x," * 2**20)
+    _refused(lambda: read_log(path.parent), "the first line has no end")
+
+
+@pytest.mark.parametrize("file_format", ["csv", "parquet"])
+def test_many_columns_are_refused_at_once(file_format, written):
+    """Looking each one up among all of them took minutes."""
+    path = written("joint_motion", file_format) / f"episode_0000.{file_format}"
+    names = ["time", *(f"q.{i}" for i in range(30_000))]
+    if file_format == "csv":
+        path.write_text(",".join(names) + "\n" + ",".join("0" * len(names)))
+    else:
+        _write_table(dict.fromkeys(names, np.zeros(1)), path)
+    begun = time.process_time()
+    _refused(lambda: read_log(path.parent), "30001 columns", "give 10000 at most")
+    assert time.process_time() - begun < 2.0
+    if file_format == "csv":
+        path.write_text(",".join(names[:9000]) + "\n" + ",".join("0" * 9000))
+        begun = time.process_time()
+        _refused(lambda: read_log(path.parent), "mixed lengths: column 'q.*' has 8999")
+        assert time.process_time() - begun < 2.0
+
+
+MAGNITUDES = {
+    "wrench.fx": ("transitions", 1e300, "beyond 1e+07 N;"),
+    "ft_sensor.tz": ("transitions", -1e9, "beyond 1e+07 N\N{MIDDLE DOT}m;"),
+    "X_GB_measured.x": ("transitions", 1e200, "beyond 10000 m;"),
+    "X_GB_commanded.qw": ("transitions", 1e200, "beyond 1e+20 1;"),
+    "action.dw": ("transitions", 1e7, "beyond 1e+06 rad;"),
+    "q.1": ("joint_motion", 1e300, "beyond 1e+06 rad;"),
+    "vd.2": ("joint_motion", 1e300, "beyond 1e+09 rad/s"),
+}
+
+
+@pytest.mark.parametrize("column", MAGNITUDES)
+def test_magnitudes_that_nothing_has(column, written, sample):
+    kind, value, *words = MAGNITUDES[column]
+    folder, columns = written(kind, "parquet"), sample(kind)
+    columns[column][3] = value
+    _write_table(columns, folder / "episode_0000.parquet")
+    words = (f"column '{column}' is {value:g} in row 3", *words, "convert it to SI")
+    _refused(lambda: read_log(folder), *words)
+
+
+def test_a_parquet_file_of_more_rows_than_memory(written, sample):
+    """Runs of equal values take no room in the file."""
+    path = written("joint_motion", "parquet") / "episode_0000.parquet"
+    table = pa.table({name: np.zeros(2**20) for name in sample("joint_motion")})
+    with pq.ParquetWriter(path, table.schema, compression="zstd") as writer:
+        for _ in range(20):
+            writer.write_table(table, row_group_size=2**20)
+    _refused(lambda: read_log(path.parent), "272629760 values", "split it")
+
+
+@pytest.mark.parametrize("column", [["a"] * 12, [[1.0]] * 12, [{"a": 1}] * 12])
+def test_columns_of_texts_and_lists_are_refused_unread(column, written, sample):
+    path = written("joint_motion", "parquet") / "episode_0000.parquet"
+    table = pa.table({**sample("joint_motion"), "q.0": pa.array(column)})
+    pq.write_table(table, path)
+    _refused(lambda: read_log(path.parent), "column 'q.0' is of type", "write a number")

@@ -1,5 +1,6 @@
 """More ways to get a scenario wrong: one line with file, key and remedy for each."""
 
+import time
 from pathlib import Path
 
 import pytest
@@ -68,6 +69,17 @@ NAMED = {
     "lock:\n\tclearance: 1": "line 2",
     "# only a comment": "empty",
     "name: !!python/object/apply:os.getcwd []": "line 1",
+    f"task: {{steps: {10**400}}}": "task.steps",
+    f"lock: {{clearance: {10**400}}}": "lock.clearance",
+    f"task: {{steps: {'9' * 5000}}}": "task.steps",
+    f"arm: {{posture: [{'0, ' * 900}]}}": "arm.posture: 900 values",
+    f"effects: [{'!SensorBias {fx: 0.1}, ' * 200}]": "effects: 200 values",
+    "name: " + "x" * 600: "longer than 500 characters",
+    'name: "a\\x07b"': "not printable",
+    "lock: " + "[" * 5000: "nested deeper",
+    "lock: " + "{clearance: " * 5000: "nested deeper",
+    "arm: {posture: [" + "0, " * 20_000 + "]}": "more than 10000 values",
+    "lock: &a {clearance: *a}": "within itself",
 }
 
 
@@ -87,6 +99,16 @@ def test_a_section_without_content_is_named(text: str, tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(text)
     assert EMPTY_OR_SCALAR[text] in _refusal(file)
+
+
+@pytest.mark.parametrize("size", [10**6, 9 * 10**6])
+def test_a_large_file_is_refused_before_it_is_parsed(size: int, tmp_path: Path) -> None:
+    """Nine megabytes took 39 s."""
+    file = tmp_path / "mine.yaml"
+    file.write_text("name: x\n" * (size // 8))
+    begun = time.process_time()
+    assert "more than 0.25 MiB" in _refusal(file)
+    assert time.process_time() - begun < 0.5
 
 
 def test_not_text_is_one_line(tmp_path: Path) -> None:
@@ -196,10 +218,15 @@ def test_a_scenario_made_in_code_is_checked_too() -> None:
         {"effects": [{"effect": "Magic"}]},
         {"effects": [{"fx": 1.0}]},
         {"colour": "red"},
+        {"effects": 3},
+        {"effects": ["SensorBias"]},
+        {"effects": [{"effect": ["SensorBias"]}]},
+        {"effects": [{"effect": "SensorBias {}\n- !SensorBias"}]},
+        {1: 2},
     ],
 )
 def test_a_logs_scenario_is_checked_too(mapping: dict) -> None:
-    with pytest.raises(DisasmError, match=r"scenario of the log: "):
+    with pytest.raises(DisasmError, match=r"^scenario of the log: |is not registered"):
         scenario_from_mapping(mapping)
 
 

@@ -24,6 +24,13 @@ def test_the_shipped_file_is_read() -> None:
         ("gripper: {transport: usb}", "gripper.transport"),
         ("ft_sensor: {port: abc}", "line 1"),
         ("", "is empty"),
+        ("ft_sensor: {port: 70000}", "ft_sensor.port"),
+        ("ft_sensor: {port: -1}", "ft_sensor.port"),
+        (f"gripper: {{address: {'a' * 600}}}", "gripper.address"),
+        ('iiwa: {lcm_url: "udpm://\\0"}', "iiwa.lcm_url"),
+        ("gripper: {address: [1, 2]}", "gripper.address"),
+        ("gripper: " + "[" * 5000, "nested deeper"),
+        ("#" * 300_000, "more than 0.25 MiB"),
     ],
 )
 def test_a_mistake_is_one_line(tmp_path: Path, text: str, words: str) -> None:
