@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from drake_disasm.common.files import make_folder, read_bytes, write_atomically
+from drake_disasm.common.text import shown
 from drake_disasm.logs.checks import check_values
 from drake_disasm.logs.columns import arrange_names
 from drake_disasm.logs.files import (
@@ -175,7 +176,7 @@ class LogWriter:
             if field.name not in ("provenance", "notes") and old != new:
                 raise refusal(
                     self._folder / "log.yaml",
-                    f"key '{field.name}' is {old!r}, the log to resume has {new!r}",
+                    f"key '{field.name}' is {shown(old)}, the log to resume has {shown(new)}",
                     "resume with the same header, or name a new folder",
                 )
         self._header = found
