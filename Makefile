@@ -3,11 +3,12 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 ARGS ?=
+PYTEST := $(BIN)/python -m pytest -n 2 --dist worksteal
 PIP := $(BIN)/python -m pip install --quiet --constraint constraints.txt
 # One thread per process: parallel work is done by processes.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help simulate test test-all lint format docs benchmark check-install clean
+.PHONY: help simulate test test-all test-loaded lint format docs benchmark check-install clean
 .DEFAULT_GOAL := help
 
 help:  ## Show this list
@@ -17,10 +18,15 @@ simulate: $(VENV)/.run  ## Run the task in Meshcat (ARGS="--policy straight ..."
 	$(BIN)/python tools/simulate.py $(ARGS)
 
 test: $(VENV)/.dev  ## Run the tests, without the slow proofs
-	$(BIN)/python -m pytest -n 2 -m "not slow" $(ARGS)
+	$(PYTEST) -m "not slow" $(ARGS)
 
 test-all: $(VENV)/.dev  ## Run every test
-	$(BIN)/python -m pytest -n 2 $(ARGS)
+	$(PYTEST) $(ARGS)
+
+test-loaded: $(VENV)/.dev  ## Run the tests beside four busy processes
+	@for i in 1 2 3 4; do \
+	$(BIN)/python -c "while True: pass" & busy="$$busy $$!"; done; \
+	trap "kill $$busy" EXIT INT TERM; $(PYTEST) -m "not slow" $(ARGS)
 
 lint: $(VENV)/.dev  ## Check style and types
 	$(BIN)/ruff check .

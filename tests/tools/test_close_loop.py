@@ -35,6 +35,7 @@ def test_the_tool_writes_a_scenario_and_a_report(tmp_path):
     assert "data:image/png" in page and "http://" not in page
 
 
+@pytest.mark.slow
 def test_transitions_give_a_scenario_that_simulates(tmp_path):
     hidden = [CommandGain(x=0.03)]
     transitions_log(tmp_path / "log", nominal(), hidden, 0, episodes=6, steps=12)

@@ -8,7 +8,7 @@ import pytest
 
 from tests.tools.programs import run_program
 
-SHORT = ["--station=twin", "--episodes=2", "--set", "task.steps=8"]
+SHORT = ["--station=twin", "--episodes=2", "--set", "task.steps=5"]
 
 
 def _evaluate(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -19,6 +19,7 @@ def test_policies_and_settings_make_the_lines(tmp_path: Path) -> None:
     done = _evaluate(
         tmp_path, *SHORT, "--scenario=removal_turned", "--policy", "straight",
         "admittance", "--sweep", "effects.0.ry=0,0.15", "--json", "out/figures.json",
+        "--workers=2",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.splitlines()) == 5

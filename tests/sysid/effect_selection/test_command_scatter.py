@@ -46,7 +46,7 @@ def test_finds_by_how_much_commands_scatter(tmp_path):
         [],
         pytest.param([CommandGain(z=0.3)], marks=pytest.mark.slow),
         pytest.param([GrooveFriction(0.1)], marks=pytest.mark.slow),
-        [SensorBias(fy=0.5)],
+        pytest.param([SensorBias(fy=0.5)], marks=pytest.mark.slow),
     ],
     ids=lambda effects: "".join(type(e).__name__ for e in effects) or "nothing",
 )

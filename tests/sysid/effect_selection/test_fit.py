@@ -64,7 +64,7 @@ def test_an_added_effect_ends_where_the_models_own_derivatives_lead(tmp_path):
     turned = load_scenario("removal_turned", ["task.steps=14"])
     policy = Exploring(make_policy("admittance"), 1.5e-4, 0)
     simulation = TaskSimulation(turned, "twin", policy)
-    log = record_transitions(tmp_path / "log", simulation, 28)
+    log = record_transitions(tmp_path / "log", simulation, 8)
     model = TwinModel([log], load_scenario("removal"), ())
     fitter, pose = _fitter(model, GroovePose)
     effect = pose.only(["ry", "x"])
