@@ -4,6 +4,7 @@ from drake_disasm.safety.guards import Guard, Situation, guards
 from drake_disasm.safety.lag import Lag, LagMonitor
 from drake_disasm.safety.limits import SafetyConfig
 from drake_disasm.safety.pacing import CommandPacer, PaceCounts
+from drake_disasm.safety.retreat import Retreat
 from drake_disasm.safety.supervisor import Mode, Supervisor
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "LagMonitor",
     "Mode",
     "PaceCounts",
+    "Retreat",
     "SafetyConfig",
     "Situation",
     "Supervisor",

@@ -20,6 +20,17 @@ class SafetyConfig:
     max_torque_z: float = quantity(
         2.4, "N m", "on the gripper about its z", low=0.1, high=3.0
     )
+    on_force: str = quantity(
+        "hold", "", "what a hold for too much force does: hold where the arm was "
+        "measured, which keeps pressing, or yield: back away along the force",
+        choices=("hold", "yield"),
+    )  # fmt: skip
+    retreat: float = quantity(
+        0.002, "m", "that on_force: yield may back away", low=1e-4, high=0.01
+    )
+    retreat_speed: float = quantity(
+        0.01, "m/s", "at which it backs away", low=1e-3, high=0.05
+    )
     joint_margin: float = quantity(
         0.035, "rad", "kept from each joint's limit", low=0.0, high=0.5
     )

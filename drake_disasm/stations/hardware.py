@@ -17,7 +17,14 @@ from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.devices.reading import Clock, Reading
 from drake_disasm.effects import Effect
 from drake_disasm.ports import CELL_PORTS, Health, check_ports
-from drake_disasm.safety import CommandPacer, LagMonitor, Mode, Supervisor, guards
+from drake_disasm.safety import (
+    CommandPacer,
+    LagMonitor,
+    Mode,
+    Retreat,
+    Supervisor,
+    guards,
+)
 from drake_disasm.scenario import ArmConfig, Scenario, validate
 from drake_disasm.stations.arm_over_lcm import command_sender, export_status
 from drake_disasm.stations.base import InitialState, Station, refuse_twins_contact
@@ -111,7 +118,7 @@ class HardwareStation(Station):
         self._set_cell_geometry()
         self.g_W = MultibodyPlant(0.0).gravity_field().gravity_vector()
         self.grip_command = 0.0  # closes until the fingers stall on the bolt
-        self.supervisor = _supervisor(scenario.arm, config)
+        self.supervisor = _supervisor(scenario.arm, config, self._retreat())
         self.pacer = CommandPacer(
             self.control_period,
             self._cell.clock,
@@ -302,6 +309,13 @@ class HardwareStation(Station):
         for quantity in ("health", "time_measured"):
             builder.ExportOutput(reader.GetOutputPort(quantity), f"{name}.{quantity}")
 
+    def _retreat(self) -> Retreat | None:
+        limits = self.config.safety
+        if limits.on_force == "hold":
+            return None
+        R_BS = self.X_SB.rotation().inverse().matrix()
+        return Retreat(self.coordinates, R_BS, limits, self.control_period)
+
     def _refuse_far_start(self, position: np.ndarray) -> None:
         away = np.abs(position - self.start)
         joint = int(np.argmax(away))
@@ -328,7 +342,9 @@ def refuse_what_is_simulated(scenario: Scenario) -> None:
     refuse_twins_contact(scenario)
 
 
-def _supervisor(arm: ArmConfig, config: HardwareConfig) -> Supervisor:
+def _supervisor(
+    arm: ArmConfig, config: HardwareConfig, retreat: Retreat | None
+) -> Supervisor:
     """Returns the supervisor of an arm, by its model's limits and the file's."""
     plant = MultibodyPlant(0.0)
     add_arm(plant, arm.model)
@@ -340,4 +356,5 @@ def _supervisor(arm: ArmConfig, config: HardwareConfig) -> Supervisor:
         fastest,
         limits.start_tolerance,
         limits.max_jump,
+        retreat,
     )

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 
 from drake_disasm.safety import Mode, Situation, Supervisor
+from drake_disasm.safety.supervisor import HOLD_SHARE
 from tests.drake_disasm.safety.test_guards import USUAL, Q
 
 PERIOD = 0.005  # s
@@ -52,7 +53,9 @@ def test_a_trip_holds_at_the_measured_position_and_says_why():
     active.command(at(Q, Q))
     stop.append("first")
     there = Q + 0.001
-    assert np.array_equal(active.command(at(there, Q + 0.003)), there)
+    step = active.command(at(there, Q + 0.003)) - Q
+    assert np.allclose(step, HOLD_SHARE * STEP)  # slowly: the arm springs back
+    active.command(at(there, Q + 0.003))
     stop[:] = []
     for _ in range(3):  # latched, though all is well again and the arm is pushed
         assert np.array_equal(active.command(at(Q + 0.002, Q)), there)
@@ -98,3 +101,18 @@ def test_a_new_episode_does_not_end_a_hold():
     active.trip("stop", Q, 1.0)
     active.begin()
     assert active.mode is Mode.HOLD and active.reason == "stop"
+
+
+def test_a_command_that_was_not_sent_is_not_where_the_next_one_starts() -> None:
+    active = supervisor([])
+    active.command(at(Q, Q))
+    active.command(at(Q, Q + STEP))
+    active.withdraw()
+    assert np.allclose(active.command(at(Q, Q + 2 * STEP)), Q + STEP)
+
+
+def test_the_limit_is_one_per_second() -> None:
+    active = supervisor([])
+    active.command(at(Q, Q))
+    soon = dataclasses.replace(at(Q, Q + 0.01), since_sent=0.5 * PERIOD)
+    assert np.allclose(active.command(soon), Q + 0.5 * STEP)
