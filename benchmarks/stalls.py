@@ -27,6 +27,7 @@ from tqdm import tqdm
 from drake_disasm.common.files import write_json
 from drake_disasm.devices.datagrams import receive, stamp_arrivals
 from drake_disasm.fakes.cell import FakeCell
+from drake_disasm.fakes.real_time import RealTime
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
@@ -78,13 +79,11 @@ def play(pipe: Connection) -> None:
     with FakeCell(scenario, lcm) as cell, _Wire() as wire:
         config = cell.config()
         pipe.send((config.ft_sensor.port, config.gripper.port))
-        period, begun, steps = cell.station.control_period, time.monotonic(), 0
-        forces: list[float] = []
+        pace, forces = RealTime(cell), list[float]()
         while True:
             cell.advance()
-            steps += 1
+            pace.keep()
             forces.append(float(np.linalg.norm(cell.load())))
-            time.sleep(max(0.0, begun + steps * period - time.monotonic()))
             if not pipe.poll():
                 continue
             if pipe.recv() == "jog":

@@ -8,12 +8,14 @@ cause the fault, and an empty line to end it:
   ft_sensor: delay, loss, reorder, short, header, status, frozen, jump
   gripper:   crc, drop, silent, status, short, header
   iiwa:      loss, frozen, reorder, nan, jump, short, header
+
+Type `start` to have the arm back where an episode starts, as if it had been jogged.
 """
 
 import argparse
+import math
 import select
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,10 +27,16 @@ from drake_disasm.common import options, program
 from drake_disasm.common.files import write_text
 from drake_disasm.fakes import hex_box, robotiq_gripper
 from drake_disasm.fakes.cell import IIWA_FAULTS, FakeCell
+from drake_disasm.fakes.real_time import RealTime
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations.hardware_config import HardwareConfig
 
 _LCM = "udpm://239.255.76.67:7667?ttl=0"
+_LATE = 1.0  # s that were lost
+_BEHIND = (
+    "the fake cell can't keep real time on this machine; "
+    "try --set simulation.cell_time_step=0.005"
+)
 _EXAMPLES = """examples:
   python tools/fake_cell.py --config out/fake.yaml             in one terminal
   python tools/simulate.py --station hardware --hardware-config out/fake.yaml
@@ -76,14 +84,15 @@ def main(arguments: Sequence[str]) -> int:
 
 def _play(cell: FakeCell) -> None:
     """Advances the cell in real time; causes the faults that are typed."""
-    period, begun, steps = cell.station.control_period, time.monotonic(), 0
+    pace, steps = RealTime(cell), 0
     while True:
         program.stop_if_interrupted()
         cell.advance()
+        pace.keep()
         steps += 1
-        ahead = begun + steps * period - time.monotonic()
-        if ahead > 0.0:
-            time.sleep(ahead)
+        if pace.lost > _LATE:
+            print(_BEHIND, file=sys.stderr, flush=True)
+            pace.lost = -math.inf  # once is enough
         if steps % 20 == 0 and sys.stdin and select.select([sys.stdin], [], [], 0)[0]:
             line = sys.stdin.readline()
             if line:
@@ -100,6 +109,10 @@ def _cause(cell: FakeCell, words: Sequence[str]) -> None:
     if not words:
         for device, _ in devices.values():
             device.fault = ""  # type: ignore[attr-defined]
+        return
+    if list(words) == ["start"]:
+        cell.jog_to_start()
+        print("the arm is at the start", flush=True)
         return
     try:
         name, fault = words

@@ -68,3 +68,15 @@ def _line(name: str, reading: Reading, health: Health, now: float) -> str:
     age = f"{1e3 * reading.age(now):6.0f} ms old"
     more = reading.error or reading.counters.text
     return f"{name:10} {health.name:8} {values}  {age}  {more}"
+
+
+def pace_in_words(station: HardwareStation) -> str:
+    """Returns what keeping the commands' pace has cost, in a line."""
+    counts = station.counts()
+    if not (counts["stalls"] or counts["clamped"]):
+        return "pace: every command was sent in time"
+    return (
+        f"pace: {counts['stalls']} stalls, the longest of "
+        f"{1e3 * counts['longest_stall']:.0f} ms; {counts['slipped']:.2f} s lost, not "
+        f"made up for; {counts['held']} commands not sent, {counts['clamped']} shortened"
+    )

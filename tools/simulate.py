@@ -195,6 +195,9 @@ def _on_hardware(
             print(summary_table([_run_one(simulation, seed, writer, view)]))
         finally:
             print(hardware.health_table(station))
+            print(hardware.pace_in_words(station))
+            if writer:
+                writer.note(pace=station.counts())
     _finish(args, view)
     return 0
 

@@ -142,6 +142,15 @@ class FakeCell:
             while not heard() and time.monotonic() < deadline:
                 time.sleep(1e-5)
 
+    def skip(self, periods: int) -> None:
+        """Lets control periods pass in which nothing is simulated, and nothing sent.
+
+        For a machine too slow for real time: the devices' clocks go on, and what they
+        would have sent is lost.
+        """
+        self.time += periods * self.station.control_period
+        self.hex.sequence = (self.hex.sequence + periods) % 2**32
+
     def position_measured(self) -> np.ndarray:
         """Returns the arm's true joint angles (7,) [rad]."""
         return self._evaluate("iiwa.position_measured")

@@ -207,12 +207,11 @@ class HardwareStation(Station):
         stopwatch.clock = self._cell.clock
         self._lag.stopwatches[name] = stopwatch
 
-    def counts(self) -> dict[str, float]:
-        """Returns what keeping the robot safe has cost so far, by name."""
-        return {
-            **dataclasses.asdict(self.pacer.counts),
-            "clamped": self.supervisor.clamped,
-        }
+    def counts(self) -> dict[str, float | int]:
+        """Returns what keeping the commands' pace has cost so far, by name."""
+        counts = dataclasses.asdict(self.pacer.counts)
+        rounded = {name: round(value, 4) for name, value in counts.items()}
+        return rounded | {"clamped": self.supervisor.clamped}
 
     def connect(self) -> None:
         """Starts the clients; calling it again restarts the sensor's stream."""
