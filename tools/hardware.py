@@ -77,6 +77,6 @@ def pace_in_words(station: HardwareStation) -> str:
         return "pace: every command was sent in time"
     return (
         f"pace: {counts['stalls']} stalls, the longest of "
-        f"{1e3 * counts['longest_stall']:.0f} ms; {counts['slipped']:.2f} s lost, not "
-        f"made up for; {counts['held']} commands not sent, {counts['clamped']} shortened"
+        f"{1e3 * counts['longest_stall']:.0f} ms; {counts['slipped']:.2f} s lost; "
+        f"{counts['held']} commands not sent, {counts['clamped']} shortened"
     )

@@ -76,7 +76,7 @@ class FakeCell:
         self.fault, self.commands = "", 0
         self.commanded = self.station.start
         self._late: bytes | None = None
-        self._utime = 0
+        self._utime, self._restarted_at = 0, 0.0
 
     def __enter__(self) -> Self:
         return self
@@ -142,6 +142,19 @@ class FakeCell:
             while not heard() and time.monotonic() < deadline:
                 time.sleep(1e-5)
 
+    def restart(self, device: str) -> None:
+        """Starts a device anew, as after a loss of power.
+
+        Args:
+            device: "iiwa" (its driver), "ft_sensor" or "gripper".
+        """
+        if device == "iiwa":
+            self._restarted_at, self._first_status = self.time, np.nan
+        elif device == "ft_sensor":
+            self.hex.restart()
+        else:
+            self.gripper.restart()
+
     def skip(self, periods: int) -> None:
         """Lets control periods pass in which nothing is simulated, and nothing sent.
 
@@ -188,7 +201,7 @@ class FakeCell:
     def _status(self) -> lcmt_iiwa_status:
         message = lcmt_iiwa_status()
         if self.fault != "frozen":
-            self._utime = round(1e6 * self.time)
+            self._utime = round(1e6 * (self.time - self._restarted_at))
         message.utime, message.num_joints = self._utime, 7
         q = self.position_measured().copy()
         if self.fault in ("nan", "jump"):

@@ -79,6 +79,12 @@ class FakeHexBox:
         self._started.clear()
         self._socket.close()
 
+    def restart(self) -> None:
+        """Forgets its client and begins to count anew, as after a loss of power."""
+        self._client = None
+        self._started.clear()
+        self.sequence = 0
+
     @property
     def started(self) -> bool:
         """Whether a client has requested the stream."""

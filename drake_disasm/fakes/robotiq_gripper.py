@@ -52,7 +52,7 @@ class FakeRobotiqGripper:
         self.state = Activation.DONE if activated else Activation.RESET
         self.command = Command(activate=activated)
         self.position = 3
-        self._stopping = threading.Event()
+        self._stopping, self._restarting = threading.Event(), threading.Event()
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._listener.settimeout(TICK)
         self.port: int = self._listener.getsockname()[1]
@@ -76,6 +76,10 @@ class FakeRobotiqGripper:
         self._thread.join()
         self._listener.close()
 
+    def restart(self) -> None:
+        """Closes the connection; the gripper behind the gateway keeps its grip."""
+        self._restarting.set()
+
     def _serve(self) -> None:
         while not self._stopping.is_set():
             try:
@@ -88,7 +92,10 @@ class FakeRobotiqGripper:
 
     def _talk(self, connection: socket.socket) -> None:
         buffer = b""
-        while not self._stopping.is_set() and self.fault != "drop":
+        self._restarting.clear()
+        while not (self._stopping.is_set() or self._restarting.is_set()):
+            if self.fault == "drop":
+                return
             try:
                 received = connection.recv(256)
             except TimeoutError:

@@ -30,8 +30,8 @@ class PaceCounts:
         slipped: by how much the diagram's time fell behind real time [s].
         stalls: how often something took more than STALL periods.
         longest_stall: of them, beyond the time that was due [s].
-        held: commands that were not sent, since a stall came between decision and
-            sending.
+        held: commands that were not sent: a stall came between decision and sending,
+            or the arm did not listen.
         waited: for commands' turns [s].
     """
 
@@ -103,6 +103,11 @@ class CommandPacer:
         self.last_sent = self._clock()
         due = self.last_sent if np.isnan(self._due) else self._due
         self._due = due + self._period
+
+    def skipped(self) -> None:
+        """Takes note that this turn's command is not sent at all."""
+        self.counts.held += 1
+        self._due = (self.turn if np.isnan(self._due) else self._due) + self._period
 
     def refuse_late(self) -> bool:
         """Returns whether a stall came since the turn; its command must not leave."""

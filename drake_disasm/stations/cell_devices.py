@@ -65,11 +65,11 @@ class CellDevices:
         )
         settings = RobotiqSettings(**dataclasses.asdict(grip))
         self.gripper = RobotiqClient(settings, clock)
-        arm = IiwaStatusMonitor(
+        self._arm = IiwaStatusMonitor(
             self.lcm, self.checked_lcm, iiwa.status_channel, iiwa.status_period, clock
         )
         self.clients: dict[str, Readable] = {
-            "iiwa": arm,
+            "iiwa": self._arm,
             "gripper": self.gripper,
             "ft_sensor": self._sensor,
         }
@@ -96,6 +96,15 @@ class CellDevices:
         self.gripper.stop()
         self.commands.stop()
         self._locks.release()
+
+    def arm_listens(self) -> bool:
+        """Returns whether the arm's driver sends, and has for long enough.
+
+        To a driver that has just been started a command is an error.
+        """
+        now, limit = self.clock(), self._config.safety.stale_arm
+        sends = self._arm.read().health(now, limit) is Health.READY
+        return sends and self._arm.sending_for(now) >= _LISTENS_FIRST
 
     def pump(self) -> None:
         """Handles the arm's messages while no simulator does."""
@@ -135,7 +144,7 @@ class CellDevices:
             if self._is_commanded and self.commands.foreign:
                 raise DisasmError(self.commands.foreign)
             not_ready = [n for n, h in health.items() if h is not Health.READY]
-            if not not_ready and waited >= _LISTENS_FIRST:
+            if not not_ready and waited >= _LISTENS_FIRST and self.arm_listens():
                 return
             if waited > self._config.ready_timeout:
                 raise DisasmError(self._silence(not_ready))

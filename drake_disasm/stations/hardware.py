@@ -260,6 +260,7 @@ class HardwareStation(Station):
             "iiwa_command",
             ArmCommandWriter(
                 command_sender(self._cell, self.config.iiwa),
+                self._cell.arm_listens,
                 self.pacer,
                 self.supervisor,
                 period,

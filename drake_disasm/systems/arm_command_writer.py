@@ -30,6 +30,7 @@ class ArmCommandWriter(LeafSystem):
 
     Args:
         send: takes joint positions (7,) [rad] and the time [s].
+        listens: whether the arm's driver takes commands now.
         pacer: of the station.
         supervisor: of the station.
         period: of the commands [s].
@@ -39,19 +40,25 @@ class ArmCommandWriter(LeafSystem):
     def __init__(
         self,
         send: Callable[[np.ndarray, float], None],
+        listens: Callable[[], bool],
         pacer: CommandPacer,
         supervisor: Supervisor,
         period: float,
         size: int,
     ) -> None:
         super().__init__()
-        self.send, self._pacer, self._supervisor = send, pacer, supervisor
+        self.send, self._listens = send, listens
+        self._pacer, self._supervisor = pacer, supervisor
         self.stopwatch = Stopwatch()
         self._position = self.DeclareVectorInputPort("position", size)
         self.DeclarePeriodicPublishEvent(period, COMMAND_DELAY, self._publish)
 
     def _publish(self, context: Context) -> EventStatus:
         position = self._position.Eval(context)
+        if not self._listens():
+            self._supervisor.withdraw()
+            self._pacer.skipped()
+            return EventStatus.Succeeded()
         if self._pacer.refuse_late():
             self._supervisor.withdraw()
             return EventStatus.Succeeded()

@@ -14,6 +14,9 @@ JOINTS = 7
 #: A message this much older than the newest is not late: the driver has restarted [s].
 BEGUN_ANEW = 1.0
 
+#: A silence after which the driver may have been started anew [s].
+BREAK = 0.2
+
 _US = 1e6
 
 
@@ -64,6 +67,7 @@ class IiwaStatusMonitor:
         self._mailbox, self._period = Mailbox(JOINTS, clock), period
         self._device_clock = DeviceClock()
         self._stamp: float | None = None  # of the newest, by the driver's clock [s]
+        self._came = self._since = -np.inf  # newest, and first without a break [s]
         self._channel, self._checked = channel, checked
         self.commanded: np.ndarray | None = None
         lcm.Subscribe(channel, self._take)
@@ -71,6 +75,10 @@ class IiwaStatusMonitor:
     def read(self) -> Reading:
         """Returns the newest measured joint angles (7,) [rad]."""
         return self._mailbox.read()
+
+    def sending_for(self, now: float) -> float:
+        """Returns for how long the driver has sent by now, without a break [s]."""
+        return now - self._since if self._stamp is not None else 0.0
 
     def _take(self, data: bytes) -> None:
         try:
@@ -82,7 +90,11 @@ class IiwaStatusMonitor:
         stamp = message.utime / _US
         if not self._is_newer(stamp):
             return
-        taken = self._device_clock.taken_at(stamp, self._mailbox.clock())
+        now = self._mailbox.clock()
+        if now - self._came > BREAK:
+            self._since = now
+        self._came = now
+        taken = self._device_clock.taken_at(stamp, now)
         self.commanded = np.array(message.joint_position_commanded)
         self._mailbox.put(np.array(message.joint_position_measured), taken)
         self._checked.Publish(self._channel, data)
@@ -95,6 +107,7 @@ class IiwaStatusMonitor:
             return False
         if gap <= -BEGUN_ANEW:
             self._device_clock.begin_anew()
+            self._came = -np.inf
             self._mailbox.count(reconnects=1)
         elif self._stamp is not None:
             self._mailbox.count(lost=max(0, round(gap / self._period) - 1))
