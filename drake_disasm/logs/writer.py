@@ -176,7 +176,8 @@ class LogWriter:
             if field.name not in ("provenance", "notes") and old != new:
                 raise refusal(
                     self._folder / "log.yaml",
-                    f"key '{field.name}' is {shown(old)}, the log to resume has {shown(new)}",
+                    f"key '{field.name}' is {shown(old)}, the log to resume has "
+                    f"{shown(new)}",
                     "resume with the same header, or name a new folder",
                 )
         self._header = found

@@ -74,7 +74,7 @@ class CellDevices:
             "ft_sensor": self._sensor,
         }
         channel = CommandChannel(self.lcm, iiwa.command_channel)
-        self.commands = CommandMonitor(channel, lambda: arm.commanded)
+        self.commands = CommandMonitor(channel, lambda: self._arm.commanded)
         self._is_commanded = activate
         self._locks = DeviceLocks(_used(config, self.lcm.get_lcm_url(), activate))
 
