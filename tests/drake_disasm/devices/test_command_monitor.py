@@ -9,6 +9,7 @@ from drake import lcmt_iiwa_command
 from pydrake.lcm import DrakeLcm
 
 from drake_disasm.devices.iiwa import CommandChannel, CommandMonitor
+from tests.progress import wait_until
 
 CHANNEL = "IIWA_COMMAND"
 _URL = f"udpm://239.255.76.68:{20_000 + os.getpid() % 20_000}?ttl=0"
@@ -20,6 +21,8 @@ class Arm:
     def __init__(self, lcm: DrakeLcm) -> None:
         self.lcm = lcm
         self.obeys: np.ndarray | None = None
+        self._marks, self._mark = [b""], 0
+        lcm.Subscribe("MARK", self._marks.append)
         self.monitor = CommandMonitor(CommandChannel(lcm, CHANNEL), lambda: self.obeys)
         self.monitor.start()
 
@@ -31,9 +34,15 @@ class Arm:
 
     def foreign(self) -> str:
         """Returns what the monitor says, after all messages have been handled."""
-        while self.lcm.HandleSubscriptions(0):
-            pass
+        self._mark += 1
+        wait_until(self.hears)
         return self.monitor.foreign
+
+    def hears(self) -> bool:
+        """Handles messages; returns whether one that was sent last has come."""
+        self.lcm.Publish("MARK", str(self._mark).encode())
+        self.lcm.HandleSubscriptions(100)
+        return self._marks[-1] == str(self._mark).encode()
 
 
 def publish(lcm: DrakeLcm, position: np.ndarray) -> None:
@@ -44,11 +53,10 @@ def publish(lcm: DrakeLcm, position: np.ndarray) -> None:
     lcm.Publish(CHANNEL, message.encode())
 
 
-@pytest.fixture(params=["memq://", _URL])
+@pytest.fixture(params=["memq://", _URL], ids=["memq", "udpm"])
 def arm(request: pytest.FixtureRequest) -> Iterator[Arm]:
     """In this process, and over UDP."""
     arm = Arm(DrakeLcm(request.param))
-    publish(arm.lcm, np.zeros(7))
     if request.param == _URL and not _comes(arm):
         pytest.skip("LCM's multicast does not come back on this machine")
     arm.foreign()
@@ -58,8 +66,7 @@ def arm(request: pytest.FixtureRequest) -> Iterator[Arm]:
 
 
 def _comes(arm: Arm) -> bool:
-    arm.lcm.HandleSubscriptions(100)
-    return bool(arm.monitor.foreign)
+    return any(arm.hears() for _ in range(50))
 
 
 def _place(k: int) -> np.ndarray:
