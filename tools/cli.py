@@ -133,7 +133,7 @@ def named_policy(name: str, scenario: Scenario) -> Policy:
         return policy
     if ":" in name:
         return _imported(name)
-    known = [*SCRIPTED, *shipped_policies()]
+    known, name = [*SCRIPTED, *shipped_policies()], clipped(name)
     raise DisasmError(
         f"policy '{name}' does not exist; {closest(name, known)} or give an .npz file "
         "or module:callable"

@@ -15,6 +15,8 @@ from drake_disasm.common.quantity import check, closest, quantity
 from drake_disasm.common.text import clipped
 
 ALGORITHMS = ("ddpg", "td3", "sac")
+_WIDTHS = {"low": 1, "high": 10_000}
+_MOST_LAYERS = 20
 SCHEDULES = ("delayed", "every_step")
 
 
@@ -40,7 +42,7 @@ class Hyperparameters:
     )
     hidden: list[int] = dataclasses.field(
         default_factory=lambda: [50, 50],
-        metadata={"unit": "1", "doc": "widths of the hidden layers", "low": 1},
+        metadata={"unit": "1", "doc": "widths of the hidden layers", **_WIDTHS},
     )
     layer_norm: bool = quantity(False, "", "LayerNorm in the critics")
     critics: int = quantity(1, "1", "the target is their minimum", low=1, high=20)
@@ -102,8 +104,11 @@ class Hyperparameters:
             DisasmError: names the first that breaks them.
         """
         check(self)
-        if not self.hidden or min(self.hidden) < 1:
-            raise DisasmError(f"hidden: {self.hidden}; give at least one width >= 1")
+        if not 1 <= len(self.hidden) <= _MOST_LAYERS:
+            raise DisasmError(
+                f"hidden: {len(self.hidden)} widths; give at least one width, and "
+                f"{_MOST_LAYERS} at most"
+            )
 
     @property
     def observation_scale(self) -> list[float]:

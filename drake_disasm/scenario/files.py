@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -40,8 +41,9 @@ def scenario_path(name: str) -> Path:
         DisasmError: neither a shipped scenario nor a file.
     """
     for path in (Path(name), _shipped_dir() / f"{name}.yaml"):
-        if path.is_file():
+        if os.path.isfile(path):  # pathlib's raises on a name that is too long
             return path
+    name = clipped(name, 200)
     known = closest(name, shipped_scenarios())
     raise DisasmError(f"scenario {name}: no such file; {known}")
 

@@ -101,6 +101,13 @@ def test_a_section_without_content_is_named(text: str, tmp_path: Path) -> None:
     assert EMPTY_OR_SCALAR[text] in _refusal(file)
 
 
+@pytest.mark.parametrize("name", ["x" * 5000, "a\0b", "/dev/zero", "/tmp", ""])
+def test_a_name_of_no_file_is_one_short_line(name: str) -> None:
+    with pytest.raises(DisasmError, match=r"no such file; ") as caught:
+        load_scenario(name)
+    assert len(str(caught.value)) < 400
+
+
 @pytest.mark.parametrize("size", [10**6, 9 * 10**6])
 def test_a_large_file_is_refused_before_it_is_parsed(size: int, tmp_path: Path) -> None:
     """Nine megabytes took 39 s."""
