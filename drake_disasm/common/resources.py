@@ -1,6 +1,7 @@
 """Where the models are, in a checkout and in an installed wheel."""
 
 import importlib.util
+import os
 from functools import cache
 from pathlib import Path
 
@@ -41,7 +42,7 @@ def model_path(url: str) -> Path:
     """
     prefix = f"package://{MODELS_PACKAGE}/"
     path = models_dir() / url.removeprefix(prefix) if url.startswith(prefix) else url
-    if not Path(path).is_file():
+    if not os.path.isfile(path):  # pathlib's raises on a name that is too long
         raise DisasmError(
             f"model file {url} is missing (looked at {path}); "
             "check the `model` key in the scenario"

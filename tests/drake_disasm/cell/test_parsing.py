@@ -25,7 +25,14 @@ def test_only_our_models_are_known() -> None:
 
 
 @pytest.mark.parametrize(
-    "url", ["", "/nowhere/a.urdf", "package://other/a.urdf", "package://disasm_models/"]
+    "url",
+    [
+        "",
+        "/nowhere/a.urdf",
+        "package://other/a.urdf",
+        "package://disasm_models/",
+        "x" * 5000,
+    ],
 )
 def test_missing_file_is_named(url: str) -> None:
     with pytest.raises(DisasmError, match=r"is missing.*`model` key") as caught:
