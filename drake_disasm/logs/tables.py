@@ -1,9 +1,10 @@
 """Tables as Parquet and CSV; both keep every bit of a float64."""
 
+import contextlib
 import csv
 import io
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -51,10 +52,8 @@ def column_names(data: bytes, path: Path) -> list[str]:
     """
     if path.suffix == ".csv":
         return _csv_names(data, path)
-    try:
+    with _named(path, data):
         return list(pq.read_schema(_stream(data)).names)
-    except (pa.ArrowException, OSError) as error:
-        raise _unreadable(path, error, data) from error
 
 
 def read_table(
@@ -72,16 +71,23 @@ def read_table(
         DisasmError: the content is not of that format, a cell of a CSV is not a
             number, or its rows have mixed lengths.
     """
+    with _named(path, data):
+        is_csv = path.suffix == ".csv"
+        table = _read_csv(data, path, booleans) if is_csv else _read_parquet(data, path)
+        if len(set(table.column_names)) < len(table.column_names):
+            raise refusal(path, "columns of one name", "rename one of them")
+        return {name: table[name].to_numpy() for name in table.column_names}
+
+
+@contextlib.contextmanager
+def _named(path: Path, data: bytes) -> Iterator[None]:
+    """Makes refusals that name the file of what PyArrow raises."""
     try:
-        if path.suffix == ".csv":
-            table = _read_csv(data, path, booleans)
-        else:
-            table = _read_parquet(data, path)
-    except (pa.ArrowException, OSError) as error:
+        yield
+    except DisasmError:
+        raise
+    except Exception as error:  # mostly its own, but UnicodeDecodeError for a name
         raise _unreadable(path, error, data) from error
-    if len(set(table.column_names)) < len(table.column_names):
-        raise refusal(path, "columns of one name", "rename one of them")
-    return {name: table[name].to_numpy() for name in table.column_names}
 
 
 def _csv_names(data: bytes, path: Path) -> list[str]:

@@ -237,6 +237,9 @@ class BeesAlgorithm:
             for s in state["sites"]
         ]
         self.trace = Trace.from_mapping(state["trace"])
+        vectors = [s.centre for s in self.sites] + [s.edge for s in self.sites]
+        if {v.shape for v in (*vectors, *self.trace.points)} - {(self.box.size,)}:
+            raise ValueError("points of another size")
         self._generator.bit_generator.state = state["generator"]
 
     def _resume(self, path: Path) -> None:

@@ -86,6 +86,39 @@ def test_an_interrupted_search_goes_on_from_its_last_cycle(tmp_path):
     assert again.values == whole.values
 
 
+def _without(state, *keys):
+    inner = state
+    for key in keys[:-1]:
+        inner = inner[key]
+    del inner[keys[-1]]
+    return json.dumps(state)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda state: "",
+        lambda state: json.dumps(state)[:-20],
+        lambda state: "[" * 10**5,
+        lambda state: _without(state, "trace", "values"),
+        lambda state: _without(state, "sites", 0, "edge"),
+        lambda state: _without(state, "sites", 0, "centre", 0),
+        lambda state: _without(state, "generator", "state"),
+        lambda state: json.dumps(state | {"generator": {"bit_generator": "x"}}),
+        lambda state: json.dumps(state | {"sites": 3}),
+    ],
+)
+def test_refuses_a_damaged_checkpoint_in_one_line(damage, tmp_path):
+    path = tmp_path / "bees.json"
+    BeesAlgorithm(BOX).run(sphere, cycles=1, checkpoint=path)
+    path.write_text(damage(json.loads(path.read_text())))
+    with pytest.raises(
+        DisasmError, match=r"bees.json: is damaged .*; delete"
+    ) as caught:
+        BeesAlgorithm(BOX).run(sphere, cycles=2, checkpoint=path)
+    assert "\n" not in str(caught.value)
+
+
 def test_refuses_the_checkpoint_of_another_search(tmp_path):
     path = tmp_path / "bees.json"
     BeesAlgorithm(BOX).run(sphere, cycles=1, checkpoint=path)
