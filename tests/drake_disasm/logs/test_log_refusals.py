@@ -348,6 +348,13 @@ def test_names_that_are_nearly_episodes(name, written):
     _refused(lambda: read_log(folder), str(folder / name), "rename it")
 
 
+def test_a_parquet_column_whose_name_is_no_text(written):
+    """PyArrow raises a UnicodeDecodeError, which is none of its own."""
+    path = written("joint_motion", "parquet") / "episode_0000.parquet"
+    path.write_bytes(path.read_bytes().replace(b"tau.0", b"\xf7au.0"))
+    _refused(lambda: read_log(path.parent), "not a whole Parquet file", "write it")
+
+
 def test_columns_that_differ_between_episodes(written, sample, headers):
     folder = written("transitions", "parquet", episodes=2)
     columns = sample("transitions")
