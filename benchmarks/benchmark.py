@@ -172,7 +172,7 @@ def measure_latency() -> Iterator[Figure]:
 
     Of the hardware station with a fake cell in another process, in real time.
     """
-    with endurance.playing() as config:
+    with endurance.playing() as (config, _):
         limits = load_hardware_config(config).safety
         try:
             noted = endurance.run(config, _LATENCY_MINUTES)

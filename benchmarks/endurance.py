@@ -128,19 +128,27 @@ def run(config: Path, minutes: float, views: Sequence[MeshcatView] = ()) -> Ages
 
 
 @contextlib.contextmanager
-def playing() -> Iterator[Path]:
-    """Plays a cell in another process; yields the file by which it is found."""
+def playing(*options: str) -> Iterator[tuple[Path, "subprocess.Popen[str]"]]:
+    """Plays a cell in another process; yields the file by which it is found, and it.
+
+    Args:
+        options: of fake_cell.py.
+    """
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder) / "fake.yaml"
         fake = subprocess.Popen(
-            [sys.executable, _FAKE_CELL, "--config", config, "--lcm-url", _LCM],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
+            [
+                *(sys.executable, _FAKE_CELL, "--config", str(config)),
+                *("--lcm-url", _LCM, *options),
+            ],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
         )
         try:
             while not config.exists():
                 time.sleep(0.1)
-            yield config
+            yield config, fake
         finally:
             fake.send_signal(signal.SIGINT)
             fake.wait()
@@ -160,7 +168,7 @@ def main() -> None:
     parser.add_argument("--meshcat", action="store_true", help="with a page, unwatched")
     args = parser.parse_args()
     views = [MeshcatView(start_meshcat())] if args.meshcat else []
-    with playing() as config:
+    with playing() as (config, _):
         before = _open()
         print(run(config, args.minutes, views).table())
         print(f"threads and sockets before {before}, after {_open()}")

@@ -40,7 +40,7 @@ PLACES = ("policy", "solver", "sender", "anywhere")
 _GROUP, _PORT = "239.255.76.67", 7673  # not where another cell may be
 _LCM = f"udpm://{_GROUP}:{_PORT}?ttl=0"
 #: The played cell must keep real time, on a machine that others use too.
-_QUICK_ENOUGH = "simulation.cell_time_step=0.005"
+QUICK_ENOUGH = "simulation.cell_time_step=0.005"
 _WINDOW = 0.1  # s, over which commands are counted
 _SPAN = 4  # commands over which the joints' speed is taken
 _STEPS_AFTER = 12
@@ -74,7 +74,7 @@ class StallRun:
 def play(pipe: Connection) -> None:
     """Plays a cell in real time; answers what came over the wire, and forces."""
     go_first(2)
-    scenario = load_scenario("removal", [_QUICK_ENOUGH])
+    scenario = load_scenario("removal", [QUICK_ENOUGH])
     lcm = DrakeLcm(_LCM)
     with FakeCell(scenario, lcm) as cell, _Wire() as wire:
         config = cell.config()

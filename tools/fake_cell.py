@@ -9,7 +9,10 @@ cause the fault, and an empty line to end it:
   gripper:   crc, drop, silent, status, short, header
   iiwa:      loss, frozen, reorder, nan, jump, short, header
 
-Type `start` to have the arm back where an episode starts, as if it had been jogged.
+and `restart` for each of them: as after a loss of power.
+
+Type `start` to have the arm back where an episode starts, as if it had been jogged;
+`force` prints the greatest force at the sensor since.
 """
 
 import argparse
@@ -20,6 +23,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import cli
+import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
 from pydrake.lcm import DrakeLcm
 
@@ -82,48 +86,58 @@ def main(arguments: Sequence[str]) -> int:
     return 0
 
 
+class _Console:
+    """Does what is typed."""
+
+    def __init__(self, cell: FakeCell) -> None:
+        self._cell, self._greatest = cell, 0.0
+        self._devices: dict[str, tuple[object, Sequence[str]]] = {
+            "iiwa": (cell, IIWA_FAULTS),
+            "ft_sensor": (cell.hex, hex_box.FAULTS),
+            "gripper": (cell.gripper, robotiq_gripper.FAULTS),
+        }
+
+    def look(self) -> None:
+        """Takes note of the force, and does what was typed since."""
+        self._greatest = max(self._greatest, float(np.linalg.norm(self._cell.load())))
+        while sys.stdin and select.select([sys.stdin], [], [], 0)[0]:
+            line = sys.stdin.readline()
+            if not line:
+                return
+            self._obey(line.split())
+
+    def _obey(self, words: Sequence[str]) -> None:
+        match list(words):
+            case []:
+                for device, _ in self._devices.values():
+                    device.fault = ""  # type: ignore[attr-defined]
+            case ["start"]:
+                self._cell.jog_to_start()
+                self._greatest = 0.0
+                print("the arm is at the start", flush=True)
+            case ["force"]:
+                print(f"greatest force {self._greatest:.2f} N", flush=True)
+            case [name, "restart"] if name in self._devices:
+                self._cell.restart(name)
+                print(f"{name}: restarted", flush=True)
+            case [name, fault] if fault in self._devices.get(name, ("", ""))[1]:
+                self._devices[name][0].fault = fault  # type: ignore[attr-defined]
+                print(f"{name}: {fault}", flush=True)
+            case _:
+                print(f"{' '.join(words)}: write a device and a fault; see --help")
+
+
 def _play(cell: FakeCell) -> None:
-    """Advances the cell in real time; causes the faults that are typed."""
-    pace, steps = RealTime(cell), 0
+    """Advances the cell in real time; does what is typed."""
+    pace, console = RealTime(cell), _Console(cell)
     while True:
         program.stop_if_interrupted()
         cell.advance()
         pace.keep()
-        steps += 1
         if pace.lost > _LATE:
             print(_BEHIND, file=sys.stderr, flush=True)
             pace.lost = -math.inf  # once is enough
-        if steps % 20 == 0 and sys.stdin and select.select([sys.stdin], [], [], 0)[0]:
-            line = sys.stdin.readline()
-            if line:
-                _cause(cell, line.split())
-
-
-def _cause(cell: FakeCell, words: Sequence[str]) -> None:
-    """Causes a fault of a device; no words end all faults."""
-    devices: dict[str, tuple[object, Sequence[str]]] = {
-        "iiwa": (cell, IIWA_FAULTS),
-        "ft_sensor": (cell.hex, hex_box.FAULTS),
-        "gripper": (cell.gripper, robotiq_gripper.FAULTS),
-    }
-    if not words:
-        for device, _ in devices.values():
-            device.fault = ""  # type: ignore[attr-defined]
-        return
-    if list(words) == ["start"]:
-        cell.jog_to_start()
-        print("the arm is at the start", flush=True)
-        return
-    try:
-        name, fault = words
-        device, faults = devices[name]
-        if fault not in faults:
-            raise ValueError
-    except (ValueError, KeyError):
-        print(f"{' '.join(words)}: write a device and a fault; see --help")
-        return
-    device.fault = fault  # type: ignore[attr-defined]
-    print(f"{name}: {fault}", flush=True)
+        console.look()
 
 
 if __name__ == "__main__":

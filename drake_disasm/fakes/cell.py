@@ -29,6 +29,7 @@ from drake_disasm.stations.hardware_config import HardwareConfig
 IIWA_FAULTS = ("", "loss", "frozen", "reorder", "nan", "jump", "short", "header")
 JUMP = 0.3  # rad, of the fault "jump"
 _DEAF = 0.25  # s after the first status, as in kuka_driver.cc
+_RESTART = 0.5  # s without the driver
 _ARRIVES = 0.2  # s, on a busy machine
 
 
@@ -149,7 +150,8 @@ class FakeCell:
             device: "iiwa" (its driver), "ft_sensor" or "gripper".
         """
         if device == "iiwa":
-            self._restarted_at, self._first_status = self.time, np.nan
+            self._restarted_at = self.time + _RESTART
+            self._first_status = np.nan
         elif device == "ft_sensor":
             self.hex.restart()
         else:
@@ -176,6 +178,8 @@ class FakeCell:
         return self.station.GetOutputPort(port).Eval(self._context)
 
     def _obey(self, data: bytes) -> None:
+        if self.time < self._restarted_at:
+            return
         message = lcmt_iiwa_command.decode(data)
         since = self.time - self._first_status
         if not since > _DEAF:  # NaN before the first status
@@ -186,6 +190,8 @@ class FakeCell:
         self.commanded = np.array(message.joint_position)
 
     def _send_status(self) -> None:
+        if self.time < self._restarted_at:
+            return
         if np.isnan(self._first_status):
             self._first_status = self.time
         data = self._status().encode()

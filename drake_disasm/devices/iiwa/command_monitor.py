@@ -40,8 +40,12 @@ class CommandMonitor:
         self._is_obeyed, self._foreign = False, ""
 
     def start(self) -> None:
-        """Begins to listen."""
+        """Begins to listen.
+
+        Where the arm was sent before is forgotten: it may have been jogged since.
+        """
         self._channel.start()
+        self._positions[:], self._count = np.nan, 0
         self.forget()
 
     def forget(self) -> None:

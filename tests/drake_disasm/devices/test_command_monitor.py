@@ -126,3 +126,20 @@ def test_no_socket_stays() -> None:
     arm.monitor.stop()
     assert channel._socket is None
     assert channel.take() == []
+
+
+def test_an_arm_that_was_jogged_between_episodes_has_no_other_master(arm: Arm) -> None:
+    """The first status that is handled after the jog is one from before it."""
+    ours = np.full(7, 0.1)
+    arm.send(ours)
+    arm.obeys = ours
+    assert not arm.foreign()
+    arm.monitor.stop()
+    arm.monitor.start()
+    assert not arm.foreign()
+    arm.obeys = np.full(7, 0.3)
+    assert not arm.foreign()
+    arm.send(arm.obeys)
+    assert not arm.foreign()
+    arm.obeys = np.full(7, 0.5)  # and yet it is noticed
+    assert "rad from ours" in arm.foreign()
