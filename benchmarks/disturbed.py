@@ -7,14 +7,13 @@ person would do. `python benchmarks/disturbed.py --minutes 60 --output DIR` prin
 ended the episodes, the greatest forces, and whether any row of the log was lost.
 """
 
-import argparse
 import collections
 import contextlib
 import re
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -213,20 +212,21 @@ def rows_lost(folder: Path, tally: Tally) -> int:
     return sum(max(0, s - k) for s, k in zip(tally.steps, kept, strict=False))
 
 
-def main() -> None:
-    """Runs, and prints what happened."""
+def main(arguments: Sequence[str]) -> int:
+    """Runs, and prints what happened; returns the exit status."""
     tqdm.monitor_interval = 0  # a thread of its own
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = program.argument_parser("disturbed", __doc__, "")
     add = parser.add_argument
     add("--minutes", type=options.above_zero, default=10.0, metavar="N")
-    add("--seed", type=int, default=0)
+    add("--seed", type=options.seed, default=0)
     add("--output", type=Path, default=Path("out/disturbed"), metavar="DIR")
-    args = parser.parse_args()
+    args = parser.parse_args(arguments)
     go_first(1)
     args.output.mkdir(parents=True, exist_ok=True)
     tally = run(args.minutes, args.output, args.seed)
     print(f"rows lost: {rows_lost(args.output, tally)}")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    program.run(main)

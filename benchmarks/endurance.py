@@ -4,7 +4,6 @@
 the bolt to and fro, and prints whether anything tripped, and how old samples were.
 """
 
-import argparse
 import contextlib
 import gc
 import signal
@@ -21,7 +20,7 @@ import psutil
 from pydrake.systems.framework import Context
 from tqdm import tqdm
 
-from drake_disasm.common import options
+from drake_disasm.common import options, program
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.stations.hardware_config import load_hardware_config
@@ -160,19 +159,20 @@ def _open() -> tuple[int, int]:
     return threading.active_count(), len(psutil.Process().net_connections("inet"))
 
 
-def main() -> None:
-    """Plays the cell in another process, and runs."""
+def main(arguments: Sequence[str]) -> int:
+    """Plays the cell in another process, and runs; returns the exit status."""
     tqdm.monitor_interval = 0  # a thread of its own
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = program.argument_parser("endurance", __doc__, "")
     parser.add_argument("--minutes", type=options.above_zero, default=10.0, metavar="N")
     parser.add_argument("--meshcat", action="store_true", help="with a page, unwatched")
-    args = parser.parse_args()
+    args = parser.parse_args(arguments)
     views = [MeshcatView(start_meshcat())] if args.meshcat else []
     with playing() as (config, _):
         before = _open()
         print(run(config, args.minutes, views).table())
         print(f"threads and sockets before {before}, after {_open()}")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    program.run(main)

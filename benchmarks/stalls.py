@@ -6,7 +6,6 @@ anywhere (SIGSTOP). Commands are counted on the wire, by the time at which the o
 system received them. `python benchmarks/stalls.py` prints docs/hardware.md's table.
 """
 
-import argparse
 import dataclasses
 import multiprocessing as mp
 import os
@@ -24,6 +23,7 @@ from drake import lcmt_iiwa_command
 from pydrake.lcm import DrakeLcm
 from tqdm import tqdm
 
+from drake_disasm.common import options, program
 from drake_disasm.common.files import write_json
 from drake_disasm.devices.datagrams import receive, stamp_arrivals
 from drake_disasm.fakes.cell import FakeCell
@@ -305,17 +305,31 @@ def table(runs: Sequence[StallRun]) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
-    """Runs, and prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def main(arguments: Sequence[str]) -> int:
+    """Runs, and prints the table; returns the exit status."""
+    parser = program.argument_parser("stalls", __doc__, "")
     add = parser.add_argument
-    add("--repeats", type=int, default=5, metavar="N", help="of each (default: 5)")
-    add("--stalls", type=float, nargs="+", default=STALLS, metavar="S", help="[s]")
+    add(
+        "--repeats",
+        type=options.positive,
+        default=5,
+        metavar="N",
+        help="of each (default: 5)",
+    )
+    add(
+        "--stalls",
+        type=options.nonnegative,
+        nargs="+",
+        default=STALLS,
+        metavar="S",
+        help="[s]",
+    )
     add("--output", type=Path, metavar="FILE", help="JSON, written as runs end")
-    args = parser.parse_args()
+    args = parser.parse_args(arguments)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     print(table(run_all(args.stalls, args.repeats, args.output)))
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    program.run(main)

@@ -35,6 +35,9 @@ PROGRAMS: list[tuple[str, tuple[str, ...], list[str]]] = [
         LOG,
         ["--seed=-1", "--huber=nan", "--huber=0", "--cycles=0", "--budget=0"],
     ),
+    ("endurance", (), ["--minutes=nan", "--minutes=0", "--minutes=-1"]),
+    ("disturbed", (), ["--minutes=inf", "--seed=-1"]),
+    ("stalls", (), ["--repeats=0", "--stalls=nan", "--stalls=-1"]),
     ("fuzz", (), ["--files=0", "--datagrams=x", "--seed=-1", "--case=-1"]),
     ("close_loop", LOG, ["--huber=nan", "--huber=-1", "--workers=0"]),
     (
