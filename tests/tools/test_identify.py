@@ -79,6 +79,7 @@ def test_readings_at_rest_from_the_command_line(readings: Path, tmp_path: Path) 
     assert load_scenario(str(out / "scenario.yaml")).effects
 
 
+@pytest.mark.slow
 def test_a_twin_from_the_command_line_and_back_into_simulate(
     transitions: Path, tmp_path: Path
 ) -> None:

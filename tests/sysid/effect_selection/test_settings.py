@@ -84,7 +84,7 @@ def test_each_threshold_has_unit_reason_and_what_was_measured():
 @pytest.mark.parametrize(("alpha", "ending"), [(0.05, "explained"), (1e-4, "none")])
 def test_thresholds_are_passed_down(alpha, ending, tmp_path):
     """With 4000 draws no p-value is as low as 1e-4."""
-    log = read_log(static_log(tmp_path, [SensorDrift], 2.0, seed=0).folder)
+    log = read_log(static_log(tmp_path, [SensorDrift], 5.0, seed=2).folder)
     model = model_of([log], ModelChoice())
     settings = SelectionSettings(alpha=alpha)
     found = close_loop(model, settings=settings, library=[SensorDrift])
