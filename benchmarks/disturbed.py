@@ -23,6 +23,7 @@ from tqdm import tqdm
 
 from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import write_text
 from drake_disasm.common.progress import ProgressUpdate
 from drake_disasm.logs import LogWriter, read_log
 from drake_disasm.scenario import load_scenario
@@ -124,6 +125,7 @@ class Tally:
         self.ends: collections.Counter[str] = collections.Counter()
         self.forces: list[float] = []
         self.steps: list[int] = []
+        self.reasons: list[str] = []
 
     def text(self) -> str:
         """Returns it in words."""
@@ -147,6 +149,7 @@ def _ended(tally: Tally) -> Iterator[None]:
         tally.ends["its last step"] += 1
     except (HoldError, DisasmError) as error:
         reason = str(error).removeprefix("the robot is held: ")
+        tally.reasons.append(reason)
         tally.ends[re.sub(r"-?\d+(\.\d+)?", "#", reason.split(";")[0])] += 1
 
 
@@ -177,8 +180,9 @@ def run(minutes: float, folder: Path, seed: int) -> Tally:
             text += f", {policy.stalls} stalls"
             counts = {n: r.counters.text for n, r in station.readings().items()}
             text += f"\npace: {station.counts()}\ndevices: {counts}\n"
-            (folder / "tally.txt").write_text(text)
-    print(text)
+            text += "".join(f"{reason}\n" for reason in tally.reasons)
+            write_text(folder / "tally.txt", text)
+    print(tally.text())
     return tally
 
 

@@ -6,6 +6,7 @@ the bolt to and fro, and prints whether anything tripped, and how old samples we
 
 import contextlib
 import gc
+import os
 import signal
 import subprocess
 import sys
@@ -28,7 +29,8 @@ from drake_disasm.task.simulation import TaskSimulation
 from drake_disasm.visualization import MeshcatView, start_meshcat
 
 _FAKE_CELL = str(Path(__file__).parents[1] / "tools" / "fake_cell.py")
-_LCM = "udpm://239.255.76.67:7672?ttl=0"  # not where another cell may be
+#: Not where another cell may be.
+_LCM = f"udpm://239.255.76.67:{20_000 + os.getpid() % 20_000}?ttl=0"
 _NEAR, _FAR, _STEP = 0.005, 0.02, 0.001  # m
 _YIELDS = 5e-5  # m/N, in a step: the grip creeps, and a stiff way would press ever more
 

@@ -9,7 +9,6 @@ system received them. `python benchmarks/stalls.py` prints docs/hardware.md's ta
 import dataclasses
 import multiprocessing as mp
 import os
-import signal
 import socket
 import struct
 import threading
@@ -37,8 +36,7 @@ from drake_disasm.task.simulation import TaskSimulation
 
 STALLS = (0.0, 0.01, 0.05, 0.1, 0.24, 1.0, 3.0)  # s
 PLACES = ("policy", "solver", "sender", "anywhere")
-_GROUP, _PORT = "239.255.76.67", 7673  # not where another cell may be
-_LCM = f"udpm://{_GROUP}:{_PORT}?ttl=0"
+_GROUP = "239.255.76.67"
 #: The played cell must keep real time, on a machine that others use too.
 QUICK_ENOUGH = "simulation.cell_time_step=0.005"
 _WINDOW = 0.1  # s, over which commands are counted
@@ -71,12 +69,12 @@ class StallRun:
     ended: str
 
 
-def play(pipe: Connection) -> None:
+def play(pipe: Connection, port: int) -> None:
     """Plays a cell in real time; answers what came over the wire, and forces."""
     go_first(2)
     scenario = load_scenario("removal", [QUICK_ENOUGH])
-    lcm = DrakeLcm(_LCM)
-    with FakeCell(scenario, lcm) as cell, _Wire() as wire:
+    lcm = DrakeLcm(_lcm_url(port))
+    with FakeCell(scenario, lcm) as cell, _Wire(port) as wire:
         config = cell.config()
         pipe.send((config.ft_sensor.port, config.gripper.port))
         pace, forces = RealTime(cell), list[float]()
@@ -98,11 +96,11 @@ def play(pipe: Connection) -> None:
 class _Wire:
     """Listens to the arm's commands on LCM's multicast group."""
 
-    def __init__(self) -> None:
+    def __init__(self, port: int) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
-        self._socket.bind((_GROUP, _PORT))
+        self._socket.bind((_GROUP, port))
         member = struct.pack("4sl", socket.inet_aton(_GROUP), socket.INADDR_ANY)
         self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
         self._socket.settimeout(0.2)
@@ -173,11 +171,15 @@ class _Staller:
         return stalled
 
 
-def drive(pipe: Connection, ports: tuple[int, int]) -> None:
+def _lcm_url(port: int) -> str:
+    return f"udpm://{_GROUP}:{port}?ttl=0"
+
+
+def drive(pipe: Connection, port: int, ports: tuple[int, int]) -> None:
     """Slides the bolt on a hardware station, and stands still where it is told to."""
     go_first(1)
     config = HardwareConfig()
-    config.iiwa.lcm_url = _LCM
+    config.iiwa.lcm_url = _lcm_url(port)
     config.ft_sensor.address = config.gripper.address = "127.0.0.1"
     config.ft_sensor.port, config.gripper.port = ports
     config.ft_sensor.period = 0.005
@@ -256,10 +258,11 @@ def run_all(stalls: Sequence[float], repeats: int, path: Path | None) -> list[St
     """Runs each stall in each place; writes results as they come."""
     spawn = mp.get_context("spawn")
     (cell, cells_end), (station, stations_end) = spawn.Pipe(), spawn.Pipe()
-    player = spawn.Process(target=play, args=(cells_end,), daemon=True)
+    port = 20_000 + os.getpid() % 20_000  # not where another cell may be
+    player = spawn.Process(target=play, args=(cells_end, port), daemon=True)
     player.start()
     ports = cell.recv()
-    driver = spawn.Process(target=drive, args=(stations_end, ports), daemon=True)
+    driver = spawn.Process(target=drive, args=(stations_end, port, ports), daemon=True)
     driver.start()
     station.recv()
     runs: list[StallRun] = []
@@ -326,7 +329,6 @@ def main(arguments: Sequence[str]) -> int:
     )
     add("--output", type=Path, metavar="FILE", help="JSON, written as runs end")
     args = parser.parse_args(arguments)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     print(table(run_all(args.stalls, args.repeats, args.output)))
     return 0
 

@@ -29,7 +29,7 @@ from drake_disasm.stations.hardware_config import HardwareConfig
 IIWA_FAULTS = ("", "loss", "frozen", "reorder", "nan", "jump", "short", "header")
 JUMP = 0.3  # rad, of the fault "jump"
 _DEAF = 0.25  # s after the first status, as in kuka_driver.cc
-_RESTART = 0.5  # s without the driver
+_RESTART = 1.5  # s without the driver
 _ARRIVES = 0.2  # s, on a busy machine
 
 

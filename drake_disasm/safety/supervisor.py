@@ -82,6 +82,15 @@ class Supervisor:
         """Takes note that the last command was not sent after all."""
         self._sent = self._sent_before
 
+    def refuse(self, reason: str, now: float) -> None:
+        """Takes note that nothing can be sent now [s]; whoever moves is held.
+
+        What would go on meanwhile would have to be made up for.
+        """
+        self.withdraw()
+        if self.mode is Mode.ACTIVE and self._sent is not None:
+            self.trip(reason, self._sent, now)
+
     def begin(self) -> None:
         """Waits anew, wherever the arm was taken meanwhile; a hold stays one."""
         if self.mode is not Mode.HOLD:

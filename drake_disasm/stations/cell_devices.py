@@ -102,7 +102,8 @@ class CellDevices:
 
         To a driver that has just been started a command is an error.
         """
-        now, limit = self.clock(), self._config.safety.stale_arm
+        # Later than the guard looks for the same: its reason is the better one.
+        now, limit = self.clock(), 2.0 * self._config.safety.stale_arm
         sends = self._arm.read().health(now, limit) is Health.READY
         return sends and self._arm.sending_for(now) >= _LISTENS_FIRST
 

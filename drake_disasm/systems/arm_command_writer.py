@@ -9,6 +9,8 @@ from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.common.timing import COMMAND_DELAY
 from drake_disasm.safety import CommandPacer, Supervisor
 
+_STARTED = "the arm's driver does not listen: it has just started"
+
 
 class ArmCommandWriter(LeafSystem):
     """Sends what the safety filter let through, once a control period.
@@ -56,7 +58,7 @@ class ArmCommandWriter(LeafSystem):
     def _publish(self, context: Context) -> EventStatus:
         position = self._position.Eval(context)
         if not self._listens():
-            self._supervisor.withdraw()
+            self._supervisor.refuse(_STARTED, self._pacer.turn)
             self._pacer.skipped()
             return EventStatus.Succeeded()
         if self._pacer.refuse_late():

@@ -14,8 +14,8 @@ JOINTS = 7
 #: A message this much older than the newest is not late: the driver has restarted [s].
 BEGUN_ANEW = 1.0
 
-#: A silence after which the driver may have been started anew [s].
-BREAK = 0.2
+#: A silence after which the driver may have been started anew [s]: it takes longer.
+BREAK = 1.0
 
 _US = 1e6
 
@@ -87,29 +87,29 @@ class IiwaStatusMonitor:
             self._mailbox.count(invalid=1)
             self._mailbox.complain(f"{error}; check that the driver is this arm's")
             return
-        stamp = message.utime / _US
-        if not self._is_newer(stamp):
+        stamp, now = message.utime / _US, self._mailbox.clock()
+        if not self._is_newer(stamp, now):
             return
-        now = self._mailbox.clock()
-        if now - self._came > BREAK:
-            self._since = now
-        self._came = now
         taken = self._device_clock.taken_at(stamp, now)
         self.commanded = np.array(message.joint_position_commanded)
         self._mailbox.put(np.array(message.joint_position_measured), taken)
         self._checked.Publish(self._channel, data)
 
-    def _is_newer(self, stamp: float) -> bool:
-        """Takes a message's time [s], and counts what it tells of others."""
+    def _is_newer(self, stamp: float, now: float) -> bool:
+        """Takes a message's time by the driver's and by our clock [s].
+
+        Counts what that tells of other messages.
+        """
         gap = np.inf if self._stamp is None else stamp - self._stamp
-        if -BEGUN_ANEW < gap <= 0.0:
+        is_broken, self._came = now - self._came > BREAK, now
+        if is_broken or gap <= -BEGUN_ANEW:
+            self._since = now
+            self._device_clock.begin_anew()
+            self._mailbox.count(reconnects=int(gap <= 0.0))
+        elif gap <= 0.0:
             self._mailbox.count(reordered=1)
             return False
-        if gap <= -BEGUN_ANEW:
-            self._device_clock.begin_anew()
-            self._came = -np.inf
-            self._mailbox.count(reconnects=1)
-        elif self._stamp is not None:
+        if np.isfinite(gap):
             self._mailbox.count(lost=max(0, round(gap / self._period) - 1))
         self._stamp = stamp
         return True

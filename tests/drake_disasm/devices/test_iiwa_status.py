@@ -95,3 +95,46 @@ def test_what_is_lost_late_or_broken_is_counted_and_only_good_ones_get_on() -> N
     assert (counters.reordered, counters.invalid) == (2, 2)
     assert "check that the driver" in monitor.read().error
     assert monitor.read().values[6] == 6.25 and len(passed) == 2
+
+
+class _Driver:
+    """A driver whose clock, and whose messages' way, are the test's."""
+
+    def __init__(self) -> None:
+        self.now, self.lcm = 0.0, DrakeLcm("memq://")
+        checked = DrakeLcm("memq://")
+        self.monitor = IiwaStatusMonitor(
+            self.lcm, checked, "STATUS", 0.005, lambda: self.now
+        )
+
+    def say(self, stamp: float) -> float:
+        """Sends a status of a time [s]; returns its age when it was taken [s]."""
+        self.lcm.Publish("STATUS", status(round(1e6 * stamp)).encode())
+        self.lcm.HandleSubscriptions(0)
+        return self.monitor.read().age(self.now)
+
+
+def test_a_status_that_queued_up_is_as_old_as_it_is() -> None:
+    driver = _Driver()
+    for k in range(20):
+        driver.now = 7.0 + 0.005 * k
+        assert driver.say(0.005 * k) == pytest.approx(0.0, abs=1e-6)
+    driver.now += 0.1  # a stall; the first that is handled is an old one
+    assert driver.say(0.100) == pytest.approx(0.095, abs=2e-3)
+    assert driver.say(0.195) == pytest.approx(0.0, abs=2e-3)
+    counters = driver.monitor.read().counters
+    assert (counters.queued, counters.lost) == (1, 18)
+
+
+@pytest.mark.parametrize("stamp", [0.0, 0.3, 80.0])
+def test_a_driver_that_was_started_anew_is_believed_its_time(stamp: float) -> None:
+    driver = _Driver()
+    for k in range(100):
+        driver.now = 7.0 + 0.005 * k
+        driver.say(0.005 * k)
+    assert driver.monitor.sending_for(driver.now) == pytest.approx(0.495)
+    driver.now += 1.5
+    for k in range(10):
+        driver.now += 0.005
+        assert driver.say(stamp + 0.005 * k) == pytest.approx(0.0, abs=1e-6)
+    assert driver.monitor.sending_for(driver.now) == pytest.approx(0.045)

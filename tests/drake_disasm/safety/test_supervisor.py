@@ -116,3 +116,15 @@ def test_the_limit_is_one_per_second() -> None:
     active.command(at(Q, Q))
     soon = dataclasses.replace(at(Q, Q + 0.01), since_sent=0.5 * PERIOD)
     assert np.allclose(active.command(soon), Q + 0.5 * STEP)
+
+
+def test_whoever_moves_is_held_where_nothing_can_be_sent() -> None:
+    active = supervisor([])
+    active.refuse("deaf", 1.0)
+    assert active.mode is Mode.WAITING
+    active.command(at(Q, Q))
+    active.command(at(Q, Q + STEP))
+    active.refuse("deaf", 2.0)
+    assert active.mode is Mode.HOLD and active.reason == "deaf"
+    assert active.held_since == 2.0
+    assert np.array_equal(active.command(at(Q, Q + 2 * STEP)), Q)
