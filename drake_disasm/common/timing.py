@@ -17,7 +17,8 @@ MOTION_DELAY = 2e-6
 
 #: A command leaves for the arm this long after it was decided on [s]. At the same
 #: time it would leave before, being published at the end of the step that led there.
-COMMAND_DELAY = 1e-5
+#: It leaves before the policy acts, which may take its time.
+COMMAND_DELAY = 5e-7
 
 
 def boundary(steps: int, period: float) -> float:

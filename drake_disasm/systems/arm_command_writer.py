@@ -57,12 +57,12 @@ class ArmCommandWriter(LeafSystem):
 
     def _publish(self, context: Context) -> EventStatus:
         position = self._position.Eval(context)
+        if self._pacer.refuse_late():
+            self._supervisor.withdraw()
+            return EventStatus.Succeeded()
         if not self._listens():
             self._supervisor.refuse(_STARTED, self._pacer.turn)
             self._pacer.skipped()
-            return EventStatus.Succeeded()
-        if self._pacer.refuse_late():
-            self._supervisor.withdraw()
             return EventStatus.Succeeded()
         self._pacer.await_gap()
         with self.stopwatch:
