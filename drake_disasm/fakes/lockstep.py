@@ -2,7 +2,8 @@
 
 import contextlib
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from pydrake.lcm import DrakeLcm
 from pydrake.systems.analysis import Simulator
@@ -31,12 +32,15 @@ class FakeHardware:
 
 
 @contextlib.contextmanager
-def fake_hardware(scenario: Scenario, seed: int = 0) -> Iterator[FakeHardware]:
+def fake_hardware(
+    scenario: Scenario, seed: int = 0, limits: Mapping[str, Any] | None = None
+) -> Iterator[FakeHardware]:
     """Yields a hardware station with fake devices, in virtual time.
 
     Args:
         scenario: of the task; effects in it are refused, as by any hardware station.
         seed: of the fake sensor's noise.
+        limits: fields of the safety limits that differ from the defaults, by name.
     """
     lcm = DrakeLcm("memq://")
     with FakeCell(scenario, lcm, seed) as cell:
@@ -45,7 +49,9 @@ def fake_hardware(scenario: Scenario, seed: int = 0) -> Iterator[FakeHardware]:
             """Lets a period pass while the station waits."""
             cell.advance(arrival(station.devices["ft_sensor"].read))
 
+        config = cell.config()
+        config.safety = dataclasses.replace(config.safety, **(limits or {}))
         with HardwareStation(
-            scenario, cell.config(), clock=cell.clock, wait=wait, lcm=lcm
+            scenario, config, clock=cell.clock, wait=wait, lcm=lcm
         ) as station:
             yield FakeHardware(station, cell)

@@ -6,7 +6,8 @@
 import contextlib
 import dataclasses
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -59,9 +60,15 @@ def in_lockstep(
     policy: Policy,
     seed: int = 0,
     views: Sequence[MeshcatView] = (),
+    limits: Mapping[str, Any] | None = None,
 ) -> Iterator[tuple[TaskSimulation, HardwareStation, FakeCell]]:
-    """Yields a diagram on the hardware station, with a fake cell in step with it."""
-    with fake_hardware(scenario, seed) as fake:
+    """Yields a diagram on the hardware station, with a fake cell in step with it.
+
+    Args:
+        scenario, policy, seed, views: of the diagram.
+        limits: fields of the safety limits that differ from the defaults.
+    """
+    with fake_hardware(scenario, seed, limits) as fake:
         simulation = TaskSimulation(scenario, lambda _: fake.station, policy, views)
         fake.attach(simulation.simulator)
         yield simulation, fake.station, fake.cell
