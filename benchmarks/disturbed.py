@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from endurance import Shuttle, playing
-from stalls import QUICK_ENOUGH, go_first
+from stalls import QUICK_ENOUGH, figures_left_out, go_first
 from tqdm import tqdm
 
 from drake_disasm.common import options, program
@@ -150,7 +150,7 @@ def _ended(tally: Tally) -> Iterator[None]:
     except (HoldError, DisasmError) as error:
         reason = str(error).removeprefix("the robot is held: ")
         tally.reasons.append(reason)
-        tally.ends[re.sub(r"-?\d+(\.\d+)?", "#", reason.split(";")[0])] += 1
+        tally.ends[figures_left_out(reason)] += 1
 
 
 def run(minutes: float, folder: Path, seed: int) -> Tally:

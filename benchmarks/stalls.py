@@ -9,6 +9,7 @@ system received them. `python benchmarks/stalls.py` prints docs/hardware.md's ta
 import dataclasses
 import multiprocessing as mp
 import os
+import re
 import socket
 import struct
 import threading
@@ -287,6 +288,11 @@ def run_all(stalls: Sequence[float], repeats: int, path: Path | None) -> list[St
     return runs
 
 
+def figures_left_out(reason: str) -> str:
+    """Returns a hold's reason without its figures and its remedy, to be counted."""
+    return re.sub(r"-?\d+(\.\d+)?", "#", reason.split(";")[0])
+
+
 def table(runs: Sequence[StallRun]) -> str:
     """Returns a row for each stall and place, the worst of its runs, as Markdown."""
     lines = [
@@ -296,7 +302,7 @@ def table(runs: Sequence[StallRun]) -> str:
     ]
     for stall, place in dict.fromkeys((run.stall, run.place) for run in runs):
         same = [run for run in runs if (run.stall, run.place) == (stall, place)]
-        ends = [run.ended for run in same]
+        ends = [figures_left_out(run.ended) for run in same]
         ended = "; ".join(f"{ends.count(end)} {end}" for end in dict.fromkeys(ends))
         lines.append(
             f"| {stall:g} s | {place} | {max(run.rate for run in same)} "
