@@ -196,6 +196,7 @@ def _one_episode(
     done = 0
 
     def count(update: ProgressUpdate) -> None:
+        """Takes note of the steps done."""
         nonlocal done
         done = int(update.done)
 

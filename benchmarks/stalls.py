@@ -166,6 +166,7 @@ class _Staller:
         """Returns a call that stands still first, if it is to."""
 
         def stalled(*arguments: object) -> object:
+            """Stands still if it is to, then calls."""
             self()
             return call(*arguments)
 
@@ -249,7 +250,7 @@ def measure(
             them is.
     """
     times, q = commands
-    counts = np.searchsorted(times, times + _WINDOW) - np.arange(len(times))
+    counts = np.searchsorted(times, times + _WINDOW - 1e-6) - np.arange(len(times))
     way = np.abs(q[_SPAN:] - q[:-_SPAN]).max(axis=1)
     took = np.maximum(times[_SPAN:] - times[:-_SPAN], 0.1 * period)
     return int(counts.max()), float(np.diff(times).min()), float((way / took).max())

@@ -122,6 +122,7 @@ class LogWriter:
         self._newest = None
 
         def begin(names: list[str]) -> RowFile:
+            """Begins the file at the first row, whose columns are known then."""
             file = RowFile(path, self._arranged(names, path))
             self._newest = self._next
             return file
