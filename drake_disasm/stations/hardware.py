@@ -84,6 +84,7 @@ class HardwareStation(Station):
     Attributes:
         supervisor: lets commands through, or holds.
         pacer: keeps commands at their rate, and counts what that costs.
+        lag: remembers how far the diagram fell behind, and what its parts took.
         devices: clients by name.
 
     Args:
@@ -125,7 +126,7 @@ class HardwareStation(Station):
             self._cell.let_pass,
             _LOOKS * max(config.iiwa.status_period, config.ft_sensor.period),
         )
-        self._lag = LagMonitor(config.safety.lag_window)
+        self.lag = LagMonitor(config.safety.lag_window)
         builder = DiagramBuilder()
         export_status(builder, self._cell, config.iiwa)
         self._wire_command(builder)
@@ -205,7 +206,7 @@ class HardwareStation(Station):
     def register_part(self, name: str, stopwatch: Stopwatch) -> None:
         """See Station."""
         stopwatch.clock = self._cell.clock
-        self._lag.stopwatches[name] = stopwatch
+        self.lag.stopwatches[name] = stopwatch
 
     def counts(self) -> dict[str, float | int]:
         """Returns what keeping the commands' pace has cost so far, by name."""
@@ -240,7 +241,7 @@ class HardwareStation(Station):
             SafetyFilter(
                 self.supervisor,
                 self.pacer,
-                self._lag,
+                self.lag,
                 self.devices,
                 self.coordinates,
                 self.mounting,

@@ -50,7 +50,9 @@ def fake(tmp_path: Path) -> Iterator[Path]:
     """Plays a cell in real time; yields the file by which it is found."""
     _skip_without_multicast()
     config = tmp_path / "fake.yaml"
-    cell = command("fake_cell", "--config", config, "--lcm-url", _LCM)
+    # In real time on a slow machine, too.
+    quick = ("--set", "simulation.cell_time_step=0.005")
+    cell = command("fake_cell", "--config", config, "--lcm-url", _LCM, *quick)
     streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL}
     with running(cell, **streams) as process:
         wait_until(config.exists, process)

@@ -87,3 +87,21 @@ def test_a_run_on_hardware_is_seen_in_meshcat(
         assert meshcat._GetPackedTransform(_ARM) != begun
         assert meshcat.HasPath("path")
         assert not meshcat.HasPath("/drake/contact_forces")
+
+
+def test_what_a_view_takes_is_counted_as_the_views(
+    scenario: Scenario, meshcat: Meshcat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever draws between the first and the last of the view's systems."""
+    view = MeshcatView(meshcat)
+    with in_lockstep(scenario, make_policy("straight"), views=[view]) as parts:
+        simulation, station, cell = parts
+        simulation.reset(0)
+        monkeypatch.setattr(view.wrench, "_draw", lambda *_: cell.skip(1))
+        watches = station.lag.stopwatches
+        before = {name: watch.total for name, watch in watches.items()}
+        simulation.step()
+        took = {name: watch.total - before[name] for name, watch in watches.items()}
+    assert set(took) == {"view", "policy", "inverse kinematics", "sending"}
+    assert took["view"] > 0.02  # two arrows of 5 ms, in three frames
+    assert took["policy"] == took["inverse kinematics"] == took["sending"] == 0.0
