@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from drake_disasm.common.stopwatch import Stopwatch
 
-#: What the diagram is called beside those of its parts that have a stopwatch.
-REST = "the rest of the diagram"
+#: What is called beside the parts of the diagram that have a stopwatch.
+REST = "the rest of the program"
 
 _WAITING = "waiting"
 _LOOKS = 20  # in a window
