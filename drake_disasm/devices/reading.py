@@ -75,8 +75,10 @@ class Reading:
 class Mailbox:
     """Holds the newest reading; a client's thread puts it in, a system takes it."""
 
-    def __init__(self, size: int, clock: Clock = time.monotonic) -> None:
-        self.clock = clock
+    def __init__(
+        self, size: int, clock: Clock = time.monotonic, queued_after: float = QUEUED
+    ) -> None:
+        self.clock, self._queued_after = clock, queued_after
         self._lock = threading.Lock()
         self._reading = Reading(np.full(size, np.nan))
 
@@ -95,7 +97,8 @@ class Mailbox:
         now = self.clock()
         taken = now if time is None else time
         with self._lock:
-            counters = self._counted(received=1, queued=int(now - taken > QUEUED))
+            queued = int(now - taken > self._queued_after)
+            counters = self._counted(received=1, queued=queued)
             self._reading = Reading(np.array(values), taken, "", counters)
 
     def complain(self, error: str) -> None:

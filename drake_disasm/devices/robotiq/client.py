@@ -101,7 +101,7 @@ class RobotiqClient:
             speed=_byte("speed", settings.speed, SPEEDS),
             force=_byte("force", settings.force, FORCES),
         )
-        self._mailbox = Mailbox(2, clock)
+        self._mailbox = Mailbox(2, clock, queued_after=TIMEOUT)
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         # The manual's way: rACT is cleared, then set.
@@ -191,6 +191,7 @@ class RobotiqClient:
         return True
 
     def _cycle(self) -> None:
+        asked = self._clock()  # the answer is no older
         status = self._read_status()
         complaint = _complaint(status)
         if complaint:  # a position with a complaint is no sample
@@ -199,14 +200,13 @@ class RobotiqClient:
             self._continue_activation(status)
             return
         opening = self._settings.stroke.opening(status.position)
-        self._mailbox.put(np.array([opening, self._rate(opening)]))
+        self._mailbox.put(np.array([opening, self._rate(opening, asked)]), asked)
         # One activation per start: a gripper that is reset in mid-run may hold a part.
         self._activation.clear()
         self._pursue(status)
 
-    def _rate(self, opening: float) -> float:
+    def _rate(self, opening: float, now: float) -> float:
         """Returns the rate [m/s] since the sample before, which it replaces."""
-        now = self._clock()
         before, opening_before = self._sample or (now, opening)
         self._sample = now, opening
         return (opening - opening_before) / (now - before) if now > before else 0.0

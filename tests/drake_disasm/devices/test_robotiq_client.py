@@ -118,7 +118,7 @@ def test_follows_to_the_opening_with_a_rate(
     client, rates = _client(fake), []
     put = client._mailbox.put
     monkeypatch.setattr(
-        client._mailbox, "put", lambda values: (rates.append(values[1]), put(values))
+        client._mailbox, "put", lambda v, time: (rates.append(v[1]), put(v, time))
     )
     with client:
         client.command(0.070)
