@@ -6,6 +6,7 @@ exits with 1 if anything but a DisasmError came, or a refusal took two seconds.
 """
 
 import argparse
+import contextlib
 import dataclasses
 import multiprocessing
 import resource
@@ -121,7 +122,7 @@ def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
     if args.case is not None:
-        with _temporary() as tempfile.tempdir:
+        with _temporary() as folder, _for_temporary_files(folder):
             for name in args.only:
                 print(f"{name}: {_read_here(name, args.seed, args.case)}")
         return 0
@@ -211,6 +212,16 @@ def _temporary() -> "tempfile.TemporaryDirectory[str]":
     memory = Path("/dev/shm")
     parent = memory if memory.is_dir() else None
     return tempfile.TemporaryDirectory(prefix="fuzz_", dir=parent)
+
+
+@contextlib.contextmanager
+def _for_temporary_files(folder: str) -> Iterator[None]:
+    """Has temporary files in a folder, for as long as it is there."""
+    before, tempfile.tempdir = tempfile.tempdir, folder
+    try:
+        yield
+    finally:
+        tempfile.tempdir = before
 
 
 def read_cases(job: Job, folder: str, sender: Connection) -> None:

@@ -99,7 +99,7 @@ def test_hardware_takes_the_path_of_a_file() -> None:
         ("twinn", {}, r"no station 'twinn'; did you mean 'twin'\?"),
         ("robot", {}, "no station 'robot'; known: cell, twin, hardware"),
         ("hardware", {}, r"where its devices are; give config.*models/hardware"),
-        ("hardware", {"config": "none.yaml"}, r"none\.yaml: No such file"),
+        ("hardware", {"config": "none.yaml"}, r"none\.yaml: can't be read"),
         ("cell", {"dry_run": True}, "station 'cell': takes no option 'dry_run'"),
     ],
 )

@@ -1,5 +1,6 @@
 """The transfer study: who trains where, and what is made of the results."""
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import pytest
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.learning.evaluation import Evaluation
 from drake_disasm.learning.experiment import Experiment
 from drake_disasm.learning.hyperparameters import preset
 from drake_disasm.learning.run import write_episodes
@@ -51,11 +53,15 @@ def test_nobody_goes_on_from_a_training_that_is_not_finished(tmp_path: Path) -> 
         check_start(part, [0])
 
 
+#: An evaluation's names; counts are whole numbers.
+FIGURES = {f.name: 0.0 for f in dataclasses.fields(Evaluation)} | {"truly_out": 0}
+
+
 def _finish(folder: Path, seed: int, P: float, **files: Any) -> None:
     """Leaves behind what a finished training does."""
     folder = folder / f"seed_{seed:03d}"
     folder.mkdir(parents=True)
-    figures = {"performance": P, "successes": 3, "episodes": 4}
+    figures = FIGURES | {"performance": P, "successes": 3, "episodes": 4}
     result = {"seed": seed, "first_success": 2, "training": figures}
     result["validation"] = figures | {"performance": P + 1.0, "successes": 4}
     for name, content in {"result": result, **files}.items():
@@ -65,7 +71,7 @@ def _finish(folder: Path, seed: int, P: float, **files: Any) -> None:
 
 
 def test_the_table_counts_finished_seeds_alone(tmp_path: Path) -> None:
-    greedy = {"performance": -7.0, "successes": 1, "episodes": 4}
+    greedy = FIGURES | {"performance": -7.0, "successes": 1, "episodes": 4}
     for seed, P in ((0, 1.0), (1, 2.0)):
         _finish(tmp_path / "untrained", seed, P)
     _finish(tmp_path / "from_after", 0, 5.0, deployed=greedy)
