@@ -7,7 +7,6 @@ the bolt to and fro, and prints whether anything tripped, and how old samples we
 import contextlib
 import gc
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -151,7 +150,7 @@ def playing(*options: str) -> Iterator[tuple[Path, "subprocess.Popen[str]"]]:
                 time.sleep(0.1)
             yield config, fake
         finally:
-            fake.send_signal(signal.SIGINT)
+            fake.terminate()  # Ctrl-C may be ignored, as behind nohup
             fake.wait()
 
 
