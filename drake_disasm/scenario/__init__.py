@@ -15,10 +15,13 @@ from drake_disasm.scenario.files import (
 )
 from drake_disasm.scenario.randomisation import draw, with_values
 from drake_disasm.scenario.schema import (
+    CONTROLS,
     ArmConfig,
+    CartesianImpedanceConfig,
     ContactConfig,
     GripperConfig,
     ImpactConfig,
+    JointImpedanceConfig,
     LockConfig,
     ObservationConfig,
     PlacementConfig,
@@ -33,10 +36,13 @@ from drake_disasm.scenario.schema import (
 from drake_disasm.scenario.validity import validate
 
 __all__ = [
+    "CONTROLS",
     "ArmConfig",
+    "CartesianImpedanceConfig",
     "ContactConfig",
     "GripperConfig",
     "ImpactConfig",
+    "JointImpedanceConfig",
     "LockConfig",
     "ObservationConfig",
     "PlacementConfig",

@@ -5,6 +5,9 @@ import dataclasses
 from drake_disasm.common.quantity import quantity
 from drake_disasm.effects import Effect
 
+#: KUKA's control modes that take joint angles from FRI.
+CONTROLS = ("position", "joint_impedance", "cartesian_impedance")
+
 
 @dataclasses.dataclass
 class SimulationConfig:
@@ -90,8 +93,53 @@ class ContactConfig:
 
 
 @dataclasses.dataclass
+class JointImpedanceConfig:
+    """Springs in the joints, as KUKA's JointImpedanceControlMode has them.
+
+    KUKA asks for 0 N m/rad or more and a damping of 0 to 1 (iiwa_stack's
+    JointImpedanceControlMode.msg); the bounds above are libiiwa's, those below leave
+    a spring that holds the bolt. A fresh mode has 1000 N m/rad and 0.7 [from memory].
+    """
+
+    stiffness: list[float] = quantity(
+        [1000.0, 1000.0, 1000.0, 1000.0, 1000.0, 1000.0, 1000.0], "N m/rad",
+        "of each joint", low=10.0, high=5000.0,
+    )  # fmt: skip
+    damping_ratio: float = quantity(0.7, "1", "of each joint", low=0.1, high=1.0)
+
+
+@dataclasses.dataclass
+class CartesianImpedanceConfig:
+    """Springs at the bolt along x, y, z of Gn, then about them.
+
+    As KUKA's CartesianImpedanceControlMode has them: 0 to 5000 N/m and 0 to 300
+    N m/rad, damping 0.1 to 1, in the null space 0 N m/rad or more and 0.3 to 1
+    (iiwa_stack's CartesianImpedanceControlMode.msg; libiiwa has the same bounds). An
+    axis without stiffness holds no bolt, so the least is 10 N/m and 1 N m/rad here.
+    A fresh mode has 2000 N/m, 200 N m/rad and 0.7 (iiwa_stack's Python client); its
+    null space is assumed.
+    """
+
+    stiffness: list[float] = quantity(
+        [2000.0, 2000.0, 2000.0, 200.0, 200.0, 200.0], "N/m, N m/rad", "at the bolt",
+        low=1.0, high=5000.0,
+    )  # fmt: skip
+    damping_ratio: float = quantity(0.7, "1", "of each axis", low=0.1, high=1.0)
+    nullspace_stiffness: float = quantity(
+        100.0, "N m/rad", "of each joint, where the bolt does not feel it",
+        low=0.0, high=1000.0,
+    )  # fmt: skip
+    nullspace_damping_ratio: float = quantity(
+        0.7, "1", "of that spring", low=0.3, high=1.0
+    )
+
+
+@dataclasses.dataclass
 class ArmConfig:
-    """The arm and its joint position controller."""
+    """The arm and its controller: `stiffness`, `damping_ratio` are position control's.
+
+    The gains of each control: drake_disasm/cell/arm_control.py.
+    """
 
     model: str = quantity(
         "package://disasm_models/iiwa14/iiwa14.urdf", "", "URDF of the arm"
@@ -100,12 +148,21 @@ class ArmConfig:
         [0.0, 0.6, 0.0, -1.4, 0.0, 1.14, 0.0], "rad", "preferred joint angles",
         low=-3.0, high=3.0,
     )  # fmt: skip
+    control: str = quantity(
+        "position", "", "how the arm is controlled", choices=CONTROLS
+    )
     stiffness: list[float] = quantity(
         [20e3, 8e3, 20e3, 8e3, 8e3, 8e3, 8e3], "N m/rad", "of each joint",
         low=10.0, high=1e6,
     )  # fmt: skip
     damping_ratio: float = quantity(
         1.0, "1", "of each joint about its own inertia", low=0.1, high=5.0
+    )
+    joint_impedance: JointImpedanceConfig = dataclasses.field(
+        default_factory=JointImpedanceConfig
+    )
+    cartesian_impedance: CartesianImpedanceConfig = dataclasses.field(
+        default_factory=CartesianImpedanceConfig
     )
     control_period: float = quantity(
         0.005, "s", "of the position interface", low=1e-3, high=0.02

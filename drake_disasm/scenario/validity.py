@@ -4,7 +4,14 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import check
 from drake_disasm.effects import find_effect
 from drake_disasm.scenario.randomisation import refuse_broken_ranges, with_values
-from drake_disasm.scenario.schema import LockConfig, Scenario
+from drake_disasm.scenario.schema import (
+    CartesianImpedanceConfig,
+    LockConfig,
+    Scenario,
+)
+
+#: Of Cartesian impedance control along the axes [N/m] and about them [N m/rad].
+_STIFFNESS = (("N/m along", 10.0, 5000.0), ("N m/rad about", 1.0, 300.0))
 
 
 def validate(scenario: Scenario) -> None:
@@ -33,6 +40,7 @@ def _validate_one(scenario: Scenario) -> None:
     check(scenario)
     _refuse_unregistered(scenario)
     _refuse_broken_periods(scenario)
+    _refuse_impossible_stiffness(scenario.arm.cartesian_impedance)
     _refuse_impossible_lock(scenario.lock)
     _refuse_unreachable_end(scenario)
 
@@ -62,6 +70,17 @@ def _refuse_broken_periods(scenario: Scenario) -> None:
             raise DisasmError(
                 f"{name}: task.period ({scenario.task.period:g} s) is not a whole "
                 f"number of {step:g} s; give a divisor of it"
+            )
+
+
+def _refuse_impossible_stiffness(config: CartesianImpedanceConfig) -> None:
+    """The first three and the last three are of different units."""
+    for axis, k in enumerate(config.stiffness):
+        words, low, high = _STIFFNESS[axis // 3]
+        if not low <= k <= high:
+            raise DisasmError(
+                f"arm.cartesian_impedance.stiffness: {k:g} {words} {'xyz'[axis % 3]} "
+                f"is out of range; give a value from {low:g} to {high:g}"
             )
 
 

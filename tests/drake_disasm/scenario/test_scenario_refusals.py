@@ -30,6 +30,25 @@ BAD = {
     "effects: [!GroovePose {ry: 1}]": ["effects.0.ry", "-0.2 to 0.2"],
     "effects: [{}]": ["effects.0", "no name", "GroovePose"],
     "arm: {posture: [1, 2]}": ["arm.posture", "2 values", "7"],
+    "arm: {control: torque}": ["arm.control", "'torque'", "cartesian_impedance"],
+    "arm: {joint_impedance: {damping_ratio: 0}}": ["damping_ratio: 0", "0.1 to 1"],
+    "arm: {joint_impedance: {stiffness: [1, 9, 9, 9, 9, 9, 6000]}}": [
+        "arm.joint_impedance.stiffness: 1 N m/rad",
+        "10 to 5000",
+    ],
+    "arm: {cartesian_impedance: {damping_ratio: 0}}": ["damping_ratio: 0", "0.1 to 1"],
+    "arm: {cartesian_impedance: {stiffness: [2e3, 2e3, 6e3, 2e2, 2e2, 2e2]}}": [
+        "arm.cartesian_impedance.stiffness: 6000",
+        "1 to 5000",
+    ],
+    "arm: {cartesian_impedance: {stiffness: [2e3, 5, 2e3, 2e2, 2e2, 2e2]}}": [
+        "arm.cartesian_impedance.stiffness: 5 N/m along y",
+        "10 to 5000",
+    ],
+    "arm: {cartesian_impedance: {stiffness: [2e3, 2e3, 2e3, 2e2, 2e2, 301]}}": [
+        "arm.cartesian_impedance.stiffness: 301 N m/rad about z",
+        "1 to 300",
+    ],
     "gripper: {hold: glue}": ["gripper.hold", "'glue'", "friction"],
     "simulation: {cell_time_step: 0.003}": ["cell_time_step", "divisor"],
     "lock: {clearance": ["line 1", "not YAML"],
