@@ -3,7 +3,13 @@
 Description: slide the bolt from A to B along the groove, then lift it out.
 Randomisation: imprecision psi on the action (algorithm 3.2), sensor noise.
 Success: `travelled` (x - x0 > 55 mm, chapter 3) or `removed` (the head's underside
-2 mm above the plate, chapter 4); more than the safety force or torque is failure.
+2 mm above the plate, chapter 4); more than the safety force or torque is failure, and
+so is a bolt outside the workspace.
+
+The reward is the thesis's where the bolt goes on and up. Where it goes elsewhere it
+closes two holes, each worth more than the task itself: progress counts up to the
+groove's end only (or a bolt just below the height of success flies on along x), and
+what rising has paid, falling takes back (or it moves up and down until time is up).
 """
 
 import dataclasses
@@ -12,7 +18,7 @@ from typing import Self
 
 import numpy as np
 
-from drake_disasm.scenario import TaskConfig
+from drake_disasm.scenario import Scenario, TaskConfig
 
 _MM = 1000.0  # the reward speaks millimetres, because the thesis does
 
@@ -26,7 +32,8 @@ class BoltState:
     """What the agent sees, all in the groove's nominal frame G.
 
     Attributes:
-        p: (3,) displacement of Bo since the start of the episode [m].
+        p: (3,) displacement of Bo since the start of the episode, as the arm's
+            encoders have it [m].
         r: (3,) rotation vector of B since then [rad].
         f, t: (3,) force and torque of the environment on the bolt at Bo [N, N m].
     """
@@ -60,11 +67,12 @@ class Outcome(enum.IntEnum):
     FORCE_LIMIT = 2
     TORQUE_LIMIT = 3
     STEP_LIMIT = 4
+    WORKSPACE = 5  # after the others: logs and files have the numbers
 
     @property
     def terminated(self) -> bool:
         """Whether the task itself ended the episode, well or badly."""
-        return self in (self.SUCCESS, self.FORCE_LIMIT, self.TORQUE_LIMIT)
+        return self not in (self.RUNNING, self.STEP_LIMIT)
 
     @property
     def truncated(self) -> bool:
@@ -77,23 +85,58 @@ class Outcome(enum.IntEnum):
         return self.name.lower().replace("_", " ")
 
 
+@dataclasses.dataclass(frozen=True)
+class TaskGeometry:
+    """Where a task happens: lengths of the lock, and the workspace around.
+
+    Attributes:
+        lift_needed: rise of the bolt at which it is out [m].
+        groove_end: way along x at which the groove ends [m].
+        low, high: (3,) of the workspace: the displacement of the bolt from the start,
+            in G, beyond which an episode has failed [m].
+    """
+
+    lift_needed: float
+    groove_end: float
+    low: np.ndarray
+    high: np.ndarray
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Self:
+        """Returns the geometry of a scenario, without its effects."""
+        lift = scenario.lock.lift_needed(scenario.task.lift_success)
+        end, room = scenario.lock.end, np.array(scenario.task.room)
+        return cls(lift, end, -room, np.array([end, lift, 0.0]) + room)
+
+
 def reward_terms(
-    before: BoltState, after: BoltState, task: TaskConfig
+    before: BoltState, after: BoltState, task: TaskConfig, geometry: TaskGeometry
 ) -> dict[str, float]:
-    """Returns the weighted reward terms of one step (eq. 3.4 and 4.3) by name."""
+    """Returns the weighted reward terms of one step by name.
+
+    They are those of eq. 3.4 and 4.3 as long as the bolt goes on and up; see the
+    module for where they are not.
+    """
     w = task.reward
-    dx, dy = _MM * (after.p[:2] - before.p[:2])
-    lifting = after.p[0] > task.travel_success and dy > 0.0
+    progress, rise = (
+        _MM * (counts(after, task, geometry) - counts(before, task, geometry))
+    ).tolist()
     return {
-        "progress": w.w_dis * dx,
+        "progress": w.w_dis * progress,
         "force": -w.w_f * after.force / w.f_max,
         "torque": -w.w_t * after.torque / w.t_max,
-        "lift": w.w_y * dy if lifting else 0.0,
+        "lift": w.w_y * rise,
     }
 
 
+def counts(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> np.ndarray:
+    """Returns the way along x and the height [m] that the reward counts, (2,)."""
+    x, y = state.p[:2]
+    return np.array([min(x, geometry.groove_end), y if x > task.travel_success else 0])
+
+
 def outcome(
-    state: BoltState, steps_done: int, task: TaskConfig, lift_needed: float
+    state: BoltState, steps_done: int, task: TaskConfig, geometry: TaskGeometry
 ) -> Outcome:
     """Returns how the episode stands after `steps_done` steps.
 
@@ -101,22 +144,30 @@ def outcome(
         state: the newest state.
         steps_done: steps taken so far.
         task: limits and what counts as success.
-        lift_needed: rise of the bolt at which it is out [m].
+        geometry: where the groove ends and the bolt is out.
     """
     if state.force > task.reward.f_max:
         return Outcome.FORCE_LIMIT
     if state.torque > task.reward.t_max:
         return Outcome.TORQUE_LIMIT
-    if succeeded(state, task, lift_needed):
+    if succeeded(state, task, geometry):
         return Outcome.SUCCESS
+    if not within_workspace(state, geometry):
+        return Outcome.WORKSPACE
     return Outcome.STEP_LIMIT if steps_done >= task.steps else Outcome.RUNNING
 
 
-def succeeded(state: BoltState, task: TaskConfig, lift_needed: float) -> bool:
+def succeeded(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> bool:
     """Returns whether the task is done."""
     if task.success == "travelled":
         return bool(state.p[0] > task.travel_success)
-    return bool(state.p[1] >= lift_needed)
+    return bool(state.p[1] >= geometry.lift_needed)
+
+
+def within_workspace(state: BoltState, geometry: TaskGeometry) -> bool:
+    """Returns whether the bolt is where the task has any business."""
+    p = state.p
+    return bool(np.all((geometry.low <= p) & (p <= geometry.high)))
 
 
 def action_bounds(task: TaskConfig) -> np.ndarray:

@@ -41,16 +41,6 @@ def plate_bottom(config: LockConfig) -> float:
     return -lip_height(config) - channel - _FLOOR
 
 
-def lift_needed(config: LockConfig, margin: float) -> float:
-    """Returns the rise of B [m] at which the head's underside clears the plate.
-
-    Args:
-        margin: height of the underside above the plate's upper face [m].
-    """
-    underside = head_top(config) - config.head_thickness
-    return lip_height(config) + margin - underside
-
-
 def groove_boxes(lock: LockConfig) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Returns the solid parts of the groove by name: two opposite corners in G [m].
 

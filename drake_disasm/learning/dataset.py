@@ -4,9 +4,9 @@ import numpy as np
 
 from drake_disasm.learning.hyperparameters import Hyperparameters
 from drake_disasm.learning.replay import Replay
-from drake_disasm.mdp import BoltState, reward_terms
+from drake_disasm.mdp import BoltState, TaskGeometry, reward_terms
 from drake_disasm.policies import ActionMap
-from drake_disasm.scenario import TaskConfig
+from drake_disasm.scenario import Scenario
 
 
 def remember(
@@ -14,7 +14,7 @@ def remember(
     observations: np.ndarray,
     actions: np.ndarray,
     terminated: bool,
-    task: TaskConfig,
+    scenario: Scenario,
     action_map: ActionMap,
     config: Hyperparameters,
 ) -> None:
@@ -29,14 +29,16 @@ def remember(
         observations: (T + 1, 12) states [m, rad, N, N m].
         actions: (T, 6) un-noised actions [m, rad].
         terminated: whether the task itself ended the episode.
-        task: defines the reward.
+        scenario: of the task: defines the reward.
         action_map: of the agent.
         config: of the agent, for the scales of the state.
     """
     scaled = observations / np.array(config.observation_scale)
     states = [BoltState.from_vector(s) for s in observations]
+    task, geometry = scenario.task, TaskGeometry.of(scenario)
     for k, action in enumerate(actions):
-        reward = sum(reward_terms(states[k], states[k + 1], task).values())
+        terms = reward_terms(states[k], states[k + 1], task, geometry)
+        reward = sum(terms.values())
         chosen = action_map.from_action(observations[k], action)
         last = k == len(actions) - 1
         replay.add(scaled[k], chosen, reward, scaled[k + 1], terminated and last)

@@ -113,19 +113,19 @@ def _demonstrations(job: SeedJob) -> Replay | None:
 
 def _memory(experiment: Experiment, folders: Collection[str]) -> Replay | None:
     """Returns a replay memory of all transitions of some logs, if there are any."""
-    task, config = experiment.scenario.task, experiment.config
+    scenario, config = experiment.scenario, experiment.config
     if not folders:
         return None
     episodes = [e for log in read_logs(folders) for e in log.episodes]
     replay = Replay(sum(episode.rows - 1 for episode in episodes))
-    actions = action_map(experiment.scenario, config)
+    actions = action_map(scenario, config)
     for episode in episodes:
         remember(
             replay,
             observations(episode),
             episode["action"][:-1],
             bool(episode["terminated"][-1]),
-            task,
+            scenario,
             actions,
             config,
         )

@@ -56,6 +56,20 @@ class LockConfig:
         0.2, "kg", "of the bolt and its chain", low=0.001, high=1.0
     )
 
+    @property
+    def end(self) -> float:
+        """How far along x the bolt can go until it stops in the keyhole [m]."""
+        return self.travel + self.keyhole_clearance / 2
+
+    def lift_needed(self, margin: float) -> float:
+        """Returns the rise of the bolt at which the head is clear of the plate [m].
+
+        Args:
+            margin: height of the head's underside above the plate's upper face [m].
+        """
+        head = self.axial_clearance / 2 + self.head_thickness
+        return self.lip_thickness + head + margin
+
 
 @dataclasses.dataclass
 class ImpactConfig:
@@ -260,6 +274,11 @@ class TaskConfig:
     lift_success: float = quantity(
         0.002, "m", "head's underside above the plate", low=0.0, high=0.05
     )
+    room: list[float] = quantity(
+        [0.006, 0.008, 0.008], "m", "that the bolt has along x, y, z of G beside its "
+        "way from A to the groove's end and out; further away an episode has failed",
+        low=0.001, high=0.5,
+    )  # fmt: skip
     reward: RewardConfig = dataclasses.field(default_factory=RewardConfig)
 
 

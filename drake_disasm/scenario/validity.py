@@ -101,8 +101,7 @@ def _refuse_impossible_lock(lock: LockConfig) -> None:
 
 
 def _refuse_unreachable_end(scenario: Scenario) -> None:
-    task, lock = scenario.task, scenario.lock
-    end = lock.travel + lock.keyhole_clearance / 2
+    task, end = scenario.task, scenario.lock.end
     if task.success == "travelled" and task.travel_success >= end:
         raise DisasmError(
             f"task.travel_success: the groove ends after {end:g} m (lock.travel and "

@@ -30,7 +30,7 @@ from drake_disasm.stations.arm_over_lcm import command_sender, export_status
 from drake_disasm.stations.base import InitialState, Station, refuse_twins_contact
 from drake_disasm.stations.capabilities import refuse_on_hardware
 from drake_disasm.stations.cell_devices import CellDevices
-from drake_disasm.stations.hardware_config import HardwareConfig
+from drake_disasm.stations.hardware_config import HardwareConfig, refuse_narrow_guard
 from drake_disasm.stations.wiring import export_required
 from drake_disasm.systems.arm_command_writer import ArmCommandWriter
 from drake_disasm.systems.connection_check import ConnectionCheck
@@ -113,6 +113,7 @@ class HardwareStation(Station):
         super().__init__()
         validate(scenario)
         refuse_what_is_simulated(scenario)
+        refuse_narrow_guard(scenario, config.safety)
         self.scenario, self.config, self.dry_run = scenario, config, dry_run
         self._cell = CellDevices(config, not dry_run, clock, wait, lcm)
         self.devices = self._cell.clients

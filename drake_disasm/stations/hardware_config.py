@@ -3,12 +3,18 @@
 import dataclasses
 from pathlib import Path
 
+import numpy as np
+
 from drake_disasm.common.bounded_yaml import MOST_BYTES
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import read_text
 from drake_disasm.common.quantity import check, quantity
+from drake_disasm.mdp import TaskGeometry
 from drake_disasm.safety import SafetyConfig
+from drake_disasm.scenario import Scenario
 from drake_disasm.scenario.strict_yaml import parse
+
+_ROUNDING = 1e-9  # m
 
 
 @dataclasses.dataclass
@@ -86,3 +92,25 @@ def load_hardware_config(path: Path) -> HardwareConfig:
     except DisasmError as error:
         raise DisasmError(f"{path}: {error}") from None
     return config
+
+
+def refuse_narrow_guard(scenario: Scenario, limits: SafetyConfig) -> None:
+    """Refuses a guard within the task's workspace: it would hold before the task ends.
+
+    The task's is the one that decides; the guard is for an arm that goes on.
+
+    Raises:
+        DisasmError: names the first side of the guard's workspace that is too near.
+    """
+    task, margin = TaskGeometry.of(scenario), limits.workspace_margin
+    for side, wanted, sign in (("low", task.low, -1.0), ("high", task.high, 1.0)):
+        guarded = np.array(getattr(limits, f"workspace_{side}"))
+        least = wanted + sign * margin
+        short = sign * (guarded - least) < -_ROUNDING
+        if short.any():
+            axis = int(np.argmax(short))
+            raise DisasmError(
+                f"safety.workspace_{side}.{axis}: {guarded[axis]:g} m would hold the "
+                f"arm before the task's workspace (task.room) and a margin end at "
+                f"{least[axis]:g} m; widen it, or give the task less room"
+            )

@@ -10,7 +10,13 @@ from pydrake.systems.framework import (
 )
 
 from drake_disasm.common.timing import POLICY_DELAY
-from drake_disasm.mdp import REWARD_TERMS, BoltState, outcome, reward_terms
+from drake_disasm.mdp import (
+    REWARD_TERMS,
+    BoltState,
+    TaskGeometry,
+    outcome,
+    reward_terms,
+)
 from drake_disasm.scenario import TaskConfig
 
 
@@ -31,12 +37,12 @@ class TaskMonitor(LeafSystem):
 
     Args:
         task: the MDP.
-        lift_needed: rise of the bolt at which it is out of the groove [m].
+        geometry: where the groove ends and the bolt is out.
     """
 
-    def __init__(self, task: TaskConfig, lift_needed: float) -> None:
+    def __init__(self, task: TaskConfig, geometry: TaskGeometry) -> None:
         super().__init__()
-        self._task, self._lift_needed = task, lift_needed
+        self._task, self._geometry = task, geometry
         self._observation = self.DeclareVectorInputPort("observation", 12)
         self._before = self.DeclareDiscreteState(12)
         self._steps = self.DeclareDiscreteState(1)
@@ -61,13 +67,16 @@ class TaskMonitor(LeafSystem):
     def _calc_reward(self, context: Context, output: BasicVector) -> None:
         before = context.get_discrete_state(self._before).value()
         terms = reward_terms(
-            BoltState.from_vector(before), self._state(context), self._task
+            BoltState.from_vector(before),
+            self._state(context),
+            self._task,
+            self._geometry,
         )
         output.SetFromVector(np.array([terms[name] for name in REWARD_TERMS]))
 
     def _calc_outcome(self, context: Context, output: BasicVector) -> None:
         steps = int(context.get_discrete_state(self._steps).value()[0])
-        result = outcome(self._state(context), steps, self._task, self._lift_needed)
+        result = outcome(self._state(context), steps, self._task, self._geometry)
         output.SetFromVector([float(result)])
 
     def _state(self, context: Context) -> BoltState:

@@ -24,10 +24,9 @@ from pydrake.systems.primitives import (
     RandomSource,
 )
 
-from drake_disasm.cell.lock_dimensions import lift_needed
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Effect, motion_chain
-from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES, action_bounds
+from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES, TaskGeometry, action_bounds
 from drake_disasm.scenario import Scenario, TaskConfig
 from drake_disasm.stations import InitialState, Station
 from drake_disasm.systems.imprecision import ImprecisionNoise
@@ -223,8 +222,9 @@ def add_motion(
 def _add_monitor(
     builder: DiagramBuilder, scenario: Scenario, processor: ObservationProcessor
 ) -> TaskMonitor:
-    lift = lift_needed(scenario.lock, scenario.task.lift_success)
-    monitor = builder.AddNamedSystem("task_monitor", TaskMonitor(scenario.task, lift))
+    monitor = builder.AddNamedSystem(
+        "task_monitor", TaskMonitor(scenario.task, TaskGeometry.of(scenario))
+    )
     observation = processor.GetOutputPort("observation")
     builder.Connect(observation, monitor.get_input_port())
     return monitor

@@ -17,7 +17,6 @@ from pydrake.systems.framework import (
     System,
 )
 
-from drake_disasm.cell.lock_dimensions import lift_needed
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.timing import MOTION_DELAY, POLICY_DELAY, boundary
 from drake_disasm.effects import BoltMotion, Effect, is_local
@@ -259,6 +258,6 @@ class TaskSimulation:
     def bolt_is_out(self) -> bool:
         """Returns whether the bolt truly is out, which only a simulation knows."""
         scenario = self._built
-        lift = lift_needed(scenario.lock, scenario.task.lift_success)
+        lift = scenario.lock.lift_needed(scenario.task.lift_success)
         context = self.station.GetMyMutableContextFromRoot(self.context)
         return self.station.bolt_is_out(context, lift)

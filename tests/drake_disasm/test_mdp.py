@@ -1,12 +1,20 @@
 """Reward and termination against the thesis's equations, by hand."""
 
+import dataclasses
+import itertools
+
 import numpy as np
 import pytest
 
-from drake_disasm.mdp import BoltState, Outcome, outcome, reward_terms
+from drake_disasm.mdp import BoltState, Outcome, TaskGeometry, outcome, reward_terms
 from drake_disasm.scenario import TaskConfig, load_scenario
 
-LIFT = 0.007
+GEOMETRY = TaskGeometry(
+    lift_needed=0.007,
+    groove_end=0.0605,
+    low=np.array([-0.01, -0.01, -0.01]),
+    high=np.array([0.07, 0.02, 0.01]),
+)
 
 
 def _state(x_mm: float = 0, y_mm: float = 0, f: float = 0, t: float = 0) -> BoltState:
@@ -22,7 +30,9 @@ def task(request: pytest.FixtureRequest) -> TaskConfig:
 
 def test_progress_force_and_torque(task: TaskConfig) -> None:
     w = task.reward
-    terms = reward_terms(_state(x_mm=10), _state(x_mm=12.5, f=-3.0, t=0.5), task)
+    terms = reward_terms(
+        _state(x_mm=10), _state(x_mm=12.5, f=-3.0, t=0.5), task, GEOMETRY
+    )
     assert terms["progress"] == pytest.approx(w.w_dis * 2.5)
     assert terms["force"] == pytest.approx(-w.w_f * 3.0 / w.f_max)
     assert terms["torque"] == pytest.approx(-w.w_t * 0.5 / w.t_max)
@@ -30,20 +40,64 @@ def test_progress_force_and_torque(task: TaskConfig) -> None:
 
 
 @pytest.mark.parametrize(
-    ("x_mm", "dy_mm", "lift"), [(56, 2.0, 10.0), (54, 2.0, 0.0), (56, -2.0, 0.0)]
+    ("x_mm", "dy_mm", "lift"), [(56, 2.0, 10.0), (54, 2.0, 0.0), (56, -2.0, -10.0)]
 )
-def test_lift_counts_upwards_and_near_the_end_alone(
+def test_lift_counts_near_the_end_alone_and_falling_takes_it_back(
     x_mm: float, dy_mm: float, lift: float
 ) -> None:
     """Equation 4.3: w_y = 5 per mm while x' - x0 > 55 mm and y' > y."""
     task = load_scenario("removal").task
-    terms = reward_terms(_state(x_mm, 1.0), _state(x_mm, 1.0 + dy_mm), task)
+    terms = reward_terms(_state(x_mm, 1.0), _state(x_mm, 1.0 + dy_mm), task, GEOMETRY)
     assert terms["lift"] == pytest.approx(lift)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_round_trip_pays(seed: int) -> None:
+    """From anywhere to anywhere and back, in and out of where lifting counts."""
+    random = np.random.default_rng(seed)
+    way = [_state(*random.uniform([40, -5], [80, 20])) for _ in range(8)]
+    task = load_scenario("removal").task
+    pairs = itertools.pairwise([*way, way[0]])
+    terms = [reward_terms(*pair, task, GEOMETRY) for pair in pairs]
+    assert sum(t["progress"] for t in terms) == pytest.approx(0.0)
+    assert sum(t["lift"] for t in terms) == pytest.approx(0.0)
+
+
+def test_progress_ends_with_the_groove(task: TaskConfig) -> None:
+    terms = reward_terms(_state(60), _state(70), task, GEOMETRY)
+    assert terms["progress"] == pytest.approx(task.reward.w_dis * 0.5)
+
+
+@pytest.mark.parametrize("side", ["low", "high"])
+@pytest.mark.parametrize("axis", range(3))
+def test_leaving_the_workspace_fails(axis: int, side: str, task: TaskConfig) -> None:
+    p = np.zeros(3)
+    p[axis] = getattr(GEOMETRY, side)[axis]
+    before = BoltState(0.99 * p, *np.zeros((3, 3)))
+    after = BoltState(1.01 * p, *np.zeros((3, 3)))
+    never = dataclasses.replace(GEOMETRY, lift_needed=1.0)
+    removal = dataclasses.replace(task, success="removed")
+    assert outcome(before, 5, removal, never) is Outcome.RUNNING
+    assert outcome(after, 5, removal, never) is Outcome.WORKSPACE
+    assert Outcome.WORKSPACE.terminated and not Outcome.WORKSPACE.truncated
+
+
+def test_the_workspace_follows_the_lock() -> None:
+    scenario = load_scenario("removal", ["lock.travel=0.1", "task.room=[.01,.02,.03]"])
+    geometry = TaskGeometry.of(scenario)
+    np.testing.assert_allclose(geometry.low, [-0.01, -0.02, -0.03])
+    out = scenario.lock.lift_needed(0.002)
+    np.testing.assert_allclose(geometry.high, [0.1105, out + 0.02, 0.03])
+
+
+def test_the_numbers_of_outcomes_are_those_of_old_files() -> None:
+    names = ("RUNNING", "SUCCESS", "FORCE_LIMIT", "TORQUE_LIMIT", "STEP_LIMIT")
+    assert [Outcome[name].value for name in names] == list(range(5))
 
 
 def test_reward_is_that_of_equation_3_4() -> None:
     task = load_scenario("sliding").task
-    terms = reward_terms(_state(0), _state(3, f=15, t=2.5), task)
+    terms = reward_terms(_state(0), _state(3, f=15, t=2.5), task, GEOMETRY)
     assert sum(terms.values()) == pytest.approx(0.6 * 3 - 0.2 * 0.5 - 0.2 * 0.5)
 
 
@@ -61,14 +115,14 @@ OUTCOMES = [
 def test_outcome(
     state: BoltState, steps: int, expected: Outcome, task: TaskConfig
 ) -> None:
-    assert outcome(state, steps, task, LIFT) is expected
+    assert outcome(state, steps, task, GEOMETRY) is expected
 
 
 def test_success_is_travel_or_lift() -> None:
     sliding, removal = load_scenario("sliding").task, load_scenario("removal").task
-    assert outcome(_state(55.1), 5, sliding, LIFT) is Outcome.SUCCESS
-    assert outcome(_state(54.9, 8), 5, sliding, LIFT) is Outcome.RUNNING
-    assert outcome(_state(60, 6.9), 5, removal, LIFT) is Outcome.RUNNING
+    assert outcome(_state(55.1), 5, sliding, GEOMETRY) is Outcome.SUCCESS
+    assert outcome(_state(54.9, 8), 5, sliding, GEOMETRY) is Outcome.RUNNING
+    assert outcome(_state(60, 6.9), 5, removal, GEOMETRY) is Outcome.RUNNING
 
 
 def test_terminated_and_truncated_are_told_apart() -> None:
@@ -81,14 +135,14 @@ def test_terminated_and_truncated_are_told_apart() -> None:
 def test_reward_is_that_of_equation_4_3() -> None:
     """2 mm on and 3 mm up beyond 55 mm, at 8 N and 1 N m."""
     task = load_scenario("removal").task
-    terms = reward_terms(_state(56, 1), _state(58, 4, f=8, t=1), task)
+    terms = reward_terms(_state(56, 1), _state(58, 4, f=8, t=1), task, GEOMETRY)
     expected = {"progress": 1.6 * 2, "force": -0.12, "torque": -0.06, "lift": 5.0 * 3}
     assert terms == pytest.approx(expected)
 
 
 def test_limits_are_passed_only_when_exceeded(task: TaskConfig) -> None:
     f, t = task.reward.f_max, task.reward.t_max
-    assert outcome(_state(f=f, t=t), 5, task, LIFT) is Outcome.RUNNING
+    assert outcome(_state(f=f, t=t), 5, task, GEOMETRY) is Outcome.RUNNING
 
 
 def test_state_is_read_in_the_order_of_the_observation() -> None:

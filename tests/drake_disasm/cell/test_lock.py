@@ -12,7 +12,6 @@ from drake_disasm.cell.lock_dimensions import (
     facet_length,
     groove_boxes,
     head_top,
-    lift_needed,
     lip_height,
     plate_bottom,
 )
@@ -69,8 +68,8 @@ def test_heights_add_up(lock: LockConfig) -> None:
     channel_floor = groove_boxes(lock)["floor"][1][1]
     assert underside - channel_floor == pytest.approx(play)
     assert plate_bottom(lock) < channel_floor
-    expected = lock.lip_thickness + play + lock.head_thickness + 0.002
-    assert lift_needed(lock, 0.002) == pytest.approx(expected)
+    lifted = underside + lock.lift_needed(0.002)
+    assert lifted == pytest.approx(lip_height(lock) + 0.002)
 
 
 def test_bolt_weighs_what_the_scenario_says() -> None:

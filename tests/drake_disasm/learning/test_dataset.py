@@ -34,7 +34,7 @@ def test_a_log_teaches_what_was_lived_through(base: str, tmp_path: Path) -> None
             observations(episode),
             episode["action"][:-1],
             bool(episode["terminated"][-1]),
-            SCENARIO.task,
+            SCENARIO,
             action_map(SCENARIO, config),
             config,
         )
@@ -52,7 +52,7 @@ def test_an_action_out_of_reach_is_cut_to_the_nearest() -> None:
     config, memory = preset("chapter3"), Replay(5)
     actions = np.array([[0.009, -0.009, 0.0015, 0, 0, 0]])
     remember(
-        memory, np.zeros((2, 12)), actions, False, SCENARIO.task,
+        memory, np.zeros((2, 12)), actions, False, SCENARIO,
         action_map(SCENARIO, config), config,
     )  # fmt: skip
     np.testing.assert_allclose(memory.contents()[0][0, 12:15], [1.0, -1.0, 0.5])

@@ -41,7 +41,7 @@ def _demonstrations(training_map: Any, config: Any) -> Replay:
     memory = Replay(50)
     observations = np.random.default_rng(0).normal(size=(51, 12)) * 1e-3
     actions = np.zeros((50, 6))
-    remember(memory, observations, actions, True, SCENARIO.task, training_map, config)
+    remember(memory, observations, actions, True, SCENARIO, training_map, config)
     return memory
 
 

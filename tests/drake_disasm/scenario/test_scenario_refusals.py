@@ -219,6 +219,7 @@ IMPOSSIBLE = {
     "lock.head_diameter=0.0053": "lock.head_diameter: .* slips through the slot",
     "lock.neck_diameter=0.012": "lock.head_diameter: .* slips through the slot",
     "lock={head_diameter: 0.03, travel: 0.03}": "lock.travel: .* no lips",
+    "task.room=[0, 0.01, 0.01]": "task.room: .* out of range",
     "lock.travel=0.05": "task.travel_success: .* never reached",
 }
 

@@ -6,7 +6,12 @@ import pytest
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.resources import models_dir
-from drake_disasm.stations.hardware_config import load_hardware_config
+from drake_disasm.safety import SafetyConfig
+from drake_disasm.scenario import load_scenario, shipped_scenarios
+from drake_disasm.stations.hardware_config import (
+    load_hardware_config,
+    refuse_narrow_guard,
+)
 
 
 def test_the_shipped_file_is_read() -> None:
@@ -44,3 +49,24 @@ def test_a_mistake_is_one_line(tmp_path: Path, text: str, words: str) -> None:
 def test_a_missing_file_says_what_to_copy(tmp_path: Path) -> None:
     with pytest.raises(DisasmError, match=r"copy models/hardware/cell\.yaml"):
         load_hardware_config(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_the_shipped_guard_lets_the_shipped_tasks_decide(name: str) -> None:
+    refuse_narrow_guard(load_scenario(name), SafetyConfig())
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [
+        ([-0.01] * 3, [0.068, 0.03, 0.01], "safety.workspace_high.0: 0.068 m"),
+        ([-0.01, -0.009, -0.01], [0.08, 0.03, 0.01], "safety.workspace_low.1: -0.009"),
+    ],
+)
+def test_a_guard_within_the_tasks_workspace_is_refused(
+    low: list[float], high: list[float], words: str
+) -> None:
+    limits = SafetyConfig(workspace_low=low, workspace_high=high)
+    with pytest.raises(DisasmError) as caught:
+        refuse_narrow_guard(load_scenario("removal"), limits)
+    assert words in str(caught.value) and "\n" not in str(caught.value)

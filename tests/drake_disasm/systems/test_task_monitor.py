@@ -6,16 +6,23 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import Context
 
-from drake_disasm.mdp import REWARD_TERMS, BoltState, Outcome, outcome, reward_terms
+from drake_disasm.mdp import (
+    REWARD_TERMS,
+    BoltState,
+    Outcome,
+    TaskGeometry,
+    outcome,
+    reward_terms,
+)
 from drake_disasm.scenario import TaskConfig
 from drake_disasm.systems.task_monitor import TaskMonitor
 
-LIFT = 0.007
+GEOMETRY = TaskGeometry(0.007, 0.0605, -0.006 * np.ones(3), 0.066 * np.ones(3))
 TASK = TaskConfig(steps=3)
 
 
 def _monitor() -> tuple[TaskMonitor, Context]:
-    monitor = TaskMonitor(TASK, LIFT)
+    monitor = TaskMonitor(TASK, GEOMETRY)
     return monitor, monitor.CreateDefaultContext()
 
 
@@ -47,7 +54,10 @@ def test_terms_are_those_of_the_last_step_alone(seed: int) -> None:
         _observe(monitor, context, after)
         terms = monitor.GetOutputPort("reward_terms").Eval(context)
         expected = reward_terms(
-            BoltState.from_vector(before), BoltState.from_vector(after), TASK
+            BoltState.from_vector(before),
+            BoltState.from_vector(after),
+            TASK,
+            GEOMETRY,
         )
         np.testing.assert_array_equal(terms, [expected[n] for n in REWARD_TERMS])
 
@@ -70,6 +80,7 @@ def test_steps_are_counted_and_limited() -> None:
         (11, -5.1, Outcome.TORQUE_LIMIT),
         (1, 0.0071, Outcome.SUCCESS),
         (1, 0.0069, Outcome.RUNNING),
+        (0, 0.0661, Outcome.WORKSPACE),
         (6, 19.9, Outcome.RUNNING),
     ],
 )
@@ -82,4 +93,4 @@ def test_outcome_follows_the_observation(
     _observe(monitor, context, observation)
     assert _outcome(monitor, context) is expected
     state = BoltState.from_vector(observation)
-    assert outcome(state, 0, TASK, LIFT) is expected
+    assert outcome(state, 0, TASK, GEOMETRY) is expected
