@@ -24,6 +24,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.spatial import rotation_vector
 from drake_disasm.scenario import ArmConfig
 
+_ZERO = np.zeros(3)
 _TOLERANCE = 1e-5  # m, of inverse kinematics
 _TURN_TOLERANCE = 1e-4  # rad, of the same
 _SOLUTION = DifferentialInverseKinematicsStatus.kSolutionFound
@@ -44,18 +45,28 @@ class Coordinates(abc.ABC):
 
 
 class BoltCoordinates(Coordinates):
-    """The twin's joints: x, y, z [m], then yaw, pitch, roll [rad] of B in Gn."""
+    """The twin's joints: x, y, z [m], then yaw, pitch, roll [rad] of B in Gn.
+
+    Args:
+        p_BoTo_B: (3,) point of the bolt that x, y, z are displacements of [m].
+    """
 
     size = 6
 
+    def __init__(self, p_BoTo_B: np.ndarray = _ZERO) -> None:
+        self._X_BT = RigidTransform(p_BoTo_B)
+        self._X_TB = self._X_BT.inverse()
+
     def pose(self, coordinates: np.ndarray) -> RigidTransform:
         """See Coordinates."""
-        return RigidTransform(RollPitchYaw(coordinates[:2:-1]), coordinates[:3])
+        X = RigidTransform(RollPitchYaw(coordinates[:2:-1]), coordinates[:3])
+        return self._X_BT @ X @ self._X_TB
 
     def solve(self, X_GB: RigidTransform, near: np.ndarray) -> np.ndarray:
         """See Coordinates; exact, `near` is not needed."""
-        rpy = RollPitchYaw(X_GB.rotation()).vector()
-        return np.concatenate([X_GB.translation(), rpy[::-1]])
+        X = self._X_TB @ X_GB @ self._X_BT
+        rpy = RollPitchYaw(X.rotation()).vector()
+        return np.concatenate([X.translation(), rpy[::-1]])
 
 
 class ArmCoordinates(Coordinates):

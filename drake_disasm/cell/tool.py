@@ -3,7 +3,9 @@
 Frames: F flange, S sensor, T the gripper's tcp (z towards the tips), B bolt.
 """
 
+import copy
 import dataclasses
+from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
@@ -12,6 +14,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     Frame,
     ModelInstanceIndex,
+    RigidBody,
     SpatialInertia,
     WeldJoint,
 )
@@ -30,14 +33,32 @@ class Tool:
 
     Attributes:
         X_FB, X_SB: pose of the bolt, as grasped, in flange and sensor frame.
+        X_TB: pose of the bolt, as grasped, in the gripper's tcp.
         M_F: spatial inertia about Fo in F, sensor's body and bolt included.
+        M_palm_F: the same without fingers and bolt.
+        M_fingers_B: spatial inertia of the fingers about Bo in B.
+        M_bolt_B: of the bolt.
         p_SoScm_S: centre of mass in the sensor frame (3,) [m].
     """
 
     X_FB: RigidTransform
     X_SB: RigidTransform
+    X_TB: RigidTransform
     M_F: SpatialInertia
+    M_palm_F: SpatialInertia
+    M_fingers_B: SpatialInertia
+    M_bolt_B: SpatialInertia
     p_SoScm_S: np.ndarray
+
+    @property
+    def M_gripped_B(self) -> SpatialInertia:
+        """Of fingers and bolt, which move when the fingers yield."""
+        return summed([self.M_fingers_B, self.M_bolt_B])
+
+    @property
+    def p_BoTo_B(self) -> np.ndarray:
+        """The middle of the pads, where the fingers' compliance is, (3,) in B [m]."""
+        return self.X_TB.inverse().translation()
 
     @property
     def mass(self) -> float:
@@ -64,7 +85,18 @@ class Tool:
         M_F = plant.CalcSpatialInertia(
             context, plant.world_frame(), [*bodies, bolt.index()]
         )
-        return cls(X_FB, X_SF @ X_FB, M_F, X_SF @ M_F.get_com())
+        fingers = [plant.GetJointByName(name).child_body().index() for name in FINGERS]
+        palm = [index for index in bodies if index not in fingers]
+        return cls(
+            X_FB=X_FB,
+            X_SB=X_SF @ X_FB,
+            X_TB=grasp_pose(scenario),
+            M_F=M_F,
+            M_palm_F=plant.CalcSpatialInertia(context, plant.world_frame(), palm),
+            M_fingers_B=plant.CalcSpatialInertia(context, bolt.body_frame(), fingers),
+            M_bolt_B=bolt_inertia(scenario.lock),
+            p_SoScm_S=X_SF @ M_F.get_com(),
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,12 +106,14 @@ class ToolModels:
     Attributes:
         sensor_joint: the weld between flange and sensor whose reaction is read.
         frame_S, frame_T: sensing frame and tool centre point.
+        carriage: body that carries the fingers, fixed to the palm.
         sensor, gripper: model instances.
     """
 
     sensor_joint: WeldJoint
     frame_S: Frame
     frame_T: Frame
+    carriage: RigidBody
     sensor: ModelInstanceIndex
     gripper: ModelInstanceIndex
 
@@ -107,15 +141,28 @@ def add_tool(plant: MultibodyPlant, frame_F: Frame, scenario: Scenario) -> ToolM
     gripper = add_model(plant, url)
     plant.WeldFrames(tool_side, model_frame(plant, gripper, "gripper_base", url))
     frame_T = model_frame(plant, gripper, "tcp", url)
-    return ToolModels(joint, frame_S, frame_T, sensor, gripper)
+    carriage = model_frame(plant, gripper, "finger_carriage", url).body()
+    return ToolModels(joint, frame_S, frame_T, carriage, sensor, gripper)
 
 
-def grasp_pose(scenario: Scenario) -> RigidTransform:
-    """Returns X_TB: y_B points back at the robot, the fingertips end above the plate.
+def summed(inertias: Sequence[SpatialInertia]) -> SpatialInertia:
+    """Returns the spatial inertia of bodies together, about one point in one frame."""
+    total = copy.copy(inertias[0])
+    for inertia in inertias[1:]:
+        total += inertia
+    return total
+
+
+def grasp_rotation() -> RotationMatrix:
+    """Returns R_TB: y_B points back at the robot.
 
     x_B = -x_T, since the flange's x axis points back at the base when the tool
     points down with joint 7 at zero.
     """
-    R_TB = RotationMatrix(np.array([[-1.0, 0, 0], [0, 0, -1.0], [0, -1.0, 0]]))
+    return RotationMatrix(np.array([[-1.0, 0, 0], [0, 0, -1.0], [0, -1.0, 0]]))
+
+
+def grasp_pose(scenario: Scenario) -> RigidTransform:
+    """Returns X_TB: the fingertips end above the plate."""
     tip = lip_height(scenario.lock) + scenario.gripper.fingertip_gap
-    return RigidTransform(R_TB, [0.0, 0.0, tip + PAD_LENGTH / 2])
+    return RigidTransform(grasp_rotation(), [0.0, 0.0, tip + PAD_LENGTH / 2])

@@ -61,6 +61,12 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1]).T
 
 
+def skew(a: np.ndarray) -> np.ndarray:
+    """Returns [a]x (3, 3): skew(a) @ b is the cross product of a and b, (3,) each."""
+    x, y, z = a
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
 def pose_to_vector(X: RigidTransform) -> np.ndarray:
     """Returns [x, y, z, qw, qx, qy, qz] with qw >= 0, (7,)."""
     wxyz = X.rotation().ToQuaternion().wxyz()

@@ -1,6 +1,6 @@
 """The force/torque sensor, as the simulated stations carry it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from pydrake.common.value import Value
@@ -16,7 +16,10 @@ from pydrake.systems.framework import (
 )
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.spatial import wrench_from_spatial_force
+from drake_disasm.common.spatial import (
+    shift_and_express,
+    wrench_from_spatial_force,
+)
 from drake_disasm.common.timing import newest_step
 from drake_disasm.devices.sensor_chain import (
     Payload,
@@ -46,6 +49,7 @@ class ForceTorqueSensor(LeafSystem):
     - reaction_forces
     - body_poses
     - noise
+    - mount_coordinates (where `mount` is given)
     output_ports:
     - wrench
     - health
@@ -59,6 +63,8 @@ class ForceTorqueSensor(LeafSystem):
         payload: that hangs on the sensor.
         time_step: of the plant whose reaction is read [s].
         effects: of the default Context, in the order of the chain.
+        mount: X_WS of (6,) coordinates, for a sensor that is elsewhere than the joint's
+            child frame: a massless spring between them transmits the load.
     """
 
     def __init__(
@@ -70,12 +76,13 @@ class ForceTorqueSensor(LeafSystem):
         payload: Payload,
         time_step: float,
         effects: Sequence[SensorEffect] = (),
+        mount: Callable[[np.ndarray], RigidTransform] | None = None,
     ) -> None:
         super().__init__()
         _refuse_too_many_memories(effects)
         self._noise, self._quantum = np.array(config.noise), np.array(config.quantum)
         self._joint, self._body = int(joint), int(body)
-        self._R_BodyS, self._payload = X_BodyS.rotation(), payload
+        self._X_BodyS, self._payload = X_BodyS, payload
         self._time_step = time_step
         self._effects = self.DeclareAbstractParameter(Value[object](tuple(effects)))
         self._load_at_rest: np.ndarray | None = None
@@ -86,6 +93,9 @@ class ForceTorqueSensor(LeafSystem):
             "body_poses", Value[list[RigidTransform]]()
         )
         self._noise_port = self.DeclareVectorInputPort("noise", 6)
+        self._mount = mount
+        if mount:
+            self._coordinates = self.DeclareVectorInputPort("mount_coordinates", 6)
         self._memory = self.DeclareDiscreteState(6 * MOST_MEMORIES)
         self._remembered = self.DeclareDiscreteState([np.nan])  # when [s]
         self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._update)
@@ -95,17 +105,17 @@ class ForceTorqueSensor(LeafSystem):
         # Not the time: between two plant steps the sensor has no new sample, and
         # what depends on time takes that of the newest step.
         reaction = self._reaction.ticket()
+        tickets = {
+            reaction,
+            self._poses.ticket(),
+            self._noise_port.ticket(),
+            self.xd_ticket(),
+            self.all_parameters_ticket(),
+        }
+        if self._mount:
+            tickets.add(self._coordinates.ticket())
         self.DeclareVectorOutputPort(
-            "wrench",
-            6,
-            self._calc_wrench,
-            prerequisites_of_calc={
-                reaction,
-                self._poses.ticket(),
-                self._noise_port.ticket(),
-                self.xd_ticket(),
-                self.all_parameters_ticket(),
-            },
+            "wrench", 6, self._calc_wrench, prerequisites_of_calc=tickets
         )
         self.DeclareVectorOutputPort(
             "health", 1, self._calc_health, prerequisites_of_calc={reaction}
@@ -133,9 +143,12 @@ class ForceTorqueSensor(LeafSystem):
     def load(self, context: Context) -> np.ndarray:
         """Returns the load on the sensor (6,), [f; tau] at So in S."""
         load = -wrench_from_spatial_force(self._reaction.Eval(context)[self._joint])
-        if self._load_at_rest is not None and not load.any():
-            return self._load_at_rest
-        return load
+        if not load.any():
+            return load if self._load_at_rest is None else self._load_at_rest
+        if not self._mount:
+            return load
+        X_WJc = self._X_WJc(context)
+        return shift_and_express(load, self._X_WS(context).inverse() @ X_WJc)
 
     def reading_at_zeroing(self, context: Context) -> np.ndarray:
         """Returns the noise-free mean (6,) of readings that zeroing averages.
@@ -149,14 +162,23 @@ class ForceTorqueSensor(LeafSystem):
         """Returns what `set_effects` put there."""
         return context.get_abstract_parameter(self._effects).get_value()
 
+    def _X_WJc(self, context: Context) -> RigidTransform:
+        """Returns the pose of the joint's child frame."""
+        return self._poses.Eval(context)[self._body] @ self._X_BodyS
+
+    def _X_WS(self, context: Context) -> RigidTransform:
+        if self._mount:
+            return self._mount(self._coordinates.Eval(context))
+        return self._X_WJc(context)
+
     def _has_stepped(self, context: Context) -> bool:
         """Returns whether the plant has made a step: its reactions are zero before."""
         F = self._reaction.Eval(context)[self._joint]
         return bool(np.any(F.get_coeffs() != 0.0))
 
     def _sensing(self, context: Context, time: float) -> Sensing:
-        R_WBody = self._poses.Eval(context)[self._body].rotation()
-        return self._payload.sensing(np.array(time), (R_WBody @ self._R_BodyS).matrix())
+        R_WS = self._X_WS(context).rotation().matrix()
+        return self._payload.sensing(np.array(time), R_WS)
 
     def _chain(self, context: Context, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Returns the reading (6,) without noise, and the memories (k, 6) up to now."""

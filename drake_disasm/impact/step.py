@@ -62,6 +62,7 @@ class ImpactConditions:
         around: what may differ from state to state.
         M: (6, 6) mass matrix of the twin's joints, at their zero.
         K, D: (6,) their stiffness and damping.
+        p_BoTo_B: (3,) the point of the bolt that the joints move [m].
     """
 
     law: ImpactLaw
@@ -70,6 +71,7 @@ class ImpactConditions:
     M: np.ndarray
     K: np.ndarray
     D: np.ndarray
+    p_BoTo_B: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,11 +131,14 @@ class ImpactStep:
         self._h = h
         self._A = c.M + np.diag(h * c.D + h**2 * c.K)
         self._around = c.around.spread(len(q))
+        self.E, R_GnB = turning(q[:, 3:])
+        self._p_ToBo = -R_GnB @ c.p_BoTo_B
         pull = c.K * (qd - q) + c.D * vd
         pull[:, :3] += self._around.f_Gn
+        turn = np.cross(self._p_ToBo, self._around.f_Gn)
+        pull[:, 3:] += np.einsum("nji,nj->ni", self.E, turn)
         self._b = _times(c.M, v) + h * pull
-        self.E, R_GnB = turning(q[:, 3:])
-        self._place(R_GnB, q[:, :3])
+        self._place(R_GnB, q[:, :3] + c.p_BoTo_B + self._p_ToBo)
 
     def solve(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns v+ (n, 6) and the wrench on the bolt at Bo, [f; tau] (n, 6).
@@ -154,8 +159,9 @@ class ImpactStep:
                 break
         else:
             raise RuntimeError("IMPACT contact: no force balances this step")
+        f = balance.Q[:, :3]
         turn = np.linalg.solve(self.E.swapaxes(1, 2), balance.Q[:, 3:, None])
-        return v, np.hstack([balance.Q[:, :3], turn[..., 0]])
+        return v, np.hstack([f, turn[..., 0] - np.cross(self._p_ToBo, f)])
 
     def _descend(
         self, todo: np.ndarray, v: np.ndarray, step: np.ndarray, balance: _Balance
@@ -195,6 +201,7 @@ class ImpactStep:
         self._p = found.penetration
         self._n = np.einsum("nij,kj->nki", R_GnG, found.normal)
         self._arm = np.einsum("nij,nkj->nki", R_GnG, found.arm)
+        self._arm = self._arm + self._p_ToBo[:, None]  # from To, which the joints move
         lever = np.cross(self._arm, self._n)
         turn = np.einsum("nki,nij->nkj", lever, self.E)
         self._Jn = np.concatenate([self._n, turn], axis=2)

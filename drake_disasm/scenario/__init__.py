@@ -31,7 +31,6 @@ from drake_disasm.scenario.schema import (
     SensorConfig,
     SimulationConfig,
     TaskConfig,
-    TwinConfig,
 )
 from drake_disasm.scenario.validity import validate
 
@@ -52,7 +51,6 @@ __all__ = [
     "SensorConfig",
     "SimulationConfig",
     "TaskConfig",
-    "TwinConfig",
     "draw",
     "dump_scenario",
     "load_scenario",

@@ -20,6 +20,7 @@ from drake_disasm.common.text import clipped
 from drake_disasm.effects import find_effect
 from drake_disasm.scenario.effect_tags import tagged
 from drake_disasm.scenario.names import find_field, resolve
+from drake_disasm.scenario.older import upgraded
 from drake_disasm.scenario.schema import Scenario
 from drake_disasm.scenario.strict_yaml import parse
 from drake_disasm.scenario.validity import validate
@@ -56,7 +57,7 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     """
     path = scenario_path(name)
     text = read_text(path, "give a scenario in YAML", MOST_BYTES)
-    scenario = parse(text, Scenario(), str(path))
+    scenario = parse(upgraded(text), Scenario(), str(path))
     _checked(check, scenario, str(path))
     for override in overrides:
         scenario = _override(scenario, override)
@@ -91,7 +92,7 @@ def scenario_from_mapping(mapping: dict[str, Any]) -> Scenario:
     """
     source = "scenario of the log"
     plain = {key: value for key, value in mapping.items() if key != "effects"}
-    lines = [yaml.safe_dump(plain) if plain else "", "effects:"]
+    lines = [upgraded(yaml.safe_dump(plain)) if plain else "", "effects:"]
     for effect in _effects(mapping, source):
         values = {key: value for key, value in effect.items() if key != "effect"}
         flow = yaml.safe_dump(values, default_flow_style=True, width=10**6).strip()

@@ -1,7 +1,7 @@
 """The names of a scenario's fields, as all programs and files write them.
 
     lock.clearance                      a field of a section
-    twin.stiffness.0                    an element of a list, counted from 0
+    gripper.stiffness.0                    an element of a list, counted from 0
     effects.0.ry                        a field of an effect, by its place in the list
     GroovePose.ry                       the same by the effect's name
     JointCoulombFriction.iiwa_joint_4.size      and by its joint
@@ -136,7 +136,7 @@ def find_number(scenario: Scenario, path: str, name: str = "") -> Field:
     if not field.can_vary:
         raise DisasmError(
             f"{name or path}: is not a number that can vary; name one such as "
-            "contact.friction, twin.stiffness.0 or GroovePose.ry"
+            "contact.friction, gripper.stiffness.0 or GroovePose.ry"
         )
     return field
 

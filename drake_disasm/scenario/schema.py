@@ -185,13 +185,31 @@ class ArmConfig:
 
 @dataclasses.dataclass
 class GripperConfig:
-    """The gripper and how it holds the bolt."""
+    """The gripper and how it holds the bolt.
+
+    `stiffness` is that of adaptive fingers and their rubber pads between palm and
+    bolt: springs along and about the axes of the bolt as gripped (x along the groove,
+    y out of the plate, z across, along which the fingers close) in the middle of the
+    pads. No figure of the real gripper is known; these are assumed, as the ones with
+    which the thesis's numbers can be reproduced (docs/physics.md).
+    """
 
     model: str = quantity(
         "package://disasm_models/gripper_2f140/gripper_2f140.urdf", "", "URDF"
     )
     hold: str = quantity(
         "friction", "", "how the bolt is held", choices=("friction", "weld")
+    )
+    compliance: str = quantity(
+        "adaptive", "", "of the fingers against the palm; adaptive: the springs of "
+        "`stiffness`; rigid: none", choices=("adaptive", "rigid"),
+    )  # fmt: skip
+    stiffness: list[float] = quantity(
+        [600.0, 600.0, 600.0, 10.0, 10.0, 10.0], "N/m, N m/rad", "of adaptive fingers",
+        low=1.0, high=1e6,
+    )  # fmt: skip
+    damping_ratio: float = quantity(
+        1.0, "1", "of adaptive fingers that hold the bolt", low=0.1, high=5.0
     )
     grip_force: float = quantity(60.0, "N", "on each pad", low=10.0, high=125.0)
     fingertip_gap: float = quantity(
@@ -226,25 +244,6 @@ class PlacementConfig:
         [0.6, 0.0, 0.22], "m", "point A in the world", low=-1.5, high=1.5
     )
     yaw: float = quantity(0.0, "rad", "of x_G about z_W", low=-3.2, high=3.2)
-
-
-@dataclasses.dataclass
-class TwinConfig:
-    """Arm, gripper and sensor as seen from the bolt: a six-axis spring-damper.
-
-    In the axes of Gn: translations x, y, z, then rotations about x, y, z. The
-    stiffness is the cell's own, measured at A (docs/physics.md says how).
-    """
-
-    stiffness: list[float] = quantity(
-        [16.6e3, 15.4e3, 13.4e3, 410.0, 280.0, 2000.0], "N/m, N m/rad", "",
-        low=1.0, high=1e7,
-    )  # fmt: skip
-    damping_ratio: float = quantity(1.0, "1", "of each axis", low=0.1, high=10.0)
-    mass: float = quantity(2.0, "kg", "moved along with the bolt", low=0.01, high=50)
-    inertia: float = quantity(
-        0.005, "kg m^2", "turned along with the bolt", low=1e-5, high=5.0
-    )
 
 
 @dataclasses.dataclass
@@ -312,7 +311,6 @@ class Scenario:
     arm: ArmConfig = dataclasses.field(default_factory=ArmConfig)
     gripper: GripperConfig = dataclasses.field(default_factory=GripperConfig)
     ft_sensor: SensorConfig = dataclasses.field(default_factory=SensorConfig)
-    twin: TwinConfig = dataclasses.field(default_factory=TwinConfig)
     task: TaskConfig = dataclasses.field(default_factory=TaskConfig)
     observation: ObservationConfig = dataclasses.field(
         default_factory=ObservationConfig

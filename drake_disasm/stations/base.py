@@ -5,7 +5,7 @@ import functools
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, Frame
 from pydrake.systems.analysis import Simulator
@@ -13,13 +13,14 @@ from pydrake.systems.framework import Context, Diagram, System
 from pydrake.systems.primitives import RandomSource
 
 from drake_disasm.cell.coordinates import ArmCoordinates, Coordinates
+from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.devices.sensor_chain import Payload
 from drake_disasm.effects import BoltMotion, Effect
 from drake_disasm.ports import Port
-from drake_disasm.scenario import PlacementConfig, Scenario
+from drake_disasm.scenario import Scenario
 from drake_disasm.systems.observation import Mounting
 
 #: Returns the Context of a part of a station.
@@ -196,9 +197,3 @@ def add_nominal_groove(plant: MultibodyPlant, X_WG: RigidTransform) -> Frame:
     """Returns the groove's nominal frame, added to a plant."""
     world = plant.world_frame()
     return plant.AddFrame(FixedOffsetFrame("groove_nominal", world, X_WG))
-
-
-def nominal_groove_pose(placement: PlacementConfig) -> RigidTransform:
-    """Returns X_WGn: x along the groove at `yaw`, y up, z across."""
-    R = RollPitchYaw(np.pi / 2, 0.0, placement.yaw).ToRotationMatrix()
-    return RigidTransform(R, placement.p_WG)

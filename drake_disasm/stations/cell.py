@@ -13,12 +13,14 @@ from pydrake.systems.controllers import InverseDynamics
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import (
     Adder,
+    ConstantVectorSource,
     Demultiplexer,
     MatrixGain,
     PassThrough,
     StateInterpolatorWithDiscreteDerivative,
 )
 
+from drake_disasm.cell.grip import AXIS_ORDER, finger_springs
 from drake_disasm.cell.lock_dimensions import bolt_inertia
 from drake_disasm.cell.parsing import add_arm
 from drake_disasm.cell.tool import FINGERS
@@ -27,8 +29,9 @@ from drake_disasm.ports import CELL_PORTS
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.arm_mechanics import ArmMechanics, refuse_unknown_arm_effects
 from drake_disasm.stations.base import refuse_twins_contact
-from drake_disasm.stations.cell_models import add_cell
+from drake_disasm.stations.cell_models import add_adaptive_fingers, add_cell
 from drake_disasm.stations.simulated import SimulatedStation
+from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.stations.wiring import export_ready_device, export_required
 
 _ARM_INERTIA = 4.0  # kg m^2, of a joint with its rotor, for the damping ratio
@@ -94,10 +97,16 @@ class CellStation(SimulatedStation):
         self.iiwa, self.tool_models, self.lock = models.iiwa, models.tool, models.lock
         arm = [e for e in self._default_effects if isinstance(e, ArmEffect)]
         self._mechanics = ArmMechanics(plant, self.iiwa, models.frame_F, arm)
+        fingers = None
+        if config.gripper.compliance == "adaptive":
+            springs = finger_springs(config.gripper, self.tool)
+            fingers = add_adaptive_fingers(plant, self.tool_models, springs)
         plant.Finalize()
         self._set_gains()
         self._wire_arm(builder)
         self._wire_gripper(builder)
+        if fingers:
+            self._wire_adaptive_fingers(builder, fingers)
         self._add_sensor(
             builder, self.tool_models.sensor_joint, self.tool_models.frame_S
         )
@@ -215,6 +224,37 @@ class CellStation(SimulatedStation):
         builder.Connect(plant.get_state_output_port(gripper), opening.get_input_port())
         builder.ExportOutput(opening.get_output_port(), "gripper.state_measured")
         export_ready_device(builder, "gripper", self.time_step)
+
+    def _wire_adaptive_fingers(
+        self, builder: DiagramBuilder, fingers: SixAxisSpring
+    ) -> None:
+        """Lets the springs rest where the bolt is gripped, weight included.
+
+        The gripper closes about a bolt that is in its place: the springs carry fingers
+        and bolt as they hang at the start, and yield to what changes.
+        """
+        plant = self.plant
+        rest = builder.AddNamedSystem(
+            "adaptive_fingers_rest", ConstantVectorSource(np.zeros(12))
+        )
+        carried = builder.AddNamedSystem(
+            "adaptive_fingers_load", ConstantVectorSource(self._weight_on(fingers))
+        )
+        builder.Connect(
+            rest.get_output_port(), plant.get_desired_state_input_port(fingers.instance)
+        )
+        builder.Connect(
+            carried.get_output_port(), plant.get_actuation_input_port(fingers.instance)
+        )
+
+    def _weight_on(self, fingers: SixAxisSpring) -> np.ndarray:
+        """Returns the forces (6,) that keep fingers and bolt where they are at A."""
+        M_B, g_W = self.tool.M_gripped_B, self.g_W
+        R_BW = self.X_WG.rotation().inverse().matrix()  # B coincides with G there
+        f_B = M_B.get_mass() * (R_BW @ g_W)
+        p_ToCm_B = M_B.get_com() - self.tool.p_BoTo_B
+        wrench = np.concatenate([f_B, np.cross(p_ToCm_B, f_B)])
+        return -wrench[list(AXIS_ORDER)]
 
     def _refuse_arm_effects(self, effects: Sequence[ArmEffect]) -> None:
         refuse_unknown_arm_effects(effects)

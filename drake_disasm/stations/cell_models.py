@@ -5,14 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, ModelInstanceIndex
+from pydrake.multibody.tree import FixedOffsetFrame, Frame, ModelInstanceIndex
 
+from drake_disasm.cell.grip import Springs
 from drake_disasm.cell.lock import Lock, add_lock
 from drake_disasm.cell.lock_dimensions import plate_bottom
 from drake_disasm.cell.parsing import add_arm, add_model
-from drake_disasm.cell.tool import ToolModels, add_tool, grasp_pose
+from drake_disasm.cell.tool import ToolModels, add_tool, grasp_pose, grasp_rotation
 from drake_disasm.effects import Environment
 from drake_disasm.scenario import Scenario
+from drake_disasm.stations.six_axis_spring import SixAxisSpring
 
 _BENCH = "package://disasm_models/bench/bench.urdf"
 
@@ -32,6 +34,31 @@ class CellModels:
     frame_F: Frame
     tool: ToolModels
     lock: Lock
+
+
+def add_adaptive_fingers(
+    plant: MultibodyPlant, models: ToolModels, springs: Springs
+) -> SixAxisSpring:
+    """Puts springs in the place of the fixed joint between palm and fingers.
+
+    Args:
+        plant: not yet finalized.
+        models: of the gripper, added to it.
+        springs: in the middle of the pads, along the axes of the bolt as gripped.
+    """
+    fixed = plant.GetJointByName("finger_carriage_joint", models.gripper)
+    X_CT = models.frame_T.GetFixedPoseInBodyFrame()
+    X_TA = RigidTransform(grasp_rotation(), np.zeros(3))  # A: the springs' axes
+    on_palm = plant.AddFrame(
+        FixedOffsetFrame("finger_springs", fixed.frame_on_parent(), X_CT @ X_TA)
+    )
+    on_carriage = plant.AddFrame(
+        FixedOffsetFrame("sprung", models.carriage.body_frame(), X_CT @ X_TA)
+    )
+    plant.RemoveJoint(fixed)
+    spring = SixAxisSpring(plant, "adaptive_fingers", on_palm, springs)
+    plant.WeldFrames(spring.last.body_frame(), on_carriage)
+    return spring
 
 
 def add_cell(

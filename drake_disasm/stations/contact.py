@@ -14,7 +14,7 @@ import numpy as np
 from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, SceneGraph
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
+from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from drake_disasm.cell.lock import (
     Lock,
@@ -28,7 +28,7 @@ from drake_disasm.effects import Effect, Environment, EnvironmentEffect, environ
 from drake_disasm.impact import ImpactConditions, ImpactLaw, LockShape, Surroundings
 from drake_disasm.scenario import ContactConfig, LockConfig
 from drake_disasm.stations.base import Parts
-from drake_disasm.stations.carrier import Carrier
+from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.systems.impact_contact import ImpactContact
 from drake_disasm.systems.outside_force import OutsideForce
 
@@ -143,8 +143,9 @@ class ImpactContactForce(ContactStrategy):
     """The thesis's contact law, as a force on the bolt; the plant sees no contact.
 
     Args:
-        carrier: the twin's, whose springs and masses the law's solution depends on.
+        spring: the twin's, which the law's solution depends on, as on the masses.
         R_WGn, time_step: of the station [s].
+        p_BoTo_B: (3,) where the spring is [m].
         contact: parameters of the law.
         environment: of the default Context.
     """
@@ -168,26 +169,27 @@ class ImpactContactForce(ContactStrategy):
         lock: Lock,
         outside_force: OutsideForce,
         *,
-        carrier: Carrier,
+        spring: SixAxisSpring,
         R_WGn: RotationMatrix,
+        p_BoTo_B: np.ndarray,
         time_step: float,
         contact: ContactConfig,
         environment: Environment,
     ) -> None:
         super().__init__(plant, scene_graph, lock, outside_force)
-        self._carrier, self._contact = carrier, contact
+        self._spring, self._contact = spring, contact
+        self._p_BoTo_B = p_BoTo_B
         self._exclude_from_scene_graph()
-        at_zero = plant.CreateDefaultContext()
         self.system = ImpactContact(
-            lock.bolt.index(), R_WGn, time_step, self._conditions(environment, at_zero)
+            lock.bolt.index(), R_WGn, time_step, self._conditions(environment)
         )
 
     def add_forces(self, builder: DiagramBuilder, forces: OutputPort) -> OutputPort:
         """See ContactStrategy."""
         system = builder.AddNamedSystem("impact_contact", self.system)
-        state = self._plant.get_state_output_port(self._carrier.instance)
+        state = self._plant.get_state_output_port(self._spring.instance)
         builder.Connect(state, system.GetInputPort("state"))
-        desired = builder.GetSubsystemByName("desired_state").get_output_port()
+        desired = builder.GetSubsystemByName("arm_ahead").get_output_port()
         builder.Connect(desired, system.GetInputPort("desired_state"))
         builder.Connect(forces, system.GetInputPort("applied_spatial_force"))
         return system.get_output_port()
@@ -205,14 +207,12 @@ class ImpactContactForce(ContactStrategy):
         plant_context, outside = parts(self._plant), parts(self.outside_force)
         self.outside_force.set_force(outside, np.array(environment.force_Gn))
         set_pose(self._lock, environment, plant_context)
-        conditions = self._conditions(environment, plant_context)
+        conditions = self._conditions(environment)
         self.system.set_conditions(parts(self.system), conditions)
 
-    def _conditions(
-        self, environment: Environment, plant_context: Context
-    ) -> ImpactConditions:
+    def _conditions(self, environment: Environment) -> ImpactConditions:
         config, clearance = self._lock.config, environment.clearance
-        K, D = self._carrier.gains()
+        K, D = self._spring.gains()
         return ImpactConditions(
             law=dataclasses.replace(
                 ImpactLaw.of(self._contact.impact),
@@ -221,9 +221,10 @@ class ImpactContactForce(ContactStrategy):
             ),
             shape=LockShape(dataclasses.replace(config, clearance=clearance)),
             around=Surroundings.of([environment]),
-            M=self._carrier.mass_matrix(plant_context),
+            M=self._spring.mass_matrix(),
             K=K,
             D=D,
+            p_BoTo_B=self._p_BoTo_B,
         )
 
     def _exclude_from_scene_graph(self) -> None:

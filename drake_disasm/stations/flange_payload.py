@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, RigidBody, SpatialInertia, UnitInertia
 
+from drake_disasm.cell.tool import summed
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import ArmEffect, FlangePayload
 
@@ -38,7 +39,7 @@ def payload_inertia(effects: Sequence[ArmEffect]) -> SpatialInertia:
             G = UnitInertia(xx, yy, zz, xy, xz, yz)
             p_FoPcm_F = payload.first_moment / payload.mass
             more = SpatialInertia(payload.mass, p_FoPcm_F, G, skip_validity_check=True)
-            M_F = more if M_F.get_mass() == 0.0 else M_F + more
+            M_F = more if M_F.get_mass() == 0.0 else summed([M_F, more])
         elif payload.first_moment.any():
             raise DisasmError(
                 "FlangePayload: no body has a first moment (cx, cy, cz) and no mass; "

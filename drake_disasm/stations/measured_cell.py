@@ -9,8 +9,9 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import MatrixGain, Multiplexer
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
+from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.scenario import Scenario
-from drake_disasm.stations.base import add_nominal_groove, nominal_groove_pose
+from drake_disasm.stations.base import add_nominal_groove
 from drake_disasm.stations.cell_models import add_cell
 
 #: Its inputs, and output ports of any station with the cell's port table.

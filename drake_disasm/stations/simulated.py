@@ -2,7 +2,7 @@
 
 import copy
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from pydrake.geometry import SceneGraph
@@ -14,6 +14,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, System
 from pydrake.systems.primitives import RandomSource
 
 from drake_disasm.cell.lock import Lock, nominal_environment
+from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor
 from drake_disasm.effects import (
     ArmEffect,
@@ -30,7 +31,6 @@ from drake_disasm.stations.base import (
     Parts,
     Station,
     add_nominal_groove,
-    nominal_groove_pose,
 )
 from drake_disasm.stations.capabilities import refuse_unknown_kinds
 from drake_disasm.stations.contact import (
@@ -60,6 +60,9 @@ class SimulatedStation(Station):
 
     #: Of the discrete plant [s].
     time_step: float
+
+    #: X_WS of (6,) coordinates, where the sensor is not on the joint that it reads.
+    _sensor_mount: Callable[[np.ndarray], RigidTransform] | None = None
 
     plant: MultibodyPlant
     scene_graph: SceneGraph
@@ -101,6 +104,7 @@ class SimulatedStation(Station):
             self.payload,
             self.time_step,
             sensor_chain(self.scenario.effects),
+            self._sensor_mount,
         )
         self.sensor_noise = wire_sensor(builder, self.plant, self.sensor, config.period)
 

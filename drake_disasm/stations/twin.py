@@ -5,39 +5,57 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from pydrake.math import RigidTransform
 from pydrake.multibody.tree import FixedOffsetFrame, Frame, WeldJoint
 from pydrake.systems.framework import Context, DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Multiplexer
+from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, PassThrough
 
 from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.cell.grip import AXIS_ORDER
 from drake_disasm.cell.lock import add_lock, nominal_environment
 from drake_disasm.cell.lock_dimensions import GROOVE_FIELDS
-from drake_disasm.cell.tool import Tool
+from drake_disasm.cell.tool import summed
+from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import ArmEffect
 from drake_disasm.impact import ImpactConditions
 from drake_disasm.ports import TWIN_PORTS
-from drake_disasm.scenario import ImpactConfig, Scenario, TwinConfig, validate
+from drake_disasm.scenario import (
+    ArmConfig,
+    GripperConfig,
+    ImpactConfig,
+    Scenario,
+    validate,
+)
+from drake_disasm.stations.arm_node import ArmNode, ArmStep
 from drake_disasm.stations.capabilities import refuse_arm_effects
-from drake_disasm.stations.carrier import Carrier
 from drake_disasm.stations.contact import ContactStrategy, ImpactContactForce
 from drake_disasm.stations.simulated import SimulatedStation
+from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.stations.wiring import export_ready_device, export_required
 from drake_disasm.systems.optional_input import OptionalInput
 from drake_disasm.systems.outside_force import OutsideForce
 
 _MATERIAL_FIELDS = ("friction", "modulus", "head_modulus", "dissipation")
+_SPRING_FIELDS = (
+    "stiffness",
+    "damping_ratio",
+    "finger_stiffness",
+    "joint_impedance",
+    "cartesian_impedance",
+)
 
 
 class TwinStation(SimulatedStation):
-    """The thesis's twin: the command moves the bolt through a six-axis spring.
+    """The thesis's twin: the command moves the bolt through arm and gripper.
 
-    A carrier in Gn has six joints (x, y, z, then yaw, pitch and roll) whose
-    controllers are the stiffness and damping of arm, gripper and sensor; the
-    solver takes them implicitly. The bolt hangs on the carrier by a weld at S
-    whose reaction is the sensor's load, so the readings mean the same as the
-    cell's and pass the same processing. While `bolt.velocity` is not connected it is
-    zero.
+    Its numbers are `twin_of(scenario)`. The arm under its controller is a linear
+    system (`ArmNode`); where it is, is `bolt.position_measured`, as encoders see it.
+    Behind it is the gripper's six-axis spring, of joints x, y, z, yaw, pitch and roll
+    from Gn in the middle of the pads, which the solver takes implicitly: what it
+    gives by, no encoder sees. Bolt and fingers hang on it by a weld at S whose
+    reaction is the sensor's load, so the readings mean the same as the cell's and
+    pass the same processing. While `bolt.velocity` is not connected it is zero.
 
     @system
     name: TwinStation
@@ -61,13 +79,14 @@ class TwinStation(SimulatedStation):
     table = TWIN_PORTS
     arm = "bolt"
     has_velocity_input = True
-    settling_time = 0.05
+    settling_time = 0.5
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__(scenario)
         self.control_period = scenario.simulation.twin_time_step
-        self.X_SB = Tool.from_models(scenario).X_SB
-        self.coordinates, self.start = BoltCoordinates(), np.zeros(6)
+        self.parameters = twin_of(scenario)
+        self.X_SB, p_BoTo_B = self.parameters.X_SB, self.parameters.p_BoTo_B
+        self.coordinates, self.start = BoltCoordinates(p_BoTo_B), np.zeros(6)
         self._is_reconfigured = False
         builder = DiagramBuilder()
         self._build(builder)
@@ -88,7 +107,7 @@ class TwinStation(SimulatedStation):
         Args:
             context: this station's; its time and state stay as they are.
             scenario: may differ in effects, in what the contact is made of, in
-                the groove's dimensions, and in the section `twin`.
+                the groove's dimensions, and in stiffness and damping of arm and grip.
 
         Raises:
             DisasmError: the scenario is out of bounds, or differs elsewhere.
@@ -99,6 +118,7 @@ class TwinStation(SimulatedStation):
                 "the twin can't take this scenario in place; build a station of it"
             )
         self.scenario, self._initial = scenario, None
+        self.parameters = twin_of(scenario)
         self._is_reconfigured = True
         self.lock = dataclasses.replace(
             self.lock,
@@ -107,6 +127,18 @@ class TwinStation(SimulatedStation):
         )
         self._prepare(context)
         self.set_effects(context, scenario.effects)
+
+    def deflection(self, wrench: np.ndarray) -> np.ndarray:
+        """Returns by how much the grip gives (6,), in coordinates, under a wrench.
+
+        At rest, bolt against arm; no encoder sees it.
+
+        Args:
+            wrench: (6,) on the bolt at Bo in Gn, [f; tau], processed as the task's.
+        """
+        p, k = self.parameters.p_BoTo_B, self.parameters.grip.stiffness
+        t_To = wrench[3:] - np.cross(p, wrench[:3])
+        return (np.concatenate([wrench[:3], t_To]) / k)[list(AXIS_ORDER)]
 
     def impact_conditions(self, context: Context) -> ImpactConditions:
         """Returns the present inputs of the IMPACT law.
@@ -124,8 +156,8 @@ class TwinStation(SimulatedStation):
             return
         scenario = self.scenario
         self.contact.reconfigure(self.lock, scenario.contact, self._parts(context))
-        plant_context = self.part_context(self.plant, context)
-        self._carrier.set_springs(scenario.twin, plant_context)
+        self._spring.set_springs(self.parameters.grip)
+        self.arm_node.set_step(self._arm_step())
 
     def _build(self, builder: DiagramBuilder) -> None:
         scenario = self.scenario
@@ -134,12 +166,20 @@ class TwinStation(SimulatedStation):
         self.lock = add_lock(
             plant, frame_Gn, scenario.lock, scenario.contact, self._environment
         )
-        self._carrier = Carrier(plant, frame_Gn, scenario.twin)
+        p_BoTo_B, grip = self.parameters.p_BoTo_B, self.parameters.grip
+        frame_Tn = plant.AddFrame(
+            FixedOffsetFrame("grip_nominal", frame_Gn, RigidTransform(p_BoTo_B))
+        )
+        self._spring = SixAxisSpring(plant, "grip", frame_Tn, grip)
         frame_S, joint = self._add_sensor_joint()
         plant.Finalize()
         self._read_payload()
         self._wire_commands(builder)
         self._add_sensor(builder, joint, frame_S)
+        builder.Connect(
+            builder.GetSubsystemByName("measured").get_output_port(0),
+            self.sensor.GetInputPort("mount_coordinates"),
+        )
         export_ready_device(builder, "bolt", self.time_step)
         self._finish(builder)
 
@@ -151,8 +191,9 @@ class TwinStation(SimulatedStation):
             self.scene_graph,
             self.lock,
             outside_force,
-            carrier=self._carrier,
+            spring=self._spring,
             R_WGn=self.X_WG.rotation(),
+            p_BoTo_B=self.parameters.p_BoTo_B,
             time_step=self.time_step,
             contact=self.scenario.contact,
             environment=self._environment,
@@ -162,40 +203,73 @@ class TwinStation(SimulatedStation):
         refuse_arm_effects(effects)
 
     def _add_sensor_joint(self) -> tuple[Frame, WeldJoint]:
-        X_BS = self.X_SB.inverse()
+        """Hangs bolt and fingers on the springs; returns S and the weld there."""
         plant, bolt = self.plant, self.lock.bolt
-        on_carrier = plant.AddFrame(
-            FixedOffsetFrame("carrier_sensor", self._carrier.body.body_frame(), X_BS)
+        X_TB = RigidTransform(self.parameters.p_BoTo_B).inverse()
+        X_BS = self.X_SB.inverse()
+        on_spring = plant.AddFrame(
+            FixedOffsetFrame(
+                "sprung_sensor", self._spring.last.body_frame(), X_TB @ X_BS
+            )
         )
         frame_S = plant.AddFrame(FixedOffsetFrame("sensor", bolt.body_frame(), X_BS))
-        return frame_S, plant.WeldFrames(on_carrier, frame_S)
+        fingers = plant.AddRigidBody(
+            "fingers", self._spring.instance, self.parameters.M_fingers_B
+        )
+        plant.WeldFrames(bolt.body_frame(), fingers.body_frame())
+        return frame_S, plant.WeldFrames(on_spring, frame_S)
 
     def _read_payload(self) -> None:
-        M_B = self.lock.bolt.default_spatial_inertia()
+        """Sets what the sensor carries: bolt and fingers."""
+        bolt = self.lock.bolt.default_spatial_inertia()
+        M_B = summed([bolt, self.parameters.M_fingers_B])
         self.payload_mass = M_B.get_mass()
         self.p_SoScm_S = self.X_SB @ M_B.get_com()
 
+    def _sensor_mount(self, coordinates: np.ndarray) -> RigidTransform:
+        """Returns X_WS of a sensor before the springs, by the arm's coordinates."""
+        return self.X_WG @ self.coordinates.pose(coordinates) @ self.X_SB.inverse()
+
     def _wire_commands(self, builder: DiagramBuilder) -> None:
-        """Commands place and rate; carries the bolt's weight as an arm would."""
-        plant, instance = self.plant, self._carrier.instance
+        """Commands place and rate; carries the weight behind the springs."""
+        plant, instance = self.plant, self._spring.instance
         connect = builder.Connect
-        desired = builder.AddNamedSystem("desired_state", Multiplexer([6, 6]))
+        place = builder.AddNamedSystem("commanded_place", PassThrough(6))
         rate = builder.AddNamedSystem("commanded_rate", OptionalInput(np.zeros(6)))
         export_required(
             builder,
-            desired.get_input_port(0),
+            place.get_input_port(),
             "bolt.position",
             "connect the commanded coordinates (6,), station.start to stay there",
         )
         builder.ExportInput(rate.get_input_port(), "bolt.velocity")
-        connect(rate.get_output_port(), desired.get_input_port(1))
+        self.arm_node = ArmNode(
+            builder,
+            self._arm_step(),
+            self.time_step,
+            (
+                place.get_output_port(),
+                rate.get_output_port(),
+                plant.get_state_output_port(instance),
+            ),
+        )
         weight = plant.CalcGravityGeneralizedForces(plant.CreateDefaultContext())
         carried = builder.AddNamedSystem("carried", ConstantVectorSource(-weight))
         measured = builder.AddNamedSystem("measured", Demultiplexer([6, 6]))
-        connect(desired.get_output_port(), plant.get_desired_state_input_port(instance))
+        connect(self.arm_node.desired, plant.get_desired_state_input_port(instance))
         connect(carried.get_output_port(), plant.get_actuation_input_port(instance))
-        connect(plant.get_state_output_port(instance), measured.get_input_port())
+        connect(self.arm_node.state, measured.get_input_port())
         builder.ExportOutput(measured.get_output_port(0), "bolt.position_measured")
+
+    def _arm_step(self) -> ArmStep:
+        parameters = self.parameters
+        step = ArmStep.of(parameters.arm, parameters.grip, self.time_step)
+        if not step.is_stable:
+            raise DisasmError(
+                f"simulation.twin_time_step: {self.time_step:g} s is too long for this "
+                "arm behind so stiff a grip; give less"
+            )
+        return step
 
 
 def _structure(scenario: Scenario) -> Scenario:
@@ -205,12 +279,19 @@ def _structure(scenario: Scenario) -> Scenario:
         name="",
         effects=[],
         randomisation=[],
-        twin=TwinConfig(),
+        arm=_without_springs(scenario.arm, ArmConfig()),
+        gripper=_without_springs(scenario.gripper, GripperConfig()),
         contact=dataclasses.replace(
             _without(scenario.contact, _MATERIAL_FIELDS), impact=ImpactConfig()
         ),
         lock=_without(scenario.lock, GROOVE_FIELDS),
     )
+
+
+def _without_springs(section: Any, nominal: Any) -> Any:
+    """Returns a section with the nominal's numbers for stiffness and damping."""
+    names = [f.name for f in dataclasses.fields(section) if f.name in _SPRING_FIELDS]
+    return dataclasses.replace(section, **{n: getattr(nominal, n) for n in names})
 
 
 def _without(section: Any, names: tuple[str, ...]) -> Any:

@@ -10,6 +10,7 @@ import dataclasses
 
 import numpy as np
 
+from drake_disasm.cell.tool import summed
 from drake_disasm.effects import environment_at, is_local
 from drake_disasm.impact import (
     ImpactConditions,
@@ -18,6 +19,7 @@ from drake_disasm.impact import (
     turning,
 )
 from drake_disasm.scenario import Scenario
+from drake_disasm.stations.arm_node import ArmStep
 from drake_disasm.task.replay import ReplayDiagram, Steps, coarse_step
 
 
@@ -44,6 +46,7 @@ class ImpactReplay:
         self._scenario = scenario
         station = self._diagram.station
         M_B = station.lock.bolt.default_spatial_inertia()
+        M_B = summed([M_B, station.parameters.M_fingers_B])
         I_B = M_B.CalcRotationalInertia().CopyToFullMatrix3()
         R_WGn, g_W = station.X_WG.rotation(), station.plant.gravity_field()
         g_Gn = R_WGn.matrix().T @ g_W.gravity_vector()
@@ -69,28 +72,35 @@ class ImpactReplay:
         Raises:
             RuntimeError: the contact equations of a step have no solution.
         """
-        conditions = self._conditions(steps)
-        q, v, qd = steps.q, steps.v, steps.qd
+        station = self._diagram.station
+        given = np.array([station.deflection(wrench) for wrench in steps.wrench])
+        conditions = self._conditions(steps, steps.q + given)
+        q, v, qd, rate = steps.q + given, steps.v, steps.qd, steps.qd_rate
+        arm, parameters = np.hstack([steps.q, steps.v]), station.parameters
         for h in self._time_steps():
-            qd = qd + h * steps.qd_rate
-            step = ImpactStep(conditions, h, q, v, qd, steps.qd_rate)
+            qd = qd + h * rate
+            node = ArmStep.of(parameters.arm, parameters.grip, h)
+            arm = arm @ node.A.T + np.hstack([qd, rate, q, v]) @ node.B.T
+            step = ImpactStep(conditions, h, q, v, arm[:, :6], arm[:, 6:])
             begin, v_begin = q, v
             v, contact = step.solve()
             q = q + h * v
         contact[:, :3] += conditions.around.f_Gn
         loads = self._loads(begin, (v - v_begin) / h, contact)
         times = (steps.index + 1) * self._scenario.task.period
-        rows = zip(times, q, loads, strict=True)
+        rows = zip(times, arm[:, :6], q, loads, strict=True)
         return np.array([self._diagram.observed(*row) for row in rows])
 
-    def _conditions(self, steps: Steps) -> ImpactConditions:
+    def _conditions(self, steps: Steps, q_bolt: np.ndarray) -> ImpactConditions:
         """Returns the contact's conditions, per step where an effect is local."""
         conditions, effects = self._diagram.impact_conditions(), self._scenario.effects
         if not is_local(effects):
             return conditions
         nominal = self._diagram.station.lock.nominal
+        rows = zip(q_bolt, steps.qd_rate, strict=True)
+        motions = [self._diagram.motion(*row) for row in rows]
         around = Surroundings.of(
-            [environment_at(nominal, effects, motion) for motion in steps.motions()]
+            [environment_at(nominal, effects, motion) for motion in motions]
         )
         return dataclasses.replace(conditions, around=around)
 
@@ -117,9 +127,11 @@ class ImpactReplay:
         mass, p_BoBcm_B, I_Bo_B, g_Gn = self._bolt
         E, R = turning(q[:, 3:])
         alpha = np.einsum("nij,nj->ni", E, vdot[:, 3:])
+        p_BoTo = R @ self._diagram.station.parameters.p_BoTo_B
+        a_Bo = vdot[:, :3] - np.cross(alpha, p_BoTo)
         p_BoBcm = np.einsum("nij,j->ni", R, p_BoBcm_B)
         spin = np.einsum("nij,jk,nlk,nl->ni", R, I_Bo_B, R, alpha)
-        pull = mass * (g_Gn - vdot[:, :3])
+        pull = mass * (g_Gn - a_Bo)
         f = contact[:, :3] + pull - mass * np.cross(alpha, p_BoBcm)
         t = contact[:, 3:] + np.cross(p_BoBcm, pull) - spin
         return np.hstack([f, t])

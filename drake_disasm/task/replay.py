@@ -1,7 +1,9 @@
 """The twin driven open loop: from a measured state, through a measured command.
 
-Arm, gripper and sensor together act as a damped spring, whose transients decay within
-some 11 ms. Of a step of 100 ms only the end is compared, so only its last part needs
+What the encoders don't see, by how much the grip gives, is known from the measured
+wrench: a step begins where pose and wrench agree with what was measured.
+
+Of a step of 100 ms only the end is compared, so only its last part needs
 fine time steps: `TwinReplay` can simulate the rest with coarse ones, in half the time
 (docs/identification.md has the figures).
 """
@@ -15,6 +17,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
+from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.spatial import (
     pose_from_vector,
     rotation_vector,
@@ -26,12 +29,27 @@ from drake_disasm.effects import BoltMotion
 from drake_disasm.impact import ImpactConditions
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations import TwinStation
+from drake_disasm.stations.arm_node import ArmStep
 from drake_disasm.task.diagram import add_motion, add_observation
 
-#: Coordinates, their rates and the commanded coordinates, each (6,).
-_State = tuple[np.ndarray, np.ndarray, np.ndarray]
-
 _COARSE = 0.02  # s, what validity allows at most
+
+
+@dataclasses.dataclass(frozen=True)
+class TwinState:
+    """State of a moving twin, in its coordinates; each (6,).
+
+    Attributes:
+        q, v: coordinates of the arm, which are measured, and their rates.
+        qd: commanded coordinates.
+        q_bolt, v_bolt: coordinates of the bolt and their rates.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+    qd: np.ndarray
+    q_bolt: np.ndarray
+    v_bolt: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,6 +61,7 @@ class Steps:
         q, v: (n, 6) measured coordinates at the step's start, and their rates, by
             difference from the step before.
         qd, qd_rate: (n, 6) commanded coordinates then, and their rate in the step.
+        wrench: (n, 6) measured on the bolt then, at Bo in Gn.
     """
 
     index: np.ndarray
@@ -50,14 +69,10 @@ class Steps:
     v: np.ndarray
     qd: np.ndarray
     qd_rate: np.ndarray
+    wrench: np.ndarray
 
     def __len__(self) -> int:
         return len(self.index)
-
-    def motions(self) -> list[BoltMotion]:
-        """Returns the bolt's motion in each of the steps, for local effects."""
-        pairs = zip(self.q[:, :3], self.qd_rate[:, :3], strict=True)
-        return [BoltMotion(p, v) for p, v in pairs]
 
     def select(self, which: np.ndarray | slice) -> Self:
         """Returns some of the steps, by a mask (n,) or a slice."""
@@ -119,7 +134,7 @@ class TwinReplay:
         return self._fine.reading_at_zeroing
 
     def transitions(self, steps: Steps) -> np.ndarray:
-        """Returns the states (n, 12) after independent steps, each from its own q, v.
+        """Returns the states (n, 12) after independent steps, each from its own start.
 
         Raises:
             RuntimeError: Drake's contact solver did not converge.
@@ -140,18 +155,29 @@ class TwinReplay:
         return np.array([self.advance(rate) for rate in steps.qd_rate])
 
     def _start(self, steps: Steps, i: int) -> None:
-        self.start(int(steps.index[i]), steps.q[i], steps.v[i], steps.qd[i])
+        self.start(
+            int(steps.index[i]), steps.q[i], steps.v[i], steps.qd[i], steps.wrench[i]
+        )
 
-    def start(self, step: int, q: np.ndarray, v: np.ndarray, qd: np.ndarray) -> None:
-        """Sets the twin's state.
+    def start(
+        self,
+        step: int,
+        q: np.ndarray,
+        v: np.ndarray,
+        qd: np.ndarray,
+        wrench: np.ndarray,
+    ) -> None:
+        """Sets the twin's state by what was measured.
 
         Args:
             step: periods of the MDP since the episode began.
-            q, v: (6,) coordinates and their rates.
+            q, v: (6,) measured coordinates and their rates.
             qd: (6,) commanded coordinates.
+            wrench: (6,) measured on the bolt, at Bo in Gn.
         """
         self._step = step
-        self._state: _State | None = (q, v, qd)
+        q_bolt = q + self._fine.station.deflection(wrench)
+        self._state: TwinState | None = TwinState(q, v, qd, q_bolt, v)
 
     def advance(self, qd_rate: np.ndarray) -> np.ndarray:
         """Moves the command at a rate for one period; returns the state (12,) then.
@@ -164,20 +190,19 @@ class TwinReplay:
         """
         begin, end = (boundary(self._step + i, self._period) for i in (0, 1))
         self._step += 1
-        q, _, _ = self._state or self._fine.state()
-        motion = BoltMotion(q[:3], qd_rate[:3])
+        state = self._state or self._fine.state()
+        motion = self._fine.motion(state.q_bolt, qd_rate)
         if self._coarse:
             switch = begin + self._switch
             self._coarse.update_local_effects(motion)
-            self._coarse.start(begin, *(self._state or self._fine.state()))
+            self._coarse.start(begin, state)
             self._coarse.advance(qd_rate, switch)
             self._fine.update_local_effects(motion)
-            self._fine.start(switch, *self._coarse.state())
-        elif self._state:
-            self._fine.update_local_effects(motion)
-            self._fine.start(begin, *self._state)
+            self._fine.start(switch, self._coarse.state())
         else:
             self._fine.update_local_effects(motion)
+            if self._state:
+                self._fine.start(begin, state)
         self._state = None
         self._fine.advance(qd_rate, end)
         return self._fine.observation()
@@ -215,23 +240,39 @@ class ReplayDiagram:
     def zero(self) -> None:
         """Lets the bolt settle at A and zeroes the sensor, as at an episode's start."""
         rest = np.zeros(6)
-        self.start(boundary(0, 1.0), rest, rest, self.station.start)
+        at_start = TwinState(rest, rest, self.station.start, rest, rest)
+        self.start(boundary(0, 1.0), at_start)
         self.advance(rest, self.station.settling_time)
         reading = self.station.reading_at_zeroing(self.station_context)
         self.reading_at_zeroing = reading
         self.processor.zero(self.processor_context, reading)
 
+    def motion(self, q_bolt: np.ndarray, qd_rate: np.ndarray) -> BoltMotion:
+        """Returns the bolt's motion in a step, for local effects.
+
+        Args:
+            q_bolt: (6,) coordinates of the bolt.
+            qd_rate: (6,) rate of the commanded coordinates.
+        """
+        X_GB = self.station.coordinates.pose(q_bolt)
+        p_BoTo = X_GB.rotation() @ self.station.parameters.p_BoTo_B
+        rate_of_turn = qd_rate[:2:-1]  # roll, pitch, yaw: about x, y, z while small
+        return BoltMotion(
+            X_GB.translation(), qd_rate[:3] - np.cross(rate_of_turn, p_BoTo)
+        )
+
     def update_local_effects(self, motion: BoltMotion) -> None:
         """Brings effects that depend on the bolt's motion up to date."""
         self.station.update_local_effects(self.station_context, self.effects, motion)
 
-    def start(self, time: float, q: np.ndarray, v: np.ndarray, qd: np.ndarray) -> None:
-        """Sets the twin's state (see `TwinReplay`) and the time [s]."""
+    def start(self, time: float, state: TwinState) -> None:
+        """Sets the twin's state and the time [s]."""
         self._context.SetTime(time)
         plant = self.station.plant
-        plant.SetPositions(self._plant_context, q)
-        plant.SetVelocities(self._plant_context, v)
-        self._motion_context.SetDiscreteState(qd)
+        plant.SetPositions(self._plant_context, state.q_bolt)
+        plant.SetVelocities(self._plant_context, state.v_bolt)
+        self._arm_context.SetDiscreteState(np.concatenate([state.q, state.v]))
+        self._motion_context.SetDiscreteState(state.qd)
         self._simulator.Initialize()
 
     def advance(self, qd_rate: np.ndarray, time: float) -> None:
@@ -239,31 +280,38 @@ class ReplayDiagram:
         self._rate.SetFromVector(qd_rate)
         self._simulator.AdvanceTo(time)
 
-    def state(self) -> _State:
-        """Returns coordinates, their rates and the commanded ones, each (6,)."""
+    def state(self) -> TwinState:
+        """Returns the present state."""
         plant = self.station.plant
-        return (
-            plant.GetPositions(self._plant_context),
-            plant.GetVelocities(self._plant_context),
-            self._motion_context.get_discrete_state_vector().CopyToVector(),
+        arm = self._arm_context.get_discrete_state_vector().CopyToVector()
+        return TwinState(
+            q=arm[:6],
+            v=arm[6:],
+            qd=self._motion_context.get_discrete_state_vector().CopyToVector(),
+            q_bolt=plant.GetPositions(self._plant_context),
+            v_bolt=plant.GetVelocities(self._plant_context),
         )
 
     def impact_conditions(self) -> ImpactConditions:
         """Returns the present conditions of IMPACT contact, which the scenario has."""
         return self.station.impact_conditions(self.station_context)
 
-    def observed(self, time: float, q: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """Returns the state (12,) of the task at coordinates under a load.
+    def observed(
+        self, time: float, q: np.ndarray, q_bolt: np.ndarray, load: np.ndarray
+    ) -> np.ndarray:
+        """Returns the state (12,) of the task under a load.
 
         Args:
             time: of the sensor's sample, since the episode began [s].
-            q: (6,) coordinates.
+            q: (6,) coordinates of the arm.
+            q_bolt: (6,) of the bolt.
             load: (6,) of the bolt on the sensor, [f; tau] at Bo in Gn.
         """
         station, sensor = self.station, self.station.sensor
         X_GB = station.coordinates.pose(q)
-        X_SGn = station.X_SB @ RigidTransform(X_GB.rotation().inverse(), np.zeros(3))
-        reading = shift_and_express(load, X_SGn)
+        X_SGn = station.X_SB @ X_GB.inverse()
+        p_GnBo = station.coordinates.pose(q_bolt).translation()
+        reading = shift_and_express(load, X_SGn @ RigidTransform(p_GnBo))
         effects = sensor.effects(station.part_context(sensor, self.station_context))
         if effects:
             R_WS = (station.X_WG.rotation() @ X_SGn.rotation().inverse()).matrix()
@@ -298,6 +346,8 @@ class ReplayDiagram:
         self._context = root
         self.station_context = self.station.GetMyMutableContextFromRoot(root)
         self._plant_context = self.station.plant.GetMyMutableContextFromRoot(root)
+        arm = self.station.arm_node.system
+        self._arm_context = arm.GetMyMutableContextFromRoot(root)
         self._motion_context = self._motion.GetMyMutableContextFromRoot(root)
         self.processor_context = self.processor.GetMyMutableContextFromRoot(root)
         source_context = self._source.GetMyMutableContextFromRoot(root)
@@ -311,11 +361,15 @@ def _with_rotation_vector(observation: np.ndarray, X_GB: RigidTransform) -> np.n
 
 
 def coarse_step(scenario: Scenario) -> float:
-    """Returns a step [s] of about 20 ms that divides the period; 0 if there is none."""
+    """Returns a step [s] of about 20 ms that divides the period; 0 if none will do."""
     period, fine = scenario.task.period, scenario.simulation.twin_time_step
     step = period / np.ceil(period / _COARSE - 1e-9)
     whole = step / fine
-    return step if whole > 1.5 and abs(whole - round(whole)) < 1e-6 else 0.0
+    if whole < 1.5 or abs(whole - round(whole)) > 1e-6:
+        return 0.0
+    parameters = twin_of(scenario)
+    arm = ArmStep.of(parameters.arm, parameters.grip, step)
+    return step if arm.is_stable else 0.0
 
 
 def with_time_step(scenario: Scenario, time_step: float) -> Scenario:

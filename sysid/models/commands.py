@@ -45,7 +45,13 @@ class Commands:
         return np.array(path)
 
 
-def twin_coordinates(path: Array) -> Array:
-    """Returns the twin's coordinates (n, 6) of positions and rotation vectors."""
-    angles = Rotation.from_rotvec(path[:, 3:]).as_euler("ZYX")
-    return np.hstack([path[:, :3], angles])
+def twin_coordinates(path: Array, p_BoTo_B: Array) -> Array:
+    """Returns the twin's coordinates (n, 6) of positions and rotation vectors (n, 6).
+
+    Args:
+        path: of B in G.
+        p_BoTo_B: (3,) see `BoltCoordinates`.
+    """
+    turn = Rotation.from_rotvec(path[:, 3:])
+    moved = path[:, :3] + turn.apply(p_BoTo_B) - p_BoTo_B
+    return np.hstack([moved, turn.as_euler("ZYX")])

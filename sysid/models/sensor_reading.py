@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import UniformGravityFieldElement
 from scipy.spatial.transform import Rotation
 
-from drake_disasm.cell.lock_dimensions import bolt_inertia
+from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import Tool
 from drake_disasm.devices.sensor_chain import (
     Payload,
@@ -16,7 +16,6 @@ from drake_disasm.devices.sensor_chain import (
 )
 from drake_disasm.effects import SensorEffect
 from drake_disasm.scenario import Scenario
-from drake_disasm.stations.base import nominal_groove_pose
 from sysid.models.base import Array
 
 
@@ -63,11 +62,11 @@ class SensorReading:
     """
 
     def __init__(self, scenario: Scenario, tool: Tool) -> None:
-        bolt = bolt_inertia(scenario.lock)
+        carried = tool.M_gripped_B
         self.X_SB = X_SB = tool.X_SB
         g_W = UniformGravityFieldElement().gravity_vector()
-        # What hangs on the twin's sensor: the bolt alone.
-        self._payload = Payload(bolt.get_mass(), X_SB @ bolt.get_com(), g_W)
+        # What hangs on the twin's sensor: bolt and fingers.
+        self._payload = Payload(carried.get_mass(), X_SB @ carried.get_com(), g_W)
         self._R_WG = nominal_groove_pose(scenario.placement).rotation().matrix()
         self._R_BS = X_SB.inverse().rotation().matrix()
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.spatial import pose_from_vector
 from drake_disasm.effects import MotionEffect
@@ -37,6 +38,7 @@ class Transitions:
         rows: (rows,) its number among all transitions of the episodes.
         commands: of whole episodes, since effects on the motion have a memory.
         period: of the MDP [s].
+        p_BoTo_B: (3,) of the twin's coordinates [m].
     """
 
     steps: Steps
@@ -44,6 +46,7 @@ class Transitions:
     rows: NDArray[np.int64]
     commands: tuple[Commands, ...]
     period: float
+    p_BoTo_B: Array
 
     @classmethod
     def of(
@@ -58,11 +61,13 @@ class Transitions:
             _refuse_other_logs(log, scenario)
         episodes = [episode for log in logs for episode in log.episodes]
         period = scenario.task.period
-        steps = _concatenated([_steps(e, period) for e in episodes])
+        p_BoTo_B = Tool.from_models(scenario).p_BoTo_B
+        twin = BoltCoordinates(p_BoTo_B)
+        steps = _concatenated([_steps(e, period, twin) for e in episodes])
         states = [at_sensor(observations(e)[:-1], sensing.X_SB) for e in episodes]
         commands = tuple(Commands.of(e, period) for e in episodes)
         rows = np.arange(len(steps))
-        return cls(steps, np.concatenate(states), rows, commands, period)
+        return cls(steps, np.concatenate(states), rows, commands, period, p_BoTo_B)
 
     def select(self, mask: NDArray[np.bool_]) -> Self:
         """Returns the transitions where the mask (rows,) is true."""
@@ -77,7 +82,9 @@ class Transitions:
         """Returns the steps as effects, in the chain's order, have them executed."""
         if not effects:
             return self.steps
-        paths = [twin_coordinates(c.executed(effects)) for c in self.commands]
+        paths = [
+            twin_coordinates(c.executed(effects), self.p_BoTo_B) for c in self.commands
+        ]
         qd = np.concatenate([path[:-1] for path in paths])
         moved = np.concatenate([np.diff(path, axis=0) for path in paths])
         return dataclasses.replace(
@@ -149,9 +156,9 @@ def _refuse_other_logs(log: Log, scenario: Scenario) -> None:
         )
 
 
-def _steps(episode: Episode, period: float) -> Steps:
-    measured = _coordinates(episode["X_GB_measured"])
-    commanded = _coordinates(episode["X_GB_commanded"])
+def _steps(episode: Episode, period: float, twin: BoltCoordinates) -> Steps:
+    measured = _coordinates(episode["X_GB_measured"], twin)
+    commanded = _coordinates(episode["X_GB_commanded"], twin)
     rates = np.diff(measured, axis=0) / period
     return Steps(
         np.arange(episode.rows - 1),
@@ -159,12 +166,12 @@ def _steps(episode: Episode, period: float) -> Steps:
         np.vstack([np.zeros((1, 6)), rates[:-1]]),
         commanded[:-1],
         np.diff(commanded, axis=0) / period,
+        observations(episode)[:-1, 6:],
     )
 
 
-def _coordinates(poses: Array) -> Array:
+def _coordinates(poses: Array, twin: BoltCoordinates) -> Array:
     """Returns the twin's coordinates (n, 6) of poses (n, 7)."""
-    twin = BoltCoordinates()
     return np.array([twin.solve(pose_from_vector(p), np.zeros(6)) for p in poses])
 
 

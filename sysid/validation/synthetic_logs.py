@@ -137,7 +137,8 @@ def rollout(
     motion, sensor = motion_chain(real.effects), sensor_chain(real.effects)
     real.effects = [e for e in real.effects if isinstance(e, EnvironmentEffect)]
     replay = ImpactReplay(real, coarse=True)  # as the model of the log has it
-    reading = SensorReading(scenario, Tool.from_models(scenario))
+    tool = Tool.from_models(scenario)
+    reading, p_BoTo_B = SensorReading(scenario, tool), tool.p_BoTo_B
     count, size, _ = commanded.shape
     clean, states = np.zeros((2, count, size, 12))
     states[:, 0, 6:] = noise[:, 0]
@@ -151,7 +152,9 @@ def rollout(
             executed[e, k + 1], memories[e] = through_motion(
                 motion, commanded[e, k + 1], in_G[e, 6:], memories[e], times[0]
             )
-        step = _steps(k, states[:, : k + 1], executed[:, k : k + 2], times[0])
+        step = _steps(
+            k, states[:, : k + 1], executed[:, k : k + 2], in_G, times[0], p_BoTo_B
+        )
         clean[:, k + 1] = at_sensor(replay.transitions(step), reading.X_SB)
         for e in range(count):
             so_far = clean[e, 1 : k + 2]
@@ -162,13 +165,29 @@ def rollout(
     return Rollout(commanded, states, readings)
 
 
-def _steps(k: int, states: Array, executed: Array, period: float) -> Steps:
-    """Returns step k of all episodes; states (E, k + 1, 12), executed (E, 2, 6)."""
-    q = twin_coordinates(states[:, k, :6])
-    before = twin_coordinates(states[:, max(k - 1, 0), :6])
-    begin, end = (twin_coordinates(executed[:, i]) for i in (0, 1))
+def _steps(
+    k: int,
+    states: Array,
+    executed: Array,
+    in_G: Array,
+    period: float,
+    p_BoTo_B: Array,
+) -> Steps:
+    """Returns step k of all episodes.
+
+    Args:
+        states: (E, k + 1, 12).
+        executed: (E, 2, 6) commands at begin and end.
+        in_G: (E, 12) the last of the states, with the wrench at Bo in G.
+        period: of the MDP [s].
+        p_BoTo_B: (3,) of the twin's coordinates [m].
+    """
+    q = twin_coordinates(states[:, k, :6], p_BoTo_B)
+    before = twin_coordinates(states[:, max(k - 1, 0), :6], p_BoTo_B)
+    begin, end = (twin_coordinates(executed[:, i], p_BoTo_B) for i in (0, 1))
     rate = (end - begin) / period
-    return Steps(np.full(len(q), k), q, (q - before) / period, begin, rate)
+    index = np.full(len(q), k)
+    return Steps(index, q, (q - before) / period, begin, rate, in_G[:, 6:])
 
 
 def _columns(scenario: Scenario, path: Array, states: Array) -> dict[str, Array]:

@@ -6,10 +6,10 @@ from pydrake.geometry import Meshcat, QueryObject
 from pydrake.math import RigidTransform
 
 from drake_disasm.cell.coordinates import ArmCoordinates
+from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import Tool
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import Scenario, load_scenario
-from drake_disasm.stations.base import nominal_groove_pose
 from drake_disasm.stations.measured_cell import MeasuredCell
 from drake_disasm.visualization import MeasuredView, MeshcatView, start_meshcat
 from tests.fakes.fault_runs import in_lockstep

@@ -1,0 +1,72 @@
+"""How the bolt yields in the gripper: the fingers' springs, and the pads'.
+
+Springs act in the middle of the pads, T, along and about the axes of the bolt as
+gripped: x along the groove, y out of the plate, z across, along which the fingers
+close.
+"""
+
+import dataclasses
+from typing import Self
+
+import numpy as np
+
+from drake_disasm.cell.tool import Tool
+from drake_disasm.scenario import GripperConfig
+
+#: Joints x, y, z, then yaw, pitch and roll, by number of axis.
+AXIS_ORDER = (0, 1, 2, 5, 4, 3)
+
+#: The simulated pads with rigid fingers behind them, as measured on the cell without
+#: adaptive fingers (docs/physics.md); along z the finger drives are in series.
+_PADS = np.array([270e3, 300e3, np.nan, 430.0, 300.0, 430.0])
+
+
+@dataclasses.dataclass(frozen=True)
+class Springs:
+    """A spring and a damper for each of six axes.
+
+    Attributes:
+        stiffness: (6,) along and about x, y, z [N/m, N m/rad].
+        damping: (6,) likewise [N s/m, N m s/rad].
+    """
+
+    stiffness: np.ndarray
+    damping: np.ndarray
+
+    @classmethod
+    def damped(cls, stiffness: np.ndarray, ratio: float, inertia: np.ndarray) -> Self:
+        """Returns springs with a damping ratio about what each axis moves.
+
+        Args:
+            stiffness: (6,) [N/m, N m/rad].
+            ratio: 1 is critical.
+            inertia: (6,) [kg, kg m^2].
+        """
+        return cls(stiffness, 2.0 * ratio * np.sqrt(stiffness * inertia))
+
+
+def gripped_inertia(tool: Tool) -> np.ndarray:
+    """Returns mass and inertia about T (6,) of fingers and bolt [kg, kg m^2]."""
+    M_T = tool.M_gripped_B.Shift(tool.p_BoTo_B)
+    moments = M_T.CalcRotationalInertia().get_moments()
+    return np.concatenate([np.full(3, M_T.get_mass()), moments])
+
+
+def finger_springs(gripper: GripperConfig, tool: Tool) -> Springs:
+    """Returns the springs of adaptive fingers between palm and pads."""
+    inertia = gripped_inertia(tool)
+    return Springs.damped(np.array(gripper.stiffness), gripper.damping_ratio, inertia)
+
+
+def grip_springs(gripper: GripperConfig, tool: Tool) -> Springs:
+    """Returns the springs between palm and bolt: fingers and pads in series."""
+    inertia = gripped_inertia(tool)
+    pads = _PADS.copy()
+    pads[2] = 2.0 * gripper.finger_stiffness
+    behind_pads = Springs.damped(pads, 1.0, inertia)
+    if gripper.compliance == "rigid":
+        return behind_pads
+    fingers = finger_springs(gripper, tool)
+    stiffness = 1.0 / (1.0 / fingers.stiffness + 1.0 / pads)
+    share = stiffness / fingers.stiffness  # of the motion that is the fingers'
+    return Springs(stiffness, fingers.damping * share**2)

@@ -1,0 +1,52 @@
+"""Scenarios of older versions, in today's words."""
+
+import yaml
+
+from drake_disasm.common import bounded_yaml
+
+_RIGID = ("compliance", "rigid")
+
+
+def upgraded(text: str) -> str:
+    """Returns the text of a scenario in today's words; most is returned as it is.
+
+    A section `twin` is of the time when the twin's springs were written by hand and the
+    gripper was rigid. The springs follow from arm and gripper now, so the section goes,
+    and with it ranges of its numbers; the gripper stays rigid unless it says otherwise.
+    """
+    try:
+        bounded_yaml.check_bounds(text)
+        root = yaml.compose(text)
+    except Exception:  # the reader says what is wrong
+        return text
+    if not isinstance(root, yaml.MappingNode) or not _section(root, "twin"):
+        return text
+    root.value = [(key, value) for key, value in root.value if key.value != "twin"]
+    gripper = _section(root, "gripper")
+    if gripper is None:
+        gripper = yaml.MappingNode("tag:yaml.org,2002:map", [])
+        root.value.append((_word("gripper"), gripper))
+    if isinstance(gripper, yaml.MappingNode) and not _section(gripper, _RIGID[0]):
+        gripper.value.append((_word(_RIGID[0]), _word(_RIGID[1])))
+    ranges = _section(root, "randomisation")
+    if isinstance(ranges, yaml.SequenceNode):
+        ranges.value = [node for node in ranges.value if not _is_of_twin(node)]
+    return str(yaml.serialize(root))
+
+
+def _section(node: yaml.MappingNode, name: str) -> yaml.Node | None:
+    found = [value for key, value in node.value if key.value == name]
+    return found[0] if found else None
+
+
+def _is_of_twin(node: yaml.Node) -> bool:
+    if not isinstance(node, yaml.MappingNode):
+        return False
+    parameter = _section(node, "parameter")
+    return isinstance(parameter, yaml.ScalarNode) and parameter.value.startswith(
+        "twin."
+    )
+
+
+def _word(text: str) -> yaml.ScalarNode:
+    return yaml.ScalarNode("tag:yaml.org,2002:str", text)
