@@ -94,7 +94,7 @@ def _yaml_file(name: str, texts: list[str], read: Any) -> Subject:
 
 
 def _scenario() -> Subject:
-    shipped = ("removal_turned", "removal_randomised", "sliding")
+    shipped = ("removal_turned", "removal_randomised", "chapter3")
     texts = [dump_scenario(load_scenario(name)) for name in shipped]
     paths = [models_dir() / f"scenarios/{name}.yaml" for name in shipped]
     texts += [path.read_text("utf-8") for path in paths]
@@ -141,7 +141,7 @@ def _checkpoint() -> Subject:
     from drake_disasm.learning.hyperparameters import Hyperparameters
     from drake_disasm.learning.training import Training, TrainingSpec
 
-    scenario = load_scenario("sliding", ["task.steps=4"])
+    scenario = load_scenario("chapter3", ["task.steps=4"])
     config = Hyperparameters(hidden=[4], replay=20, batch=4)
     training = Training(TrainingSpec(scenario, "twin", config, 0, compiled=False))
     training.run_episode()

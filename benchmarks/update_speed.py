@@ -69,7 +69,7 @@ def _reference(name: str) -> Callable[[int], None]:
     from drake_disasm.learning.hyperparameters import preset
 
     config = preset(name, "ddpg")
-    env = DisassemblyEnv("sliding")
+    env = DisassemblyEnv("chapter3")
     arguments: dict[str, Any] = {
         "net_arch": list(config.hidden),
         "optimizer_kwargs": {"eps": config.adam_epsilon},

@@ -26,8 +26,8 @@ from drake_disasm.task.simulation import TaskSimulation
 
 _EXAMPLES = """examples:
   python tools/evaluate.py --policy admittance straight --station cell --episodes 10
-  python tools/evaluate.py --policy out/sliding/seed_000/policy.npz \\
-      --scenario sliding --station twin --sweep imprecision=0,0.0001,0.0003,0.0005
+  python tools/evaluate.py --policy out/chapter3/seed_000/policy.npz \\
+      --scenario chapter3 --station twin --sweep imprecision=0,0.0001,0.0003,0.0005
   python tools/evaluate.py --policy removal_randomised admittance \\
       --scenario removal_turned --sweep effects.0.ry=-0.0698,-0.0349,0,0.0349,0.0698
   python tools/evaluate.py --policy admittance --set 'effects=[!SensorBias {fx: 2}]'

@@ -33,16 +33,16 @@ from drake_disasm.scenario import load_scenario
 
 _EXAMPLES = """examples:
   python tools/train.py --out out/first --episodes 30          a first look
-  python tools/train.py --agent ddpg --preset chapter3 --scenario sliding \\
-      --psi 0.0003 --seeds 10 --out out/sliding                the thesis's chapter 3
+  python tools/train.py --agent ddpg --preset chapter3 --scenario chapter3 \\
+      --psi 0.0003 --seeds 10 --out out/chapter3                the thesis's chapter 3
   python tools/train.py --scenario removal_randomised --out out/randomised
   python tools/train.py --agent sac --preset chapter4 --out out/sac \\
       --hyper layer_norm=true 'hidden=[64, 64]'
-  python tools/train.py --from-logs out/sliding/seed_*/log --scenario sliding \\
+  python tools/train.py --from-logs out/chapter3/seed_*/log --scenario chapter3 \\
       --preset chapter3 --out out/offline                      without acting
   python tools/train.py --station cell --start-from out/turned --scenario \\
       removal_turned --hyper demonstrations=0.5 --out out/in_the_cell    twin to cell
-  python tools/train.py ... --out out/sliding --resume         continue after Ctrl-C
+  python tools/train.py ... --out out/chapter3 --resume         continue after Ctrl-C
 """
 
 

@@ -119,10 +119,16 @@ def _effects_in(options: dict[str, Any]) -> list[Effect] | None:
 
 #: Registered ids and the scenario of each.
 IDS = {
-    "drake_disasm/Sliding-v0": "sliding",
     "drake_disasm/Removal-v0": "removal",
     "drake_disasm/RemovalTurned-v0": "removal_turned",
     "drake_disasm/RemovalRandomised-v0": "removal_randomised",
+    "drake_disasm/Chapter3-v0": "chapter3",
+    "drake_disasm/Chapter3Impedance-v0": "chapter3_impedance",
+    "drake_disasm/Chapter4-v0": "chapter4",
+    "drake_disasm/Chapter4Impedance-v0": "chapter4_impedance",
+    "drake_disasm/Chapter5-v0": "chapter5",
+    "drake_disasm/Chapter5Impedance-v0": "chapter5_impedance",
+    "drake_disasm/Sliding-v0": "chapter3",  # its old name
 }
 
 for _name, _scenario in IDS.items():

@@ -25,6 +25,9 @@ from drake_disasm.scenario.schema import Scenario
 from drake_disasm.scenario.strict_yaml import parse
 from drake_disasm.scenario.validity import validate
 
+#: Old names of shipped scenarios.
+RENAMED = {"sliding": "chapter3"}
+
 
 def _shipped_dir() -> Path:
     return models_dir() / "scenarios"
@@ -41,7 +44,8 @@ def scenario_path(name: str) -> Path:
     Raises:
         DisasmError: neither a shipped scenario nor a file.
     """
-    for path in (Path(name), _shipped_dir() / f"{name}.yaml"):
+    shipped = RENAMED.get(name, name)
+    for path in (Path(name), _shipped_dir() / f"{shipped}.yaml"):
         if os.path.isfile(path):  # pathlib's raises on a name that is too long
             return path
     name = clipped(name, 200)

@@ -22,7 +22,7 @@ def _state(x_mm: float = 0, y_mm: float = 0, f: float = 0, t: float = 0) -> Bolt
     return BoltState(p, np.zeros(3), np.array([0, f, 0]), np.array([0, 0, t]))
 
 
-@pytest.fixture(scope="module", params=["sliding", "removal"])
+@pytest.fixture(scope="module", params=["chapter3", "removal"])
 def task(request: pytest.FixtureRequest) -> TaskConfig:
     """Both chapters' tasks."""
     return load_scenario(request.param).task
@@ -96,7 +96,7 @@ def test_the_numbers_of_outcomes_are_those_of_old_files() -> None:
 
 
 def test_reward_is_that_of_equation_3_4() -> None:
-    task = load_scenario("sliding").task
+    task = load_scenario("chapter3").task
     terms = reward_terms(_state(0), _state(3, f=15, t=2.5), task, GEOMETRY)
     assert sum(terms.values()) == pytest.approx(0.6 * 3 - 0.2 * 0.5 - 0.2 * 0.5)
 
@@ -119,7 +119,7 @@ def test_outcome(
 
 
 def test_success_is_travel_or_lift() -> None:
-    sliding, removal = load_scenario("sliding").task, load_scenario("removal").task
+    sliding, removal = load_scenario("chapter3").task, load_scenario("removal").task
     assert outcome(_state(55.1), 5, sliding, GEOMETRY) is Outcome.SUCCESS
     assert outcome(_state(54.9, 8), 5, sliding, GEOMETRY) is Outcome.RUNNING
     assert outcome(_state(60, 6.9), 5, removal, GEOMETRY) is Outcome.RUNNING

@@ -5,7 +5,7 @@ import pytest
 from tests.tools.programs import run_program
 
 LOG = ("--log", "nowhere", "--out", "nowhere")
-STUDY = ("--before", "sliding", "--after", "sliding", "--stand-in", "sliding")
+STUDY = ("--before", "chapter3", "--after", "chapter3", "--stand-in", "chapter3")
 #: Program, the options that it needs, and options of numbers with what is refused.
 PROGRAMS: list[tuple[str, tuple[str, ...], list[str]]] = [
     (

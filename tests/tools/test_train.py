@@ -23,7 +23,7 @@ from tests.tools.programs import ROOT, run_program
 
 #: A training of seconds: short episodes, a small network, nothing compiled.
 SMALL = [
-    "--scenario=sliding", "--set", "task.steps=8", "--preset=chapter3", "--eager",
+    "--scenario=chapter3", "--set", "task.steps=8", "--preset=chapter3", "--eager",
     "--validation=2", "--hyper", "hidden=[8]", "batch=8", "exploration=0.0002",
 ]  # fmt: skip
 
@@ -257,4 +257,4 @@ def test_a_finished_training_resumes_to_nothing(undisturbed: Path) -> None:
 def test_the_small_training_is_what_it_says() -> None:
     """The tests above lean on the preset and the scenario being there."""
     assert preset("chapter3").algorithm == "ddpg"
-    assert load_scenario("sliding").task.success == "travelled"
+    assert load_scenario("chapter3").task.success == "travelled"

@@ -14,7 +14,7 @@ from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.logs.transitions import observations
 from drake_disasm.scenario import load_scenario
 
-SCENARIO = load_scenario("sliding", ["imprecision=0.0002", "task.steps=12"])
+SCENARIO = load_scenario("chapter3", ["imprecision=0.0002", "task.steps=12"])
 
 
 @pytest.mark.parametrize("base", ["", "admittance"])
@@ -44,7 +44,7 @@ def test_a_log_teaches_what_was_lived_through(base: str, tmp_path: Path) -> None
 
 def _header() -> LogHeader:
     return LogHeader(
-        kind="transitions", task="sliding", provenance={}, period=0.1, joints=()
+        kind="transitions", task="chapter3", provenance={}, period=0.1, joints=()
     )
 
 

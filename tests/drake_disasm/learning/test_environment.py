@@ -45,7 +45,7 @@ def test_every_id_makes_its_scenario(name: str) -> None:
 
 
 def test_stable_baselines3_trains_on_it_as_it_stands() -> None:
-    env = gymnasium.make("drake_disasm/Sliding-v0")
+    env = gymnasium.make("drake_disasm/Chapter3-v0")
     agent = DDPG("MlpPolicy", env, learning_starts=0, batch_size=8, device="cpu")
     agent.learn(12)
     action, _ = agent.predict(env.reset(seed=0)[0], deterministic=True)
@@ -65,7 +65,7 @@ def test_a_jam_terminates_and_a_time_limit_truncates(env: DisassemblyEnv) -> Non
 
 
 def test_success_terminates() -> None:
-    env = DisassemblyEnv(load_scenario("sliding", ["task.travel_success=0.003"]))
+    env = DisassemblyEnv(load_scenario("chapter3", ["task.travel_success=0.003"]))
     env.reset(seed=1)
     terminated, truncated, info, _ = _push(env)
     assert (terminated, truncated, info["is_success"]) == (True, False, True)

@@ -21,7 +21,7 @@ from drake_disasm.scenario import load_scenario
 
 @pytest.fixture
 def experiment() -> Experiment:
-    return Experiment(load_scenario("sliding"), "twin", "best", preset("best"))
+    return Experiment(load_scenario("chapter3"), "twin", "best", preset("best"))
 
 
 def _begin_as_of_old(experiment: Experiment, folder: Path) -> None:

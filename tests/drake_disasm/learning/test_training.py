@@ -20,7 +20,7 @@ from drake_disasm.learning.training import Training, TrainingSpec, action_map
 from drake_disasm.policies import Admittance
 from drake_disasm.scenario import load_scenario
 
-SCENARIO = load_scenario("sliding", ["imprecision=0.0003", "task.steps=6"])
+SCENARIO = load_scenario("chapter3", ["imprecision=0.0003", "task.steps=6"])
 
 
 def _training(

@@ -22,7 +22,7 @@ _UPDATES = 6
 
 @pytest.fixture(scope="module")
 def env() -> DisassemblyEnv:
-    return DisassemblyEnv("sliding")
+    return DisassemblyEnv("chapter3")
 
 
 def _batches(count: int, size: int = 20) -> Iterator[np.ndarray]:

@@ -124,7 +124,7 @@ def test_whoever_asks_clips(make_network: MakeNetwork) -> None:
 
 def test_policy_runs_in_the_diagram(policy: LearnedPolicy) -> None:
     """On the twin: its correction of `straight` is too small to spoil the slide."""
-    scenario = load_scenario("sliding")
+    scenario = load_scenario("chapter3")
     policy.check_fits(scenario)
     summary = run_episode(TaskSimulation(scenario, "twin", policy), seed=1)
     assert summary.outcome is not Outcome.RUNNING
@@ -141,7 +141,7 @@ from drake_disasm.policies import load_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
 simulation = TaskSimulation(
-    load_scenario("sliding"), "twin", load_policy(Path(sys.argv[1]))
+    load_scenario("chapter3"), "twin", load_policy(Path(sys.argv[1]))
 )
 simulation.reset(0)
 simulation.step()

@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.resources import models_dir
 from drake_disasm.effects import GrooveFriction, GroovePose
+from drake_disasm.mdp import action_bounds
 from drake_disasm.scenario import (
     Scenario,
     dump_scenario,
@@ -19,8 +21,30 @@ from drake_disasm.stations import CellStation
 SHIPPED = sorted(path.stem for path in (models_dir() / "scenarios").glob("*.yaml"))
 
 
-def test_the_three_of_the_issue_are_shipped() -> None:
-    assert {"sliding", "removal", "removal_turned"} <= set(SHIPPED)
+CHAPTERS = ("chapter3", "chapter4", "chapter5")
+
+
+def test_our_tasks_and_the_chapters_are_shipped() -> None:
+    ours = {"removal", "removal_turned", "removal_randomised"}
+    impedance = {f"{name}_impedance" for name in CHAPTERS}
+    assert {*ours, *CHAPTERS, *impedance} == set(SHIPPED)
+
+
+@pytest.mark.parametrize("name", CHAPTERS)
+def test_variants_of_a_chapter_have_its_task(name: str) -> None:
+    chapter, impedance = load_scenario(name), load_scenario(f"{name}_impedance")
+    assert impedance.task == chapter.task
+    assert (chapter.arm.control, impedance.arm.control) == (
+        "position",
+        "cartesian_impedance",
+    )
+
+
+def test_old_names_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert load_scenario("sliding") == load_scenario("chapter3")
+    monkeypatch.chdir(tmp_path)
+    Path("sliding").write_text("name: mine")
+    assert load_scenario("sliding").name == "mine"
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -32,8 +56,10 @@ def test_round_trips(name: str, tmp_path: Path) -> None:
 
 
 def test_chapters_differ_as_the_thesis_says() -> None:
-    sliding, removal = load_scenario("sliding").task, load_scenario("removal").task
+    sliding, removal = (load_scenario(name).task for name in CHAPTERS[:2])
     assert (sliding.success, removal.success) == ("travelled", "removed")
+    for task in (sliding, removal):
+        assert action_bounds(task) == pytest.approx([0.003] * 3 + [np.pi / 180] * 3)
     ours = sliding.reward
     assert [ours.w_dis, ours.w_f, ours.w_t, ours.w_y] == [0.6, 0.2, 0.2, 0.0]
     assert [ours.f_max, ours.t_max, sliding.steps] == [30.0, 5.0, 100]

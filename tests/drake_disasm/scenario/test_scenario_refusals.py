@@ -227,7 +227,7 @@ IMPOSSIBLE = {
 @pytest.mark.parametrize("override", IMPOSSIBLE)
 def test_what_cannot_be_is_refused(override: str) -> None:
     with pytest.raises(DisasmError, match=IMPOSSIBLE[override]) as caught:
-        load_scenario("sliding", [override])
+        load_scenario("chapter3", [override])
     assert override in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -264,7 +264,7 @@ def test_later_overrides_win() -> None:
 
 
 def test_override_leaves_the_rest_of_its_section() -> None:
-    scenario = load_scenario("sliding", ["task.reward.w_f=0.25"])
+    scenario = load_scenario("chapter3", ["task.reward.w_f=0.25"])
     assert scenario.task.reward.w_f == 0.25
     assert scenario.task.reward.w_dis == 0.6
     assert scenario.task.success == "travelled"

@@ -141,7 +141,7 @@ def test_recorder_has_minaris_layout() -> None:
 
 def test_summary_table_has_a_row_per_episode() -> None:
     simulation = TaskSimulation(
-        load_scenario("sliding"), "twin", make_policy("straight")
+        load_scenario("chapter3"), "twin", make_policy("straight")
     )
     summaries = [run_episode(simulation, seed) for seed in range(2)]
     lines = summary_table(summaries).splitlines()
