@@ -16,9 +16,10 @@ from pydrake.multibody.inverse_kinematics import (
     InverseKinematics,
 )
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable
+from pydrake.multibody.tree import Frame
 from pydrake.solvers import Solve
 
+from drake_disasm.cell.arm_dynamics import add_frames, bolt_jacobian
 from drake_disasm.cell.parsing import add_arm
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.spatial import rotation_vector
@@ -82,9 +83,8 @@ class ArmCoordinates(Coordinates):
     def __init__(
         self, arm: ArmConfig, X_WG: RigidTransform, X_FB: RigidTransform, period: float
     ) -> None:
-        self._X_GW = X_WG.inverse()
         self._X_WG = X_WG
-        self._plant, self._frame_B = _arm_alone(arm, X_FB)
+        self._plant, self._frame_B, self._frame_G = _arm_alone(arm, X_FB, X_WG)
         self._context = self._plant.CreateDefaultContext()
         self._posture = np.array(arm.posture)
         self._parameters = self._differential_ik_parameters(period)
@@ -93,7 +93,7 @@ class ArmCoordinates(Coordinates):
     def pose(self, coordinates: np.ndarray) -> RigidTransform:
         """See Coordinates."""
         self._plant.SetPositions(self._context, coordinates)
-        return self._X_GW @ self._frame_B.CalcPoseInWorld(self._context)
+        return self._frame_B.CalcPose(self._context, self._frame_G)
 
     def solve(self, X_GB: RigidTransform, near: np.ndarray) -> np.ndarray:
         """See Coordinates.
@@ -158,21 +158,8 @@ class ArmCoordinates(Coordinates):
         K = (J diag(k)^-1 J^T)^-1, the joints being springs in series.
         """
         self._plant.SetPositions(self._context, q)
-        J = self._jacobian_G()
+        J = bolt_jacobian(self._plant, self._context, self._frame_B, self._frame_G)
         return np.linalg.inv(J @ np.diag(1.0 / joint_stiffness) @ J.T)
-
-    def _jacobian_G(self) -> np.ndarray:
-        world = self._plant.world_frame()
-        J = self._plant.CalcJacobianSpatialVelocity(
-            self._context,
-            JacobianWrtVariable.kV,
-            self._frame_B,
-            np.zeros(3),
-            world,
-            world,
-        )
-        R_GW = self._X_GW.rotation().matrix()
-        return np.vstack([R_GW @ J[3:], R_GW @ J[:3]])
 
     def _differential_ik_parameters(
         self, period: float
@@ -193,10 +180,11 @@ class ArmCoordinates(Coordinates):
 
 
 def _arm_alone(
-    arm: ArmConfig, X_FB: RigidTransform
-) -> tuple[MultibodyPlant, FixedOffsetFrame]:
+    arm: ArmConfig, X_FB: RigidTransform, X_WG: RigidTransform
+) -> tuple[MultibodyPlant, Frame, Frame]:
+    """Returns a plant with the arm, and its frames B and Gn."""
     plant = MultibodyPlant(0.0)
     _, flange = add_arm(plant, arm.model)
-    frame_B = plant.AddFrame(FixedOffsetFrame("bolt", flange, X_FB))
+    frames = add_frames(plant, flange, X_FB, X_WG)
     plant.Finalize()
-    return plant, frame_B
+    return plant, *frames

@@ -20,9 +20,10 @@ from pydrake.systems.primitives import (
     StateInterpolatorWithDiscreteDerivative,
 )
 
+from drake_disasm.cell.arm_control import joint_gains
+from drake_disasm.cell.arm_dynamics import ArmDynamics
 from drake_disasm.cell.grip import AXIS_ORDER, finger_springs
 from drake_disasm.cell.lock_dimensions import bolt_inertia
-from drake_disasm.cell.parsing import add_arm
 from drake_disasm.cell.tool import FINGERS
 from drake_disasm.effects import ArmEffect
 from drake_disasm.ports import CELL_PORTS
@@ -33,8 +34,8 @@ from drake_disasm.stations.cell_models import add_adaptive_fingers, add_cell
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.stations.wiring import export_ready_device, export_required
+from drake_disasm.systems.cartesian_impedance import CartesianImpedance
 
-_ARM_INERTIA = 4.0  # kg m^2, of a joint with its rotor, for the damping ratio
 _PAD_INDENTATION = 3e-5  # m, of a pad (20 MPa, 7.5 mm thick) under some 60 N
 _FINGER_MASS = 0.3  # kg, of a finger with its drive, for its damping
 
@@ -42,11 +43,12 @@ _FINGER_MASS = 0.3  # kg, of a finger with its drive, for its damping
 class CellStation(SimulatedStation):
     """KUKA iiwa 14, OnRobot HEX-E and Robotiq 2F-140 at the door-chain lock.
 
-    Position control is a spring and damper in each joint about the commanded
-    angle, which the discrete solver takes implicitly, plus gravity compensation
-    by Drake's InverseDynamics with the tool's data: what KUKA's position mode
-    feels like from outside, its stiffness being that of the drives. The fingers
-    are position-controlled likewise.
+    Position and joint impedance control are a spring and damper in each joint about
+    the commanded angle, which the discrete solver takes implicitly, Cartesian
+    impedance control one at the bolt (CartesianImpedance); plus gravity compensation
+    by Drake's InverseDynamics with the tool's data. That is what KUKA's modes feel
+    like from outside, the stiffness of position mode being that of the drives. The
+    fingers are position-controlled likewise.
 
     @system
     name: CellStation
@@ -86,6 +88,7 @@ class CellStation(SimulatedStation):
         refuse_twins_contact(scenario)
         self.grip_command = _grip_command(scenario)
         self.tool = self._set_cell_geometry()
+        self._dynamics = ArmDynamics(scenario.arm, self.tool, self.X_WG)
         builder = DiagramBuilder()
         self._build(builder)
 
@@ -113,10 +116,12 @@ class CellStation(SimulatedStation):
         self._finish(builder)
 
     def _set_gains(self) -> None:
-        plant, arm, gripper = self.plant, self.scenario.arm, self.scenario.gripper
+        plant, gripper = self.plant, self.scenario.gripper
+        self._dynamics.set_positions(self.start)
+        inertia = np.diag(self._dynamics.mass_matrix())
+        k_arm, d_arm = joint_gains(self.scenario.arm, inertia)
         joints = plant.GetJointActuatorIndices(self.iiwa)
-        for index, k in zip(joints, arm.stiffness, strict=True):
-            d = 2.0 * arm.damping_ratio * np.sqrt(k * _ARM_INERTIA)
+        for index, k, d in zip(joints, k_arm, d_arm, strict=True):
             _set_spring(plant, index, k, d)
         for index in plant.GetJointActuatorIndices(self.tool_models.gripper):
             k = gripper.finger_stiffness
@@ -138,10 +143,7 @@ class CellStation(SimulatedStation):
             ),
         )
         connect(command.get_output_port(), desired.get_input_port())
-        connect(
-            desired.get_output_port(), plant.get_desired_state_input_port(self.iiwa)
-        )
-        self._add_gravity_compensation(builder)
+        self._wire_torques(builder, desired.get_output_port())
         state = builder.AddNamedSystem("iiwa_state", Demultiplexer([7, 7]))
         connect(plant.get_state_output_port(self.iiwa), state.get_input_port())
         torque = plant.get_net_actuation_output_port(self.iiwa)
@@ -158,25 +160,34 @@ class CellStation(SimulatedStation):
             builder.ExportOutput(port, f"iiwa.{quantity}")
         export_ready_device(builder, "iiwa", self.time_step)
 
-    def _add_gravity_compensation(self, builder: DiagramBuilder) -> None:
-        """Adds what the controller's own model of arm and tool says of gravity."""
-        plant = MultibodyPlant(0.0)
-        _, flange = add_arm(plant, self.scenario.arm.model)
-        load = plant.AddRigidBody("tool", plant.AddModelInstance("tool"), self.tool.M_F)
-        plant.WeldFrames(flange, load.body_frame())
-        plant.Finalize()
-        self._controller_plant = plant
-        compensation = builder.AddNamedSystem(
+    def _wire_torques(self, builder: DiagramBuilder, desired: OutputPort) -> None:
+        """Adds the controller: springs about a desired state (14,), and gravity's part.
+
+        Springs in the joints are the plant's own; gravity compensation is by the
+        controller's own model of arm and tool.
+        """
+        plant, iiwa, connect = self.plant, self.iiwa, builder.Connect
+        state = plant.get_state_output_port(iiwa)
+        weight = builder.AddNamedSystem(
             "iiwa_gravity_compensation",
-            InverseDynamics(plant, InverseDynamics.kGravityCompensation),
+            InverseDynamics(self._dynamics.plant, InverseDynamics.kGravityCompensation),
         )
-        builder.Connect(
-            self.plant.get_state_output_port(self.iiwa), compensation.get_input_port(0)
+        connect(state, weight.get_input_port(0))
+        actuation = plant.get_actuation_input_port(iiwa)
+        if self.scenario.arm.control != "cartesian_impedance":
+            connect(desired, plant.get_desired_state_input_port(iiwa))
+            connect(weight.get_output_port(), actuation)
+            return
+        spring = builder.AddNamedSystem(
+            "iiwa_cartesian_impedance",
+            CartesianImpedance(self.scenario.arm, self._dynamics, self.start),
         )
-        builder.Connect(
-            compensation.get_output_port(),
-            self.plant.get_actuation_input_port(self.iiwa),
-        )
+        connect(state, spring.GetInputPort("state"))
+        connect(desired, spring.GetInputPort("desired_state"))
+        torque = builder.AddNamedSystem("iiwa_torque", Adder(2, 7))
+        connect(weight.get_output_port(), torque.get_input_port(0))
+        connect(spring.get_output_port(), torque.get_input_port(1))
+        connect(torque.get_output_port(), actuation)
 
     def _external_torque(self, builder: DiagramBuilder) -> OutputPort:
         """Returns the port of what pushes on the arm, the bolt being part of its tool.
@@ -187,7 +198,7 @@ class CellStation(SimulatedStation):
         contact = self.plant.get_generalized_contact_forces_output_port(self.iiwa)
         if self.scenario.gripper.hold == "weld":
             return contact
-        X_FB, plant = self.tool.X_FB, self._controller_plant
+        X_FB, plant = self.tool.X_FB, self._dynamics.plant
         context = plant.CreateDefaultContext()
         for i in range(1, plant.num_bodies()):  # 0 is the world
             body = plant.get_body(BodyIndex(i))

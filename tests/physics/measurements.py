@@ -12,6 +12,8 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 
+from drake_disasm.cell.arm_control import joint_gains
+from drake_disasm.cell.coordinates import ArmCoordinates
 from drake_disasm.common.spatial import rotation_from_vector, rotation_vector
 from drake_disasm.effects import GroovePose
 from drake_disasm.mdp import Outcome
@@ -168,21 +170,31 @@ def _vector(X: RigidTransform) -> np.ndarray:
     return np.concatenate([X.translation(), rotation_vector(X.rotation())])
 
 
-def stiffness(station: CellStation, loads: Sequence[float]) -> np.ndarray:
-    """Returns load over displacement along each axis, (6, 2): bolt, measured pose."""
-    rest = pushed(station, np.zeros(6), 0.6)
+def stiffness(
+    station: CellStation, loads: Sequence[float], duration: float = 0.6
+) -> np.ndarray:
+    """Returns load over displacement along each axis, (6, 2): bolt, measured pose.
+
+    Args:
+        station: the cell.
+        loads: (6,) one at a time [N, N m].
+        duration: of each; an arm that yields takes its time [s].
+    """
+    rest = pushed(station, np.zeros(6), duration)
     table = np.zeros((6, 2))
     for axis, load in enumerate(loads):
-        moved = pushed(station, load * np.eye(6)[axis], 0.6)
+        moved = pushed(station, load * np.eye(6)[axis], duration)
         table[axis] = [load / (moved[i] - rest[i])[axis] for i in range(2)]
     return table
 
 
 def stated_stiffness(station: CellStation) -> np.ndarray:
-    """Returns the stiffness per axis (6,) that the joints' springs amount to."""
-    K = station.coordinates.stiffness(  # type: ignore[attr-defined]
-        np.array(station.scenario.arm.stiffness), station.start
-    )
+    """Returns the stiffness per axis (6,) that the arm's controller states."""
+    arm, coordinates = station.scenario.arm, station.coordinates
+    if arm.control == "cartesian_impedance":
+        return np.array(arm.cartesian_impedance.stiffness)
+    assert isinstance(coordinates, ArmCoordinates)
+    K = coordinates.stiffness(joint_gains(arm, np.zeros(7))[0], station.start)
     return 1.0 / np.diag(np.linalg.inv(K))
 
 

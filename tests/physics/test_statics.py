@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from pydrake.math import RotationMatrix
 
-from drake_disasm.scenario import load_scenario
+from drake_disasm.scenario import CONTROLS, load_scenario
 from drake_disasm.stations import CellStation
 from tests.physics.measurements import AWAY, QUIET, pushed, stated_stiffness, stiffness
 
 RESOLUTION = np.array([0.2, 0.2, 0.8, 0.010, 0.010, 0.002])  # HEX-E, noise-free
 G = 9.81
+#: Within which a push has come to rest [s], by the arm's control.
+SETTLES = {"position": 0.6, "joint_impedance": 1.2, "cartesian_impedance": 2.4}
 #: Joint angles with the tool upright, level, upside down, and askew in the air.
 POSTURES = [
     [0.0, 0.5, 0.0, -1.2, 0.0, 1.44, 0.0],
@@ -78,13 +80,54 @@ def test_cartesian_stiffness_is_the_stated_one(cell: CellStation) -> None:
     np.testing.assert_allclose(table[:5, 0], twin[:5], rtol=0.05)
 
 
+@pytest.mark.parametrize("control", SETTLES)
+def test_arm_is_as_stiff_as_its_control_states(control: str) -> None:
+    """At the measured pose, each axis by itself, within 2 %."""
+    overrides = [QUIET, f"arm.control={control}", "gripper.hold=weld"]
+    station = CellStation(load_scenario("removal", overrides))
+    table = stiffness(station, [5.0, 5.0, 5.0, 0.1, 0.1, 0.1], SETTLES[control])
+    np.testing.assert_allclose(table[:, 1], stated_stiffness(station), rtol=0.02)
+
+
 def test_grip_creeps_less_than_stated(cell: CellStation) -> None:
     """Regularised friction creeps: 1 N along x moves the neck 0.12 mm in 10 s."""
     early, late = (pushed(cell, [1, 0, 0, 0, 0, 0], t)[0][0] for t in (1.0, 4.0))
     assert 0.0 < (late - early) / 3.0 < 1e-5  # m/s
 
 
-def test_resting_arm_does_not_sag(cell: CellStation) -> None:
+@pytest.mark.parametrize("control", CONTROLS)
+def test_resting_arm_does_not_sag(control: str) -> None:
+    cell = CellStation(load_scenario("removal", [QUIET, f"arm.control={control}"]))
     context = cell.settled([])
     measured = cell.GetOutputPort("iiwa.position_measured").Eval(context)
     assert np.abs(measured - cell.start).max() < 1e-6
+
+
+@pytest.mark.parametrize("ratio", [0.1, 1.0])
+def test_stiffest_cartesian_impedance_comes_to_rest(ratio: float) -> None:
+    """The torques are explicit in time: at KUKA's bounds nothing rings up."""
+    overrides = ["control=cartesian_impedance"] + [
+        f"cartesian_impedance.{word}"
+        for word in (
+            "stiffness=[5000, 5000, 5000, 300, 300, 300]",
+            f"damping_ratio={ratio}",
+            "nullspace_stiffness=1000",
+        )
+    ]
+    station = CellStation(
+        load_scenario(
+            "removal", ["gripper.hold=weld"] + [f"arm.{o}" for o in overrides]
+        )
+    )
+    simulator = station.at_start([AWAY])
+    context = simulator.get_mutable_context()
+    plant_context = station.part_context(station.plant, context)
+    pushed_off = np.array([1, -1, 1, -1, 1, -1, 1]) * 0.05  # rad/s
+    station.plant.SetVelocities(plant_context, station.iiwa, pushed_off)
+    simulator.Initialize()
+    speeds = []
+    for time in (0.5, 1.5, 3.0):
+        simulator.AdvanceTo(time)
+        v = station.GetOutputPort("iiwa.velocity_estimated").Eval(context)
+        speeds.append(np.abs(v).max())
+    assert speeds[0] < 0.05 and speeds[2] < 0.2 * speeds[0], speeds
