@@ -2,10 +2,6 @@
 
 What the encoders don't see, by how much the grip gives, is known from the measured
 wrench: a step begins where pose and wrench agree with what was measured.
-
-Of a step of 100 ms only the end is compared, so only its last part needs
-fine time steps: `TwinReplay` can simulate the rest with coarse ones, in half the time
-(docs/identification.md has the figures).
 """
 
 import dataclasses
@@ -17,7 +13,6 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.spatial import (
     pose_from_vector,
     rotation_vector,
@@ -29,10 +24,7 @@ from drake_disasm.effects import BoltMotion
 from drake_disasm.impact import ImpactConditions
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations import TwinStation
-from drake_disasm.stations.arm_node import ArmStep
 from drake_disasm.task.diagram import add_motion, add_observation
-
-_COARSE = 0.02  # s, what validity allows at most
 
 
 @dataclasses.dataclass(frozen=True)
@@ -96,23 +88,16 @@ class TwinReplay:
     (`BoltCoordinates`).
 
     Args:
-        scenario: what the twin is; its `simulation.twin_time_step` is the fine one.
-        coarse: whether all but the end of a step may be simulated in coarse steps.
+        scenario: what the twin is.
     """
 
-    def __init__(self, scenario: Scenario, coarse: bool = False) -> None:
-        self._build(scenario, coarse)
+    def __init__(self, scenario: Scenario) -> None:
+        self._build(scenario)
 
-    def _build(self, scenario: Scenario, coarse: bool) -> None:
-        self._fine = ReplayDiagram(scenario)
-        self._fine.zero()
-        self._coarse: ReplayDiagram | None = None
+    def _build(self, scenario: Scenario) -> None:
+        self._diagram = ReplayDiagram(scenario)
+        self._diagram.zero()
         self._period = scenario.task.period
-        self._switch = 0.0
-        time_step = coarse_step(scenario) if coarse else 0.0
-        if time_step:
-            self._coarse = ReplayDiagram(with_time_step(scenario, time_step))
-            self._switch = self._period - time_step
 
     def reconfigure(self, scenario: Scenario) -> None:
         """Takes a scenario's parameters, in place where the station can.
@@ -120,18 +105,16 @@ class TwinReplay:
         Raises:
             DisasmError: the scenario is out of bounds.
         """
-        if not self._fine.can_reconfigure(scenario):
-            self._build(scenario, self._coarse is not None)
+        if not self._diagram.can_reconfigure(scenario):
+            self._build(scenario)
             return
-        self._fine.reconfigure(scenario)
-        self._fine.zero()
-        if self._coarse:
-            self._coarse.reconfigure(with_time_step(scenario, self._coarse.time_step))
+        self._diagram.reconfigure(scenario)
+        self._diagram.zero()
 
     @property
     def reading_at_zeroing(self) -> np.ndarray:
         """What the sensor read (6,) when it was zeroed, [f; tau] in S."""
-        return self._fine.reading_at_zeroing
+        return self._diagram.reading_at_zeroing
 
     def transitions(self, steps: Steps) -> np.ndarray:
         """Returns the states (n, 12) after independent steps, each from its own start.
@@ -176,7 +159,7 @@ class TwinReplay:
             wrench: (6,) measured on the bolt, at Bo in Gn.
         """
         self._step = step
-        q_bolt = q + self._fine.station.deflection(wrench)
+        q_bolt = q + self._diagram.station.deflection(wrench)
         self._state: TwinState | None = TwinState(q, v, qd, q_bolt, v)
 
     def advance(self, qd_rate: np.ndarray) -> np.ndarray:
@@ -190,22 +173,14 @@ class TwinReplay:
         """
         begin, end = (boundary(self._step + i, self._period) for i in (0, 1))
         self._step += 1
-        state = self._state or self._fine.state()
-        motion = self._fine.motion(state.q_bolt, qd_rate)
-        if self._coarse:
-            switch = begin + self._switch
-            self._coarse.update_local_effects(motion)
-            self._coarse.start(begin, state)
-            self._coarse.advance(qd_rate, switch)
-            self._fine.update_local_effects(motion)
-            self._fine.start(switch, self._coarse.state())
-        else:
-            self._fine.update_local_effects(motion)
-            if self._state:
-                self._fine.start(begin, state)
+        state = self._state or self._diagram.state()
+        motion = self._diagram.motion(state.q_bolt, qd_rate)
+        self._diagram.update_local_effects(motion)
+        if self._state:
+            self._diagram.start(begin, state)
         self._state = None
-        self._fine.advance(qd_rate, end)
-        return self._fine.observation()
+        self._diagram.advance(qd_rate, end)
+        return self._diagram.observation()
 
 
 class ReplayDiagram:
@@ -358,24 +333,6 @@ def _with_rotation_vector(observation: np.ndarray, X_GB: RigidTransform) -> np.n
     """Returns a state (12,) whose rotation is a vector, whatever the variant."""
     turn = rotation_vector(X_GB.rotation())
     return np.concatenate([observation[:3], turn, observation[6:]])
-
-
-def coarse_step(scenario: Scenario) -> float:
-    """Returns a step [s] of about 20 ms that divides the period; 0 if none will do."""
-    period, fine = scenario.task.period, scenario.simulation.twin_time_step
-    step = period / np.ceil(period / _COARSE - 1e-9)
-    whole = step / fine
-    if whole < 1.5 or abs(whole - round(whole)) > 1e-6:
-        return 0.0
-    parameters = twin_of(scenario)
-    arm = ArmStep.of(parameters.arm, parameters.grip, step)
-    return step if arm.is_stable else 0.0
-
-
-def with_time_step(scenario: Scenario, time_step: float) -> Scenario:
-    """Returns the scenario with another time step of the twin [s]."""
-    simulation = dataclasses.replace(scenario.simulation, twin_time_step=time_step)
-    return dataclasses.replace(scenario, simulation=simulation)
 
 
 def noise_free(scenario: Scenario) -> Scenario:

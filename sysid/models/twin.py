@@ -65,8 +65,8 @@ class TwinModel(ScenarioModel):
             scenario: of the twin, at the parameters' nominal values.
             parameters: paths in that scenario.
             rollout: whether episodes are simulated whole.
-            coarse: whether a transition may begin in coarse time steps
-                (`TwinReplay`).
+            coarse: whether a transition with IMPACT contact may begin in coarse time
+                steps (`ImpactReplay`).
 
         Raises:
             DisasmError: a log is of another kind or period.
@@ -203,10 +203,9 @@ class TwinModel(ScenarioModel):
         return self._replay
 
     def _new_replay(self, scenario: Scenario) -> TwinReplay | ImpactReplay:
-        if self.rollout:
+        if self.rollout or not self._has_impact:
             return TwinReplay(scenario)
-        kind = ImpactReplay if self._has_impact else TwinReplay
-        return kind(scenario, self.coarse)
+        return ImpactReplay(scenario, self.coarse)
 
     @property
     def _has_impact(self) -> bool:

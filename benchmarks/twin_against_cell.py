@@ -1,0 +1,90 @@
+"""How well the twin predicts the cell's transitions, with nothing hidden and no fit.
+
+    python benchmarks/twin_against_cell.py --scenario removal --steps 800
+
+The cell is recorded under `admittance` with exploration. Each of its steps is then
+predicted by the twin that follows from the same scenario, from the measured state. The
+residuals are in units of the sensor's noise: 1 is not possible, since the wrench at a
+step's beginning is as noisy as that at its end; 1.4 is all that can be had.
+"""
+
+import argparse
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from drake_disasm.common.program import run
+from drake_disasm.logs import read_log
+from drake_disasm.policies import Exploring, make_policy
+from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.task.recording import record_transitions
+from drake_disasm.task.simulation import TaskSimulation
+from sysid.models.twin import TwinModel
+from sysid.parameters import nominal_values
+
+_EXPLORATION = 1.5e-4  # m
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Records, predicts and prints the table."""
+    options = _parser().parse_args(arguments)
+    print("scenario | quantile | " + " ".join(f"{name:>6}" for name in _CHANNELS))
+    for name in options.scenario:
+        scenario = load_scenario(name, options.set)
+        folder = options.log / name if options.log else None
+        residual = residuals(scenario, options.steps, folder, options.station)
+        for label, row in _rows(residual):
+            numbers = " ".join(f"{value:6.2f}" for value in row)
+            print(f"{name} | {label} | {numbers}", flush=True)
+    return 0
+
+
+_CHANNELS = ("x", "y", "z", "u", "v", "w", "fx", "fy", "fz", "tx", "ty", "tz")
+
+
+def residuals(
+    scenario: Scenario, steps: int, folder: Path | None = None, station: str = "cell"
+) -> np.ndarray:
+    """Returns residuals (n, 12) in units of the noise, wrench at the sensor.
+
+    Args:
+        scenario: of cell and twin.
+        steps: to record, at least.
+        folder: keeps the log, or has it already; None: a temporary one.
+        station: that is recorded.
+    """
+    with tempfile.TemporaryDirectory() as temporary:
+        log = folder or Path(temporary) / "log"
+        if not log.exists():
+            policy = Exploring(make_policy("admittance"), _EXPLORATION, 0)
+            simulation = TaskSimulation(scenario, station, policy)
+            record_transitions(log, simulation, steps)
+        model = TwinModel([read_log(log)], scenario, ())
+    measured = model.measurements
+    predicted = model.predict(nominal_values(()), slice(0, measured.rows))
+    return np.asarray((predicted - measured.values) / measured.noise)
+
+
+def _rows(residual: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    size = np.abs(residual)
+    return [
+        ("rms", np.sqrt(np.mean(residual**2, axis=0))),
+        ("median / 0.67", np.median(size, axis=0) / 0.6745),
+        ("95 % / 1.96", np.quantile(size, 0.95, axis=0) / 1.96),
+    ]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--scenario", nargs="+", default=["removal"])
+    parser.add_argument("--set", nargs="*", default=[], metavar="KEY=VALUE")
+    parser.add_argument("--steps", type=int, default=800, help="to record, at least")
+    parser.add_argument("--station", default="cell", choices=("cell", "twin"))
+    parser.add_argument("--log", type=Path, help="folder that keeps the logs")
+    return parser
+
+
+if __name__ == "__main__":
+    run(main)
