@@ -10,6 +10,10 @@ The reward is the thesis's where the bolt goes on and up. Where it goes elsewher
 closes two holes, each worth more than the task itself: progress counts up to the
 groove's end only (or a bolt just below the height of success flies on along x), and
 what rising has paid, falling takes back (or it moves up and down until time is up).
+
+All of it is about where the bolt is. A gripper that yields lets the arm go on without
+it: pulled up by 4 N, a bolt under the lips would look removed. So the bolt's place is
+the measured one plus what the measured wrench makes it yield (`TaskGeometry.place`).
 """
 
 import dataclasses
@@ -18,6 +22,7 @@ from typing import Self
 
 import numpy as np
 
+from drake_disasm.cell.grip import bolt_compliance
 from drake_disasm.scenario import Scenario, TaskConfig
 
 _MM = 1000.0  # the reward speaks millimetres, because the thesis does
@@ -33,7 +38,7 @@ class BoltState:
 
     Attributes:
         p: (3,) displacement of Bo since the start of the episode, as the arm's
-            encoders have it [m].
+            encoders have it: in a grip that yields the bolt is elsewhere [m].
         r: (3,) rotation vector of B since then [rad].
         f, t: (3,) force and torque of the environment on the bolt at Bo [N, N m].
     """
@@ -94,19 +99,27 @@ class TaskGeometry:
         groove_end: way along x at which the groove ends [m].
         low, high: (3,) of the workspace: the displacement of the bolt from the start,
             in G, beyond which an episode has failed [m].
+        compliance: (3, 6) displacement of Bo in the grip by the wrench [f; tau] on
+            the bolt at Bo, in G [m/N, m/(N m)].
     """
 
     lift_needed: float
     groove_end: float
     low: np.ndarray
     high: np.ndarray
+    compliance: np.ndarray
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
         """Returns the geometry of a scenario, without its effects."""
         lift = scenario.lock.lift_needed(scenario.task.lift_success)
         end, room = scenario.lock.end, np.array(scenario.task.room)
-        return cls(lift, end, -room, np.array([end, lift, 0.0]) + room)
+        high = np.array([end, lift, 0.0]) + room
+        return cls(lift, end, -room, high, bolt_compliance(scenario)[:3])
+
+    def place(self, state: BoltState) -> np.ndarray:
+        """Returns the displacement of Bo since the start (3,) [m], grip included."""
+        return state.p + self.compliance @ np.concatenate([state.f, state.t])
 
 
 def reward_terms(
@@ -131,7 +144,7 @@ def reward_terms(
 
 def counts(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> np.ndarray:
     """Returns the way along x and the height [m] that the reward counts, (2,)."""
-    x, y = state.p[:2]
+    x, y = geometry.place(state)[:2]
     return np.array([min(x, geometry.groove_end), y if x > task.travel_success else 0])
 
 
@@ -159,14 +172,15 @@ def outcome(
 
 def succeeded(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> bool:
     """Returns whether the task is done."""
+    x, y = geometry.place(state)[:2]
     if task.success == "travelled":
-        return bool(state.p[0] > task.travel_success)
-    return bool(state.p[1] >= geometry.lift_needed)
+        return bool(x > task.travel_success)
+    return bool(y >= geometry.lift_needed)
 
 
 def within_workspace(state: BoltState, geometry: TaskGeometry) -> bool:
     """Returns whether the bolt is where the task has any business."""
-    p = state.p
+    p = geometry.place(state)
     return bool(np.all((geometry.low <= p) & (p <= geometry.high)))
 
 

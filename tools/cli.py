@@ -126,7 +126,7 @@ def named_policy(name: str, scenario: Scenario) -> Policy:
         DisasmError: there is none of that name, or it does not fit the scenario.
     """
     if name in SCRIPTED:
-        return make_policy(name)
+        return make_policy(name, scenario)
     if path := find_policy(name):
         policy = load_policy(path)
         policy.check_fits(scenario)

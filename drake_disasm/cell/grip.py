@@ -11,7 +11,8 @@ from typing import Self
 import numpy as np
 
 from drake_disasm.cell.tool import Tool
-from drake_disasm.scenario import GripperConfig
+from drake_disasm.common.spatial import skew
+from drake_disasm.scenario import GripperConfig, Scenario
 
 #: Joints x, y, z, then yaw, pitch and roll, by number of axis.
 AXIS_ORDER = (0, 1, 2, 5, 4, 3)
@@ -70,3 +71,15 @@ def grip_springs(gripper: GripperConfig, tool: Tool) -> Springs:
     stiffness = 1.0 / (1.0 / fingers.stiffness + 1.0 / pads)
     share = stiffness / fingers.stiffness  # of the motion that is the fingers'
     return Springs(stiffness, fingers.damping * share**2)
+
+
+def bolt_compliance(scenario: Scenario) -> np.ndarray:
+    """Returns how the bolt yields in the gripper under a wrench on it, (6, 6).
+
+    Displacement of Bo and rotation, against where the flange would have the bolt, by
+    the wrench [f; tau] on the bolt at Bo; all in Gn [m/N, m/(N m); rad/N, rad/(N m)].
+    """
+    tool = Tool.from_models(scenario)
+    S = np.eye(6)  # displacement of Bo by that of To
+    S[:3, 3:] = skew(tool.p_BoTo_B)
+    return S @ np.diag(1.0 / grip_springs(scenario.gripper, tool).stiffness) @ S.T

@@ -253,7 +253,8 @@ class _Explorer:
 def action_map(scenario: Scenario, config: Hyperparameters) -> ActionMap:
     """Returns the map from an agent's tanh output to an action of a task."""
     scale = action_bounds(scenario.task) * np.array(config.residual)
-    return ActionMap(scale, make_policy(config.base) if config.base else None)
+    base = make_policy(config.base, scenario) if config.base else None
+    return ActionMap(scale, base)
 
 
 def _summary(row: dict[str, Any]) -> EpisodeSummary:

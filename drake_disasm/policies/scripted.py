@@ -1,11 +1,21 @@
 """Two scripted policies: the naive one, and the classical baseline."""
 
 import dataclasses
+from typing import Self
 
 import numpy as np
 
+from drake_disasm.cell.grip import bolt_compliance
+from drake_disasm.cell.twin_parameters import bolt_stiffness
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
+from drake_disasm.scenario import Scenario
+
+#: Shares of a force or torque that a step of `Admittance` takes back, or adds.
+_YIELD, _PUSH, _LIFT, _TURN = 0.4, 1.2, 3.2, 0.6
+_FASTEST, _FASTEST_LIFT = 0.001, 0.0015  # m per step
+_STEP_FORCE, _LIFT_STEP_FORCE = 12.8, 24.0  # N that a step against a stop adds
+_STOP, _STOP_SHARE = 3.0, 0.25  # N that tell a stop, and share of what a step adds
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,7 +41,8 @@ class Admittance:
     the measured wrench on the bolt and C its compliance per step. Along x it pushes
     with a bounded force, so it slows down as resistance grows and stops at a stop;
     then, and while the bolt is being lifted, it pushes upwards instead. It knows
-    neither the groove's direction nor where it ends.
+    neither the groove's direction nor where it ends. Its gains are for an arm and grip
+    of about 16 kN/m; `for_stiffness` gives those for another.
 
     Attributes:
         speed: greatest step along x [m].
@@ -39,12 +50,13 @@ class Admittance:
         stop: resistance along x that counts as the end of the groove [N].
         lift: resistance at which the motion along y stops [N].
         lift_speed: greatest step along y [m].
-        lifted: rise from which on it keeps lifting [m].
-        yield_compliance: step per force across the motion [m/N]. Times the arm's
-            stiffness it must stay below 1, or the yielding overshoots.
+        lifted: rise of the bolt from which on it keeps lifting [m].
+        yield_compliance: step per force across the motion [m/N]. Times the stiffness
+            it must stay below 1, or the yielding overshoots.
         push_compliance: step per force along x while pushing [m/N].
         lift_compliance: step per force along y while lifting [m/N].
         rotation_compliance: step per torque [rad/(N m)].
+        grip_compliance: how far the bolt yields in the grip per force along y [m/N].
     """
 
     speed: float = 0.0008
@@ -57,12 +69,39 @@ class Admittance:
     push_compliance: float = 7.5e-5
     lift_compliance: float = 2e-4
     rotation_compliance: float = 1.5e-3
+    grip_compliance: float = 0.0
+
+    @classmethod
+    def for_stiffness(cls, stiffness: np.ndarray, grip_compliance: float) -> Self:
+        """Returns the policy for a bolt that is held with some stiffness.
+
+        The stiffest axis decides, so that a step's answer to a force or torque takes
+        back the same share of it whatever holds the bolt. The softer it is, the less
+        force a step adds, the smaller the force that tells a stop from friction, and
+        the less the bolt leaps when it comes free.
+
+        Args:
+            stiffness: (6,) at the bolt, along and about x, y, z [N/m, N m/rad].
+            grip_compliance: see above.
+        """
+        k, turning = float(stiffness[:3].max()), float(stiffness[3:].max())
+        speed = min(_FASTEST, _STEP_FORCE / k)
+        return cls(
+            speed=speed,
+            stop=_STOP + _STOP_SHARE * speed * k,
+            lift_speed=min(_FASTEST_LIFT, _LIFT_STEP_FORCE / k),
+            yield_compliance=_YIELD / k,
+            push_compliance=_PUSH / k,
+            lift_compliance=_LIFT / k,
+            rotation_compliance=_TURN / turning,
+            grip_compliance=grip_compliance,
+        )
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
         """Returns the action (6,) for an observation (12,)."""
         y, f, t = observation[1], observation[6:9], observation[9:12]
         move, turn = self.yield_compliance * f, self.rotation_compliance * t
-        lifting = y > self.lifted
+        lifting = y + self.grip_compliance * f[1] > self.lifted
         if not lifting:
             move[0] = min(self.speed, self.push_compliance * (self.push + f[0]))
         if lifting or f[0] < -self.stop:
@@ -78,14 +117,22 @@ SCRIPTED: dict[str, type[Straight] | type[Admittance]] = {
 }
 
 
-def make_policy(name: str) -> Straight | Admittance:
+def make_policy(name: str, scenario: Scenario | None = None) -> Straight | Admittance:
     """Returns the scripted policy of a name.
 
+    Args:
+        name: one of SCRIPTED.
+        scenario: whose arm, control and gripper its gains are for; None: for an arm
+            and a grip of about 16 kN/m.
+
     Raises:
-        DisasmError: there is no such policy.
+        DisasmError: there is no such policy, or the arm can't reach the lock.
     """
     if name not in SCRIPTED:
         raise DisasmError(
             f"policy '{name}' does not exist; {closest(name, list(SCRIPTED))}"
         )
-    return SCRIPTED[name]()
+    if scenario is None or name != "admittance":
+        return SCRIPTED[name]()
+    grip = bolt_compliance(scenario)[1, 1]
+    return Admittance.for_stiffness(bolt_stiffness(scenario), float(grip))

@@ -38,7 +38,7 @@ class SafetyConfig:
         0.25, "1", "of each joint's greatest velocity", low=0.001, high=1.0
     )
     workspace_low: list[float] = quantity(
-        [-0.010, -0.010, -0.010], "m", "of the bolt in G, from the start",
+        [-0.012, -0.010, -0.010], "m", "of the bolt in G, from the start",
         low=-0.5, high=0.0,
     )  # fmt: skip
     workspace_high: list[float] = quantity(

@@ -274,7 +274,7 @@ class TaskConfig:
         0.002, "m", "head's underside above the plate", low=0.0, high=0.05
     )
     room: list[float] = quantity(
-        [0.006, 0.008, 0.008], "m", "that the bolt has along x, y, z of G beside its "
+        [0.010, 0.008, 0.008], "m", "that the bolt has along x, y, z of G beside its "
         "way from A to the groove's end and out; further away an episode has failed",
         low=0.001, high=0.5,
     )  # fmt: skip

@@ -14,6 +14,7 @@ GEOMETRY = TaskGeometry(
     groove_end=0.0605,
     low=np.array([-0.01, -0.01, -0.01]),
     high=np.array([0.07, 0.02, 0.01]),
+    compliance=np.zeros((3, 6)),
 )
 
 

@@ -59,8 +59,8 @@ def test_the_shipped_guard_lets_the_shipped_tasks_decide(name: str) -> None:
 @pytest.mark.parametrize(
     ("low", "high", "words"),
     [
-        ([-0.01] * 3, [0.068, 0.03, 0.01], "safety.workspace_high.0: 0.068 m"),
-        ([-0.01, -0.009, -0.01], [0.08, 0.03, 0.01], "safety.workspace_low.1: -0.009"),
+        ([-0.012] * 3, [0.070, 0.03, 0.01], "safety.workspace_high.0: 0.07 m"),
+        ([-0.012, -0.009, -0.01], [0.08, 0.03, 0.01], "safety.workspace_low.1: -0.009"),
     ],
 )
 def test_a_guard_within_the_tasks_workspace_is_refused(

@@ -17,7 +17,9 @@ from drake_disasm.mdp import (
 from drake_disasm.scenario import TaskConfig
 from drake_disasm.systems.task_monitor import TaskMonitor
 
-GEOMETRY = TaskGeometry(0.007, 0.0605, -0.006 * np.ones(3), 0.066 * np.ones(3))
+GEOMETRY = TaskGeometry(
+    0.007, 0.0605, -0.006 * np.ones(3), 0.066 * np.ones(3), np.zeros((3, 6))
+)
 TASK = TaskConfig(steps=3)
 
 

@@ -19,7 +19,7 @@ def _episodes(
 ) -> list[EpisodeSummary]:
     scenario = load_scenario("removal")
     scenario.effects = [GroovePose(ry=np.deg2rad(angle_deg))]
-    simulation = TaskSimulation(scenario, model, make_policy(policy))
+    simulation = TaskSimulation(scenario, model, make_policy(policy, scenario))
     return [run_episode(simulation, seed) for seed in seeds]
 
 

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from drake_disasm.mdp import Outcome
+from drake_disasm.mdp import BoltState, Outcome, TaskGeometry
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.episode import EpisodeSummary, run_episode
 from drake_disasm.task.simulation import TaskSimulation
 
 SCENARIO = load_scenario("removal")
-OUT = SCENARIO.lock.lift_needed(SCENARIO.task.lift_success)
-HOVER = OUT - 0.001  # m, just below the height that counts as out
+GEOMETRY = TaskGeometry.of(SCENARIO)
+HOVER = GEOMETRY.lift_needed - 0.001  # m, just below the height that counts as out
 
 
 class Cheat:
@@ -22,12 +22,12 @@ class Cheat:
     """
 
     def __init__(self, then: str) -> None:
-        self._honest, self._then = make_policy("admittance"), then
+        self._honest, self._then = make_policy("admittance", SCENARIO), then
         self._steps = 0
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
         """Returns the action (6,) for an observation (12,)."""
-        y = observation[1]
+        y = GEOMETRY.place(BoltState.from_vector(observation))[1]
         if y < HOVER - 0.0003 and not self._steps:
             action = self._honest(observation)
             action[1] = min(action[1], 0.0004)
@@ -49,6 +49,25 @@ def _episode(policy: object, seed: int = 1) -> EpisodeSummary:
 )
 def test_cheating_pays_less_than_removing_the_bolt(then: str, end: Outcome) -> None:
     """Before: 183 for flying on, 213 for going up and down, 132 for the task."""
-    honest, cheat = _episode(make_policy("admittance")), _episode(Cheat(then))
+    honest, cheat = _episode(make_policy("admittance", SCENARIO)), _episode(Cheat(then))
     assert honest.outcome is Outcome.SUCCESS and cheat.outcome is end
     assert cheat.reward < honest.reward
+
+
+@pytest.mark.parametrize("station", ["twin", "cell"])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_pulling_at_a_bolt_that_is_stuck_is_no_success(axis: int, station: str) -> None:
+    """In a grip that yields the arm goes on; the bolt's place is judged."""
+    action = np.zeros(6)
+    action[axis] = (-0.001, 0.001, 0.001)[axis]
+    scenario = load_scenario("removal", ["ft_sensor.noise=[0, 0, 0, 0, 0, 0]"])
+    simulation = TaskSimulation(scenario, station)
+    simulation.reset(1)
+    for step in range(11):  # and two at rest: a damper acts while the arm moves
+        result = simulation.step(action * (step < 9))
+        assert result.outcome is Outcome.RUNNING
+    X_GnB = simulation.evaluate(simulation.station, "bolt_pose")
+    state = BoltState.from_vector(result.observation)
+    assert abs(state.p[axis]) > 0.008
+    place = GEOMETRY.place(state)
+    np.testing.assert_allclose(place, X_GnB.translation(), atol=1e-4)
