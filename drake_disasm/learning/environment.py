@@ -124,10 +124,13 @@ IDS = {
     "drake_disasm/RemovalRandomised-v0": "removal_randomised",
     "drake_disasm/Chapter3-v0": "chapter3",
     "drake_disasm/Chapter3Impedance-v0": "chapter3_impedance",
+    "drake_disasm/Chapter3Stiff-v0": "chapter3_stiff",
     "drake_disasm/Chapter4-v0": "chapter4",
     "drake_disasm/Chapter4Impedance-v0": "chapter4_impedance",
+    "drake_disasm/Chapter4Stiff-v0": "chapter4_stiff",
     "drake_disasm/Chapter5-v0": "chapter5",
     "drake_disasm/Chapter5Impedance-v0": "chapter5_impedance",
+    "drake_disasm/Chapter5Stiff-v0": "chapter5_stiff",
     "drake_disasm/Sliding-v0": "chapter3",  # its old name
 }
 

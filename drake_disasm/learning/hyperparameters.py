@@ -88,7 +88,8 @@ class Hyperparameters:
     residual: list[float] = quantity(
         [1.0] * 6,
         "1",
-        "largest action of the agent, per axis, in shares of the task's bounds",
+        "largest action of the agent, per axis, in shares of the task's bounds; of "
+        "3 mm and 1 degree where it corrects a base policy, whatever the bounds",
         low=0.0,
         high=1.0,
     )

@@ -241,6 +241,12 @@ class Training:
         return np.random.default_rng(seed_for(self.spec.seed, purpose, number))
 
 
+#: What a residual's shares are of [m, rad]: how far a correction may go is a matter of
+#: the contact and not of the task's bounds, and those of chapter 4 are what it was
+#: chosen with.
+_CORRECTION = np.array([0.003] * 3 + [np.deg2rad(1.0)] * 3)
+
+
 @dataclasses.dataclass
 class _Explorer:
     """How an episode is explored: the actor, and the noise on its output."""
@@ -252,9 +258,11 @@ class _Explorer:
 
 def action_map(scenario: Scenario, config: Hyperparameters) -> ActionMap:
     """Returns the map from an agent's tanh output to an action of a task."""
-    scale = action_bounds(scenario.task) * np.array(config.residual)
-    base = make_policy(config.base, scenario) if config.base else None
-    return ActionMap(scale, base)
+    bounds, share = action_bounds(scenario.task), np.array(config.residual)
+    if not config.base:
+        return ActionMap(bounds * share)
+    scale = np.minimum(bounds, _CORRECTION * share)
+    return ActionMap(scale, make_policy(config.base, scenario))
 
 
 def _summary(row: dict[str, Any]) -> EpisodeSummary:

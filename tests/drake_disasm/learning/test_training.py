@@ -17,7 +17,7 @@ from drake_disasm.learning.hyperparameters import preset
 from drake_disasm.learning.policy import trained_policy
 from drake_disasm.learning.replay import Replay
 from drake_disasm.learning.training import Training, TrainingSpec, action_map
-from drake_disasm.policies import Admittance
+from drake_disasm.policies import Admittance, make_policy
 from drake_disasm.scenario import load_scenario
 
 SCENARIO = load_scenario("chapter3", ["imprecision=0.0003", "task.steps=6"])
@@ -149,9 +149,25 @@ def test_a_residual_begins_as_its_base_policy() -> None:
     training = _training("sac", base="admittance", residual=[0.1] * 6)
     policy = trained_policy(training, {})
     observation = np.random.default_rng(2).normal(size=12) * 1e-3
-    difference = policy(observation) - Admittance()(observation)
+    difference = policy(observation) - _base()(observation)
     bounds = training.env.simulation.bounds
     assert (np.abs(difference) < 0.01 * bounds).all()
+
+
+def _base() -> Admittance:
+    base = make_policy("admittance", SCENARIO)
+    assert isinstance(base, Admittance)
+    return base
+
+
+@pytest.mark.parametrize(
+    ("bound", "limit"), [(0.003, 9e-4), (0.001, 9e-4), (5e-4, 5e-4)]
+)
+def test_corrections_are_as_long_whatever_the_bounds(
+    bound: float, limit: float
+) -> None:
+    scenario = load_scenario("chapter3", [f"task.max_translation={bound}"])
+    assert action_map(scenario, preset("best")).action_scale[1] == pytest.approx(limit)
 
 
 def test_a_residual_never_exceeds_its_bounds() -> None:
@@ -159,7 +175,7 @@ def test_a_residual_never_exceeds_its_bounds() -> None:
     limit = 0.1 * training.env.simulation.bounds
     for sign in (-1.0, 1.0):
         action = training.action_map.to_action(np.zeros(12), sign * np.ones(6))
-        assert (np.abs(action - Admittance()(np.zeros(12))) <= limit + 1e-12).all()
+        assert (np.abs(action - _base()(np.zeros(12))) <= limit + 1e-12).all()
 
 
 def test_the_action_map_is_undone_for_demonstrations() -> None:

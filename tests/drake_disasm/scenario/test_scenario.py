@@ -27,13 +27,17 @@ CHAPTERS = ("chapter3", "chapter4", "chapter5")
 def test_our_tasks_and_the_chapters_are_shipped() -> None:
     ours = {"removal", "removal_turned", "removal_randomised"}
     impedance = {f"{name}_impedance" for name in CHAPTERS}
-    assert {*ours, *CHAPTERS, *impedance} == set(SHIPPED)
+    stiff = {f"{name}_stiff" for name in CHAPTERS}
+    assert {*ours, *CHAPTERS, *impedance, *stiff} == set(SHIPPED)
 
 
 @pytest.mark.parametrize("name", CHAPTERS)
 def test_variants_of_a_chapter_have_its_task(name: str) -> None:
     chapter, impedance = load_scenario(name), load_scenario(f"{name}_impedance")
-    assert impedance.task == chapter.task
+    stiff = load_scenario(f"{name}_stiff")
+    assert impedance.task == stiff.task == chapter.task
+    compliance = [s.gripper.compliance for s in (chapter, impedance, stiff)]
+    assert compliance == ["adaptive", "adaptive", "rigid"]
     assert (chapter.arm.control, impedance.arm.control) == (
         "position",
         "cartesian_impedance",
@@ -57,6 +61,7 @@ def test_round_trips(name: str, tmp_path: Path) -> None:
 
 def test_chapters_differ_as_the_thesis_says() -> None:
     sliding, removal = (load_scenario(name).task for name in CHAPTERS[:2])
+    assert load_scenario("chapter5").task == removal
     assert (sliding.success, removal.success) == ("travelled", "removed")
     for task in (sliding, removal):
         assert action_bounds(task) == pytest.approx([0.003] * 3 + [np.pi / 180] * 3)
