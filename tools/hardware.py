@@ -1,5 +1,6 @@
 """What simulate.py does with --station hardware."""
 
+import dataclasses
 import time
 from pathlib import Path
 
@@ -36,6 +37,7 @@ def open_station(
 def watch(station: HardwareStation, view: MeasuredView | None) -> None:
     """Prints and shows the devices' state until Ctrl-C; commands nothing."""
     print("dry run: nothing is commanded; Ctrl-C ends it", flush=True)
+    print(control_in_words(station), flush=True)
     station.connect()
     while True:
         for _ in range(_FRAMES):
@@ -43,6 +45,23 @@ def watch(station: HardwareStation, view: MeasuredView | None) -> None:
             if view:
                 view.show(station.measured())
         print(health_table(station), flush=True)
+
+
+def control_in_words(station: HardwareStation) -> str:
+    """Returns what the cabinet must be set to, and how far a command may lead."""
+    arm = station.scenario.arm
+    words = f"arm: {arm.control} control"
+    if arm.control != "position":
+        section = dataclasses.asdict(getattr(arm, arm.control))
+        values = (f"{name} {_numbers(value)}" for name, value in section.items())
+        words += f" with {', '.join(values)} (set these in the Sunrise application)"
+    lead = _numbers([f"{q:.3f}" for q in station.allowed_lead])
+    return f"{words}\ncommands may lead the joints by {lead} rad"
+
+
+def _numbers(value: object) -> str:
+    values = value if isinstance(value, list) else [value]
+    return " ".join(f"{v:g}" if isinstance(v, float) else str(v) for v in values)
 
 
 def _pump(station: HardwareStation, duration: float) -> None:

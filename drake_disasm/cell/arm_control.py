@@ -57,6 +57,23 @@ def cartesian_gains(
     return K, 2.0 * config.damping_ratio * (Q * np.sqrt(K0)) @ Q.T
 
 
+def yielding(arm: ArmConfig, J: np.ndarray) -> np.ndarray:
+    """Returns how far a load on the bolt turns the joints (7, 6) [rad/N, rad/(N m)].
+
+    dq = C w, for the wrench w = [f; tau] at Bo in Gn and the commanded joint angles.
+    Springs in the joints: C = k^-1 J^T. Cartesian impedance control: C = J^+ K^-1;
+    its null space's spring, the same in all joints, leaves the least joint motion.
+
+    Args:
+        arm: with its control.
+        J: (6, 7) Jacobian at Bo in Gn, [translation; rotation].
+    """
+    if arm.control == "cartesian_impedance":
+        return np.asarray(np.linalg.pinv(J) / arm.cartesian_impedance.stiffness)
+    k, _ = joint_gains(arm, np.ones(len(J.T)))
+    return np.asarray(J.T / k[:, None])
+
+
 def nullspace_gains(
     arm: ArmConfig, inertia: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -157,9 +157,13 @@ class ArmCoordinates(Coordinates):
 
         K = (J diag(k)^-1 J^T)^-1, the joints being springs in series.
         """
-        self._plant.SetPositions(self._context, q)
-        J = bolt_jacobian(self._plant, self._context, self._frame_B, self._frame_G)
+        J = self.jacobian(q)
         return np.linalg.inv(J @ np.diag(1.0 / joint_stiffness) @ J.T)
+
+    def jacobian(self, q: np.ndarray) -> np.ndarray:
+        """Returns the Jacobian (6, 7) at Bo in Gn, [translation; rotation]."""
+        self._plant.SetPositions(self._context, q)
+        return bolt_jacobian(self._plant, self._context, self._frame_B, self._frame_G)
 
     def _differential_ik_parameters(
         self, period: float

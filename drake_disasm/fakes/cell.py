@@ -104,6 +104,8 @@ class FakeCell:
     def config(self) -> HardwareConfig:
         """Returns the configuration by which a hardware station finds it."""
         config = HardwareConfig()
+        control = self.station.scenario.arm.control
+        config.iiwa = dataclasses.replace(config.iiwa, control=control)
         config.ft_sensor = dataclasses.replace(
             config.ft_sensor,
             address="127.0.0.1",

@@ -59,13 +59,17 @@ _REMEDY = {
 
 
 def guards(
-    limits: SafetyConfig, q_low: np.ndarray, q_high: np.ndarray
+    limits: SafetyConfig,
+    q_low: np.ndarray,
+    q_high: np.ndarray,
+    allowed_lead: np.ndarray,
 ) -> tuple[Guard, ...]:
     """Returns the guards of a station, in the order in which they are asked.
 
     Args:
         limits: of the station.
         q_low, q_high: (7,) of the joints [rad].
+        allowed_lead: (7,) see `SafetyConfig.allowed_lead` [rad].
     """
     margin = limits.joint_margin
     return (
@@ -76,7 +80,7 @@ def guards(
         lambda s: in_time(s, limits.late_command),
         lambda s: keeps_up(s, limits.max_lag),
         lambda s: within_joints(s, q_low + margin, q_high - margin),
-        lambda s: near_measured(s, limits.max_lead),
+        lambda s: near_measured(s, allowed_lead),
         lambda s: within_workspace(s, limits),
         lambda s: gentle(s, limits),
     )
@@ -144,12 +148,16 @@ def within_joints(s: Situation, low: np.ndarray, high: np.ndarray) -> str:
     return f"joint {joint} is sent {way:.3f} rad into its limit's margin"
 
 
-def near_measured(s: Situation, limit: float) -> str:
+def near_measured(s: Situation, limit: np.ndarray) -> str:
     """What is wanted is near where the arm is: it follows, and nothing leaps."""
-    joint, way = _largest(s.q_wanted - s.q_measured)
-    if way <= limit:
+    way = np.abs(s.q_wanted - s.q_measured)
+    joint, beyond = _largest(way - limit, signed=True)
+    if beyond <= 0.0:
         return ""
-    return f"joint {joint} is sent {way:.3f} rad from where it is; it does not follow"
+    return (
+        f"joint {joint} is sent {way[joint - 1]:.3f} rad from where it is, "
+        f"{limit[joint - 1]:.3f} are allowed; it does not follow"
+    )
 
 
 def within_workspace(s: Situation, limits: SafetyConfig) -> str:

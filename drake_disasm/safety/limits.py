@@ -2,6 +2,8 @@
 
 import dataclasses
 
+import numpy as np
+
 from drake_disasm.common.quantity import quantity
 
 
@@ -49,8 +51,9 @@ class SafetyConfig:
         0.002, "m", "kept from the workspace's sides", low=0.0, high=0.05
     )
     max_lead: float = quantity(
-        0.02, "rad", "of a joint's command before what is measured", low=1e-3, high=0.5
-    )
+        0.02, "rad", "of a joint's command before what is measured, besides what the "
+        "arm's control yields to the greatest force and torque", low=1e-3, high=0.5,
+    )  # fmt: skip
     max_jump: float = quantity(
         0.05, "rad", "of a measured joint between two looks", low=1e-3, high=0.5
     )
@@ -78,6 +81,21 @@ class SafetyConfig:
         0.8, "s", "lost within the window: a diagram that is late by habit",
         low=0.01, high=60.0,
     )  # fmt: skip
+
+    def allowed_lead(self, yielding: np.ndarray) -> np.ndarray:
+        """Returns how far each joint's command may be before what is measured [rad].
+
+        Whatever holds the arm back, and lets it go, finds it pulled by a spring that
+        pushes the bolt with no more than what the gripper may be loaded with.
+
+        Args:
+            yielding: (7, 6) of the joints to a load on the bolt, see
+                `drake_disasm.cell.arm_control.yielding`.
+        """
+        torque = np.hypot(self.max_torque_xy, self.max_torque_z)
+        by_force = self.max_force * np.linalg.norm(yielding[:, :3], axis=1)
+        by_torque = torque * np.linalg.norm(yielding[:, 3:], axis=1)
+        return np.asarray(self.max_lead + by_force + by_torque)
 
     def stale_after(self, device: str) -> float:
         """Returns the age [s] at which a device's sample is stale."""

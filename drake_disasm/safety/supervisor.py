@@ -11,7 +11,9 @@ from drake_disasm.safety.retreat import Retreat
 #: Share of the joints' velocity limit at which a hold is gone to: by default about the
 #: speed of the task's own motion. An arm that leans on something springs back. Pressed
 #: against the fake cell's groove until a hold, 59 N in place of 76 N followed about z
-#: at a share of 0.2, 53 N at 0.05, for 10 ms each.
+#: at a share of 0.2, 53 N at 0.05, for 10 ms each. An arm in impedance control has a
+#: longer way back, but its damper pushes with the command's speed: at half the velocity
+#: limit 83 N followed out of the plate, at a tenth 23 N.
 HOLD_SHARE = 0.1
 
 

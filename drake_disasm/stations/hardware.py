@@ -11,6 +11,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, DiagramBuilder, InputPort
 from pydrake.systems.primitives import PassThrough
 
+from drake_disasm.cell.arm_control import yielding
+from drake_disasm.cell.coordinates import ArmCoordinates
 from drake_disasm.cell.parsing import add_arm
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.stopwatch import Stopwatch
@@ -30,7 +32,11 @@ from drake_disasm.stations.arm_over_lcm import command_sender, export_status
 from drake_disasm.stations.base import InitialState, Station, refuse_twins_contact
 from drake_disasm.stations.capabilities import refuse_on_hardware
 from drake_disasm.stations.cell_devices import CellDevices
-from drake_disasm.stations.hardware_config import HardwareConfig, refuse_narrow_guard
+from drake_disasm.stations.hardware_config import (
+    HardwareConfig,
+    refuse_another_control,
+    refuse_narrow_guard,
+)
 from drake_disasm.stations.wiring import export_required
 from drake_disasm.systems.arm_command_writer import ArmCommandWriter
 from drake_disasm.systems.connection_check import ConnectionCheck
@@ -85,6 +91,7 @@ class HardwareStation(Station):
         supervisor: lets commands through, or holds.
         pacer: keeps commands at their rate, and counts what that costs.
         lag: remembers how far the diagram fell behind, and what its parts took.
+        allowed_lead: (7,) of the joints' commands before what is measured [rad].
         devices: clients by name.
 
     Args:
@@ -117,10 +124,14 @@ class HardwareStation(Station):
         self.scenario, self.config, self.dry_run = scenario, config, dry_run
         self._cell = CellDevices(config, not dry_run, clock, wait, lcm)
         self.devices = self._cell.clients
+        refuse_another_control(scenario, config)
         self._set_cell_geometry()
+        self.allowed_lead = self._allowed_lead()
         self.g_W = MultibodyPlant(0.0).gravity_field().gravity_vector()
         self.grip_command = 0.0  # closes until the fingers stall on the bolt
-        self.supervisor = _supervisor(scenario.arm, config, self._retreat())
+        self.supervisor = _supervisor(
+            scenario.arm, config, self._retreat(), self.allowed_lead
+        )
         self.pacer = CommandPacer(
             self.control_period,
             self._cell.clock,
@@ -318,6 +329,11 @@ class HardwareStation(Station):
         R_BS = self.X_SB.rotation().inverse().matrix()
         return Retreat(self.coordinates, R_BS, limits, self.control_period)
 
+    def _allowed_lead(self) -> np.ndarray:
+        assert isinstance(self.coordinates, ArmCoordinates)
+        J = self.coordinates.jacobian(self.start)
+        return self.config.safety.allowed_lead(yielding(self.scenario.arm, J))
+
     def _refuse_far_start(self, position: np.ndarray) -> None:
         away = np.abs(position - self.start)
         joint = int(np.argmax(away))
@@ -345,7 +361,10 @@ def refuse_what_is_simulated(scenario: Scenario) -> None:
 
 
 def _supervisor(
-    arm: ArmConfig, config: HardwareConfig, retreat: Retreat | None
+    arm: ArmConfig,
+    config: HardwareConfig,
+    retreat: Retreat | None,
+    allowed_lead: np.ndarray,
 ) -> Supervisor:
     """Returns the supervisor of an arm, by its model's limits and the file's."""
     plant = MultibodyPlant(0.0)
@@ -354,7 +373,12 @@ def _supervisor(
     limits = config.safety
     fastest = plant.GetVelocityUpperLimits() * limits.velocity_share
     return Supervisor(
-        guards(limits, plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits()),
+        guards(
+            limits,
+            plant.GetPositionLowerLimits(),
+            plant.GetPositionUpperLimits(),
+            allowed_lead,
+        ),
         fastest,
         limits.start_tolerance,
         limits.max_jump,

@@ -11,7 +11,7 @@ from drake_disasm.common.files import read_text
 from drake_disasm.common.quantity import check, quantity
 from drake_disasm.mdp import TaskGeometry
 from drake_disasm.safety import SafetyConfig
-from drake_disasm.scenario import Scenario
+from drake_disasm.scenario import CONTROLS, Scenario
 from drake_disasm.scenario.strict_yaml import parse
 
 _ROUNDING = 1e-9  # m
@@ -21,6 +21,10 @@ _ROUNDING = 1e-9  # m
 class IiwaConnection:
     """The arm, behind drake-iiwa-driver."""
 
+    control: str = quantity(
+        "position", "", "mode of the Sunrise application that runs on the cabinet",
+        choices=CONTROLS,
+    )  # fmt: skip
     lcm_url: str = quantity("", "", "of LCM; empty is LCM's own default")
     command_channel: str = quantity("IIWA_COMMAND", "", "LCM channel")
     status_channel: str = quantity("IIWA_STATUS", "", "LCM channel")
@@ -114,3 +118,20 @@ def refuse_narrow_guard(scenario: Scenario, limits: SafetyConfig) -> None:
                 f"arm before the task's workspace (task.room) and a margin end at "
                 f"{least[axis]:g} m; widen it, or give the task less room"
             )
+
+
+def refuse_another_control(scenario: Scenario, config: HardwareConfig) -> None:
+    """Refuses a scenario that asks for another control than the cabinet runs.
+
+    Nothing that the arm sends tells which; so the file has to say.
+
+    Raises:
+        DisasmError: names both, and how to agree.
+    """
+    wanted, declared = scenario.arm.control, config.iiwa.control
+    if wanted != declared:
+        raise DisasmError(
+            f"iiwa.control: the cabinet is said to run '{declared}', the scenario's "
+            f"arm.control is '{wanted}'; start the Sunrise application in that mode "
+            "(docs/hardware.md), then say so in the file, or change the scenario"
+        )

@@ -4,11 +4,12 @@
 """
 
 import dataclasses
+import itertools
 
 import numpy as np
 
 from drake_disasm.fakes.cell import FakeCell
-from drake_disasm.scenario import load_scenario
+from drake_disasm.scenario import CONTROLS, load_scenario
 from drake_disasm.stations.hardware import HoldError
 from tests.fakes.fault_runs import in_lockstep
 
@@ -21,6 +22,7 @@ PUSHES = {
 }
 _MOST_STEPS, _STEPS_HELD = 60, 10
 _SOON = 0.1  # s
+_GRIP = "gripper.compliance=rigid"  # one that yields leaves the workspace sooner
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,6 +32,7 @@ class ForceRun:
     Attributes:
         push: of PUSHES.
         on_force: of the safety limits.
+        control: of the arm.
         at_hold: force at the sensor when it was held [N].
         greatest: after that [N].
         soon, late: 0.1 s and 1 s after it [N].
@@ -38,6 +41,7 @@ class ForceRun:
 
     push: str
     on_force: str
+    control: str
     at_hold: float
     greatest: float
     soon: float
@@ -45,10 +49,16 @@ class ForceRun:
     reason: str
 
 
-def run_push(push: str, on_force: str) -> ForceRun:
-    """Pushes until a hold, and watches for a second."""
+def run_push(push: str, on_force: str, control: str = "position") -> ForceRun:
+    """Pushes until a hold, and watches for a second.
+
+    Args:
+        push: of PUSHES.
+        on_force: of the safety limits.
+        control: of the arm.
+    """
     action, forces = np.array(PUSHES[push]), list[tuple[bool, float]]()
-    scenario = load_scenario("removal")
+    scenario = load_scenario("removal", [_GRIP, f"arm.control={control}"])
     limits = {"on_force": on_force}
     with in_lockstep(scenario, lambda _: action, limits=limits) as parts:
         simulation, station, cell = parts
@@ -73,7 +83,8 @@ def run_push(push: str, on_force: str) -> ForceRun:
     before = [force for is_held, force in forces if not is_held]
     after = [force for is_held, force in forces if is_held]
     soon = after[round(_SOON / station.control_period)]
-    return ForceRun(push, on_force, before[-1], max(after), soon, after[-1], reason)
+    forces_after = before[-1], max(after), soon, after[-1]
+    return ForceRun(push, on_force, control, *forces_after, reason)
 
 
 def _force(cell: FakeCell) -> float:
@@ -83,16 +94,18 @@ def _force(cell: FakeCell) -> float:
 def table(runs: list[ForceRun]) -> str:
     """Returns the runs as Markdown."""
     lines = [
-        "| pressed | on_force | at the hold | greatest after | 0.1 s later | 1 s later "
-        "| said |",
-        "|---|---|---|---|---|---|---|",
+        "| pressed | control | on_force | at the hold | greatest after | 0.1 s later "
+        "| 1 s later | said |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for run in runs:
         forces = (run.at_hold, run.greatest, run.soon, run.late)
         figures = " | ".join(f"{force:.1f} N" for force in forces)
-        lines.append(f"| {run.push} | {run.on_force} | {figures} | {run.reason} |")
+        first = f"{run.push} | {run.control} | {run.on_force}"
+        lines.append(f"| {first} | {figures} | {run.reason} |")
     return "\n".join(lines)
 
 
 if __name__ == "__main__":
-    print(table([run_push(p, mode) for p in PUSHES for mode in ("hold", "yield")]))
+    cases = itertools.product(PUSHES, CONTROLS, ("hold", "yield"))
+    print(table([run_push(push, mode, c) for push, c, mode in cases]))

@@ -185,14 +185,16 @@ def test_a_dry_run_shows_the_devices_and_commands_nothing(fake: Path) -> None:
     )
     with running(dry_run, stdout=subprocess.PIPE) as process:
         assert process.stdout
-        missing = {"iiwa", "gripper", "ft_sensor"}
+        missing, said = {"iiwa", "gripper", "ft_sensor"}, ""
         while missing:  # a busy machine lets the fake cell stand still, at first
             line = process.stdout.readline()
+            said += line
             assert line, missing
             missing -= {name for name in missing if f"{name:10} READY" in line}
         os.kill(process.pid, signal.SIGINT)
         process.stdout.read()
         assert process.wait() == 130
+    assert "arm: position control" in said and "commands may lead the joints by" in said
 
 
 @pytest.mark.slow

@@ -8,8 +8,9 @@ from drake_disasm.cell.arm_control import (
     cartesian_gains,
     joint_gains,
     nullspace_gains,
+    yielding,
 )
-from drake_disasm.scenario import ArmConfig
+from drake_disasm.scenario import CONTROLS, ArmConfig
 
 INERTIA = np.array([3.0, 4.0, 2.0, 3.0, 0.5, 1.2, 1.0])
 K = [3000.0, 500.0, 100.0, 300.0, 20.0, 5.0]
@@ -61,6 +62,25 @@ def test_every_mode_of_a_coupled_inertia_has_the_damping_ratio(ratio: float) -> 
     poles = eigvals(A, np.block([[np.eye(6), np.zeros((6, 6))],
                                  [np.zeros((6, 6)), Lambda]]))  # fmt: skip
     np.testing.assert_allclose(-poles.real / np.abs(poles), ratio, rtol=1e-6)
+
+
+def _joint_angles(arm: ArmConfig, J: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Returns where the joints rest under a load on the bolt: torques balance."""
+    if arm.control != "cartesian_impedance":
+        k, _ = joint_gains(arm, INERTIA)
+        return np.asarray(J.T @ w / k)
+    K, _ = cartesian_gains(arm, np.eye(6))
+    null = np.linalg.svd(J)[2][-1:]  # along which the null space's spring has rest
+    balance = np.vstack([K @ J, null])
+    return np.asarray(np.linalg.solve(balance, np.append(w, 0.0)))
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_joints_yield_to_a_load_as_their_springs_do(control: str) -> None:
+    arm, generator = ArmConfig(control=control), np.random.default_rng(2)
+    arm.cartesian_impedance.stiffness = K
+    J, w = generator.normal(size=(6, 7)), generator.normal(size=6)
+    np.testing.assert_allclose(yielding(arm, J) @ w, _joint_angles(arm, J, w))
 
 
 def test_nullspace_spring_is_damped_about_each_joints_inertia() -> None:

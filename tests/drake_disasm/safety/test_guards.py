@@ -25,12 +25,13 @@ USUAL = Situation(
     readings=dict.fromkeys(NAMES, FRESH),
 )
 LIMITS = SafetyConfig()
+LEAD = np.array([0.02, 0.02, 0.02, 0.02, 0.02, 0.1, 0.02])
 
 
 def objection(**changes: object) -> str:
     """Returns what the guards say of the usual situation with changes."""
     situation = dataclasses.replace(USUAL, **changes)
-    all_guards = guards(LIMITS, np.full(7, -2.0), np.full(7, 2.0))
+    all_guards = guards(LIMITS, np.full(7, -2.0), np.full(7, 2.0), LEAD)
     return next((r for guard in all_guards if (r := guard(situation))), "")
 
 
@@ -45,6 +46,7 @@ def joint(q: np.ndarray, number: int, by: float) -> np.ndarray:
 def test_the_usual_passes():
     assert objection() == ""
     assert objection(load=None) == ""
+    assert objection(q_wanted=joint(Q, 6, -0.09)) == ""  # it yields more there
     assert objection(q_before=np.full(7, np.nan)) == ""
 
 
@@ -71,6 +73,7 @@ def test_the_usual_passes():
         ),
         ({"q_wanted": joint(Q, 4, -0.68)}, "joint 4 is sent 0.015 rad into"),
         ({"q_wanted": joint(Q, 5, 0.03)}, "joint 5 is sent 0.030 rad from where"),
+        ({"q_wanted": joint(Q, 6, -0.11)}, "0.110 rad from where it is, 0.100 are"),
         ({"X_GB": RigidTransform([0.0, 0.029, 0.0])}, "workspace at y = 29.0 mm"),
         ({"load": np.array([0, 20.1, 0, 0, 0, 0])}, "force 20.1 N"),
         ({"load": np.array([0, 0, 0, 3.0, 3.0, 0])}, "torque 4.2 N m"),
@@ -79,6 +82,16 @@ def test_the_usual_passes():
 )
 def test_what_must_stop_the_robot(changes, words):
     assert words in objection(**changes)
+
+
+def test_an_arm_that_yields_may_lag_by_what_the_greatest_load_bends_it() -> None:
+    """Two joints as springs: force turns the first, torque the second."""
+    yielding = np.zeros((7, 6))
+    yielding[0, :3] = [3e-3, 0.0, 4e-3]  # rad/N
+    yielding[1, 4] = 0.01  # rad/(N m)
+    limits = SafetyConfig(max_force=10.0, max_torque_xy=4.0, max_torque_z=3.0)
+    lead = limits.allowed_lead(yielding) - limits.max_lead
+    np.testing.assert_allclose(lead, [0.05, 0.05, 0, 0, 0, 0, 0])
 
 
 def test_limits_stay_below_what_the_gripper_takes():

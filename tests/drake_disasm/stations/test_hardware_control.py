@@ -1,0 +1,77 @@
+"""The arm's controls on the hardware station, against a fake cell that plays them."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.mdp import Outcome
+from drake_disasm.policies import make_policy
+from drake_disasm.safety import Mode
+from drake_disasm.scenario import CONTROLS, load_scenario
+from drake_disasm.stations.hardware import HardwareStation, HoldError
+from drake_disasm.stations.hardware_config import HardwareConfig
+from drake_disasm.task.simulation import TaskSimulation
+from tests.drake_disasm.conftest import QUIET
+from tests.fakes.fault_runs import in_lockstep
+from tests.fakes.force_runs import run_push
+
+IMPEDANCE = [control for control in CONTROLS if control != "position"]
+_STEPS = 25
+
+
+def _end(simulation: TaskSimulation) -> np.ndarray:
+    """Returns the measured pose (6,) [m, rad] after some steps of an episode."""
+    simulation.reset(0)
+    for _ in range(_STEPS):
+        result = simulation.step()
+        assert result.outcome is Outcome.RUNNING
+    return np.asarray(result.observation[:6])
+
+
+@pytest.mark.parametrize("control", IMPEDANCE)
+def test_an_arm_that_yields_goes_as_in_simulation(control: str) -> None:
+    scenario = load_scenario("removal", [QUIET, f"arm.control={control}"])
+    policy = make_policy("admittance")
+    simulated = _end(TaskSimulation(scenario, "cell", policy))
+    with in_lockstep(scenario, policy) as (simulation, station, _):
+        difference = np.abs(_end(simulation) - simulated)
+        assert station.supervisor.mode is Mode.ACTIVE
+        assert station.supervisor.clamped == 0
+    assert simulated[0] > 0.01
+    assert difference.max() < 1e-3, difference  # m, rad; a control period later
+
+
+def test_an_arm_that_yields_may_lag_but_not_stand_still() -> None:
+    """Brakes that stay shut: a hold, once the spring could push with all it may."""
+    scenario = load_scenario("removal", ["arm.control=cartesian_impedance"])
+    with in_lockstep(scenario, make_policy("straight")) as parts:
+        simulation, station, cell = parts
+        simulation.reset(0)
+        braked = cell.position_measured()
+        cell.position_measured = lambda: braked  # type: ignore[method-assign]
+        with pytest.raises(HoldError, match=r"are allowed; it does not follow") as hold:
+            for _ in range(60):
+                simulation.step()
+        lead = np.abs(cell.commanded - braked)
+        assert (lead <= station.allowed_lead + 1e-3).all()
+        assert lead.max() > station.config.safety.max_lead, str(hold.value)
+
+
+def test_a_hold_lets_an_arm_that_yields_relax() -> None:
+    """Held where it was measured, its spring no longer presses."""
+    stiff, soft = (
+        run_push("across the groove (+z)", "hold", control)
+        for control in ("position", "cartesian_impedance")
+    )
+    assert "on the gripper, 20 are allowed" in soft.reason
+    assert soft.greatest < 1.1 * soft.at_hold
+    assert soft.late < 0.5 * stiff.late
+
+
+def test_a_cabinet_in_another_control_is_refused_when_it_is_built() -> None:
+    scenario = load_scenario("removal", ["arm.control=cartesian_impedance"])
+    with pytest.raises(DisasmError) as caught:
+        HardwareStation(scenario, HardwareConfig())
+    message = str(caught.value)
+    assert message.startswith("iiwa.control: the cabinet is said to run 'position'")
+    assert "'cartesian_impedance'" in message and "\n" not in message
