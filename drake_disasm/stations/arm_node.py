@@ -15,24 +15,25 @@ _ORDER = list(AXIS_ORDER)
 
 @dataclasses.dataclass(frozen=True)
 class ArmStep:
-    """A step of the controlled arm that carries springs: x+ = A x + B u.
+    """A step of the controlled arm that carries springs.
 
-    x is (12,): the twin's coordinates of the arm, and their rates. u is (24,): command
-    at the step's end and its rate, the bolt's coordinates and rates at its beginning.
+    x is (12,): the twin's coordinates of the arm, and their rates; u is (12,): the
+    command at the step's end and its rate; s is (12,): the bolt's coordinates and
+    rates. Without the springs the arm would go to x' = F x + C u. There the solver of
+    contact has the springs' other end, and with what it finds for the bolt the arm
+    gets the same force: x+ = x' + P (s+ - x').
 
     Attributes:
-        A, B: (12, 12), (12, 24).
+        F, C, P: (12, 12).
     """
 
-    A: np.ndarray
-    B: np.ndarray
+    F: np.ndarray
+    C: np.ndarray
+    P: np.ndarray
 
     @classmethod
     def of(cls, arm: ControlledArm, grip: Springs, h: float) -> "ArmStep":
-        """Returns the exact step for a command that moves evenly.
-
-        The force of the springs is that at the step's beginning, since the solver of
-        contact has the bolt's motion only afterwards; the arm is heavy against it.
+        """Returns the exact step for an even command and an even force.
 
         Args:
             arm: at the springs' middle, in Gn.
@@ -41,32 +42,42 @@ class ArmStep:
         """
         M, D, K = (m[np.ix_(_ORDER, _ORDER)] for m in (arm.M, arm.D, arm.K))
         one = np.eye(6)
-        rate = np.linalg.solve(M, np.hstack([-K, -D, K, D, one]))
         system = np.zeros((30, 30))  # x, command, its rate, force
-        system[:6, 6:12] = one
-        system[6:12] = rate
-        system[12:18, 18:24] = one
+        system[:6, 6:12] = system[12:18, 18:24] = one
+        system[6:12] = np.linalg.solve(M, np.hstack([-K, -D, K, D, one]))
         step = expm(h * system)[:12]
         by_place, by_rate, by_force = step[:, 12:18], step[:, 18:24], step[:, 24:]
-        springs = by_force @ np.hstack(
+        springs = np.hstack(
             [np.diag(values[_ORDER]) for values in (grip.stiffness, grip.damping)]
         )
         # The command at the end, not at the beginning.
-        B = np.hstack([by_place, by_rate - h * by_place, springs])
-        return cls(step[:, :12] - springs, B)
+        C = np.hstack([by_place, by_rate - h * by_place])
+        return cls(step[:, :12], C, by_force @ springs)
+
+    def ahead(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Returns x' (n, 12) for states and commands (n, 12)."""
+        return x @ self.F.T + u @ self.C.T
+
+    def after(self, x_ahead: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Returns x+ (n, 12) once the bolt is at s (n, 12)."""
+        return x_ahead + (s - x_ahead) @ self.P.T
 
     @property
     def is_stable(self) -> bool:
         """Whether an arm that leans on a bolt in contact comes to rest."""
-        return bool(np.abs(np.linalg.eigvals(self.A)).max() < 1.0)
+        return bool(np.abs(np.linalg.eigvals(self.F - self.P @ self.F)).max() < 1.0)
 
 
 class ArmNode:
     """The arm's systems in a twin's diagram.
 
+    Drake updates a plant (an unrestricted update) before other discrete states at the
+    same time: the arm's update sees the bolt after the step.
+
     Attributes:
+        system: the arm, whose discrete state is (12,).
         state: port of the arm's coordinates and rates (12,), which its encoders see.
-        desired: port of the same at the end of the step, for the springs behind it.
+        ahead: port of where it would be after the step without springs.
 
     Args:
         builder: of the station.
@@ -82,39 +93,36 @@ class ArmNode:
         time_step: float,
         inputs: tuple[OutputPort, OutputPort, OutputPort],
     ) -> None:
-        I, none = np.eye(12), np.zeros((12, 24))  # noqa: E741
-        self._h = time_step
-        self._arm = builder.AddNamedSystem(
-            "arm", LinearSystem(step.A, step.B, I, none, time_step)
+        A, B, ahead = _matrices(step)
+        self.system = builder.AddNamedSystem(
+            "arm", LinearSystem(A, B, np.eye(12), np.zeros((12, 24)), time_step)
         )
-        self._ahead = builder.AddNamedSystem(
-            "arm_ahead", MatrixGain(np.hstack([step.A, step.B]))
-        )
+        self._ahead = builder.AddNamedSystem("arm_ahead", MatrixGain(ahead))
         driven = builder.AddNamedSystem("arm_inputs", Multiplexer([6, 6, 12]))
-        whole = builder.AddNamedSystem("arm_state_and_inputs", Multiplexer([12, 24]))
+        commanded = builder.AddNamedSystem("arm_commanded", Multiplexer([12, 6, 6]))
         for i, port in enumerate(inputs):
             builder.Connect(port, driven.get_input_port(i))
-        builder.Connect(driven.get_output_port(), self._arm.get_input_port())
-        builder.Connect(self._arm.get_output_port(), whole.get_input_port(0))
-        builder.Connect(driven.get_output_port(), whole.get_input_port(1))
-        builder.Connect(whole.get_output_port(), self._ahead.get_input_port())
-        self.state = self._arm.get_output_port()
-        self.desired = self._ahead.get_output_port()
+        self.state = self.system.get_output_port()
+        for i, port in enumerate((self.state, *inputs[:2])):
+            builder.Connect(port, commanded.get_input_port(i))
+        builder.Connect(driven.get_output_port(), self.system.get_input_port())
+        builder.Connect(commanded.get_output_port(), self._ahead.get_input_port())
+        self.ahead = self._ahead.get_output_port()
 
     def set_step(self, step: ArmStep) -> None:
         """Gives the arm other numbers; they belong to the diagram, not a Context."""
-        I, zero = np.eye(12), np.zeros(12)  # noqa: E741
-        self._arm.UpdateCoefficients(
-            A=step.A, B=step.B, f0=zero, C=I, D=np.zeros((12, 24)), y0=zero
+        A, B, ahead = _matrices(step)
+        zero = np.zeros(12)
+        self.system.UpdateCoefficients(
+            A=A, B=B, f0=zero, C=np.eye(12), D=np.zeros((12, 24)), y0=zero
         )
         self._ahead.UpdateCoefficients(
-            B=np.zeros((0, 36)),
-            C=np.zeros((12, 0)),
-            D=np.hstack([step.A, step.B]),
-            y0=zero,
+            B=np.zeros((0, 24)), C=np.zeros((12, 0)), D=ahead, y0=zero
         )
 
-    @property
-    def system(self) -> LinearSystem:
-        """The arm, whose discrete state is (12,)."""
-        return self._arm
+
+def _matrices(step: ArmStep) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns A (12, 12) and B (12, 24) of x+ = A x + B [u; s+], and x' by [x; u]."""
+    ahead = np.hstack([step.F, step.C])
+    driven = ahead - step.P @ ahead
+    return driven[:, :12], np.hstack([driven[:, 12:], step.P]), ahead

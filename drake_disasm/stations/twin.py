@@ -256,7 +256,7 @@ class TwinStation(SimulatedStation):
         weight = plant.CalcGravityGeneralizedForces(plant.CreateDefaultContext())
         carried = builder.AddNamedSystem("carried", ConstantVectorSource(-weight))
         measured = builder.AddNamedSystem("measured", Demultiplexer([6, 6]))
-        connect(self.arm_node.desired, plant.get_desired_state_input_port(instance))
+        connect(self.arm_node.ahead, plant.get_desired_state_input_port(instance))
         connect(carried.get_output_port(), plant.get_actuation_input_port(instance))
         connect(self.arm_node.state, measured.get_input_port())
         builder.ExportOutput(measured.get_output_port(0), "bolt.position_measured")

@@ -83,11 +83,12 @@ class ImpactReplay:
         for h in self._time_steps():
             qd = qd + h * rate
             node = ArmStep.of(parameters.arm, parameters.grip, h)
-            arm = arm @ node.A.T + np.hstack([qd, rate, q, v]) @ node.B.T
-            step = ImpactStep(conditions, h, q, v, arm[:, :6], arm[:, 6:])
+            ahead = node.ahead(arm, np.hstack([qd, rate]))
+            step = ImpactStep(conditions, h, q, v, ahead[:, :6], ahead[:, 6:])
             begin, v_begin = q, v
             v, contact = step.solve()
             q = q + h * v
+            arm = node.after(ahead, np.hstack([q, v]))
         contact[:, :3] += conditions.around.f_Gn
         loads = self._loads(begin, (v - v_begin) / h, contact)
         times = (steps.index + 1) * self._scenario.task.period
