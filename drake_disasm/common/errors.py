@@ -1,4 +1,4 @@
-"""The one exception that users are meant to see."""
+"""The one exception that users are meant to see, and the one kind of warning."""
 
 
 class DisasmError(Exception):
@@ -7,3 +7,7 @@ class DisasmError(Exception):
     The programs in `tools/` print the message alone and exit with status 2;
     code that builds on the package can catch it like any other exception.
     """
+
+
+class DisasmWarning(UserWarning):
+    """Something that works and may surprise, said in one line, with the remedy."""

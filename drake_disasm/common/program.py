@@ -6,6 +6,7 @@ import math
 import signal
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import Any, NoReturn, Self
 
 from tqdm import tqdm
 
-from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.errors import DisasmError, DisasmWarning
 from drake_disasm.common.progress import ProgressUpdate
 
 EXIT_BAD_INPUT = 2
@@ -56,7 +57,19 @@ def run(main: Callable[[Sequence[str]], int]) -> None:
     for number, handler in usual.items():
         if signal.getsignal(number) is handler:
             signal.signal(number, _stop)
+    warnings.formatwarning = _one_line_for_ours(warnings.formatwarning)
     sys.exit(status(main, sys.argv[1:]))
+
+
+def _one_line_for_ours(usual: Callable[..., str]) -> Callable[..., str]:
+    """Returns a `warnings.formatwarning` that tells our warnings as errors are told."""
+
+    def told(message: Warning | str, category: type[Warning], *rest: Any) -> str:
+        if issubclass(category, DisasmWarning):
+            return f"warning: {message}\n"
+        return usual(message, category, *rest)
+
+    return told
 
 
 def status(main: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> int:

@@ -34,10 +34,13 @@ class InitialState:
     Attributes:
         position: (n,) coordinates from which motion is commanded.
         reading: (6,) of the sensor there, noise averaged away.
+        force: true magnitude of the force on the bolt there, which zeroing the sensor
+            hides [N]; NaN where nobody knows it, on hardware.
     """
 
     position: np.ndarray
     reading: np.ndarray
+    force: float = np.nan
 
 
 class Station(Diagram):

@@ -154,14 +154,14 @@ class SimulatedStation(Station):
         self.sensor.set_load_at_rest(
             self.sensor.load(self.part_context(self.sensor, settled))
         )
-        self._initial = InitialState(self.start, self.reading_at_zeroing(settled))
+        self._initial = self._state_at_start(settled)
 
     @property
     def initial_state(self) -> InitialState:
         """See Station."""
         if self._initial is None:
             settled = self.settled(self.scenario.effects)
-            return InitialState(self.start, self.reading_at_zeroing(settled))
+            return self._state_at_start(settled)
         return self._initial
 
     def refuse_effects(self, effects: Sequence[Effect]) -> None:
@@ -275,7 +275,7 @@ class SimulatedStation(Station):
         _copy_state(settled, context)
         plant_context = self.part_context(self.plant, context)
         self.plant.SetVelocities(plant_context, np.zeros(self.plant.num_velocities()))
-        return InitialState(self.start, self.reading_at_zeroing(settled))
+        return self._state_at_start(settled)
 
     def bolt_is_out(self, context: Context, lift_needed: float) -> bool:
         """See Station."""
@@ -286,6 +286,12 @@ class SimulatedStation(Station):
     def reading_at_zeroing(self, context: Context) -> np.ndarray:
         """Returns what the sensor reads, noise averaged away, (6,) [f; tau] in S."""
         return self.sensor.reading_at_zeroing(self.part_context(self.sensor, context))
+
+    def _state_at_start(self, settled: Context) -> InitialState:
+        load = self.sensor.load(self.part_context(self.sensor, settled))
+        on_bolt = load - self.mounting.weight(self.mounting.X_BS.rotation())
+        force = float(np.linalg.norm(on_bolt[:3]))
+        return InitialState(self.start, self.reading_at_zeroing(settled), force)
 
     def true_groove_pose(self, context: Context) -> RigidTransform:
         """Returns X_GnG, where the groove truly is."""

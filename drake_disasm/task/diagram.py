@@ -8,6 +8,7 @@ The loop::
 """
 
 import dataclasses
+import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -24,7 +25,7 @@ from pydrake.systems.primitives import (
     RandomSource,
 )
 
-from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.errors import DisasmError, DisasmWarning
 from drake_disasm.effects import Effect, motion_chain
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES, TaskGeometry, action_bounds
 from drake_disasm.scenario import Scenario, TaskConfig
@@ -35,6 +36,7 @@ from drake_disasm.systems.policy import ActionHold, Policy, PolicySystem
 from drake_disasm.systems.pose_target import PoseTarget
 from drake_disasm.systems.task_monitor import TaskMonitor
 
+_LOAD_AT_START = 0.2  # N on the bolt, from which on a start is warned of
 _SEEDS = 2  # one for a simulated sensor's noise, one for the imprecision
 
 
@@ -89,6 +91,7 @@ class TaskSystems:
         self.processor.zero(
             self.processor.GetMyMutableContextFromRoot(context), start.reading
         )
+        warn_of_load(start)
         return start
 
     def set_seed(self, context: Context, seed: int) -> None:
@@ -115,6 +118,22 @@ class TaskSystems:
             )
             if reset:
                 reset()
+
+
+class LoadAtStartWarning(DisasmWarning):
+    """An episode begins with a force on the bolt, which zeroing the sensor hides."""
+
+
+def warn_of_load(start: InitialState) -> None:
+    """Warns of a force on the bolt at the start, once for each distinct start."""
+    if start.force > _LOAD_AT_START:
+        warnings.warn(
+            f"the bolt is under {start.force:.2f} N at the start; the sensor is zeroed "
+            "there, so that force is missing from every state until the bolt is free; "
+            "move the groove back (GroovePose, placement), or take out what pulls",
+            LoadAtStartWarning,
+            stacklevel=2,
+        )
 
 
 def add_task(

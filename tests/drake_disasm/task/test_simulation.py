@@ -1,5 +1,7 @@
 """The task's diagram: in-place resets, seeds, and stepping with and without policy."""
 
+import warnings
+
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
@@ -10,6 +12,7 @@ from drake_disasm.effects import GroovePose, SensorBias
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
+from drake_disasm.task.diagram import LoadAtStartWarning
 from drake_disasm.task.episode import run_episode, summary_table
 from drake_disasm.task.recording import EpisodeRecorder
 from drake_disasm.task.simulation import TaskSimulation
@@ -148,3 +151,19 @@ def test_summary_table_has_a_row_per_episode() -> None:
     assert len(lines) == 5
     assert lines[-1] == "2 of 2 episodes succeeded"
     assert all("success" in line for line in lines[2:4])
+
+
+@pytest.mark.parametrize("compliance", ["adaptive", "rigid"])
+def test_a_start_in_contact_is_said(compliance: str) -> None:
+    """A groove that is 2 mm on presses its end against the bolt; zeroing hides it."""
+    scenario = load_scenario("removal", [f"gripper.compliance={compliance}"])
+    simulation = TaskSimulation(scenario, "twin")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulation.reset(1)
+        simulation.reset(1, [GroovePose(x=-0.002)])
+    with pytest.warns(LoadAtStartWarning, match=r"under \d+\.\d\d N at the start"):
+        simulation.reset(1, [GroovePose(x=0.002)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulation.reset(2, [GroovePose(x=0.002)])  # the same start again
