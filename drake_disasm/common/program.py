@@ -65,6 +65,7 @@ def _one_line_for_ours(usual: Callable[..., str]) -> Callable[..., str]:
     """Returns a `warnings.formatwarning` that tells our warnings as errors are told."""
 
     def told(message: Warning | str, category: type[Warning], *rest: Any) -> str:
+        """Returns a warning as text."""
         if issubclass(category, DisasmWarning):
             return f"warning: {message}\n"
         return usual(message, category, *rest)
