@@ -1,12 +1,15 @@
 """The scripted policies: what they answer to hand-made observations."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
+from drake_disasm.cell.twin_parameters import bolt_stiffness
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.mdp import action_bounds
 from drake_disasm.policies import SCRIPTED, Admittance, Straight, make_policy
-from drake_disasm.scenario import TaskConfig
+from drake_disasm.scenario import TaskConfig, load_scenario
 
 
 def _observation(y: float = 0.0, **wrench: float) -> np.ndarray:
@@ -91,3 +94,44 @@ def test_unhindered_step_is_within_the_bounds(name: str) -> None:
 def test_unknown_policy_suggests_a_name() -> None:
     with pytest.raises(DisasmError, match=r"'admitance'.*'admittance'"):
         make_policy("admitance")
+
+
+STIFFNESS = {
+    "stiff": np.array([15.8e3, 14.8e3, 13.1e3, 407.0, 282.0, 370.0]),
+    "yielding": np.array([539.0, 577.0, 536.0, 9.8, 9.7, 9.7]),
+}
+
+
+@pytest.mark.parametrize("held", STIFFNESS)
+def test_gains_follow_from_the_stiffness(held: str) -> None:
+    """A step takes back less than a force or torque has, on every axis."""
+    k = STIFFNESS[held]
+    policy = Admittance.for_stiffness(k, 0.0)
+    assert (policy.yield_compliance * k[:3]).max() == pytest.approx(0.4)
+    assert (policy.rotation_compliance * k[3:]).max() == pytest.approx(0.6)
+    assert policy.speed * k[0] < policy.push + 1.0
+    assert policy.stop < policy.push
+
+
+def test_gains_of_a_stiff_bolt_are_the_ones_that_were_tuned_for_it() -> None:
+    policy = Admittance.for_stiffness(STIFFNESS["stiff"], 0.0)
+    for field in dataclasses.fields(Admittance):
+        tuned = getattr(Admittance(), field.name)
+        assert getattr(policy, field.name) == pytest.approx(tuned, rel=0.1)
+
+
+def test_lifting_begins_with_the_bolt_and_not_with_the_grip() -> None:
+    """Up by 3 mm against 1.5 N at 0.6 kN/m, the bolt has risen by 0.5 mm only."""
+    policy = Admittance.for_stiffness(STIFFNESS["yielding"], 1.0 / 600.0)
+    assert policy(_observation(0.003, fy=-1.5))[0] == pytest.approx(policy.speed)
+    free = policy(_observation(0.003, fy=-0.5))
+    assert free[0] == pytest.approx(0.0) and free[1] > 0.0
+
+
+@pytest.mark.parametrize("compliance", ["adaptive", "rigid"])
+def test_a_scenario_decides_the_gains(compliance: str) -> None:
+    scenario = load_scenario("removal", [f"gripper.compliance={compliance}"])
+    policy = make_policy("admittance", scenario)
+    assert isinstance(policy, Admittance)
+    share = policy.yield_compliance * bolt_stiffness(scenario)[:3].max()
+    assert share == pytest.approx(0.4)
