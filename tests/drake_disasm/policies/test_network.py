@@ -181,11 +181,11 @@ def _described(policy: LearnedPolicy, **changes: object) -> LearnedPolicy:
 def test_policy_of_another_task_is_refused(
     policy: LearnedPolicy, changes: dict, overrides: list[str], words: list[str]
 ) -> None:
-    scenario = load_scenario("removal", overrides)
+    scenario = load_scenario("chapter4", overrides)
     with pytest.raises(DisasmError) as caught:
         _described(policy, **changes).check_fits(scenario)
     message = str(caught.value)
-    assert "\n" not in message and "removal" in message
+    assert "\n" not in message and "chapter4" in message
     assert all(word in message for word in words), message
 
 
@@ -199,7 +199,7 @@ def test_policy_of_another_task_is_refused(
     ],
 )
 def test_policy_carries_over(policy: LearnedPolicy, overrides: list[str]) -> None:
-    policy.check_fits(load_scenario("removal_turned", overrides))
+    policy.check_fits(load_scenario("chapter4", overrides))
 
 
 def test_load_policy_is_the_policy(policy: LearnedPolicy, tmp_path) -> None:
