@@ -198,10 +198,29 @@ def stated_stiffness(station: CellStation) -> np.ndarray:
     return 1.0 / np.diag(np.linalg.inv(K))
 
 
+def _control_lines() -> Iterator[str]:
+    yield "the arm's controls: axis, stated, measured pose, difference %"
+    for control, duration in (
+        ("position", 0.6),
+        ("joint_impedance", 1.2),
+        ("cartesian_impedance", 2.4),
+    ):
+        yield f"  {control}"
+        overrides = [f"arm.control={control}", "gripper.compliance=rigid"]
+        scenario = load_scenario("removal", [QUIET, "gripper.hold=weld", *overrides])
+        station = CellStation(scenario)
+        stated = stated_stiffness(station)
+        table = stiffness(station, [5, 5, 5, 0.1, 0.1, 0.1], duration)
+        for axis, found in enumerate(table[:, 1]):
+            off = 100 * (found / stated[axis] - 1)
+            yield f"  {'xyzuvw'[axis]} {stated[axis]:.0f} {found:.0f} {off:+.2f}"
+
+
 def _lines() -> Iterator[str]:
     yield from _contact_lines()
     yield from _time_step_lines()
     yield from _arm_lines()
+    yield from _control_lines()
 
 
 def _contact_lines() -> Iterator[str]:

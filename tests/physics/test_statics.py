@@ -10,6 +10,7 @@ from tests.physics.measurements import AWAY, QUIET, pushed, stated_stiffness, st
 
 RESOLUTION = np.array([0.2, 0.2, 0.8, 0.010, 0.010, 0.002])  # HEX-E, noise-free
 G = 9.81
+_STIFF_TOOL = "gripper.compliance=rigid"
 #: Within which a push has come to rest [s], by the arm's control.
 SETTLES = {"position": 0.6, "joint_impedance": 1.2, "cartesian_impedance": 2.4}
 #: Joint angles with the tool upright, level, upside down, and askew in the air.
@@ -83,7 +84,7 @@ def test_cartesian_stiffness_is_the_stated_one(cell: CellStation) -> None:
 @pytest.mark.parametrize("control", SETTLES)
 def test_arm_is_as_stiff_as_its_control_states(control: str) -> None:
     """At the measured pose, each axis by itself, within 2 %."""
-    overrides = [QUIET, f"arm.control={control}", "gripper.hold=weld"]
+    overrides = [QUIET, _STIFF_TOOL, f"arm.control={control}", "gripper.hold=weld"]
     station = CellStation(load_scenario("removal", overrides))
     table = stiffness(station, [5.0, 5.0, 5.0, 0.1, 0.1, 0.1], SETTLES[control])
     np.testing.assert_allclose(table[:, 1], stated_stiffness(station), rtol=0.02)
