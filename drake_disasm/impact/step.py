@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from drake_disasm.cell.grip import AXIS_ORDER, Springs
 from drake_disasm.effects import Environment
 from drake_disasm.impact.law import ImpactLaw
 from drake_disasm.impact.shape import LockShape
@@ -72,6 +73,12 @@ class ImpactConditions:
     K: np.ndarray
     D: np.ndarray
     p_BoTo_B: np.ndarray
+
+    def sprung(self, springs: Springs) -> Self:
+        """Returns the same with other springs in the twin's joints."""
+        order = list(AXIS_ORDER)
+        K, D = springs.stiffness[order], springs.damping[order]
+        return dataclasses.replace(self, K=K, D=D)
 
 
 @dataclasses.dataclass(frozen=True)

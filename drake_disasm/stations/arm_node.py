@@ -21,15 +21,18 @@ class ArmStep:
     command at the step's end and its rate; s is (12,): the bolt's coordinates and
     rates. Without the springs the arm would go to x' = F x + C u. There the solver of
     contact has the springs' other end, and with what it finds for the bolt the arm
-    gets the same force: x+ = x' + P (s+ - x').
+    gets the same force: x+ = x' + P (s+ - x'). That the arm gives way to the force
+    within the step is in these springs, which are softer by that.
 
     Attributes:
         F, C, P: (12, 12).
+        springs: between x' and the bolt.
     """
 
     F: np.ndarray
     C: np.ndarray
     P: np.ndarray
+    springs: Springs
 
     @classmethod
     def of(cls, arm: ControlledArm, grip: Springs, h: float) -> "ArmStep":
@@ -47,12 +50,10 @@ class ArmStep:
         system[6:12] = np.linalg.solve(M, np.hstack([-K, -D, K, D, one]))
         step = expm(h * system)[:12]
         by_place, by_rate, by_force = step[:, 12:18], step[:, 18:24], step[:, 24:]
-        springs = np.hstack(
-            [np.diag(values[_ORDER]) for values in (grip.stiffness, grip.damping)]
-        )
         # The command at the end, not at the beginning.
         C = np.hstack([by_place, by_rate - h * by_place])
-        return cls(step[:, :12], C, by_force @ springs)
+        springs = _softer(grip, by_force)
+        return cls(step[:, :12], C, by_force @ _gains(springs), springs)
 
     def ahead(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Returns x' (n, 12) for states and commands (n, 12)."""
@@ -66,6 +67,27 @@ class ArmStep:
     def is_stable(self) -> bool:
         """Whether an arm that leans on a bolt in contact comes to rest."""
         return bool(np.abs(np.linalg.eigvals(self.F - self.P @ self.F)).max() < 1.0)
+
+
+def _gains(springs: Springs) -> np.ndarray:
+    """Returns force by coordinates and rates (6, 12), in the coordinates' order."""
+    parts = (springs.stiffness, springs.damping)
+    return np.hstack([np.diag(values[_ORDER]) for values in parts])
+
+
+def _softer(grip: Springs, by_force: np.ndarray) -> Springs:
+    """Returns the springs in series with what a force moves an arm in one step.
+
+    Of each axis by itself; what one axis does to another is left out.
+
+    Args:
+        grip: the springs.
+        by_force: (12, 6) change of the arm's state by a force in the step.
+    """
+    gains = _gains(grip)
+    whole = np.linalg.solve(np.eye(6) + gains @ by_force, gains)
+    back = np.argsort(_ORDER)
+    return Springs(np.diag(whole[:, :6])[back], np.diag(whole[:, 6:])[back])
 
 
 class ArmNode:

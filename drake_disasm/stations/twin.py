@@ -156,8 +156,9 @@ class TwinStation(SimulatedStation):
             return
         scenario = self.scenario
         self.contact.reconfigure(self.lock, scenario.contact, self._parts(context))
-        self._spring.set_springs(self.parameters.grip)
-        self.arm_node.set_step(self._arm_step())
+        step = self._arm_step()
+        self._spring.set_springs(step.springs)
+        self.arm_node.set_step(step)
 
     def _build(self, builder: DiagramBuilder) -> None:
         scenario = self.scenario
@@ -166,11 +167,11 @@ class TwinStation(SimulatedStation):
         self.lock = add_lock(
             plant, frame_Gn, scenario.lock, scenario.contact, self._environment
         )
-        p_BoTo_B, grip = self.parameters.p_BoTo_B, self.parameters.grip
+        p_BoTo_B, springs = self.parameters.p_BoTo_B, self._arm_step().springs
         frame_Tn = plant.AddFrame(
             FixedOffsetFrame("grip_nominal", frame_Gn, RigidTransform(p_BoTo_B))
         )
-        self._spring = SixAxisSpring(plant, "grip", frame_Tn, grip)
+        self._spring = SixAxisSpring(plant, "grip", frame_Tn, springs)
         frame_S, joint = self._add_sensor_joint()
         plant.Finalize()
         self._read_payload()

@@ -84,7 +84,9 @@ class ImpactReplay:
             qd = qd + h * rate
             node = ArmStep.of(parameters.arm, parameters.grip, h)
             ahead = node.ahead(arm, np.hstack([qd, rate]))
-            step = ImpactStep(conditions, h, q, v, ahead[:, :6], ahead[:, 6:])
+            step = ImpactStep(
+                conditions.sprung(node.springs), h, q, v, ahead[:, :6], ahead[:, 6:]
+            )
             begin, v_begin = q, v
             v, contact = step.solve()
             q = q + h * v
