@@ -30,6 +30,7 @@ TURNED = ImpactConditions(
     M=M,
     K=K,
     D=D,
+    p_BoTo_B=np.array([0.0, 0.015, 0.0]),
 )
 H = 0.0025
 COUNT = 40
@@ -49,8 +50,9 @@ def test_springs_inertia_and_contact_balance_after_the_step():
     q, v, qd, vd = states()
     step = ImpactStep(TURNED, H, q, v, qd, vd)
     after, wrench = step.solve()
-    E, _ = turning(q[:, 3:])
-    pushed = np.hstack([wrench[:, :3], np.einsum("nji,nj->ni", E, wrench[:, 3:])])
+    E, R = turning(q[:, 3:])
+    t_To = wrench[:, 3:] - np.cross(R @ TURNED.p_BoTo_B, wrench[:, :3])
+    pushed = np.hstack([wrench[:, :3], np.einsum("nji,nj->ni", E, t_To)])
     rest = (after - v) @ M - H * (K * (qd - q - H * after) + D * (vd - after) + pushed)
     assert np.abs(pushed).max() > 1.0
     np.testing.assert_allclose(rest, 0.0, atol=5e-6)  # 1e-8 m/s, in a stiff wall

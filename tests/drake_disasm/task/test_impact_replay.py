@@ -9,6 +9,7 @@ from drake_disasm.task.replay import Steps, TwinReplay
 
 QUIET = ["contact.model=impact", "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"]
 TURNED = load_scenario("removal_turned", QUIET)
+STIFF = load_scenario("removal_turned", [*QUIET, "gripper.compliance=rigid"])
 SENSING = load_scenario(
     "removal_turned",
     [
@@ -30,16 +31,20 @@ def steps() -> Steps:
     q[:, 4] = random.uniform(0.0, 0.035, COUNT)
     away = random.uniform(-1, 1, (COUNT, 6)) * [1e-4, 1e-4, 3e-4, 1e-3, 1e-3, 1e-3]
     rate = random.uniform(-1, 1, (COUNT, 6)) * [2e-2, 3e-3, 3e-3, 1e-2, 2e-2, 1e-2]
-    return Steps(np.arange(COUNT), q, np.zeros((COUNT, 6)), q + away, rate)
+    f = np.column_stack([random.uniform(-1, 1, (COUNT, 3)), np.zeros((COUNT, 3))])
+    return Steps(np.arange(COUNT), q, np.zeros((COUNT, 6)), q + away, rate, f)
 
 
-@pytest.mark.parametrize("coarse", [False, True])
-@pytest.mark.parametrize("scenario", [TURNED, SENSING], ids=["turned", "sensing"])
-def test_it_says_what_the_diagram_says(scenario, coarse):
+@pytest.mark.parametrize(
+    ("scenario", "pushes"),
+    [(TURNED, 0.8), (SENSING, 0.8), (STIFF, 3.0)],
+    ids=["turned", "sensing", "stiff"],
+)
+def test_it_says_what_the_diagram_says(scenario, pushes):
     """To nanometres, thousandths of a newton and hundredths of a N mm."""
-    expected = TwinReplay(scenario, coarse).transitions(steps())
-    found = ImpactReplay(scenario, coarse).transitions(steps())
-    assert np.abs(expected[:, 8]).max() > 3.0
+    expected = TwinReplay(scenario).transitions(steps())
+    found = ImpactReplay(scenario).transitions(steps())
+    assert np.abs(expected[:, 8]).max() > pushes
     np.testing.assert_allclose(found[:, :3], expected[:, :3], atol=3e-9)
     np.testing.assert_allclose(found[:, 3:6], expected[:, 3:6], atol=1e-6)
     np.testing.assert_allclose(found[:, 6:9], expected[:, 6:9], atol=2e-3)
@@ -53,7 +58,7 @@ def test_becoming_another_scenario_is_building_it_anew_bit_for_bit():
             "contact.impact.stiffness": 50.0,
             "contact.impact.depth": 0.3,
             "lock.clearance": 0.0005,
-            "twin.stiffness.2": 9e3,
+            "gripper.stiffness.2": 900.0,
             "effects.0.ry": 0.01,
         },
     )

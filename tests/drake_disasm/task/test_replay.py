@@ -1,17 +1,18 @@
 """The twin driven open loop, and turned into other scenarios in place."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.scenario import load_scenario, with_values
 from drake_disasm.stations import TwinStation
-from drake_disasm.task.replay import TwinReplay, coarse_step
+from drake_disasm.task.replay import TwinReplay
 from drake_disasm.task.simulation import TaskSimulation
 
-TURNED = load_scenario("removal_turned", ["ft_sensor.noise=[0, 0, 0, 0, 0, 0]"])
+TURNED = load_scenario(
+    "removal_turned",
+    ["ft_sensor.noise=[0, 0, 0, 0, 0, 0]", "task.max_translation=0.003"],
+)
 OTHER = with_values(
     TURNED,
     {
@@ -20,9 +21,9 @@ OTHER = with_values(
         "contact.friction": 0.35,
         "contact.modulus": 1e9,
         "contact.dissipation": 5.0,
-        "twin.stiffness.1": 8e3,
-        "twin.mass": 5.0,
-        "twin.damping_ratio": 0.8,
+        "gripper.stiffness.1": 800.0,
+        "gripper.damping_ratio": 0.8,
+        "arm.stiffness.3": 6e3,
         "effects.0.ry": 0.02,
     },
 )
@@ -30,11 +31,13 @@ ACTIONS = np.random.default_rng(0).uniform(-1, 1, (6, 6)) * [
     2e-3, 3e-4, 3e-4, 0, 2e-3, 0
 ]  # fmt: skip
 
+NONE = np.zeros(6)
+
 
 def replayed(replay: TwinReplay) -> np.ndarray:
     """Returns the states of a walk along the groove in contact."""
     start = np.array([0.02, 0, 2e-4, 0, 0, 0])
-    replay.start(0, start, np.zeros(6), start)
+    replay.start(0, start, NONE, start, NONE)
     return np.array([replay.advance(rate / 0.1) for rate in ACTIONS])
 
 
@@ -45,18 +48,17 @@ def test_it_is_the_task_simulation_open_loop():
     expected = np.array(
         [simulation.step(a * [1, 1, 1, 0, 0, 0]).observation for a in ACTIONS]
     )
-    replay.start(0, np.zeros(6), np.zeros(6), np.zeros(6))
+    replay.start(0, NONE, NONE, NONE, NONE)
     found = np.array([replay.advance(a * [1, 1, 1, 0, 0, 0] / 0.1) for a in ACTIONS])
     np.testing.assert_allclose(found, expected, atol=2e-3)  # the sensor rounds
     assert first.shape == found[0].shape
 
 
-@pytest.mark.parametrize("coarse", [False, True])
-def test_becoming_another_scenario_is_building_it_anew_bit_for_bit(coarse):
-    replay = TwinReplay(TURNED, coarse)
+def test_becoming_another_scenario_is_building_it_anew_bit_for_bit():
+    replay = TwinReplay(TURNED)
     before = replayed(replay)
     replay.reconfigure(OTHER)
-    assert replayed(replay).tobytes() == replayed(TwinReplay(OTHER, coarse)).tobytes()
+    assert replayed(replay).tobytes() == replayed(TwinReplay(OTHER)).tobytes()
     replay.reconfigure(TURNED)
     assert replayed(replay).tobytes() == before.tobytes()
 
@@ -71,24 +73,9 @@ def test_what_cannot_be_changed_in_place_is_built_anew():
 def test_a_state_leaves_no_trace_in_the_next():
     replay = TwinReplay(TURNED)
     first = replayed(replay)
-    replay.start(3, np.array([0.05, 1e-3, 0, 0, 0, 0]), np.ones(6) * 0.01, np.zeros(6))
-    replay.advance(np.zeros(6))
+    replay.start(3, np.array([0.05, 1e-3, 0, 0, 0, 0]), np.ones(6) * 0.01, NONE, NONE)
+    replay.advance(NONE)
     assert replayed(replay).tobytes() == first.tobytes()
-
-
-def test_coarse_steps_end_where_fine_ones_do():
-    difference = replayed(TwinReplay(TURNED, coarse=True)) - replayed(
-        TwinReplay(TURNED)
-    )
-    settled = difference[1:]  # the first begins with a jump into contact
-    assert np.abs(settled[:, :3]).max() < 1e-5
-    assert np.abs(settled[:, 6:9]).max() < 0.2
-
-
-def test_coarse_steps_divide_the_period():
-    assert coarse_step(TURNED) == pytest.approx(0.02)
-    fine = dataclasses.replace(TURNED.simulation, twin_time_step=0.02)
-    assert coarse_step(dataclasses.replace(TURNED, simulation=fine)) == 0.0
 
 
 def test_a_station_refuses_in_place_what_needs_another_plant():
@@ -113,7 +100,7 @@ def test_impact_too_changes_in_place():
             "contact.impact.exponent": 1.3,
             "contact.friction": 0.1,
             "lock.clearance": 0.0005,
-            "twin.stiffness.2": 9e3,
+            "gripper.stiffness.2": 900.0,
             "effects.0.ry": 0.01,
         },
     )
