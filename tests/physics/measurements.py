@@ -21,7 +21,7 @@ from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation
 from drake_disasm.task.simulation import TaskSimulation
-from tests.drake_disasm.conftest import QUIET
+from tests.drake_disasm.conftest import QUIET, STIFF
 
 AWAY = GroovePose(y=-0.01)  # the groove drops away from the bolt
 
@@ -44,14 +44,17 @@ def play(force: float, *overrides: str, ry: float = 0.0) -> float:
         overrides: of the scenario.
         ry: by which the groove is turned [rad].
     """
-    simulation = quiet("removal", *overrides)
+    simulation = quiet("removal", STIFF, *overrides)
     R_GnG = rotation_from_vector(np.array([0.0, ry, 0.0]))
 
     def move(x: float, z: float) -> tuple[float, float]:
         """Moves along and across the groove; returns z and f_z in G."""
         s = simulation.step(action(*(R_GnG @ np.array([x, 0.0, z])))).observation
-        R_GGn = R_GnG.inverse()
-        return (R_GGn @ s[:3])[2], (R_GGn @ s[6:9])[2]
+        X_GnB, R_GGn = (
+            simulation.evaluate(simulation.station, "bolt_pose"),
+            R_GnG.inverse(),
+        )
+        return (R_GGn @ X_GnB.translation())[2], (R_GGn @ s[6:9])[2]
 
     ends = []
     for sign in (1.0, -1.0):
@@ -71,7 +74,7 @@ def sliding(mu: float, offset: float) -> tuple[float, float]:
         mu: Coulomb coefficient.
         offset: commanded sideways position, beyond the play [m].
     """
-    simulation = quiet("removal", f"contact.friction={mu}")
+    simulation = quiet("removal", STIFF, f"contact.friction={mu}")
     simulation.reset(0)
     simulation.step(action(z=offset))
     states = [simulation.step(action(x=1e-3)).observation for _ in range(30)]

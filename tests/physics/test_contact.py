@@ -7,7 +7,15 @@ from drake_disasm.effects import GroovePose
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
-from tests.physics.measurements import QUIET, action, episode, play, quiet, sliding
+from tests.physics.measurements import (
+    QUIET,
+    STIFF,
+    action,
+    episode,
+    play,
+    quiet,
+    sliding,
+)
 
 
 @pytest.mark.parametrize("model", ["cell", "twin"])
@@ -81,7 +89,7 @@ def test_half_the_time_step_gives_the_same(
 def test_groove_turned_the_other_way_mirrors_the_force() -> None:
     forces = []
     for sign in (1.0, -1.0):
-        simulation = quiet()
+        simulation = quiet("removal", STIFF)
         simulation.reset(0, [GroovePose(ry=sign * np.deg2rad(2.0))])
         for _ in range(25):
             result = simulation.step(action(x=1e-3))

@@ -7,12 +7,12 @@ from drake_disasm.common.spatial import rotation_from_vector
 from drake_disasm.effects import GroovePose
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
-from tests.physics.measurements import QUIET
+from tests.physics.measurements import QUIET, STIFF
 
 
 def _press(model: str, offset: np.ndarray, ry: float) -> TaskSimulation:
     """Returns a simulation whose bolt has slid 20 mm, pressed by `offset` (3,) in G."""
-    simulation = TaskSimulation(load_scenario("removal", [QUIET]), model)
+    simulation = TaskSimulation(load_scenario("removal", [QUIET, STIFF]), model)
     simulation.reset(0, [GroovePose(ry=ry)])
     R_GnG = rotation_from_vector(np.array([0.0, ry, 0.0]))
     for move in [offset] + 20 * [np.array([1e-3, 0.0, 0.0])]:
