@@ -42,9 +42,13 @@ def test_solve_inverts_pose(
 
 
 def test_twin_coordinates_are_xyz_yaw_pitch_roll(twin: TwinStation) -> None:
+    """Of the middle of the pads, from where it is at A."""
+    p_BoTo_B = twin.parameters.p_BoTo_B
+    assert np.linalg.norm(p_BoTo_B) > 0.01
     X_GB = twin.coordinates.pose(np.array([1, 2, 3, 0.3, 0.2, 0.1]))
-    expected = RigidTransform(RollPitchYaw(0.1, 0.2, 0.3), [1, 2, 3])
-    assert X_GB.IsNearlyEqualTo(expected, 1e-15)
+    turn = RollPitchYaw(0.1, 0.2, 0.3).ToRotationMatrix()
+    np.testing.assert_allclose(X_GB.rotation().matrix(), turn.matrix(), atol=1e-15)
+    np.testing.assert_allclose(X_GB @ p_BoTo_B, np.add(p_BoTo_B, [1, 2, 3]), rtol=1e-14)
 
 
 def test_out_of_reach_is_one_line() -> None:

@@ -54,6 +54,15 @@ def _actual(system: System) -> tuple[list[str], list[str]]:
     return [p.get_name() for p in inputs], [p.get_name() for p in outputs]
 
 
+def _name(entry: str) -> str:
+    return entry.split(" (")[0]
+
+
+def _is_there(entry: str, real: list[str]) -> bool:
+    """Returns whether a listed port is to be there: `name (where ...)` need not be."""
+    return " (where " not in entry or _name(entry) in real
+
+
 @pytest.fixture(scope="module")
 def systems() -> list[System]:
     """Each of our systems, in the diagrams that use them."""
@@ -73,4 +82,5 @@ def test_docstrings_list_the_ports(systems: list[System]) -> None:
     for system in systems:
         documented, actual = _documented(system), _actual(system)
         for listed, real in zip(documented, actual, strict=True):
-            assert sorted(listed) == sorted(real), type(system).__name__
+            names = [_name(entry) for entry in listed if _is_there(entry, real)]
+            assert sorted(names) == sorted(real), type(system).__name__

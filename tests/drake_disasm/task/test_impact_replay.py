@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from drake_disasm.scenario import load_scenario, with_values
+from drake_disasm.scenario import Scenario, load_scenario, with_values
+from drake_disasm.stations import TwinStation
 from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.replay import Steps, TwinReplay
 
@@ -22,17 +23,23 @@ SENSING = load_scenario(
 COUNT = 24
 
 
-def steps() -> Steps:
-    """Returns steps along the turned groove, most of them in contact."""
+def steps(scenario: Scenario) -> Steps:
+    """Returns steps along the turned groove, most of them in contact.
+
+    The bolt is in the groove; the arm is where the grip gives to reach there.
+    """
     random = np.random.default_rng(0)
     x = random.uniform(0.0, 0.058, COUNT)
-    q = np.zeros((COUNT, 6))
-    q[:, 0], q[:, 2] = x, -0.035 * x + random.uniform(-2e-4, 2e-4, COUNT)
-    q[:, 4] = random.uniform(0.0, 0.035, COUNT)
+    q_bolt = np.zeros((COUNT, 6))
+    q_bolt[:, 0], q_bolt[:, 2] = x, -0.035 * x + random.uniform(-2e-4, 2e-4, COUNT)
+    q_bolt[:, 4] = random.uniform(0.0, 0.035, COUNT)
+    wrench = random.uniform(-1, 1, (COUNT, 6)) * [1, 1, 1, 0.02, 0.02, 0.02]
+    station = TwinStation(scenario)
+    q = q_bolt - np.array([station.deflection(w) for w in wrench])
     away = random.uniform(-1, 1, (COUNT, 6)) * [1e-4, 1e-4, 3e-4, 1e-3, 1e-3, 1e-3]
     rate = random.uniform(-1, 1, (COUNT, 6)) * [2e-2, 3e-3, 3e-3, 1e-2, 2e-2, 1e-2]
-    f = np.column_stack([random.uniform(-1, 1, (COUNT, 3)), np.zeros((COUNT, 3))])
-    return Steps(np.arange(COUNT), q, np.zeros((COUNT, 6)), q + away, rate, f)
+    rest = np.zeros((COUNT, 6))
+    return Steps(np.arange(COUNT), q, rest, q + away, rate, wrench)
 
 
 @pytest.mark.parametrize(
@@ -41,14 +48,14 @@ def steps() -> Steps:
     ids=["turned", "sensing", "stiff"],
 )
 def test_it_says_what_the_diagram_says(scenario, pushes):
-    """To nanometres, thousandths of a newton and hundredths of a N mm."""
-    expected = TwinReplay(scenario).transitions(steps())
-    found = ImpactReplay(scenario).transitions(steps())
+    """To some 10 nm, thousandths of a newton and hundredths of a N mm."""
+    expected = TwinReplay(scenario).transitions(steps(scenario))
+    found = ImpactReplay(scenario).transitions(steps(scenario))
     assert np.abs(expected[:, 8]).max() > pushes
-    np.testing.assert_allclose(found[:, :3], expected[:, :3], atol=3e-9)
+    np.testing.assert_allclose(found[:, :3], expected[:, :3], atol=6e-8)
     np.testing.assert_allclose(found[:, 3:6], expected[:, 3:6], atol=1e-6)
     np.testing.assert_allclose(found[:, 6:9], expected[:, 6:9], atol=2e-3)
-    np.testing.assert_allclose(found[:, 9:], expected[:, 9:], atol=1e-5)
+    np.testing.assert_allclose(found[:, 9:], expected[:, 9:], atol=5e-5)
 
 
 def test_becoming_another_scenario_is_building_it_anew_bit_for_bit():
@@ -62,11 +69,11 @@ def test_becoming_another_scenario_is_building_it_anew_bit_for_bit():
             "effects.0.ry": 0.01,
         },
     )
-    replay = ImpactReplay(TURNED)
-    before = replay.transitions(steps())
+    replay, same = ImpactReplay(TURNED), steps(TURNED)
+    before = replay.transitions(same)
     for scenario in (other, with_values(TURNED, {"lock.neck_diameter": 0.0051})):
         replay.reconfigure(scenario)
-        expected = ImpactReplay(scenario).transitions(steps())
-        assert replay.transitions(steps()).tobytes() == expected.tobytes()
+        expected = ImpactReplay(scenario).transitions(same)
+        assert replay.transitions(same).tobytes() == expected.tobytes()
     replay.reconfigure(TURNED)
-    assert replay.transitions(steps()).tobytes() == before.tobytes()
+    assert replay.transitions(same).tobytes() == before.tobytes()
