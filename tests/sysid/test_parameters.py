@@ -46,14 +46,14 @@ def test_refuses_bounds_that_no_search_can_use(arguments, word):
 def test_names_reach_sections_lists_and_effects():
     names = [
         "contact.friction",
-        "twin.stiffness.2",
+        "gripper.stiffness.2",
         "lock.clearance",
         "contact.modulus",
     ]
     _, found = scenario_parameters(REMOVAL, [Request(n) for n in names])
     friction, stiffness, clearance, modulus = found
     assert (friction.nominal, friction.low, friction.high) == (0.2, 0.0, 2.0)
-    assert stiffness.nominal == 13.4e3 and stiffness.log_scale
+    assert stiffness.nominal == 600.0 and stiffness.log_scale
     assert clearance.unit == "m" and not clearance.log_scale
     assert modulus.log_scale
 
@@ -80,7 +80,7 @@ def test_an_effect_that_is_there_is_used():
         (Request("GroovePse.ry"), "did you mean 'GroovePose'"),
         (Request("GroovePose.rw"), "GroovePose.rw: .* known: rx, ry"),
         (Request("task.success"), "not a number"),
-        (Request("twin.stiffness.6"), "count from 0"),
+        (Request("gripper.stiffness.6"), "count from 0"),
         (Request("lock"), "not a number"),
         (Request("lock.clearance", high=0.5), "go beyond"),
         (Request("lock.clearance", low=8e-4, high=3e-4), "swap"),

@@ -19,7 +19,7 @@ NAMES = {
     "lock.clearance": "lock.clearance",
     "task.reward.w_f": "task.reward.w_f",
     "imprecision": "imprecision",
-    "twin.stiffness.2": "twin.stiffness.2",
+    "gripper.stiffness.2": "gripper.stiffness.2",
     "effects.0.ry": "effects.0.ry",
     "GroovePose.ry": "effects.0.ry",
     "GrooveFriction.coefficient": "effects.1.coefficient",
@@ -34,7 +34,7 @@ UNKNOWN = {
     "GroovePose.rw": "known: rx, ry, rz",
     "GroovePose": "'' does not exist",
     "effects.1.ry": "the scenario lists 1 effects, counted from 0",
-    "twin.stiffness.6": "there is no number 6 of 6; count from 0",
+    "gripper.stiffness.6": "there is no number 6 of 6; count from 0",
     "lock.clearance.x": "'x' is not part of a number or word",
     "JointCoulombFriction.size": "write JointCoulombFriction.JOINT.size",
 }
@@ -131,8 +131,12 @@ def test_a_range_is_given_twice_by_two_names() -> None:
 def test_sections_effects_and_words_can_be_set_as_well() -> None:
     scenario = load_scenario(
         "removal_turned",
-        ["effects.0={ry: 0.01, z: 1e-3}", "gripper.hold=weld", "twin.stiffness.1=2e4"],
+        [
+            "effects.0={ry: 0.01, z: 1e-3}",
+            "gripper.hold=weld",
+            "gripper.stiffness.1=9e2",
+        ],
     )
     assert scenario.effects == [GroovePose(ry=0.01, z=1e-3)]
     assert scenario.gripper.hold == "weld"
-    assert scenario.twin.stiffness[:3] == [16.6e3, 2e4, 13.4e3]
+    assert scenario.gripper.stiffness[:3] == [600.0, 900.0, 600.0]

@@ -9,6 +9,7 @@ from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
+from tests.drake_disasm.conftest import STIFF
 
 
 def record(folder: Path, scenario: Scenario, episodes: int) -> Log:
@@ -21,8 +22,8 @@ def record(folder: Path, scenario: Scenario, episodes: int) -> Log:
 
 @pytest.fixture(scope="session")
 def turned() -> Scenario:
-    """A groove turned by 2 degrees, and short episodes."""
-    return load_scenario("removal_turned", ["task.steps=24"])
+    """A groove turned by 2 degrees, and short episodes, on the stiff grip."""
+    return load_scenario("removal_turned", [STIFF, "task.steps=24"])
 
 
 @pytest.fixture(scope="session")
@@ -44,7 +45,8 @@ def silent_log(turned, tmp_path_factory) -> Log:
 @pytest.fixture(scope="session")
 def impact() -> Scenario:
     """The thesis's contact in the twin, in a turned groove."""
-    return load_scenario("removal_turned", ["task.steps=24", "contact.model=impact"])
+    overrides = [STIFF, "task.steps=24", "contact.model=impact"]
+    return load_scenario("removal_turned", overrides)
 
 
 @pytest.fixture(scope="session")

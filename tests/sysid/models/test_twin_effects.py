@@ -26,13 +26,15 @@ from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.scenario_parameters import Request, scenario_parameters
 from sysid.workers import Workers
+from tests.drake_disasm.conftest import STIFF
 
 _NOTHING = np.zeros(0)
 _STEPS = 30
 
 
 def _scenario(contact):
-    scenario = load_scenario("removal_turned", [f"contact.model={contact}"])
+    """On the stiff grip: the forces of several newtons tell the effects."""
+    scenario = load_scenario("removal_turned", [STIFF, f"contact.model={contact}"])
     scenario.task.steps = _STEPS
     return scenario
 
