@@ -53,5 +53,6 @@ def twin_coordinates(path: Array, p_BoTo_B: Array) -> Array:
         p_BoTo_B: (3,) see `BoltCoordinates`.
     """
     turn = Rotation.from_rotvec(path[:, 3:])
-    moved = path[:, :3] + turn.apply(p_BoTo_B) - p_BoTo_B
+    p = np.array(p_BoTo_B)  # scipy takes no read-only array
+    moved = path[:, :3] + turn.apply(p) - p
     return np.hstack([moved, turn.as_euler("ZYX")])

@@ -46,6 +46,7 @@ from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation, SimulatedStation, TwinStation
 from drake_disasm.task.simulation import TaskSimulation
+from tests.drake_disasm.conftest import STIFF
 
 G_W = np.array([0.0, 0.0, -9.81])
 ORIENTATIONS = [(0, 0, 0), (np.pi, 0, 0), (0.3, -0.8, 2.0), (np.pi / 2, 0, 0)]
@@ -107,7 +108,7 @@ def _trajectory(
     effects: list[Effect], steps: int, model: str = "hydroelastic"
 ) -> np.ndarray:
     """An episode in contact, with some turning: the groove is turned and rubs."""
-    scenario = load_scenario("removal_turned")
+    scenario = load_scenario("removal_turned", [STIFF])
     scenario.effects = [*scenario.effects, *effects]
     scenario.contact.model = model
     policy = Exploring(make_policy("straight"), 2e-4, 0)

@@ -24,7 +24,7 @@ from drake_disasm.effects import (
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
-from tests.drake_disasm.conftest import QUIET
+from tests.drake_disasm.conftest import QUIET, STIFF
 
 COUNTLESS = "ft_sensor.quantum=[0, 0, 0, 0, 0, 0]"
 TURN = np.array([0, 0, 0, 0.010, -0.012, 0.015])
@@ -92,7 +92,8 @@ def test_sensor_effects_do_not_touch_the_motion(
 @pytest.mark.parametrize("coefficient", [-0.2, -0.1, 0.15, 0.3])
 def test_friction_shows_in_the_twins_sliding_force(coefficient: float) -> None:
     """Pressed against a lip and slid: Fx = -(mu + coefficient) |Fz|, to 2 %."""
-    simulation = TaskSimulation(load_scenario("removal", [QUIET, COUNTLESS]), "twin")
+    scenario = load_scenario("removal", [QUIET, COUNTLESS, STIFF])
+    simulation = TaskSimulation(scenario, "twin")
     simulation.reset(0, [GrooveFriction(coefficient)])
     simulation.step(np.array([0, 0, 8e-4, 0, 0, 0]))
     for _ in range(15):

@@ -18,6 +18,7 @@ from sysid.objective import Objective
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
 from sysid.workers import Workers
+from tests.drake_disasm.conftest import STIFF
 
 _TURN = np.deg2rad(2.0)  # of removal_turned
 
@@ -61,11 +62,11 @@ def test_amplitudes_that_gain_nothing_are_left_out(gain):
 
 
 def test_an_added_effect_ends_where_the_models_own_derivatives_lead(tmp_path):
-    turned = load_scenario("removal_turned", ["task.steps=14"])
+    turned = load_scenario("removal_turned", [STIFF, "task.steps=14"])
     policy = Exploring(make_policy("admittance"), 1.5e-4, 0)
     simulation = TaskSimulation(turned, "twin", policy)
     log = record_transitions(tmp_path / "log", simulation, 8)
-    model = TwinModel([log], load_scenario("removal"), ())
+    model = TwinModel([log], load_scenario("removal", [STIFF]), ())
     fitter, pose = _fitter(model, GroovePose)
     effect = pose.only(["ry", "x"])
     assert model.costly
