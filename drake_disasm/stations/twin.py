@@ -137,8 +137,12 @@ class TwinStation(SimulatedStation):
             wrench: (6,) on the bolt at Bo in Gn, [f; tau], processed as the task's.
         """
         p, k = self.parameters.p_BoTo_B, self.parameters.grip.stiffness
-        t_To = wrench[3:] - np.cross(p, wrench[:3])
-        return (np.concatenate([wrench[:3], t_To]) / k)[list(AXIS_ORDER)]
+        f = wrench[:3]
+        moved = f / k[:3]
+        weight = self.X_WG.rotation().inverse() @ (self.payload_mass * self.g_W)
+        # About the pads where they are now; the sensor's place does not move along.
+        t_To = wrench[3:] - np.cross(p, f) - np.cross(moved, f + weight)
+        return np.concatenate([moved, t_To / k[3:]])[list(AXIS_ORDER)]
 
     def impact_conditions(self, context: Context) -> ImpactConditions:
         """Returns the present inputs of the IMPACT law.

@@ -79,16 +79,21 @@ def test_the_model_with_the_effect_explains_the_log_of_a_simulation(effect, tmp_
 
 
 def test_a_sensor_with_memory_is_explained_mostly(tmp_path):
-    """Between two states of a log the load is taken to go evenly."""
+    """Between two states of a log the load is taken to go evenly.
+
+    And a step begins where the grip's deflection agrees with what the sensor read,
+    hysteresis included.
+    """
     scenario = _scenario("impact")
     real, log = _log(tmp_path / "log", scenario, SensorHysteresis(1.0, 1.0))
-    assert _error(log, real) < 0.25 * _error(log, scenario)
+    assert _error(log, real) < 0.35 * _error(log, scenario)
 
 
 def test_local_effects_hold_with_hydroelastic_contact(tmp_path):
+    """To 1.2 times the noise: the wrench that a step begins with is noisy, too."""
     scenario = _scenario("hydroelastic")
     real, log = _log(tmp_path / "log", scenario, RustyPatch(0.3, position=0.01))
-    assert _error(log, real) < 0.85
+    assert _error(log, real) < 1.3
     assert _error(log, scenario) > 2.0
 
 
