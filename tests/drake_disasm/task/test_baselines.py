@@ -15,9 +15,9 @@ F_MAX = 20.0  # N
 
 
 def _episodes(
-    model: str, policy: str, angle_deg: float, seeds: range
+    model: str, policy: str, angle_deg: float, seeds: range, name: str = "removal"
 ) -> list[EpisodeSummary]:
-    scenario = load_scenario("removal")
+    scenario = load_scenario(name)
     scenario.effects = [GroovePose(ry=np.deg2rad(angle_deg))]
     simulation = TaskSimulation(scenario, model, make_policy(policy, scenario))
     return [run_episode(simulation, seed) for seed in seeds]
@@ -60,12 +60,14 @@ def test_admittance_removes_the_bolt_in_the_cell(angle_deg: float) -> None:
     ],
 )
 def test_straight_jams_before_the_end(model: str, angle_deg: float) -> None:
-    _assert_jammed(_episodes(model, "straight", angle_deg, range(1)), 0.055)
+    """On the stiff grip; one that yields lets the arm go on for long."""
+    episodes = _episodes(model, "straight", angle_deg, range(1), "chapter4_stiff")
+    _assert_jammed(episodes, 0.055)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("angle_deg", ANGLES_DEG)
 def test_ten_seeds_in_the_cell(angle_deg: float) -> None:
     _assert_removed(_episodes("cell", "admittance", angle_deg, range(10)))
-    straight = _episodes("cell", "straight", angle_deg, range(10))
+    straight = _episodes("cell", "straight", angle_deg, range(10), "chapter4_stiff")
     _assert_jammed(straight, 0.055 if angle_deg else 0.062)
