@@ -145,8 +145,8 @@ def _add_search_arguments(add: Callable[..., object]) -> None:
     add(
         "--fine",
         action="store_true",
-        help="simulate transitions in the twin's own time step throughout: takes twice "
-        "as long, for logs of a twin with that step",
+        help="simulate transitions with IMPACT contact in the twin's own time step "
+        "throughout: takes longer, for logs of a twin with that step",
     )
 
 

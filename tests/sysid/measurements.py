@@ -46,7 +46,7 @@ BOUNDS = (
     Request("lock.clearance", 2e-4, 8e-4),
     Request("GroovePose.ry", -0.08, 0.08),
     Request("GroovePose.z", -5e-4, 5e-4),
-    Request("twin.stiffness.2", 4e3, 4e4),
+    Request("gripper.stiffness.2", 200.0, 2000.0),
 )
 #: The thesis's contact in the twin, and the parameters of its table 4.2.
 IMPACT = load_scenario("removal_turned", ["contact.model=impact"])
@@ -57,7 +57,7 @@ IMPACT_BOUNDS = tuple(
 STIFFNESS = Request("contact.impact.stiffness", 10.0, 1e5, scale="log")
 EXPONENT = Request("contact.impact.exponent")
 #: Off the truth by some ten times what a log fixes: the valley, not the bottom.
-START = np.array([0.23, 4.3e-4, 0.0365, 2e-5, 14.5e3])
+START = np.array([0.23, 4.3e-4, 0.0365, 2e-5, 650.0])
 EXPLORATION = 1.5e-4  # m
 HUBER = 3.0
 
