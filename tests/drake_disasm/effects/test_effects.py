@@ -108,7 +108,8 @@ def _trajectory(
     effects: list[Effect], steps: int, model: str = "hydroelastic"
 ) -> np.ndarray:
     """An episode in contact, with some turning: the groove is turned and rubs."""
-    scenario = load_scenario("removal_turned", [STIFF])
+    steps_of_3_mm = "task.max_translation=0.003"  # or exploration's would be clipped
+    scenario = load_scenario("removal_turned", [STIFF, steps_of_3_mm])
     scenario.effects = [*scenario.effects, *effects]
     scenario.contact.model = model
     policy = Exploring(make_policy("straight"), 2e-4, 0)
