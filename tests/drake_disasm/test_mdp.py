@@ -104,7 +104,7 @@ def test_reward_is_that_of_equation_3_4() -> None:
 
 OUTCOMES = [
     (_state(10), 5, Outcome.RUNNING),
-    (_state(10), 100, Outcome.STEP_LIMIT),
+    (_state(10), 150, Outcome.STEP_LIMIT),
     (_state(10, f=31), 5, Outcome.FORCE_LIMIT),
     (_state(10, t=5.1), 5, Outcome.TORQUE_LIMIT),
     (_state(60, 7.1), 100, Outcome.SUCCESS),

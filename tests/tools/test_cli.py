@@ -69,7 +69,7 @@ def _save(path: Path, period: float = 0.1) -> None:
 
 def test_policies_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Scripted ones come first, then shipped ones, then what can be imported."""
-    scenario = load_scenario("removal")
+    scenario = load_scenario("chapter4")
     (tmp_path / "policies").mkdir()
     for name in ("straight", "residual"):
         _save(tmp_path / f"policies/{name}.npz")
@@ -84,7 +84,7 @@ def test_policies_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_policies_by_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    scenario = load_scenario("removal")
+    scenario = load_scenario("chapter4")
     (tmp_path / "folder").mkdir()
     _save(tmp_path / "folder/straight.npz")
     monkeypatch.chdir(tmp_path)

@@ -9,7 +9,7 @@ from pydrake.systems.framework import LeafSystem
 
 from drake_disasm.common.timing import POLICY_DELAY, boundary
 from drake_disasm.effects import GroovePose, SensorBias
-from drake_disasm.mdp import Outcome
+from drake_disasm.mdp import BoltState, Outcome, TaskGeometry
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.diagram import LoadAtStartWarning
@@ -71,11 +71,16 @@ def test_every_period_holds_the_same_number_of_plant_steps() -> None:
 
 
 def test_rewards_telescope(simulation: TaskSimulation) -> None:
-    """The sum of the progress terms is the whole way: no step counts twice."""
+    """The sum of the progress terms is the bolt's whole way: no step counts twice."""
+    geometry = TaskGeometry.of(simulation.scenario)
+
+    def x(observation: np.ndarray) -> float:
+        return float(geometry.place(BoltState.from_vector(observation))[0])
+
     first = simulation.reset(5, TURNED)
     results = [simulation.step() for _ in range(12)]
     progress = sum(result.reward_terms["progress"] for result in results)
-    way_mm = 1e3 * (results[-1].observation[0] - first[0])
+    way_mm = 1e3 * (x(results[-1].observation) - x(first))
     assert progress == pytest.approx(1.6 * way_mm, rel=1e-12)
 
 
