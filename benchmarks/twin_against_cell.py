@@ -17,6 +17,7 @@ import numpy as np
 
 from drake_disasm.common.program import run
 from drake_disasm.logs import read_log
+from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.task.recording import record_transitions
@@ -30,7 +31,7 @@ _EXPLORATION = 1.5e-4  # m
 def main(arguments: Sequence[str]) -> int:
     """Records, predicts and prints the table."""
     options = _parser().parse_args(arguments)
-    print("scenario | quantile | " + " ".join(f"{name:>6}" for name in _CHANNELS))
+    print("scenario | quantile | " + " ".join(f"{name:>6}" for name in STATE_NAMES))
     for name in options.scenario:
         scenario = load_scenario(name, options.set)
         folder = options.log / name if options.log else None
@@ -39,9 +40,6 @@ def main(arguments: Sequence[str]) -> int:
             numbers = " ".join(f"{value:6.2f}" for value in row)
             print(f"{name} | {label} | {numbers}", flush=True)
     return 0
-
-
-_CHANNELS = ("x", "y", "z", "u", "v", "w", "fx", "fy", "fz", "tx", "ty", "tz")
 
 
 def residuals(

@@ -34,6 +34,7 @@ def episodes_every(steps: int) -> Callable[[dict, dict], bool]:
     ended: list[tuple[int, float, str]] = []
 
     def after_step(local: dict, _: dict) -> bool:
+        """Takes note of an episode that has ended; prints once in a while."""
         info, done = local["infos"][0], local["self"].num_timesteps
         if "episode" in info:  # by the Monitor that stable-baselines3 puts around
             ended.append((*map(info["episode"].get, "lr"), info["outcome"]))

@@ -3,7 +3,12 @@
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, Frame, JacobianWrtVariable
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    Frame,
+    JacobianWrtVariable,
+    SpatialInertia,
+)
 from pydrake.systems.framework import Context
 
 from drake_disasm.cell.parsing import add_arm
@@ -23,13 +28,20 @@ class ArmDynamics:
         arm: whose model is read.
         tool: its mass, and where the bolt is in it.
         X_WG: nominal groove frame.
+        M_F: inertia on the flange, about Fo in F; None is all of the tool's.
     """
 
-    def __init__(self, arm: ArmConfig, tool: Tool, X_WG: RigidTransform) -> None:
+    def __init__(
+        self,
+        arm: ArmConfig,
+        tool: Tool,
+        X_WG: RigidTransform,
+        M_F: SpatialInertia | None = None,
+    ) -> None:
         self.plant = MultibodyPlant(0.0)
         _, flange = add_arm(self.plant, arm.model)
         instance = self.plant.AddModelInstance("tool")
-        load = self.plant.AddRigidBody("tool", instance, tool.M_F)
+        load = self.plant.AddRigidBody("tool", instance, M_F or tool.M_F)
         self.plant.WeldFrames(flange, load.body_frame())
         self._frame_B, self._frame_G = add_frames(self.plant, flange, tool.X_FB, X_WG)
         self.plant.Finalize()

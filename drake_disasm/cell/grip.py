@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 
 from drake_disasm.cell.tool import Tool
-from drake_disasm.common.spatial import skew
+from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import GripperConfig, Scenario
 
 #: Joints x, y, z, then yaw, pitch and roll, by number of axis.
@@ -80,6 +80,5 @@ def bolt_compliance(scenario: Scenario) -> np.ndarray:
     the wrench [f; tau] on the bolt at Bo; all in Gn [m/N, m/(N m); rad/N, rad/(N m)].
     """
     tool = Tool.from_models(scenario)
-    S = np.eye(6)  # displacement of Bo by that of To
-    S[:3, 3:] = skew(tool.p_BoTo_B)
+    S = velocity_shift(tool.p_BoTo_B)
     return S @ np.diag(1.0 / grip_springs(scenario.gripper, tool).stiffness) @ S.T

@@ -6,16 +6,15 @@ from typing import Self
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import JacobianWrtVariable, SpatialInertia
+from pydrake.multibody.tree import SpatialInertia
 
 from drake_disasm.cell.arm_control import cartesian_gains, joint_gains
+from drake_disasm.cell.arm_dynamics import ArmDynamics
 from drake_disasm.cell.coordinates import ArmCoordinates
 from drake_disasm.cell.grip import Springs, grip_springs
-from drake_disasm.cell.parsing import add_arm
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import Tool
-from drake_disasm.common.spatial import skew
+from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import Scenario
 
 #: Of the joints themselves in the model file [N m s/rad].
@@ -39,8 +38,7 @@ class ControlledArm:
 
     def at(self, p: np.ndarray) -> Self:
         """Returns the same for another point, at p (3,) from this one in Gn."""
-        S = np.eye(6)  # velocity of this point by that of the other
-        S[:3, 3:] = skew(p)
+        S = velocity_shift(p)
         return type(self)(*(S.T @ matrix @ S for matrix in (self.M, self.D, self.K)))
 
 
@@ -68,8 +66,7 @@ class TwinParameters:
         Of each axis by itself, arm and grip in series [N/m, N m/rad].
         """
         compliance = np.linalg.inv(self.arm.K) + np.diag(1.0 / self.grip.stiffness)
-        S = np.eye(6)  # displacement of Bo by that of To
-        S[:3, 3:] = skew(self.p_BoTo_B)
+        S = velocity_shift(self.p_BoTo_B)
         return 1.0 / np.diag(S @ compliance @ S.T)
 
 
@@ -85,7 +82,7 @@ def twin_of(scenario: Scenario, X_GB: RigidTransform | None = None) -> TwinParam
     """
     tool = Tool.from_models(scenario)
     return TwinParameters(
-        _arm_at(scenario, X_GB).at(tool.p_BoTo_B),
+        _arm_at(scenario, tool, X_GB or RigidTransform()).at(tool.p_BoTo_B),
         grip_springs(scenario.gripper, tool),
         tool.M_fingers_B,
         tool.p_BoTo_B,
@@ -106,47 +103,52 @@ def bolt_stiffness(scenario: Scenario) -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True)
 class _Case:
-    """What the controlled arm depends on; equal if that is.
+    """What the controlled arm depends on; equal if its text is.
 
     Attributes:
-        text: of the scenario's sections, and where along the way.
-        scenario, X_GB: the same.
+        text: of the rest.
+        scenario: its sections arm and placement, and the period of its task.
+        tool: on the flange.
+        X_GB: where along the way.
     """
 
     text: str
     scenario: Scenario = dataclasses.field(compare=False)
+    tool: Tool = dataclasses.field(compare=False)
     X_GB: RigidTransform = dataclasses.field(compare=False)
 
 
-def _arm_at(scenario: Scenario, X_GB: RigidTransform | None) -> ControlledArm:
+def _arm_at(scenario: Scenario, tool: Tool, X_GB: RigidTransform) -> ControlledArm:
     """Returns the arm at Bo; from memory while nothing that it depends on changes.
 
     Identification asks for hundreds of parameter sets in which the arm is the same.
     """
-    X_GB = X_GB or RigidTransform()
-    sections = [
-        repr(getattr(scenario, name))
-        for name in ("arm", "placement", "lock", "gripper", "ft_sensor")
-    ]
-    place = repr(X_GB.GetAsMatrix34().tolist())
-    return _controlled_arm(_Case("\n".join([*sections, place]), scenario, X_GB))
+    matrices = (
+        tool.X_FB.GetAsMatrix34(),
+        tool.M_F.CopyToFullMatrix6(),
+        tool.M_palm_F.CopyToFullMatrix6(),
+        X_GB.GetAsMatrix34(),
+    )
+    parts = (scenario.arm, scenario.placement, scenario.task.period)
+    text = repr((*parts, *(matrix.tolist() for matrix in matrices)))
+    return _controlled_arm(_Case(text, scenario, tool, X_GB))
 
 
 @functools.lru_cache(maxsize=64)
 def _controlled_arm(case: _Case) -> ControlledArm:
-    scenario, tool = case.scenario, Tool.from_models(case.scenario)
+    scenario, tool, arm = case.scenario, case.tool, case.scenario.arm
     X_WG = nominal_groove_pose(scenario.placement)
-    period = scenario.task.period
-    coordinates = ArmCoordinates(scenario.arm, X_WG, tool.X_FB, period)
-    start = coordinates.start(RigidTransform())
-    J_start, inertia_start, _ = _mechanics(scenario, tool, start)
-    q = coordinates.start(case.X_GB)
-    J, _, without_bolt = _mechanics(scenario, tool, q)
-    if scenario.arm.control == "cartesian_impedance":
-        K, D = cartesian_gains(scenario.arm, _operational(J_start, inertia_start))
-        return ControlledArm(_operational(J, without_bolt), D, K)
-    k, d = joint_gains(scenario.arm, np.diag(inertia_start))
-    return _condensed(J, without_bolt, k, d + _JOINT_DAMPING)
+    coordinates = ArmCoordinates(arm, X_WG, tool.X_FB, scenario.task.period)
+    # The controller knows all of the tool; what is gripped moves behind the springs.
+    known = ArmDynamics(arm, tool, X_WG)
+    known.set_positions(coordinates.start(RigidTransform()))
+    moving = ArmDynamics(arm, tool, X_WG, tool.M_palm_F)
+    moving.set_positions(coordinates.start(case.X_GB))
+    if arm.control == "cartesian_impedance":
+        K, D = cartesian_gains(arm, known.bolt_inertia())
+        return ControlledArm(moving.bolt_inertia(), D, K)
+    k, d = joint_gains(arm, np.diag(known.mass_matrix()))
+    return _condensed(moving.jacobian(), moving.mass_matrix(), k, d + _JOINT_DAMPING)
 
 
 def _condensed(
@@ -167,39 +169,3 @@ def _condensed(
     K = np.linalg.inv((J / k) @ J.T)
     T = (J / k).T @ K
     return ControlledArm(T.T @ M @ T, (T.T * d) @ T, K)
-
-
-def _operational(J: np.ndarray, M: np.ndarray) -> np.ndarray:
-    """Returns the inertia (6, 6) that a force at a point meets, (J M^-1 J^T)^-1."""
-    return np.linalg.inv(J @ np.linalg.solve(M, J.T))
-
-
-def _mechanics(
-    scenario: Scenario, tool: Tool, q: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns Jacobian (6, 7) of Bo in Gn, and mass matrices (7, 7) of arm and tool.
-
-    The first with all of the tool, as the controller knows it; the second without
-    what is gripped by fingers that yield.
-    """
-    plant = MultibodyPlant(0.0)
-    instance, frame_F = add_arm(plant, scenario.arm.model)
-    load = plant.AddRigidBody("tool", instance, tool.M_F)
-    plant.WeldFrames(frame_F, load.body_frame())
-    plant.Finalize()
-    context = plant.CreateDefaultContext()
-    plant.SetPositions(context, q)
-    world = plant.world_frame()
-    J_W = plant.CalcJacobianSpatialVelocity(
-        context,
-        JacobianWrtVariable.kV,
-        frame_F,
-        tool.X_FB.translation(),
-        world,
-        world,
-    )
-    R_GW = nominal_groove_pose(scenario.placement).rotation().matrix().T
-    whole = plant.CalcMassMatrix(context)
-    load.SetSpatialInertiaInBodyFrame(context, tool.M_palm_F)
-    J = np.vstack([R_GW @ J_W[3:], R_GW @ J_W[:3]])
-    return J, whole, plant.CalcMassMatrix(context)

@@ -67,6 +67,17 @@ def skew(a: np.ndarray) -> np.ndarray:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
+def velocity_shift(p: np.ndarray) -> np.ndarray:
+    """Returns (6, 6): [v; w] at a point of a body by that at another, p (3,) from it.
+
+    Small displacements and rotations shift likewise; its transpose shifts wrenches
+    from the first point to the other.
+    """
+    shift = np.eye(6)
+    shift[:3, 3:] = skew(p)
+    return shift
+
+
 def pose_to_vector(X: RigidTransform) -> np.ndarray:
     """Returns [x, y, z, qw, qx, qy, qz] with qw >= 0, (7,)."""
     wxyz = X.rotation().ToQuaternion().wxyz()

@@ -249,7 +249,7 @@ class CellStation(SimulatedStation):
             "adaptive_fingers_rest", ConstantVectorSource(np.zeros(12))
         )
         carried = builder.AddNamedSystem(
-            "adaptive_fingers_load", ConstantVectorSource(self._weight_on(fingers))
+            "adaptive_fingers_load", ConstantVectorSource(self._weight_on_fingers())
         )
         builder.Connect(
             rest.get_output_port(), plant.get_desired_state_input_port(fingers.instance)
@@ -258,7 +258,7 @@ class CellStation(SimulatedStation):
             carried.get_output_port(), plant.get_actuation_input_port(fingers.instance)
         )
 
-    def _weight_on(self, fingers: SixAxisSpring) -> np.ndarray:
+    def _weight_on_fingers(self) -> np.ndarray:
         """Returns the forces (6,) that keep fingers and bolt where they are at A."""
         M_B, g_W = self.tool.M_gripped_B, self.g_W
         R_BW = self.X_WG.rotation().inverse().matrix()  # B coincides with G there

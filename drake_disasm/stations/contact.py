@@ -178,7 +178,7 @@ class ImpactContactForce(ContactStrategy):
     ) -> None:
         super().__init__(plant, scene_graph, lock, outside_force)
         self._spring, self._contact = spring, contact
-        self._p_BoTo_B = p_BoTo_B
+        self._p_BoTo_B, self._M = p_BoTo_B, spring.mass_matrix()
         self._exclude_from_scene_graph()
         self.system = ImpactContact(
             lock.bolt.index(), R_WGn, time_step, self._conditions(environment)
@@ -221,7 +221,7 @@ class ImpactContactForce(ContactStrategy):
             ),
             shape=LockShape(dataclasses.replace(config, clearance=clearance)),
             around=Surroundings.of([environment]),
-            M=self._spring.mass_matrix(),
+            M=self._M,
             K=K,
             D=D,
             p_BoTo_B=self._p_BoTo_B,

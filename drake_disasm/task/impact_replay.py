@@ -80,9 +80,12 @@ class ImpactReplay:
         conditions = self._conditions(steps, steps.q + given)
         q, v, qd, rate = steps.q + given, steps.v, steps.qd, steps.qd_rate
         arm, parameters = np.hstack([steps.q, steps.v]), station.parameters
-        for h in self._time_steps():
-            qd = qd + h * rate
-            node = ArmStep.of(parameters.arm, parameters.grip, h)
+        time_steps = self._time_steps()
+        nodes = {
+            h: ArmStep.of(parameters.arm, parameters.grip, h) for h in set(time_steps)
+        }
+        for h in time_steps:
+            qd, node = qd + h * rate, nodes[h]
             ahead = node.ahead(arm, np.hstack([qd, rate]))
             step = ImpactStep(
                 conditions.sprung(node.springs), h, q, v, ahead[:, :6], ahead[:, 6:]

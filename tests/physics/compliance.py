@@ -16,11 +16,13 @@ from pydrake.systems.analysis import Simulator
 from drake_disasm.cell.grip import Springs, grip_springs
 from drake_disasm.cell.tool import Tool
 from drake_disasm.cell.twin_parameters import twin_of
-from drake_disasm.common.spatial import rotation_vector, skew
+from drake_disasm.common.spatial import rotation_vector, velocity_shift
+from drake_disasm.effects import GroovePose
 from drake_disasm.scenario import CONTROLS, Scenario, load_scenario
 from drake_disasm.stations import SimulatedStation, make_station
 from tests.drake_disasm.conftest import QUIET
-from tests.physics.measurements import AWAY
+
+AWAY = GroovePose(y=-0.01)  # the groove drops away from the bolt
 
 LOADS = np.array([2.0, 2.0, 2.0, 0.05, 0.05, 0.05])  # N, N m
 SETTLES = {"position": 0.8, "joint_impedance": 1.5, "cartesian_impedance": 3.0}  # s
@@ -104,8 +106,7 @@ def stiffness(station: SimulatedStation, p: np.ndarray, time: float) -> np.ndarr
 def stated(scenario: Scenario) -> np.ndarray:
     """Returns the same (3, 6) by the twin's parameters: at Bo, each axis by itself."""
     twin = twin_of(scenario)
-    S = np.eye(6)
-    S[:3, 3:] = skew(twin.p_BoTo_B)
+    S = velocity_shift(twin.p_BoTo_B)
     arm = S @ np.linalg.inv(twin.arm.K) @ S.T
     grip = S @ np.diag(1.0 / twin.grip.stiffness) @ S.T
     return np.array([1.0 / np.diag(C) for C in (arm, arm + grip, grip)])

@@ -7,14 +7,10 @@ import time
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from pydrake.common.value import Value
-from pydrake.math import RigidTransform
-from pydrake.multibody.math import SpatialForce
-from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 
 from drake_disasm.cell.arm_control import joint_gains
 from drake_disasm.cell.coordinates import ArmCoordinates
-from drake_disasm.common.spatial import rotation_from_vector, rotation_vector
+from drake_disasm.common.spatial import rotation_from_vector
 from drake_disasm.effects import GroovePose
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
@@ -22,8 +18,7 @@ from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation
 from drake_disasm.task.simulation import TaskSimulation
 from tests.drake_disasm.conftest import QUIET, STIFF
-
-AWAY = GroovePose(y=-0.01)  # the groove drops away from the bolt
+from tests.physics.compliance import Push
 
 
 def quiet(scenario: str = "removal", *overrides: str) -> TaskSimulation:
@@ -150,27 +145,8 @@ def pushed(
         wrench_G: [f; tau] on the bolt at Bo in G, from the start on.
         duration: how long [s].
     """
-    simulator = station.at_start([AWAY])
-    context = simulator.get_mutable_context()
-    R_WG, w = station.X_WG.rotation().matrix(), np.array(wrench_G)
-    force = ExternallyAppliedSpatialForce()
-    force.body_index = station.lock.bolt.index()
-    force.p_BoBq_B = np.zeros(3)
-    force.F_Bq_W = SpatialForce(R_WG @ w[3:], R_WG @ w[:3])
-    port = station.GetInputPort("applied_spatial_force")
-    port.FixValue(context, Value[list[ExternallyAppliedSpatialForce]]([force]))
-    simulator.Initialize()
-    simulator.AdvanceTo(duration)
-    measured = station.GetOutputPort("iiwa.position_measured").Eval(context)
-    poses = (
-        station.GetOutputPort("bolt_pose").Eval(context),
-        station.coordinates.pose(measured),
-    )
-    return tuple(_vector(X) for X in poses)  # type: ignore[return-value]
-
-
-def _vector(X: RigidTransform) -> np.ndarray:
-    return np.concatenate([X.translation(), rotation_vector(X.rotation())])
+    place = Push(station, np.zeros(3)).advance(np.array(wrench_G), duration)
+    return place.bolt, place.measured
 
 
 def stiffness(

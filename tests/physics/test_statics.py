@@ -7,8 +7,8 @@ from pydrake.math import RotationMatrix
 from drake_disasm.cell.twin_parameters import bolt_stiffness
 from drake_disasm.scenario import CONTROLS, load_scenario
 from drake_disasm.stations import CellStation
+from tests.physics.compliance import AWAY
 from tests.physics.measurements import (
-    AWAY,
     QUIET,
     STIFF,
     pushed,
