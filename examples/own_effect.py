@@ -22,31 +22,33 @@ from sysid.effect_selection import close_loop
 from sysid.models.twin import TwinModel
 from sysid.validation.synthetic_logs import transitions_log
 
+TRAVEL = 0.06  # m, L, from A to the opening
+
 
 @register_effect
 @dataclasses.dataclass
 class MagneticCatch(EnvironmentEffect):
-    """A magnet that holds the bolt at the closed end of the groove.
+    """A magnet that pulls the bolt towards the opening of the groove.
 
-    Equation: f = -F exp(-x / d) along the groove, x the travel from A.
+    Equation: f = F exp((x - L) / d) along the groove, x the travel from A.
     Where it acts: a force on the bolt at Bo.
     """
 
-    force: float = amplitude("N", 0.0, 50.0, "F, of the magnet at A")
+    force: float = amplitude("N", 0.0, 50.0, "F, of the magnet at the opening")
     reach: float = shape_parameter(0.01, "m", 0.002, 0.05, "d", (0.005, 0.01, 0.02))
     is_local = True
-    experiment = "slow pulls from A and back, without contact at the walls"
+    experiment = "slow pulls to the opening and back, without contact at the walls"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds the pull of the magnet."""
         x, y, z = environment.force_Gn
-        x -= self.force * math.exp(-max(bolt.p[0], 0.0) / self.reach)
+        x += self.force * math.exp(min(bolt.p[0] - TRAVEL, 0.0) / self.reach)
         return dataclasses.replace(environment, force_Gn=(x, y, z))
 
 
 if __name__ == "__main__":
     scenario = load_scenario("removal", ["contact.model=impact"])
-    magnet = MagneticCatch(force=1.5, reach=0.008)
+    magnet = MagneticCatch(force=4.0, reach=0.015)
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log"  # states the scenario, and was made with a magnet
         transitions_log(log, scenario, [magnet], seed=0, episodes=5, steps=12)

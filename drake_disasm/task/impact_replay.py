@@ -7,6 +7,7 @@ evaluation of the objective takes a fraction of the diagram's time
 """
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from drake_disasm.stations.arm_node import ArmStep
 from drake_disasm.task.replay import ReplayDiagram, Steps
 
 _COARSE = 0.01  # s: with 20 ms, steps under friction ended twice as far off
+_REST = 1e-6  # m/s, rad/s: in half a second less than the sensor can tell
 
 
 class ImpactReplay:
@@ -44,9 +46,7 @@ class ImpactReplay:
         self._build(scenario)
 
     def _build(self, scenario: Scenario) -> None:
-        self._diagram = ReplayDiagram(scenario)
-        self._diagram.zero()
-        self._scenario = scenario
+        self._diagram, self._scenario = ReplayDiagram(scenario), scenario
         station = self._diagram.station
         M_B = station.lock.bolt.default_spatial_inertia()
         M_B = summed([M_B, station.parameters.M_fingers_B])
@@ -54,6 +54,7 @@ class ImpactReplay:
         R_WGn, g_W = station.X_WG.rotation(), station.plant.gravity_field()
         g_Gn = R_WGn.matrix().T @ g_W.gravity_vector()
         self._bolt = (M_B.get_mass(), M_B.get_com(), I_B, g_Gn)
+        self._zero()
 
     def reconfigure(self, scenario: Scenario) -> None:
         """See TwinReplay."""
@@ -61,8 +62,8 @@ class ImpactReplay:
             self._build(scenario)
             return
         self._diagram.reconfigure(scenario)
-        self._diagram.zero()
         self._scenario = scenario
+        self._zero()
 
     @property
     def reading_at_zeroing(self) -> np.ndarray:
@@ -75,12 +76,45 @@ class ImpactReplay:
         Raises:
             RuntimeError: the contact equations of a step have no solution.
         """
-        station = self._diagram.station
-        given = np.array([station.deflection(wrench) for wrench in steps.wrench])
-        conditions = self._conditions(steps, steps.q + given)
-        q, v, qd, rate = steps.q + given, steps.v, steps.qd, steps.qd_rate
-        arm, parameters = np.hstack([steps.q, steps.v]), station.parameters
-        time_steps = self._time_steps()
+        deflection = self._diagram.station.deflection
+        given = np.array([deflection(wrench) for wrench in steps.wrench])
+        q, q_bolt, loads = self._after(steps, steps.q + given, self._time_steps())
+        times = (steps.index + 1) * self._scenario.task.period
+        rows = zip(times, q, q_bolt, loads, strict=True)
+        return np.array([self._diagram.observed(*row) for row in rows])
+
+    def _zero(self) -> None:
+        """Lets the bolt settle at A, in coarse steps, and zeroes the sensor.
+
+        Where it comes to rest does not depend on the steps' length.
+        """
+        rest, station = np.zeros((1, 6)), self._diagram.station
+        stay = Steps(np.zeros(1), rest, rest, station.start[None], rest, rest)
+        h = coarse_step(self._scenario) or self._diagram.time_step
+        time_steps = [h] * round(station.settling_time / h)
+        settled = self._after(stay, rest, time_steps, until_rest=True)
+        [state] = zip(*settled, strict=True)
+        self._diagram.zero_at(*state)
+
+    def _after(
+        self,
+        steps: Steps,
+        q_bolt: np.ndarray,
+        time_steps: Sequence[float],
+        until_rest: bool = False,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Returns coordinates of arm and bolt, and loads on the sensor (see `_loads`).
+
+        Args:
+            steps: where arm and command begin, and how the command moves.
+            q_bolt: (n, 6) where the bolt begins; it moves with the arm.
+            time_steps: of the plant [s].
+            until_rest: whether to stop before, as soon as nothing moves.
+        """
+        parameters = self._diagram.station.parameters
+        conditions = self._conditions(steps, q_bolt)
+        q, v, qd, rate = q_bolt, steps.v, steps.qd, steps.qd_rate
+        arm = np.hstack([steps.q, steps.v])
         nodes = {
             h: ArmStep.of(parameters.arm, parameters.grip, h) for h in set(time_steps)
         }
@@ -94,11 +128,10 @@ class ImpactReplay:
             v, contact = step.solve()
             q = q + h * v
             arm = node.after(ahead, np.hstack([q, v]))
+            if until_rest and max(np.abs(v).max(), np.abs(v - v_begin).max()) < _REST:
+                break
         contact[:, :3] += conditions.around.f_Gn
-        loads = self._loads(begin, (v - v_begin) / h, contact)
-        times = (steps.index + 1) * self._scenario.task.period
-        rows = zip(times, arm[:, :6], q, loads, strict=True)
-        return np.array([self._diagram.observed(*row) for row in rows])
+        return arm[:, :6], q, self._loads(begin, (v - v_begin) / h, contact)
 
     def _conditions(self, steps: Steps, q_bolt: np.ndarray) -> ImpactConditions:
         """Returns the contact's conditions, per step where an effect is local."""

@@ -5,6 +5,7 @@ wrench: a step begins where pose and wrench agree with what was measured.
 """
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
@@ -19,8 +20,8 @@ from drake_disasm.common.spatial import (
     shift_and_express,
 )
 from drake_disasm.common.timing import boundary
-from drake_disasm.devices.sensor_chain import sensed
-from drake_disasm.effects import BoltMotion
+from drake_disasm.devices.sensor_chain import sensed, sensed_at_zeroing
+from drake_disasm.effects import BoltMotion, Sensing, SensorEffect
 from drake_disasm.impact import ImpactConditions
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations import TwinStation
@@ -218,7 +219,20 @@ class ReplayDiagram:
         at_start = TwinState(rest, rest, self.station.start, rest, rest)
         self.start(boundary(0, 1.0), at_start)
         self.advance(rest, self.station.settling_time)
-        reading = self.station.reading_at_zeroing(self.station_context)
+        self._take_as_zero(self.station.reading_at_zeroing(self.station_context))
+
+    def zero_at(self, q: np.ndarray, q_bolt: np.ndarray, load: np.ndarray) -> None:
+        """Zeroes the sensor where the bolt has settled.
+
+        Args:
+            q, q_bolt: (6,) coordinates of arm and bolt.
+            load: (6,) of the bolt on the sensor, [f; tau] at Bo in Gn.
+        """
+        load_S, sensing = self._sensing(0.0, q, q_bolt, load)
+        effects = self._sensor_effects()
+        self._take_as_zero(sensed_at_zeroing(load_S, effects, sensing))
+
+    def _take_as_zero(self, reading: np.ndarray) -> None:
         self.reading_at_zeroing = reading
         self.processor.zero(self.processor_context, reading)
 
@@ -282,18 +296,27 @@ class ReplayDiagram:
             q_bolt: (6,) of the bolt.
             load: (6,) of the bolt on the sensor, [f; tau] at Bo in Gn.
         """
-        station, sensor = self.station, self.station.sensor
+        load_S, sensing = self._sensing(time, q, q_bolt, load)
+        reading = sensed(load_S, self._sensor_effects(), sensing)
+        X_GB = self.station.coordinates.pose(q)
+        observation = self.processor.observation(self.processor_context, X_GB, reading)
+        return _with_rotation_vector(observation, X_GB)
+
+    def _sensing(
+        self, time: float, q: np.ndarray, q_bolt: np.ndarray, load: np.ndarray
+    ) -> tuple[np.ndarray, Sensing]:
+        """Returns a load (6,) at So in S, and the circumstances of its reading."""
+        station = self.station
         X_GB = station.coordinates.pose(q)
         X_SGn = station.X_SB @ X_GB.inverse()
         p_GnBo = station.coordinates.pose(q_bolt).translation()
-        reading = shift_and_express(load, X_SGn @ RigidTransform(p_GnBo))
-        effects = sensor.effects(station.part_context(sensor, self.station_context))
-        if effects:
-            R_WS = (station.X_WG.rotation() @ X_SGn.rotation().inverse()).matrix()
-            sensing = station.payload.sensing(np.array(time), R_WS)
-            reading = sensed(reading, effects, sensing)
-        observation = self.processor.observation(self.processor_context, X_GB, reading)
-        return _with_rotation_vector(observation, X_GB)
+        load_S = shift_and_express(load, X_SGn @ RigidTransform(p_GnBo))
+        R_WS = (station.X_WG.rotation() @ X_SGn.rotation().inverse()).matrix()
+        return load_S, station.payload.sensing(np.array(time), R_WS)
+
+    def _sensor_effects(self) -> Sequence[SensorEffect]:
+        sensor = self.station.sensor
+        return sensor.effects(self.station.part_context(sensor, self.station_context))
 
     def observation(self) -> np.ndarray:
         """Returns the state (12,) of the task now, its rotation as a vector."""

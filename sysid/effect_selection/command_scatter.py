@@ -6,8 +6,11 @@ step had ended elsewhere at random, and where it ended depends on nothing.
 
 In step k the residual is r_k = J_k d_k + n_k, with d_k ~ N(0, S) the displacement of
 the step's end, J_k the derivatives of the prediction by that, and n_k the known noise.
-S is fitted by maximum likelihood (a random-effects model, Laird and Ware 1982), and J_k
-taken anew at the likeliest displacements, since contact is anything but linear.
+S is fitted by maximum likelihood (a random-effects model, Laird and Ware 1982), and r_k
+and J_k are taken anew at the likeliest displacements: contact is anything but linear,
+and a step begins where the one before was displaced to, which an arm with inertia and
+damping remembers. Where a wall hides the way there from the derivatives, displacements
+are drawn from N(0, S).
 """
 
 import dataclasses
@@ -134,18 +137,30 @@ def fit_command_scatter(fitter: Fitter, fit: Fit) -> CommandScatter | None:
     at_noise = fit.objective <= limits.max_objective_at_noise
     if not fit.model.has_commands or at_noise:
         return None
-    displaced = np.zeros((len(fit.linearisation.residual), 3))
-    for _ in range(limits.scatter_rounds):
-        likelihood = _likelihood(fitter, fit, displaced)
-        std = likelihood.best()
-        if not std.any():
-            return None
-        displaced = likelihood.displacements(std)
-    if not _generalises(likelihood, fit.blocks):
+    likelihood, displaced = _likeliest(fitter, fit)
+    std = likelihood.best()
+    if not std.any() or not _generalises(likelihood, fit.blocks):
         return None
     if _is_dependent(fit, displaced[:, std > 0.0]):
         return None
     return _summary(likelihood, std)
+
+
+def _likeliest(fitter: Fitter, fit: Fit) -> tuple[_Likelihood, Array]:
+    """Returns the likelihood where steps likely led, and where that is (n, 3)."""
+    limits = fitter.settings
+    random = np.random.default_rng(0)
+    steps = _Steps(fitter, fit, np.zeros((len(fit.linearisation.residual), 3)))
+    likelihood, before = steps.likelihood(), np.full(3, np.inf)
+    for _ in range(limits.scatter_rounds):
+        std = likelihood.best()
+        progress = float(np.abs(std - before).max())
+        if not std.any() or progress < limits.scatter_min_progress:
+            break
+        target = likelihood.displacements(std)
+        steps = steps.improved(std, target, random)
+        likelihood, before = steps.likelihood(), std
+    return likelihood, steps.displaced
 
 
 def _summary(likelihood: _Likelihood, std: Array) -> CommandScatter:
@@ -163,22 +178,95 @@ def _summary(likelihood: _Likelihood, std: Array) -> CommandScatter:
     )
 
 
-def _likelihood(fitter: Fitter, fit: Fit, displaced: Array) -> _Likelihood:
-    """Returns residuals without scatter, and derivatives at displacements (n, 3)."""
-    limits, delta = fitter.settings, fitter.huber_delta
-    step, scale = limits.scatter_step, limits.scatter_scale
+@dataclass(frozen=True)
+class _Steps:
+    """Steps of a fit as they were likely executed.
 
-    def residual(model: LogModel, push: Array) -> Array:
-        """Returns the residuals with steps displaced by a push (n, 3) further."""
-        there = model.displaced(displaced * scale + push)
-        return Objective(there, fitter.workers, delta).residuals(fit.theta)[0]
+    Attributes:
+        fitter, fit: whose rows they are.
+        displaced: (n, 3) where they ended, in units of `scatter_scale`.
+    """
 
-    ways = step * np.eye(3)[:, None] * np.ones((len(displaced), 1))
-    surrogate = fit.model.surrogate()
-    columns = [residual(surrogate, w) - residual(surrogate, -w) for w in ways]
-    J = np.stack(columns, axis=-1) * (scale / (2.0 * step))
-    there = residual(fit.model, np.zeros_like(displaced))
-    return _Likelihood(there - np.einsum("nci,ni->nc", J, displaced), J, delta, limits)
+    fitter: Fitter
+    fit: Fit
+    displaced: Array
+
+    def likelihood(self) -> _Likelihood:
+        """Returns residuals without scatter, and derivatives there."""
+        limits, r = self.fitter.settings, self._residual(self.fit.model, self.displaced)
+        step = limits.scatter_step / limits.scatter_scale
+        ways = step * np.eye(3)[:, None] * np.ones((len(r), 1))
+        surrogate = self.fit.model.surrogate()
+        columns = [
+            self._residual(surrogate, self.displaced + w)
+            - self._residual(surrogate, self.displaced - w)
+            for w in ways
+        ]
+        J = np.stack(columns, axis=-1) / (2.0 * step)
+        r = r - np.einsum("nci,ni->nc", J, self.displaced)
+        return _Likelihood(r, J, self.fitter.huber_delta, limits)
+
+    def improved(
+        self, std: Array, target: Array, random: np.random.Generator
+    ) -> "_Steps":
+        """Returns steps that are likelier, each by the best of some trials.
+
+        Args:
+            std: (3,) standard deviations of their ends.
+            target: (n, 3) the likeliest displacements, were the steps linear.
+            random: draws others, for steps that are missed by far.
+        """
+        limits = self.fitter.settings
+        found, all_rows = self.displaced.copy(), np.ones(len(target), bool)
+        offset = self._surrogate_offset()
+        least = self._losses(found, std, all_rows, offset)
+        for i in range(limits.scatter_draws):
+            missed = least > limits.scatter_missed * self._channels
+            rows = missed if i else all_rows
+            if not rows.any():
+                break
+            draws = std * random.standard_normal(target.shape)
+            trial = draws if i else target
+            losses = self._losses(trial, std, rows, offset)
+            better = np.flatnonzero(rows)[losses < least[rows]]
+            least[rows] = np.minimum(least[rows], losses)
+            found[better] = trial[better]
+        return dataclasses.replace(self, displaced=found)
+
+    def _losses(
+        self, ends: Array, std: Array, rows: NDArray[np.bool_], offset: Array
+    ) -> Array:
+        """Returns the losses (m,) of some steps with other ends, of which (n, 3)."""
+        surrogate = self.fit.model.surrogate()
+        r = self._residual(surrogate, ends, rows) + offset[rows]
+        level = np.sqrt(np.mean(r**2, axis=1))
+        bent = pseudo_residual(level, self.fitter.huber_delta) ** 2
+        least = self.fitter.settings.scatter_min_ratio
+        unlikely = ends[rows] / np.maximum(std, least)
+        return self._channels * bent + np.sum(unlikely**2, axis=1)
+
+    def _surrogate_offset(self) -> Array:
+        """Returns residuals (n, c) less those that the surrogate leaves."""
+        model, here = self.fit.model, self.displaced
+        surrogate = model.surrogate()
+        if surrogate is model:
+            return np.zeros((len(here), self._channels))
+        return self._residual(model, here) - self._residual(surrogate, here)
+
+    def _residual(
+        self, model: LogModel, ends: Array, rows: NDArray[np.bool_] | None = None
+    ) -> Array:
+        """Returns residuals (n, c) of steps that end elsewhere (n, 3), from here on."""
+        scale = self.fitter.settings.scatter_scale
+        there = model.displaced(self.displaced * scale, (ends - self.displaced) * scale)
+        if rows is not None:
+            there = there.of_rows(rows)
+        objective = Objective(there, self.fitter.workers, self.fitter.huber_delta)
+        return objective.residuals(self.fit.theta)[0]
+
+    @property
+    def _channels(self) -> int:
+        return self.fit.linearisation.residual.shape[1]
 
 
 def _generalises(likelihood: _Likelihood, blocks: NDArray[np.int64]) -> bool:

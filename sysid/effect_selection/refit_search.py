@@ -28,26 +28,45 @@ class RefitSearch(ForwardSearch):
     """Where effects are not linear: candidates are compared by their fits."""
 
     def _next(self, fit: Fit, survey: Survey) -> Fit | None:
-        limits, starts = self._settings, dict[tuple[str, ...], Fit]()
-        if survey.effects and fit.objective > limits.max_linear_objective:
+        limits = self._settings
+        confirmed, tried = list[_Trial](), list[_Trial]()
+        if fit.objective <= limits.max_linear_objective:
+            confirmed, tried = self._try_best(fit, survey, {})
+            if confirmed:
+                return self._chosen(fit, survey, confirmed)
+        # What is not linear at null, as a stop that takes up a force, hides from it.
+        if survey.effects and fit.objective > limits.max_objective_at_noise:
             survey, starts = self._prescreened(fit, survey)
-        worth_a_fit = [
-            e
-            for e in survey.effects
-            if e.gain >= limits.refit_min_linear_gain
-            and (not starts or e.effects in starts)
-        ]
-        chosen = trials(worth_a_fit, limits.max_trials)
-        confirmed, tried = self._try(fit, survey, chosen, starts)
+            confirmed, tried = self._try_best(fit, survey, starts)
         if not confirmed:
             confirmed, _ = self._try(fit, survey, _pairs(tried, limits), {})
-        if not confirmed:
-            return None
+        return self._chosen(fit, survey, confirmed) if confirmed else None
+
+    def _try_best(
+        self, fit: Fit, survey: Survey, starts: _Starts
+    ) -> tuple[list[_Trial], list[_Trial]]:
+        """Returns what fits confirm of the most promising, and all that was tried."""
+        chosen = trials(self._worth_a_fit(survey, starts), self._settings.max_trials)
+        return self._try(fit, survey, chosen, starts)
+
+    def _worth_a_fit(self, survey: Survey, starts: _Starts) -> list[Evidence]:
+        least = self._settings.refit_min_linear_gain
+        return [
+            e
+            for e in survey.effects
+            if e.gain >= least and (not starts or e.effects in starts)
+        ]
+
+    def _chosen(
+        self, fit: Fit, survey: Survey, confirmed: Sequence[_Trial]
+    ) -> Fit | None:
+        """Returns the best of the confirmed fits, on record, if an effect is needed."""
+        limits = self._settings
         best, found = _lowest(confirmed, limits)
         again = self.fitter.fit(fit.effects, found)
         if again.loss <= (1.0 + limits.min_gain) * found.loss:
             return self._same_effects(fit, again)
-        rivals = ties(best, survey, worth_a_fit)
+        rivals = ties(best, survey, self._worth_a_fit(survey, {}))
         rivals = _ties_by_fit(rivals, confirmed, fit, found)
         found = at_own_minimum(self.fitter, found)
         self._record(best, rivals, survey, found)

@@ -318,9 +318,27 @@ class SelectionSettings:
         "of the derivatives by where a step led: the encoders' repeatability",
     )
     scatter_rounds: int = _setting(
-        4,
+        8,
         "iterations",
         "derivatives are taken anew where steps likely led",
+    )
+    scatter_min_progress: float = _setting(
+        0.01,
+        "of scatter_scale",
+        "an iteration that changes the standard deviations by less is the last",
+    )
+    scatter_draws: int = _setting(
+        8,
+        "trials",
+        "in an iteration, of where a step led that is missed by far: a wall between "
+        "hides it from the derivatives",
+        "with none, 29 micrometres along x where there are none; with 8, 1 "
+        "(tests/sysid/effect_selection/test_command_scatter.py)",
+    )
+    scatter_missed: float = _setting(
+        2.0,
+        "of the channels' number",
+        "a step that loses more is missed by far: noise alone loses 1 on average",
     )
     scatter_edge_share: float = _setting(
         0.02,

@@ -265,11 +265,13 @@ class LogModel(abc.ABC):
         parts = [self.simulate(theta, rows) for rows in self.chunks()]
         return self.read(theta, slice(0, self.measurements.rows), np.concatenate(parts))
 
-    def displaced(self, displacement: Array) -> Self:
+    def displaced(self, displacement: Array, push: Array) -> Self:
         """Returns the same model with each step displaced from its command.
 
         Args:
-            displacement: (rows, 3) of the step's end, in G [m].
+            displacement: (rows, 3) of the step's end, where the next one begins, in G
+                [m].
+            push: (rows, 3) of the end further, of which the next knows nothing [m].
 
         Raises:
             DisasmError: the model's rows are no commanded steps.

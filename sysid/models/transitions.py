@@ -91,6 +91,16 @@ class Transitions:
             self.steps, qd=qd[self.rows], qd_rate=moved[self.rows] / self.period
         )
 
+    def ends_before(self, ends: Array) -> Array:
+        """Returns what the step before ended with, of (rows, ...) that steps end with.
+
+        Zero where an episode begins, or the step before is not among these.
+        """
+        follows = (np.diff(self.rows) == 1) & (self.steps.index[1:] > 0)
+        before = np.zeros_like(ends)
+        before[1:][follows] = ends[:-1][follows]
+        return before
+
     def covariates(self) -> dict[str, Array]:
         """Returns time, place, action and force at each beginning (rows,), by name."""
         steps = self.steps

@@ -22,6 +22,7 @@ from drake_disasm.scenario import Scenario
 from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.replay import Steps, TwinReplay
 from sysid.models.base import Array, PredictionError, even_chunks
+from sysid.models.replays import impact_replay, twin_replay
 from sysid.models.scenario_model import ScenarioModel
 from sysid.models.sensor_reading import SensorReading, at_sensor
 from sysid.models.transitions import Transitions, measured_states
@@ -76,9 +77,7 @@ class TwinModel(ScenarioModel):
         self._sensing = SensorReading(scenario, Tool.from_models(scenario))
         self._transitions = Transitions.of(logs, scenario, self._sensing)
         self.measurements = measured_states(logs, scenario, self._sensing)
-        self._displacement: Array | None = None
-        self._replay: TwinReplay | ImpactReplay | None = None
-        self._replayed: bytes | None = None
+        self._displacement: Array | None = None  # (rows, 2, 3) of begin and end
         self._executed: tuple[str, Steps] | None = None
 
     def predict(self, theta: Array, rows: slice) -> Array:
@@ -92,14 +91,13 @@ class TwinModel(ScenarioModel):
         """
         scenario = self.scenario_at(theta)
         try:
-            replay = self._replay_at(theta, scenario)
+            replay = self._replay_at(scenario)
             steps = self._steps_of(_mean_chain(scenario)).select(rows)
             if self._displacement is not None:
-                rate = self._displacement[rows] / self._transitions.period
-                steps = _faster(steps, rate)
+                period = self._transitions.period
+                steps = _displaced(steps, self._displacement[rows], period)
             states = at_sensor(self._states(replay, steps), self._sensing.X_SB)
         except (RuntimeError, DisasmError, ValueError) as error:
-            self._replay = self._replayed = None
             text = " ".join(str(error).split())
             raise PredictionError(text) from None
         zero = np.broadcast_to(replay.reading_at_zeroing, (len(states), 6))
@@ -151,9 +149,11 @@ class TwinModel(ScenarioModel):
             scenario=dataclasses.replace(self.scenario, contact=contact)
         )
 
-    def displaced(self, displacement: Array) -> Self:
+    def displaced(self, displacement: Array, push: Array) -> Self:
         """See LogModel."""
-        return self.replace(_displacement=displacement)
+        begin = self._transitions.ends_before(displacement)
+        ends = np.stack([begin, displacement + push], axis=1)
+        return self.replace(_displacement=ends)
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: time, place, action and force at the beginning of a step."""
@@ -192,20 +192,12 @@ class TwinModel(ScenarioModel):
             _displacement=None if displacement is None else displacement[mask],
         )
 
-    def _replay_at(self, theta: Array, scenario: Scenario) -> TwinReplay | ImpactReplay:
-        """Returns the replay at parameters (p,); a change takes some 10 ms."""
-        key = theta[self.simulated].tobytes()
-        if self._replay is None:
-            self._replay = self._new_replay(_environment_alone(scenario))
-        elif self._replayed != key:
-            self._replay.reconfigure(_environment_alone(scenario))
-        self._replayed = key
-        return self._replay
-
-    def _new_replay(self, scenario: Scenario) -> TwinReplay | ImpactReplay:
+    def _replay_at(self, scenario: Scenario) -> TwinReplay | ImpactReplay:
+        """Returns the replay of a scenario."""
+        simulated = _environment_alone(scenario)
         if self.rollout or not self._has_impact:
-            return TwinReplay(scenario)
-        return ImpactReplay(scenario, self.coarse)
+            return twin_replay(simulated)
+        return impact_replay(simulated, self.coarse)
 
     @property
     def _has_impact(self) -> bool:
@@ -218,8 +210,8 @@ class TwinModel(ScenarioModel):
         return replay.episode(steps)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leaves the diagram out: each worker builds its own."""
-        return self.__dict__ | {"_replay": None, "_replayed": None, "_executed": None}
+        """Leaves out what is quickly found again."""
+        return self.__dict__ | {"_executed": None}
 
 
 def _mean_chain(scenario: Scenario) -> tuple[MotionEffect, ...]:
@@ -227,10 +219,14 @@ def _mean_chain(scenario: Scenario) -> tuple[MotionEffect, ...]:
     return tuple(e for e in motion_chain(scenario.effects) if not e.is_random)
 
 
-def _faster(steps: Steps, rate: Array) -> Steps:
-    """Returns steps that go faster by rates (n, 3) [m/s]."""
-    more = np.hstack([rate, np.zeros_like(rate)])
-    return dataclasses.replace(steps, qd_rate=steps.qd_rate + more)
+def _displaced(steps: Steps, ends: Array, period: float) -> Steps:
+    """Returns steps whose command is displaced by (n, 2, 3) [m] at begin and end."""
+    zero = np.zeros((len(steps), 3))
+    begin = np.hstack([ends[:, 0], zero])
+    more = np.hstack([ends[:, 1] - ends[:, 0], zero])
+    return dataclasses.replace(
+        steps, qd=steps.qd + begin, qd_rate=steps.qd_rate + more / period
+    )
 
 
 def _environment_alone(scenario: Scenario) -> Scenario:

@@ -14,7 +14,7 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 PRINTED = {
     "own_diagram": ["watch at http://", "0.20", "the bolt is held at A"],
     "own_policy": ["twin        12", "cell        12"],
-    "own_effect": ["MagneticCatch.force = 1.5", "[MagneticCatch(force=1.5"],
+    "own_effect": ["MagneticCatch.force = 4.0", "[MagneticCatch(force=4.0"],
     "gymnasium_sb3": ["trained for 20 steps", "outcome: ", "progress"],
     "own_log_model": ["missing: JointCoulombFriction.pivot", "size = 0.150"],
     "hardware_station": ["step  x [mm]", "iiwa: READY", "ft_sensor: READY"],

@@ -155,7 +155,7 @@ def test_identifies_the_effect_with_defaults_alone(model):
 def test_it_has_no_commands_to_displace(model):
     assert not model.has_commands
     with pytest.raises(DisasmError, match="has no commands"):
-        model.displaced(np.zeros((400, 3)))
+        model.displaced(np.zeros((400, 3)), np.zeros((400, 3)))
 
 
 def test_predictions_of_another_shape_are_refused(model):
