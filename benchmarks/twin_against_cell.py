@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drake_disasm.common.program import run
+from drake_disasm.common.program import ProgressBar, run
 from drake_disasm.logs import read_log
 from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.policies import Exploring, make_policy
@@ -31,9 +31,9 @@ _EXPLORATION = 1.5e-4  # m
 def main(arguments: Sequence[str]) -> int:
     """Records, predicts and prints the table."""
     options = _parser().parse_args(arguments)
+    scenarios = {name: load_scenario(name, options.set) for name in options.scenario}
     print("scenario | quantile | " + " ".join(f"{name:>6}" for name in STATE_NAMES))
-    for name in options.scenario:
-        scenario = load_scenario(name, options.set)
+    for name, scenario in scenarios.items():
         folder = options.log / name if options.log else None
         residual = residuals(scenario, options.steps, folder, options.station)
         for label, row in _rows(residual):
@@ -56,9 +56,10 @@ def residuals(
     with tempfile.TemporaryDirectory() as temporary:
         log = folder or Path(temporary) / "log"
         if not log.exists():
-            policy = Exploring(make_policy("admittance"), _EXPLORATION, 0)
+            policy = Exploring(make_policy("admittance", scenario), _EXPLORATION, 0)
             simulation = TaskSimulation(scenario, station, policy)
-            record_transitions(log, simulation, steps)
+            with ProgressBar("step") as progress:
+                record_transitions(log, simulation, steps, progress=progress)
         model = TwinModel([read_log(log)], scenario, ())
     measured = model.measurements
     predicted = model.predict(nominal_values(()), slice(0, measured.rows))
@@ -75,12 +76,23 @@ def _rows(residual: np.ndarray) -> list[tuple[str, np.ndarray]]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--scenario", nargs="+", default=["removal"])
-    parser.add_argument("--set", nargs="*", default=[], metavar="KEY=VALUE")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--scenario", nargs="+", default=["removal"], metavar="NAME")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="of each"
+    )
     parser.add_argument("--steps", type=int, default=800, help="to record, at least")
-    parser.add_argument("--station", default="cell", choices=("cell", "twin"))
-    parser.add_argument("--log", type=Path, help="folder that keeps the logs")
+    parser.add_argument(
+        "--station", default="cell", choices=("cell", "twin"), help="that is recorded"
+    )
+    parser.add_argument(
+        "--log",
+        type=Path,
+        help="folder that keeps the logs, by the names of the scenarios; a log that is "
+        "there already is not recorded again",
+    )
     return parser
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.logs.columns import flat_columns
 from drake_disasm.logs.header import LogHeader
 from drake_disasm.logs.open_episode import OpenEpisode
@@ -120,7 +121,11 @@ def transitions_header(
 
 
 def record_transitions(
-    folder: Path, simulation: TaskSimulation, transitions: int, seed: int = 0
+    folder: Path,
+    simulation: TaskSimulation,
+    transitions: int,
+    seed: int = 0,
+    progress: Progress = ignore_progress,
 ) -> Log:
     """Records whole episodes until there are at least so many transitions.
 
@@ -129,12 +134,15 @@ def record_transitions(
         simulation: with a policy.
         transitions: to record.
         seed: of the first episode; the next ones count on.
+        progress: gets the number of transitions after each episode.
     """
     header = transitions_header(simulation.scenario, simulation.station_name, {})
+    done = 0
     with LogWriter(folder, header) as writer:
-        while transitions > 0:
+        while done < transitions:
             recorder = EpisodeRecorder(simulation)
-            transitions -= run_episode(simulation, seed, recorder).steps
+            done += run_episode(simulation, seed, recorder).steps
+            progress(ProgressUpdate("recording", done, max(done, transitions)))
             writer.write_episode(flat_columns("transitions", recorder.columns()))
             seed += 1
     return read_log(folder)

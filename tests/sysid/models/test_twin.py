@@ -93,8 +93,10 @@ def test_recovers_the_stiffness_of_impact(impact_log, impact):
         objective, objective.scaling.to_unit(np.array([400.0])), 6
     )
     assert objective.value(linearisation.residual) < at_truth + 1e-3
+    # By the objective's curvature a standard deviation is 5 %; where a step begins is
+    # known by the noisy wrench alone, which adds to that.
     assert objective.scaling.from_unit(linearisation.u)[0] == pytest.approx(
-        1000.0, rel=0.1
+        1000.0, rel=0.2
     )
 
 
