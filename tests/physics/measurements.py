@@ -1,8 +1,9 @@
 """What the physics tests and docs/physics.md measure.
 
-`python -m tests.physics.measurements` prints every table of docs/physics.md.
+`python -m tests.physics.measurements [PART ...]` prints tables of docs/physics.md.
 """
 
+import argparse
 import time
 from collections.abc import Iterator, Sequence
 
@@ -19,6 +20,13 @@ from drake_disasm.stations import CellStation
 from drake_disasm.task.simulation import TaskSimulation
 from tests.drake_disasm.conftest import QUIET, STIFF
 from tests.physics.compliance import Push
+
+#: Those in which a policy runs without being trained, and each episode is the same.
+SCENARIOS = ("removal", "removal_turned") + tuple(
+    f"chapter{number}{variant}"
+    for number in (3, 4, 5)
+    for variant in ("", "_impedance", "_stiff")
+)
 
 
 def quiet(scenario: str = "removal", *overrides: str) -> TaskSimulation:
@@ -85,7 +93,7 @@ def episode(
     `slide` is the greatest force before the bolt meets stop B (x < 59 mm).
     """
     loaded = load_scenario(scenario, [QUIET, *overrides])
-    simulation = TaskSimulation(loaded, model, make_policy(policy))
+    simulation = TaskSimulation(loaded, model, make_policy(policy, loaded))
     simulation.reset(0)
     states, result, start = [], None, time.perf_counter()
     while result is None or result.outcome is Outcome.RUNNING:
@@ -100,7 +108,9 @@ def episode(
         "z": s[-1, 2],
         "travel": s[:, 0].max(),
         "slide": force[s[:, 0] < 0.059].max(),
+        "mean": force.mean(),
         "peak": force.max(),
+        "success": float(result.outcome is Outcome.SUCCESS),
         "steps": simulation.steps,
         "rate": simulation.time / wall,
     }
@@ -195,11 +205,15 @@ def _control_lines() -> Iterator[str]:
             yield f"  {'xyzuvw'[axis]} {stated[axis]:.0f} {found:.0f} {off:+.2f}"
 
 
-def _lines() -> Iterator[str]:
-    yield from _contact_lines()
-    yield from _time_step_lines()
-    yield from _arm_lines()
-    yield from _control_lines()
+def _scenario_lines() -> Iterator[str]:
+    keys = ("success", "x", "y", "mean", "peak", "steps", "rate")
+    yield f"scenarios, without noise: {', '.join(keys)} (m, N, times real time)"
+    for name in SCENARIOS:
+        for policy in ("admittance", "straight"):
+            for model in ("cell", "twin"):
+                run = episode(model, policy, scenario=name)
+                values = " ".join(f"{run[key]:.4g}" for key in keys)
+                yield f"  {name} {policy} {model}: {values}"
 
 
 def _contact_lines() -> Iterator[str]:
@@ -281,6 +295,27 @@ def _arm_lines() -> Iterator[str]:
     yield "  " + " ".join(f"{1e3 * x:.4f}" for x in bolt)
 
 
+PARTS = {
+    "contact": _contact_lines,
+    "time_steps": _time_step_lines,
+    "arm": _arm_lines,
+    "controls": _control_lines,
+    "scenarios": _scenario_lines,
+}
+
+
+def _main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "part", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}"
+    )
+    wanted = parser.parse_args().part or list(PARTS)
+    if unknown := set(wanted) - set(PARTS):
+        parser.error(f"no part {', '.join(unknown)}; there are {', '.join(PARTS)}")
+    for part in wanted:
+        for line in PARTS[part]():
+            print(line, flush=True)
+
+
 if __name__ == "__main__":
-    for line in _lines():
-        print(line, flush=True)
+    _main()
