@@ -22,10 +22,10 @@ from tests.drake_disasm.conftest import QUIET, STIFF
 from tests.physics.compliance import Push
 
 #: Those in which a policy runs without being trained, and each episode is the same.
-SCENARIOS = ("removal", "removal_turned") + tuple(
-    f"chapter{number}{variant}"
-    for number in (3, 4, 5)
-    for variant in ("", "_impedance", "_stiff")
+SCENARIOS = (
+    "removal",
+    "removal_turned",
+    *(f"chapter{n}{v}" for n in (3, 4, 5) for v in ("", "_impedance", "_stiff")),
 )
 
 
@@ -311,7 +311,7 @@ def _main() -> None:
     )
     wanted = parser.parse_args().part or list(PARTS)
     if unknown := set(wanted) - set(PARTS):
-        parser.error(f"no part {', '.join(unknown)}; there are {', '.join(PARTS)}")
+        parser.error(f"no part {', '.join(unknown)}; there are {parts}")
     for part in wanted:
         for line in PARTS[part]():
             print(line, flush=True)
