@@ -311,7 +311,7 @@ def _main() -> None:
     )
     wanted = parser.parse_args().part or list(PARTS)
     if unknown := set(wanted) - set(PARTS):
-        parser.error(f"no part {', '.join(unknown)}; there are {parts}")
+        parser.error(f"no part {', '.join(unknown)}; there are {', '.join(PARTS)}")
     for part in wanted:
         for line in PARTS[part]():
             print(line, flush=True)
