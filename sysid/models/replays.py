@@ -4,12 +4,18 @@ To build one takes half a second, to turn it into another scenario's some 20 ms;
 models of a search, one for each effect that is tried, differ in that alone.
 """
 
+import functools
+from collections.abc import Callable
+from typing import Any, TypeVar
+
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.replay import TwinReplay
 
+_Replay = TypeVar("_Replay", TwinReplay, ImpactReplay)
+
 #: By kind: a replay and its scenario's text, since who has a scenario may change it.
-_built: dict[str, tuple[TwinReplay | ImpactReplay, str]] = {}
+_built: dict[str, tuple[Any, str]] = {}
 
 
 def impact_replay(scenario: Scenario, coarse: bool) -> ImpactReplay:
@@ -19,12 +25,8 @@ def impact_replay(scenario: Scenario, coarse: bool) -> ImpactReplay:
         DisasmError: the scenario is out of bounds.
         RuntimeError: its contact has no solution at A.
     """
-    kind = f"impact, {coarse=}"
-    replay = _reconfigured(kind, scenario)
-    if not isinstance(replay, ImpactReplay):
-        replay = ImpactReplay(scenario, coarse)
-        _built[kind] = replay, repr(scenario)
-    return replay
+    build = functools.partial(ImpactReplay, coarse=coarse)
+    return _at(scenario, f"impact, {coarse=}", build)
 
 
 def twin_replay(scenario: Scenario) -> TwinReplay:
@@ -34,21 +36,16 @@ def twin_replay(scenario: Scenario) -> TwinReplay:
         DisasmError: the scenario is out of bounds.
         RuntimeError: its contact has no solution at A.
     """
-    kind = f"twin, {scenario.contact.model}"
-    replay = _reconfigured(kind, scenario)
-    if not isinstance(replay, TwinReplay):
-        replay = TwinReplay(scenario)
-        _built[kind] = replay, repr(scenario)
-    return replay
+    return _at(scenario, f"twin, {scenario.contact.model}", TwinReplay)
 
 
-def _reconfigured(kind: str, scenario: Scenario) -> TwinReplay | ImpactReplay | None:
-    """Returns what has been built of a kind, at a scenario."""
-    if kind not in _built:
-        return None
-    replay, present = _built[kind]
-    if present != repr(scenario):
-        del _built[kind]  # what fails on the way is in no state to be used again
+def _at(scenario: Scenario, kind: str, build: Callable[[Scenario], _Replay]) -> _Replay:
+    """Returns the replay of a kind at a scenario, built if there is none."""
+    text = repr(scenario)
+    replay, present = _built.pop(kind, (None, ""))  # nothing half changed is kept
+    if replay is None:
+        replay = build(scenario)
+    elif present != text:
         replay.reconfigure(scenario)
-        _built[kind] = replay, repr(scenario)
+    _built[kind] = replay, text
     return replay
