@@ -23,23 +23,26 @@ _JOINT_DAMPING = 0.5
 
 @dataclasses.dataclass(frozen=True)
 class ControlledArm:
-    """The arm under its controller, linear about a posture: M a + D v + K x = f.
+    """The arm under its controller, linear about a posture.
 
-    x is the displacement of a point that is fixed to the flange and the rotation about
-    it, both in Gn, from where the controller is commanded to be.
+    M a + B v + D (v - v_d) + K (x - x_d) = f: x is the displacement of a point that is
+    fixed to the flange and the rotation about it, both in Gn; x_d is the commanded one.
 
     Attributes:
         M, D, K: (6, 6) inertia, damping and stiffness [kg, N s/m, N/m; rad, N m].
+        B: (6, 6) the joints' own damping, which does not know the command.
     """
 
     M: np.ndarray
     D: np.ndarray
     K: np.ndarray
+    B: np.ndarray
 
     def at(self, p: np.ndarray) -> Self:
         """Returns the same for another point, at p (3,) from this one in Gn."""
         S = velocity_shift(p)
-        return type(self)(*(S.T @ matrix @ S for matrix in (self.M, self.D, self.K)))
+        matrices = (self.M, self.D, self.K, self.B)
+        return type(self)(*(S.T @ matrix @ S for matrix in matrices))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -146,9 +149,12 @@ def _controlled_arm(case: _Case) -> ControlledArm:
     moving.set_positions(coordinates.start(case.X_GB))
     if arm.control == "cartesian_impedance":
         K, D = cartesian_gains(arm, known.bolt_inertia())
-        return ControlledArm(moving.bolt_inertia(), D, K)
+        inertia = moving.bolt_inertia()
+        # Joint rates by that of the bolt where nothing holds the null space.
+        T = np.linalg.solve(moving.mass_matrix(), moving.jacobian().T) @ inertia
+        return ControlledArm(inertia, D, K, _JOINT_DAMPING * T.T @ T)
     k, d = joint_gains(arm, np.diag(known.mass_matrix()))
-    return _condensed(moving.jacobian(), moving.mass_matrix(), k, d + _JOINT_DAMPING)
+    return _condensed(moving.jacobian(), moving.mass_matrix(), k, d)
 
 
 def _condensed(
@@ -168,4 +174,4 @@ def _condensed(
     """
     K = np.linalg.inv((J / k) @ J.T)
     T = (J / k).T @ K
-    return ControlledArm(T.T @ M @ T, (T.T * d) @ T, K)
+    return ControlledArm(T.T @ M @ T, (T.T * d) @ T, K, _JOINT_DAMPING * T.T @ T)

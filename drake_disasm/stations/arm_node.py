@@ -25,13 +25,19 @@ class ArmStep:
     within the step is in these springs, which are softer by that.
 
     Attributes:
+        h: the step [s].
         F, C, P: (12, 12).
+        G, H: (12, 6) change of x by a steady force, and by one that grows from zero,
+            by its rate; both in the coordinates' order.
         springs: between x' and the bolt.
     """
 
+    h: float
     F: np.ndarray
     C: np.ndarray
     P: np.ndarray
+    G: np.ndarray
+    H: np.ndarray
     springs: Springs
 
     @classmethod
@@ -43,17 +49,19 @@ class ArmStep:
             grip: the springs.
             h: the step [s].
         """
-        M, D, K = (m[np.ix_(_ORDER, _ORDER)] for m in (arm.M, arm.D, arm.K))
+        order = np.ix_(_ORDER, _ORDER)
+        M, D, K, B = (m[order] for m in (arm.M, arm.D, arm.K, arm.B))
         one = np.eye(6)
-        system = np.zeros((30, 30))  # x, command, its rate, force
-        system[:6, 6:12] = system[12:18, 18:24] = one
-        system[6:12] = np.linalg.solve(M, np.hstack([-K, -D, K, D, one]))
+        system = np.zeros((36, 36))  # x, command, its rate, force, its rate
+        system[:6, 6:12] = system[12:18, 18:24] = system[24:30, 30:] = one
+        pull = np.hstack([-K, -D - B, K, D, one])
+        system[6:12, :30] = np.linalg.solve(M, pull)
         step = expm(h * system)[:12]
-        by_place, by_rate, by_force = step[:, 12:18], step[:, 18:24], step[:, 24:]
+        by_place, by_rate, G, H = np.split(step[:, 12:], 4, axis=1)
         # The command at the end, not at the beginning.
         C = np.hstack([by_place, by_rate - h * by_place])
-        springs = _softer(grip, by_force)
-        return cls(step[:, :12], C, by_force @ _gains(springs), springs)
+        springs = _softer(grip, G)
+        return cls(h, step[:, :12], C, G @ _gains(springs), G, H, springs)
 
     def ahead(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Returns x' (n, 12) for states and commands (n, 12)."""
@@ -75,17 +83,17 @@ def _gains(springs: Springs) -> np.ndarray:
     return np.hstack([np.diag(values[_ORDER]) for values in parts])
 
 
-def _softer(grip: Springs, by_force: np.ndarray) -> Springs:
+def _softer(grip: Springs, G: np.ndarray) -> Springs:
     """Returns the springs in series with what a force moves an arm in one step.
 
     Of each axis by itself; what one axis does to another is left out.
 
     Args:
         grip: the springs.
-        by_force: (12, 6) change of the arm's state by a force in the step.
+        G: (12, 6) change of the arm's state by a force in the step.
     """
     gains = _gains(grip)
-    whole = np.linalg.solve(np.eye(6) + gains @ by_force, gains)
+    whole = np.linalg.solve(np.eye(6) + gains @ G, gains)
     back = np.argsort(_ORDER)
     return Springs(np.diag(whole[:, :6])[back], np.diag(whole[:, 6:])[back])
 

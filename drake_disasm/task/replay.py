@@ -51,8 +51,8 @@ class Steps:
 
     Attributes:
         index: (n,) periods since the episode began.
-        q, v: (n, 6) measured coordinates at the step's start, and their rates, by
-            difference from the step before.
+        q, v: (n, 6) measured coordinates at the step's start, and their rates as
+            estimated.
         qd, qd_rate: (n, 6) commanded coordinates then, and their rate in the step.
         wrench: (n, 6) measured on the bolt then, at Bo in Gn.
     """

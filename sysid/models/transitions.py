@@ -18,6 +18,7 @@ from drake_disasm.logs.transitions import observations
 from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.replay import Steps
+from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
 from sysid.models.commands import Commands, twin_coordinates
 from sysid.models.measurements import Channel, Measurements
@@ -62,8 +63,8 @@ class Transitions:
         episodes = [episode for log in logs for episode in log.episodes]
         period = scenario.task.period
         p_BoTo_B = Tool.from_models(scenario).p_BoTo_B
-        twin = BoltCoordinates(p_BoTo_B)
-        steps = _concatenated([_steps(e, period, twin) for e in episodes])
+        twin, rates = BoltCoordinates(p_BoTo_B), ArmRates.of(scenario)
+        steps = _concatenated([_steps(e, rates, twin) for e in episodes])
         states = [at_sensor(observations(e)[:-1], sensing.X_SB) for e in episodes]
         commands = tuple(Commands.of(e, period) for e in episodes)
         rows = np.arange(len(steps))
@@ -166,17 +167,23 @@ def _refuse_other_logs(log: Log, scenario: Scenario) -> None:
         )
 
 
-def _steps(episode: Episode, period: float, twin: BoltCoordinates) -> Steps:
+def _steps(episode: Episode, rates: ArmRates, twin: BoltCoordinates) -> Steps:
     measured = _coordinates(episode["X_GB_measured"], twin)
     commanded = _coordinates(episode["X_GB_commanded"], twin)
-    rates = np.diff(measured, axis=0) / period
+    wrench = observations(episode)[:, 6:]
+    v = np.zeros((episode.rows - 1, 6))
+    for k in range(1, len(v)):
+        last = np.s_[None, k - 1 : k + 1]
+        v[k] = rates.after(
+            v[None, k - 1], measured[last], commanded[last], wrench[last]
+        )
     return Steps(
         np.arange(episode.rows - 1),
         measured[:-1],
-        np.vstack([np.zeros((1, 6)), rates[:-1]]),
+        v,
         commanded[:-1],
-        np.diff(commanded, axis=0) / period,
-        observations(episode)[:-1, 6:],
+        np.diff(commanded, axis=0) / rates.step.h,
+        wrench[:-1],
     )
 
 

@@ -26,6 +26,7 @@ from drake_disasm.systems.pose_target import through_motion
 from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.recording import transitions_header
 from drake_disasm.task.replay import Steps
+from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
 from sysid.models.commands import twin_coordinates
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
@@ -137,8 +138,8 @@ def rollout(
     motion, sensor = motion_chain(real.effects), sensor_chain(real.effects)
     real.effects = [e for e in real.effects if isinstance(e, EnvironmentEffect)]
     replay = ImpactReplay(real, coarse=True)  # as the model of the log has it
-    tool = Tool.from_models(scenario)
-    reading, p_BoTo_B = SensorReading(scenario, tool), tool.p_BoTo_B
+    reading = SensorReading(scenario, Tool.from_models(scenario))
+    measured = _Measured(scenario, commanded)
     count, size, _ = commanded.shape
     clean, states = np.zeros((2, count, size, 12))
     states[:, 0, 6:] = noise[:, 0]
@@ -152,9 +153,7 @@ def rollout(
             executed[e, k + 1], memories[e] = through_motion(
                 motion, commanded[e, k + 1], in_G[e, 6:], memories[e], times[0]
             )
-        step = _steps(
-            k, states[:, : k + 1], executed[:, k : k + 2], in_G, times[0], p_BoTo_B
-        )
+        step = measured.steps(k, in_G, executed[:, k : k + 2])
         clean[:, k + 1] = at_sensor(replay.transitions(step), reading.X_SB)
         for e in range(count):
             so_far = clean[e, 1 : k + 2]
@@ -165,29 +164,45 @@ def rollout(
     return Rollout(commanded, states, readings)
 
 
-def _steps(
-    k: int,
-    states: Array,
-    executed: Array,
-    in_G: Array,
-    period: float,
-    p_BoTo_B: Array,
-) -> Steps:
-    """Returns step k of all episodes.
+class _Measured:
+    """What a log's model knows at the begin of a step, of all episodes.
 
     Args:
-        states: (E, k + 1, 12).
-        executed: (E, 2, 6) commands at begin and end.
-        in_G: (E, 12) the last of the states, with the wrench at Bo in G.
-        period: of the MDP [s].
-        p_BoTo_B: (3,) of the twin's coordinates [m].
+        scenario: that the log states.
+        commanded: (E, n + 1, 6).
     """
-    q = twin_coordinates(states[:, k, :6], p_BoTo_B)
-    before = twin_coordinates(states[:, max(k - 1, 0), :6], p_BoTo_B)
-    begin, end = (twin_coordinates(executed[:, i], p_BoTo_B) for i in (0, 1))
-    rate = (end - begin) / period
-    index = np.full(len(q), k)
-    return Steps(index, q, (q - before) / period, begin, rate, in_G[:, 6:])
+
+    def __init__(self, scenario: Scenario, commanded: Array) -> None:
+        self._rates = ArmRates.of(scenario)
+        self._p_BoTo_B = Tool.from_models(scenario).p_BoTo_B
+        self._qd = self._coordinates(commanded)
+        self._q, self._wrench = np.zeros_like(self._qd), np.zeros_like(self._qd)
+        self._v = np.zeros_like(self._qd[:, 0])
+
+    def steps(self, k: int, states: Array, executed: Array) -> Steps:
+        """Returns step k of all episodes; steps are asked for in their order.
+
+        Args:
+            k: number of the step.
+            states: (E, 12) at its begin, the wrench at Bo in G.
+            executed: (E, 2, 6) commands at begin and end.
+        """
+        self._q[:, k] = self._coordinates(states[:, :6])
+        self._wrench[:, k] = states[:, 6:]
+        if k:
+            last = np.s_[:, k - 1 : k + 1]
+            self._v = self._rates.after(
+                self._v, self._q[last], self._qd[last], self._wrench[last]
+            )
+        qd = self._coordinates(executed)
+        rate = (qd[:, 1] - qd[:, 0]) / self._rates.step.h
+        index = np.full(len(qd), k)
+        return Steps(index, self._q[:, k], self._v, qd[:, 0], rate, self._wrench[:, k])
+
+    def _coordinates(self, path: Array) -> Array:
+        """Returns the twin's coordinates (..., 6) of a path (..., 6)."""
+        flat = twin_coordinates(path.reshape(-1, 6), self._p_BoTo_B)
+        return flat.reshape(path.shape)
 
 
 def _columns(scenario: Scenario, path: Array, states: Array) -> dict[str, Array]:

@@ -26,7 +26,7 @@ def _arm(seed: int = 0) -> ControlledArm:
     random = np.random.default_rng(seed)
     M = _positive(random, np.array([4.0] * 3 + [0.05] * 3))
     K = _positive(random, np.array([16e3] * 3 + [400.0] * 3))
-    return ControlledArm(M, 0.02 * K, K)
+    return ControlledArm(M, 0.02 * K, K, 0.5 * M)
 
 
 def test_another_point_has_the_same_energy() -> None:
@@ -34,9 +34,8 @@ def test_another_point_has_the_same_energy() -> None:
     arm, twist = _arm(), np.array([0.1, -0.2, 0.3, 1.0, 2.0, -1.5])
     moved, there = arm.at(_P), twist.copy()
     there[:3] += np.cross(twist[3:], _P)
-    for here, other in zip(
-        (arm.M, arm.D, arm.K), (moved.M, moved.D, moved.K), strict=True
-    ):
+    for name in "MDKB":
+        here, other = getattr(arm, name), getattr(moved, name)
         assert there @ other @ there == pytest.approx(twist @ here @ twist)
 
 
@@ -53,16 +52,17 @@ def test_condensed_joints_give_way_as_springs_in_series() -> None:
 
 
 def test_a_step_without_springs_is_the_exact_solution() -> None:
-    """M a = K (x_d - x) + D (v_d - v), the command moving evenly."""
+    """M a = K (x_d - x) + D (v_d - v) - B v, the command moving evenly."""
     arm, h, none = _arm(2), 0.005, np.zeros(6)
     step = ArmStep.of(arm, Springs(none, none), h)
-    M, D, K = (m[np.ix_(_ORDER, _ORDER)] for m in (arm.M, arm.D, arm.K))
+    order = np.ix_(_ORDER, _ORDER)
+    M, D, K, B = (m[order] for m in (arm.M, arm.D, arm.K, arm.B))
     random = np.random.default_rng(3)
     x, v, end, rate = random.uniform(-1, 1, (4, 6)) * 1e-3
 
     def motion(t: float, state: np.ndarray) -> np.ndarray:
         command = end + (t - h) * rate
-        pull = K @ (command - state[:6]) + D @ (rate - state[6:])
+        pull = K @ (command - state[:6]) + D @ (rate - state[6:]) - B @ state[6:]
         return np.concatenate([state[6:], np.linalg.solve(M, pull)])
 
     start = np.concatenate([x, v])

@@ -1,0 +1,61 @@
+"""How fast the arm moves when a step begins, which no encoder measures."""
+
+import dataclasses
+from typing import Self
+
+import numpy as np
+
+from drake_disasm.cell.grip import AXIS_ORDER
+from drake_disasm.cell.twin_parameters import twin_of
+from drake_disasm.common.spatial import velocity_shift
+from drake_disasm.scenario import Scenario
+from drake_disasm.stations.arm_node import ArmStep
+from sysid.models.base import Array
+
+
+@dataclasses.dataclass(frozen=True)
+class ArmRates:
+    """Estimates the arm's rates at the end of a step from where it was and went.
+
+    Where it went tells its mean rate. Of an arm in impedance control, which lags by
+    several steps, the model says by how much the rate at the end is another. A stiff
+    arm has forgotten by then what was at the begin; what counts is when in the step a
+    force came, which nobody knows, and the mean is the better guess. An error of the
+    rate at the begin is gone after a step or two: of a free mass at once.
+
+    Attributes:
+        step: of the arm in one period of the task; coordinates as in the twin.
+        to_grip: (6, 6) wrench at the pads by that on the bolt at Bo, in Gn.
+        lags: whether the arm is in impedance control.
+    """
+
+    step: ArmStep
+    to_grip: Array
+    lags: bool
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Self:
+        """Returns the estimate for a scenario's arm, control and gripper."""
+        twin = twin_of(scenario)
+        step = ArmStep.of(twin.arm, twin.grip, scenario.task.period)
+        lags = scenario.arm.control != "position"
+        return cls(step, velocity_shift(twin.p_BoTo_B).T, lags)
+
+    def after(self, v: Array, q: Array, qd: Array, wrench: Array) -> Array:
+        """Returns the rates (n, 6) at the end of steps.
+
+        Args:
+            v: (n, 6) rates at the begin.
+            q, qd: (n, 2, 6) measured and commanded coordinates at begin and end.
+            wrench: (n, 2, 6) measured on the bolt then, [f; tau] at Bo in Gn.
+        """
+        h = self.step.h
+        mean: Array = (q[:, 1] - q[:, 0]) / h
+        if not self.lags:
+            return mean
+        commanded = np.hstack([qd[:, 1], (qd[:, 1] - qd[:, 0]) / h])
+        force = (wrench @ self.to_grip.T)[..., list(AXIS_ORDER)]
+        grows = (force[:, 1] - force[:, 0]) / h
+        ahead = self.step.ahead(np.hstack([q[:, 0], v]), commanded)
+        ahead += force[:, 0] @ self.step.G.T + grows @ self.step.H.T
+        return mean + ahead[:, 6:] - (ahead[:, :6] - q[:, 0]) / h
