@@ -34,8 +34,11 @@ class RefitSearch(ForwardSearch):
             confirmed, tried = self._try_best(fit, survey, {})
             if confirmed:
                 return self._chosen(fit, survey, confirmed)
-        # What is not linear at null, as a stop that takes up a force, hides from it.
-        if survey.effects and fit.objective > limits.max_objective_at_noise:
+        # What is not linear at null, as a stop that takes up a force, hides from it;
+        # of a costly model more than noise is always left, and minutes would be lost.
+        far = fit.objective > limits.max_linear_objective
+        hidden = fit.objective > limits.max_objective_at_noise and not fit.model.costly
+        if survey.effects and (far or hidden):
             survey, starts = self._prescreened(fit, survey)
             confirmed, tried = self._try_best(fit, survey, starts)
         if not confirmed:
