@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from drake_disasm.cell.tool import summed
-from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.effects import environment_at, is_local
 from drake_disasm.impact import (
     ImpactConditions,
@@ -90,7 +89,7 @@ class ImpactReplay:
         """
         rest, station = np.zeros((1, 6)), self._diagram.station
         stay = Steps(np.zeros(1), rest, rest, station.start[None], rest, rest)
-        h = coarse_step(self._scenario) or self._diagram.time_step
+        h = self._coarse_step() or self._diagram.time_step
         time_steps = [h] * round(station.settling_time / h)
         settled = self._after(stay, rest, time_steps, until_rest=True)
         [state] = zip(*settled, strict=True)
@@ -150,10 +149,21 @@ class ImpactReplay:
         """Returns the plant's steps within a period [s]."""
         period = self._scenario.task.period
         fine = self._scenario.simulation.twin_time_step
-        coarse = coarse_step(self._scenario) if self._coarse else 0.0
+        coarse = self._coarse_step() if self._coarse else 0.0
         first = round(period / coarse) - 1 if coarse else 0
         rest = round((period - first * coarse) / fine)
         return [coarse] * first + [fine] * rest
+
+    def _coarse_step(self) -> float:
+        """Returns about 10 ms that divide the period [s]; 0 if no such step will do."""
+        period = self._scenario.task.period
+        step = period / np.ceil(period / _COARSE - 1e-9)
+        whole = step / self._scenario.simulation.twin_time_step
+        if whole < 1.5 or abs(whole - round(whole)) > 1e-6:
+            return 0.0
+        parameters = self._diagram.station.parameters
+        arm = ArmStep.of(parameters.arm, parameters.grip, step)
+        return float(step) if arm.is_stable else 0.0
 
     def _loads(
         self, q: np.ndarray, vdot: np.ndarray, contact: np.ndarray
@@ -177,15 +187,3 @@ class ImpactReplay:
         f = contact[:, :3] + pull - mass * np.cross(alpha, p_BoBcm)
         t = contact[:, 3:] + np.cross(p_BoBcm, pull) - spin
         return np.hstack([f, t])
-
-
-def coarse_step(scenario: Scenario) -> float:
-    """Returns a step [s] of about 10 ms that divides the period; 0 if none will do."""
-    period, fine = scenario.task.period, scenario.simulation.twin_time_step
-    step = period / np.ceil(period / _COARSE - 1e-9)
-    whole = step / fine
-    if whole < 1.5 or abs(whole - round(whole)) > 1e-6:
-        return 0.0
-    parameters = twin_of(scenario)
-    arm = ArmStep.of(parameters.arm, parameters.grip, step)
-    return step if arm.is_stable else 0.0

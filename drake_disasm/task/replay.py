@@ -5,7 +5,7 @@ wrench: a step begins where pose and wrench agree with what was measured.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Self
 
 import numpy as np
@@ -228,9 +228,9 @@ class ReplayDiagram:
             q, q_bolt: (6,) coordinates of arm and bolt.
             load: (6,) of the bolt on the sensor, [f; tau] at Bo in Gn.
         """
-        load_S, sensing = self._sensing(0.0, q, q_bolt, load)
-        effects = self._sensor_effects()
-        self._take_as_zero(sensed_at_zeroing(load_S, effects, sensing))
+        X_GB = self.station.coordinates.pose(q)
+        reading = self._reading(sensed_at_zeroing, 0.0, X_GB, q_bolt, load)
+        self._take_as_zero(reading)
 
     def _take_as_zero(self, reading: np.ndarray) -> None:
         self.reading_at_zeroing = reading
@@ -296,27 +296,29 @@ class ReplayDiagram:
             q_bolt: (6,) of the bolt.
             load: (6,) of the bolt on the sensor, [f; tau] at Bo in Gn.
         """
-        load_S, sensing = self._sensing(time, q, q_bolt, load)
-        reading = sensed(load_S, self._sensor_effects(), sensing)
         X_GB = self.station.coordinates.pose(q)
+        reading = self._reading(sensed, time, X_GB, q_bolt, load)
         observation = self.processor.observation(self.processor_context, X_GB, reading)
         return _with_rotation_vector(observation, X_GB)
 
-    def _sensing(
-        self, time: float, q: np.ndarray, q_bolt: np.ndarray, load: np.ndarray
-    ) -> tuple[np.ndarray, Sensing]:
-        """Returns a load (6,) at So in S, and the circumstances of its reading."""
-        station = self.station
-        X_GB = station.coordinates.pose(q)
+    def _reading(
+        self,
+        through: Callable[[np.ndarray, Sequence[SensorEffect], Sensing], np.ndarray],
+        time: float,
+        X_GB: RigidTransform,
+        q_bolt: np.ndarray,
+        load: np.ndarray,
+    ) -> np.ndarray:
+        """Returns what the sensor reads (6,) of a load, through its effects."""
+        station, sensor = self.station, self.station.sensor
         X_SGn = station.X_SB @ X_GB.inverse()
         p_GnBo = station.coordinates.pose(q_bolt).translation()
         load_S = shift_and_express(load, X_SGn @ RigidTransform(p_GnBo))
+        effects = sensor.effects(station.part_context(sensor, self.station_context))
+        if not effects:
+            return load_S
         R_WS = (station.X_WG.rotation() @ X_SGn.rotation().inverse()).matrix()
-        return load_S, station.payload.sensing(np.array(time), R_WS)
-
-    def _sensor_effects(self) -> Sequence[SensorEffect]:
-        sensor = self.station.sensor
-        return sensor.effects(self.station.part_context(sensor, self.station_context))
+        return through(load_S, effects, station.payload.sensing(np.array(time), R_WS))
 
     def observation(self) -> np.ndarray:
         """Returns the state (12,) of the task now, its rotation as a vector."""

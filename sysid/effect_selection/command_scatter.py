@@ -14,6 +14,7 @@ are drawn from N(0, S).
 """
 
 import dataclasses
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -193,7 +194,7 @@ class _Steps:
 
     def likelihood(self) -> _Likelihood:
         """Returns residuals without scatter, and derivatives there."""
-        limits, r = self.fitter.settings, self._residual(self.fit.model, self.displaced)
+        limits, r = self.fitter.settings, self._here
         step = limits.scatter_step / limits.scatter_scale
         ways = step * np.eye(3)[:, None] * np.ones((len(r), 1))
         surrogate = self.fit.model.surrogate()
@@ -219,7 +220,7 @@ class _Steps:
         limits = self.fitter.settings
         found, all_rows = self.displaced.copy(), np.ones(len(target), bool)
         offset = self._surrogate_offset()
-        least = self._losses(found, std, all_rows, offset)
+        least = self._losses(self._here, found, std)
         for i in range(limits.scatter_draws):
             missed = least > limits.scatter_missed * self._channels
             rows = missed if i else all_rows
@@ -227,31 +228,32 @@ class _Steps:
                 break
             draws = std * random.standard_normal(target.shape)
             trial = draws if i else target
-            losses = self._losses(trial, std, rows, offset)
+            r = self._residual(self.fit.model.surrogate(), trial, rows) + offset[rows]
+            losses = self._losses(r, trial[rows], std)
             better = np.flatnonzero(rows)[losses < least[rows]]
             least[rows] = np.minimum(least[rows], losses)
             found[better] = trial[better]
         return dataclasses.replace(self, displaced=found)
 
-    def _losses(
-        self, ends: Array, std: Array, rows: NDArray[np.bool_], offset: Array
-    ) -> Array:
-        """Returns the losses (m,) of some steps with other ends, of which (n, 3)."""
-        surrogate = self.fit.model.surrogate()
-        r = self._residual(surrogate, ends, rows) + offset[rows]
+    def _losses(self, r: Array, ends: Array, std: Array) -> Array:
+        """Returns the losses (m,) of steps with residuals (m, c) and ends (m, 3)."""
         level = np.sqrt(np.mean(r**2, axis=1))
         bent = pseudo_residual(level, self.fitter.huber_delta) ** 2
         least = self.fitter.settings.scatter_min_ratio
-        unlikely = ends[rows] / np.maximum(std, least)
+        unlikely = ends / np.maximum(std, least)
         return self._channels * bent + np.sum(unlikely**2, axis=1)
 
     def _surrogate_offset(self) -> Array:
         """Returns residuals (n, c) less those that the surrogate leaves."""
-        model, here = self.fit.model, self.displaced
-        surrogate = model.surrogate()
-        if surrogate is model:
-            return np.zeros((len(here), self._channels))
-        return self._residual(model, here) - self._residual(surrogate, here)
+        surrogate = self.fit.model.surrogate()
+        if surrogate is self.fit.model:
+            return np.zeros_like(self._here)
+        return self._here - self._residual(surrogate, self.displaced)
+
+    @functools.cached_property
+    def _here(self) -> Array:
+        """Residuals (n, c) as displaced: of a costly model they take seconds."""
+        return self._residual(self.fit.model, self.displaced)
 
     def _residual(
         self, model: LogModel, ends: Array, rows: NDArray[np.bool_] | None = None

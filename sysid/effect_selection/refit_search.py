@@ -28,22 +28,20 @@ class RefitSearch(ForwardSearch):
     """Where effects are not linear: candidates are compared by their fits."""
 
     def _next(self, fit: Fit, survey: Survey) -> Fit | None:
-        limits = self._settings
+        limits, starts = self._settings, dict[tuple[str, ...], Fit]()
         confirmed, tried = list[_Trial](), list[_Trial]()
-        if fit.objective <= limits.max_linear_objective:
-            confirmed, tried = self._try_best(fit, survey, {})
-            if confirmed:
-                return self._chosen(fit, survey, confirmed)
+        is_far = fit.objective > limits.max_linear_objective
+        if not is_far:
+            confirmed, tried = self._try_best(fit, survey, starts)
         # What is not linear at null, as a stop that takes up a force, hides from it;
         # of a costly model more than noise is always left, and minutes would be lost.
-        far = fit.objective > limits.max_linear_objective
-        hidden = fit.objective > limits.max_objective_at_noise and not fit.model.costly
-        if survey.effects and (far or hidden):
+        is_left = fit.objective > limits.max_objective_at_noise and not fit.model.costly
+        if survey.effects and not confirmed and (is_far or is_left):
             survey, starts = self._prescreened(fit, survey)
             confirmed, tried = self._try_best(fit, survey, starts)
         if not confirmed:
             confirmed, _ = self._try(fit, survey, _pairs(tried, limits), {})
-        return self._chosen(fit, survey, confirmed) if confirmed else None
+        return self._chosen(fit, survey, confirmed, starts) if confirmed else None
 
     def _try_best(
         self, fit: Fit, survey: Survey, starts: _Starts
@@ -53,6 +51,7 @@ class RefitSearch(ForwardSearch):
         return self._try(fit, survey, chosen, starts)
 
     def _worth_a_fit(self, survey: Survey, starts: _Starts) -> list[Evidence]:
+        """Returns what gains enough; after prescreening, of what has a start alone."""
         least = self._settings.refit_min_linear_gain
         return [
             e
@@ -61,7 +60,11 @@ class RefitSearch(ForwardSearch):
         ]
 
     def _chosen(
-        self, fit: Fit, survey: Survey, confirmed: Sequence[_Trial]
+        self,
+        fit: Fit,
+        survey: Survey,
+        confirmed: Sequence[_Trial],
+        starts: _Starts,
     ) -> Fit | None:
         """Returns the best of the confirmed fits, on record, if an effect is needed."""
         limits = self._settings
@@ -69,7 +72,7 @@ class RefitSearch(ForwardSearch):
         again = self.fitter.fit(fit.effects, found)
         if again.loss <= (1.0 + limits.min_gain) * found.loss:
             return self._same_effects(fit, again)
-        rivals = ties(best, survey, self._worth_a_fit(survey, {}))
+        rivals = ties(best, survey, self._worth_a_fit(survey, starts))
         rivals = _ties_by_fit(rivals, confirmed, fit, found)
         found = at_own_minimum(self.fitter, found)
         self._record(best, rivals, survey, found)

@@ -332,7 +332,7 @@ class SelectionSettings:
         "trials",
         "in an iteration, of where a step led that is missed by far: a wall between "
         "hides it from the derivatives",
-        "with none, 29 micrometres along x where there are none; with 8, 1 "
+        "with none, 29 micrometres along x where there are none; with 8, 2 "
         "(tests/sysid/effect_selection/test_command_scatter.py)",
     )
     scatter_missed: float = _setting(

@@ -32,13 +32,10 @@ def _scatter(model):
 
 
 def test_finds_by_how_much_commands_scatter(tmp_path):
-    """To two standard errors of 300 draws, 8 um along y.
-
-    The encoders' noise is allowed for, which this simulated log does not have.
-    """
+    """The encoders' noise is allowed for, which this simulated log does not have."""
     truth = np.array([0.0, 1e-4, 0.0])
     found = _scatter(_model(tmp_path, [Imprecision(*truth)]))
-    np.testing.assert_allclose(found.std, truth, atol=8e-6)
+    np.testing.assert_allclose(found.std, truth, atol=5e-6)
     assert found.interval[1, 0] < 1e-4 < found.interval[1, 1]
     assert found.objective < 1.3 and found.gain > 0.9
 
