@@ -7,6 +7,7 @@ candidates need no simulation beyond A.
 """
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.effect_selection.settings import SelectionSettings
+from sysid.effect_selection.significance import Scores
 from sysid.identification.linearisation import Linearisation
 from sysid.identification.uncertainty import block_length, block_numbers
 from sysid.objective import huber_weights, pseudo_residual
@@ -23,6 +25,7 @@ Columns = NDArray[np.int64]
 
 # Numerical guards, not thresholds.
 _RIDGE = 1e-10  # of the diagonal, against columns that depend on each other
+_LEAST_LEFT = 1e-3  # of a direction's power that a fit may leave of a block
 _AT_BOUND = 1e-9  # of a parameter's range: rounding of a point on the bound
 
 
@@ -42,6 +45,7 @@ class BlockRegression:
         channels: number of channels of each row.
         huber_delta: residual, in standard deviations, beyond which the loss is linear.
         settings: how rows are weighted.
+        noise: (n,) residuals as large as they are where nothing is fitted to them.
     """
 
     A: Array
@@ -52,6 +56,7 @@ class BlockRegression:
     channels: int
     huber_delta: float
     settings: SelectionSettings
+    noise: Array
 
     @classmethod
     def of(
@@ -76,18 +81,20 @@ class BlockRegression:
         scale = np.maximum(np.sqrt(np.mean(A**2, axis=(0, 1))), 1e-300)
         A /= scale
         rows, channels, count = A.shape
+        r = linearisation.residual[order].reshape(-1)
         side = (linearisation.u < _AT_BOUND).astype(float) - (
             linearisation.u > 1.0 - _AT_BOUND
         )
         return cls(
             A.reshape(rows * channels, count),
-            linearisation.residual[order].reshape(-1),
+            r,
             np.unique(blocks[order], return_index=True)[1] * channels,
             scale,
             np.append(side, np.zeros(extra.shape[2])),
             channels,
             linearisation.huber_delta,
             settings,
+            r,
         )
 
     @property
@@ -97,7 +104,8 @@ class BlockRegression:
 
     def shifted(self, change: Array) -> "BlockRegression":
         """Returns the regression of the residuals at u + change (P,)."""
-        return dataclasses.replace(self, r=self.r + self.A @ (change * self.scale))
+        r = self.r + self.A @ (change * self.scale)
+        return dataclasses.replace(self, r=r, noise=r)
 
     def with_own_parameters(
         self, blocks: NDArray[np.bool_], size: int
@@ -134,7 +142,33 @@ class BlockRegression:
         projected = self.A - own @ K
         left, size = (np.einsum("np,np->p", A, A) for A in (projected, self.A))
         projected *= left > self.settings.min_new_column**2 * size
-        return dataclasses.replace(self, A=projected, r=self.r + own @ phi)
+        r = self.r + own @ phi
+        noise = self._unfitted(own, r)
+        return dataclasses.replace(self, A=projected, r=r, noise=noise)
+
+    def _unfitted(self, own: Array, r: Array) -> Array:
+        """Returns residuals (n,) as large as if columns (n, k) were not fitted to them.
+
+        Of a block of few rows, a base of many parameters takes up a good part: (I -
+        P_bb)^-1/2 r_b has the covariance of what was there before if that was white
+        (Bell and McCaffrey 2002).
+        """
+        root = np.sqrt(self._weights(r))
+        Q, size, _ = np.linalg.svd(root[:, None] * own, full_matrices=False)
+        Q = Q[:, size > _RIDGE * size.max(initial=0.0)]
+        found = r.copy()
+        for block in self._blocks:
+            U, s, _ = np.linalg.svd(Q[block], full_matrices=False)
+            more = 1.0 / np.sqrt(np.maximum(1.0 - s**2, _LEAST_LEFT)) - 1.0
+            found[block] += (U @ (more * (U.T @ (root * r)[block]))) / np.maximum(
+                root[block], 1e-300
+            )
+        return found
+
+    @property
+    def _blocks(self) -> list[slice]:
+        ends = [*self.begins[1:], len(self.r)]
+        return [slice(i, j) for i, j in zip(self.begins, ends, strict=True)]
 
     def held_out_losses(self, columns: Columns) -> Array:
         """Returns the loss of each block (B,) with columns fitted to all others.
@@ -143,30 +177,72 @@ class BlockRegression:
         columns are fitted with and without limited leverage of such rows, outliers of
         the fit lose their influence, and the better of the two fits counts.
         """
+        return self._held_out(columns).losses
+
+    def scores(self, columns: Columns) -> Scores:
+        """Returns what the blocks say of columns that explain nothing by chance.
+
+        The gradients g_b of the loss, decorrelated: their sum S has the squared length
+        S^T V^-1 S, about chi-squared. V is half the gradients' own second moment, which
+        no single block can exceed, and half that of white noise, which is well
+        conditioned where blocks are few.
+        """
+        found = self._held_out(columns)
+        total, g, H = found.gradients.sum(axis=0), found.noise, found.H.sum(axis=0)
+        if not g.any():
+            return Scores(np.zeros(1), np.zeros((len(g), 1)))
+        size = np.sqrt(np.maximum(np.diagonal(H), 1e-300))
+        total, g = total / size, g / size
+        H = H / np.outer(size, size) + _RIDGE * np.eye(len(H))
+        own = g.T @ g
+        noise = np.trace(np.linalg.solve(H, own)) / len(H)
+        L = np.linalg.cholesky(0.5 * (own + noise * H))
+        return Scores(np.linalg.solve(L, total), np.linalg.solve(L, g.T).T)
+
+    def _held_out(self, columns: Columns) -> "_HeldOut":
         a = self.A[:, self._feasible(columns)]
         priors = [np.ones(len(self.r))]
         if np.isfinite(self.huber_delta) and a.shape[1]:
             priors.append(self._leverage_weights(a))
         found = [self._cross_validated(a, w) for w in priors]
-        return min(found, key=np.sum)
+        return min(found, key=lambda each: float(each.losses.sum()))
 
-    def _cross_validated(self, a: Array, prior: Array) -> Array:
-        """Returns the loss of each block (B,) with columns (n, k) fitted to all others.
+    def _cross_validated(self, a: Array, prior: Array) -> "_HeldOut":
+        """Returns how columns (n, k) fitted to all other blocks predict each.
 
         Args:
             a: columns.
             prior: (n,) weights of rows, times which Huber's are taken.
         """
         w = prior * self._weights(self.r)
-        steps = self.settings.reweighting_steps
-        for _ in range(steps if np.isfinite(self.huber_delta) else 0):
-            phi = -_solve((a.T @ (w[:, None] * a))[None], (a.T @ (w * self.r))[None])
-            w = prior * self._weights(self.r + a @ phi[0])
         H, g = self._normal_equations(a, w)
+        null, noise = g, self._gradients(a, w, self.noise)
+        if np.isfinite(self.huber_delta) and a.shape[1]:
+            for _ in range(self.settings.reweighting_steps):
+                phi = -_solve(H.sum(axis=0)[None], g.sum(axis=0)[None])[0]
+                w = prior * self._weights(self.r + a @ phi)
+                H, g = self._normal_equations(a, w)
         others = -_solve(H.sum(axis=0) - H, g.sum(axis=0) - g)
         lengths = np.diff(self.begins, append=len(self.r))
         change = np.einsum("nk,nk->n", a, np.repeat(others, lengths, axis=0))
-        return self._loss(self.r + change)
+        return _HeldOut(self._loss(self.r + change), H, null, noise)
+
+    def best_of(self, groups: Sequence[Columns]) -> Columns:
+        """Returns the columns that explain most, by Akaike's criterion; or none.
+
+        Fitted to all rows: quick, and no evidence.
+        """
+        w = self._weights(self.r)
+        noise = float(np.mean(w * self.r**2))
+        best, least = np.array([], dtype=np.int64), 0.0
+        for columns in groups:
+            a = self.A[:, columns]
+            g = a.T @ (w * self.r)
+            gain = float(g @ _solve((a.T @ (w[:, None] * a))[None], g[None])[0])
+            criterion = 2.0 * len(columns) * noise - gain
+            if criterion < least:
+                best, least = columns, criterion
+        return best
 
     def _leverage_weights(self, a: Array) -> Array:
         """Returns weights (n,) that give no row more leverage than most have."""
@@ -205,10 +281,13 @@ class BlockRegression:
     def _normal_equations(self, a: Array, w: Array) -> tuple[Array, Array]:
         """Returns the normal equations of columns (n, k), (B, k, k) and (B, k)."""
         weighted = w[:, None] * a
-        ends = [*self.begins[1:], len(self.r)]
-        blocks = [slice(i, j) for i, j in zip(self.begins, ends, strict=True)]
-        H = np.array([a[block].T @ weighted[block] for block in blocks])
-        return H, np.array([weighted[block].T @ self.r[block] for block in blocks])
+        H = np.array([a[block].T @ weighted[block] for block in self._blocks])
+        return H, self._gradients(a, w, self.r)
+
+    def _gradients(self, a: Array, w: Array, r: Array) -> Array:
+        """Returns the gradient of each block's loss (B, k), of residuals (n,)."""
+        weighted = (w * r)[:, None] * a
+        return np.asarray(np.add.reduceat(weighted, self.begins, axis=0))
 
     def _feasible(self, columns: Columns) -> Columns:
         """Returns the columns without those that a bound keeps from helping."""
@@ -226,21 +305,40 @@ class BlockRegression:
         return columns
 
 
+@dataclass(frozen=True)
+class _HeldOut:
+    """Columns fitted to all other blocks than each.
+
+    Attributes:
+        losses: (B,) of the blocks.
+        H: (B, k, k) curvature of each block's loss.
+        gradients: (B, k) of each block's loss where the columns explain nothing.
+        noise: (B, k) the same, as large as by chance.
+    """
+
+    losses: Array
+    H: Array
+    gradients: Array
+    noise: Array
+
+
 def blocks_of(
-    linearisation: Linearisation,
+    residual: Array,
     episode: NDArray[np.int64],
     settings: SelectionSettings,
+    most: int | None = None,
 ) -> NDArray[np.int64]:
     """Returns the block (rows,) of each row: longer than residuals stay correlated.
 
     Args:
-        linearisation: its residuals.
+        residual: (rows, channels).
         episode: (rows,) of each row; a block never spans two.
         settings: how many blocks there may be.
+        most: blocks, if not the settings'.
     """
     rows = len(episode)
-    length = block_length(linearisation.residual, episode)
-    length = max(length, rows // settings.max_blocks)
+    length = block_length(residual, episode)
+    length = max(length, rows // (most or settings.max_blocks))
     longest = max(1, rows // settings.min_blocks)
     return block_numbers(episode, int(min(length, longest)))
 

@@ -284,7 +284,7 @@ def _generalises(likelihood: _Likelihood, blocks: NDArray[np.int64]) -> bool:
         before, after = (likelihood.select(own).rows(s)[0] for s in (np.zeros(3), std))
         np.add.at(gains, blocks[own], before - after)
     p = greater_p(gains) if gains.any() else 1.0
-    return p < limits.alpha and float(np.mean(gains > 0.0)) >= limits.min_block_share
+    return p < limits.scatter_alpha
 
 
 def _is_dependent(fit: Fit, displaced: Array) -> bool:

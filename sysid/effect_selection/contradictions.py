@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sysid.effect_selection.block_regression import BlockRegression, Columns
 from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.significance import family_p
+from sysid.effect_selection.significance import Scores, family_p
 from sysid.effect_selection.survey import LinearSurvey
 
 _OWN = "the model's own parameters"
@@ -72,7 +72,10 @@ def _difference(
     sets += [(e.text, fit.columns_of(e)) for e in fit.effects]
     sets.append((_OWN, np.arange(own)))
     gains = np.column_stack([_gains(regression, columns, begin) for _, columns in sets])
-    p, share = family_p(gains, limits) * tests, np.mean(gains > 0.0, axis=0)
+    unit = gains / max(np.linalg.norm(gains, axis=0).max(), 1e-300)
+    scores = [Scores(g.sum(keepdims=True), g[:, None]) for g in unit.T]
+    p = family_p(scores, limits) * tests
+    share = np.mean(gains > 0.0, axis=0)
     gain = gains.sum(axis=0) / regression.block_losses.sum()
     passed = (p < limits.alpha) & (share >= limits.contradiction_min_block_share)
     passed &= gain >= limits.contradiction_min_gain

@@ -38,6 +38,8 @@ def refuse_short_logs(last: Fit) -> None:
     Raises:
         DisasmError: there are too few rows; states how many more are needed.
     """
+    if last.effects:
+        return
     regression = last.regression()
     alone = regression.held_out_losses(np.arange(len(last.theta)))
     fitted = np.maximum(regression.block_losses, 1e-300)

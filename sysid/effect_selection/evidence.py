@@ -12,9 +12,7 @@ from sysid.effect_selection.candidates import Candidate, is_joint_group, kind_te
 from sysid.effect_selection.residual_curves import Dependence
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.effect_selection.significance import (
-    changed_blocks,
     family_p,
-    greater_p,
     share_better,
     worse_p,
 )
@@ -48,10 +46,9 @@ class Evidence:
 
     @property
     def accepted(self) -> bool:
-        """Whether it is significant, large enough, and consistent over the blocks."""
+        """Whether it is significant, and large enough to be of use."""
         limits = self.settings
-        significant = self.p < limits.alpha and self.gain >= limits.min_gain
-        return significant and self.block_share >= limits.min_block_share
+        return self.p < limits.alpha and self.gain >= limits.min_gain
 
     @property
     def name(self) -> str:
@@ -80,54 +77,58 @@ class Evidence:
             return False
         return worse_p(self.gains, best.gains) >= self.settings.alpha
 
-    def measured(self, gains: Array, total: float, tests: int) -> "Evidence":
+    def measured(self, gains: Array, total: float, p: float) -> "Evidence":
         """Returns the evidence for the same, by gains of an actual fit.
 
         Args:
             gains: (B,) of each block.
             total: loss of all blocks before.
-            tests: how many effects it was chosen from (Bonferroni).
+            p: that they are by chance.
         """
         if not gains.any():
-            return dataclasses.replace(
-                self, gain=0.0, p=1.0, block_share=0.0, gains=gains
-            )
-        p = greater_p(changed_blocks(gains, self.settings))
+            p = 1.0
         return dataclasses.replace(
             self,
             gain=float(gains.sum() / total),
-            p=min(1.0, tests * p),
+            p=p,
             block_share=share_better(gains, self.settings),
             gains=gains,
         )
 
 
 def rank_by_regression(
-    regression: BlockRegression, columns: Sequence[tuple[Explanation, Columns]]
+    regression: BlockRegression,
+    whitened: BlockRegression,
+    columns: Sequence[tuple[Explanation, Columns]],
 ) -> list[Evidence]:
     """Returns the evidence for groups of columns, the highest gain first.
 
     Their p-values are for all of them as one family.
+
+    Args:
+        regression: of residuals as they are: what is gained.
+        whitened: of the same prewhitened, by short blocks: whether by chance.
+        columns: of each explanation.
     """
     if not columns:
         return []
     settings = regression.settings
-    before = regression.block_losses
-    gains = np.array(
-        [before - regression.held_out_losses(group) for _, group in columns]
-    ).T
-    p, total = family_p(gains, settings), before.sum()
+    before, total = regression.block_losses, regression.block_losses.sum()
+    gains = [before - regression.held_out_losses(group) for _, group in columns]
+    p = family_p([whitened.scores(group) for _, group in columns], settings)
     found = [
         Evidence(
             explanation,
-            float(gains[:, i].sum() / total),
+            float(own.sum() / total),
             float(p[i]),
-            share_better(gains[:, i], settings),
+            share_better(own, settings),
             len(group) + _shape_count(explanation),
-            gains[:, i],
+            own,
             settings,
         )
-        for i, (explanation, group) in enumerate(columns)
+        for i, ((explanation, group), own) in enumerate(
+            zip(columns, gains, strict=True)
+        )
     ]
     return sorted(found, key=lambda each: -each.gain)
 

@@ -11,7 +11,9 @@ from sysid.confidence import Z
 from sysid.effect_selection.block_regression import BlockRegression, blocks_of
 from sysid.effect_selection.candidates import Candidate, is_joint_group
 from sysid.effect_selection.evidence import Evidence
+from sysid.effect_selection.prewhitening import Prewhitening
 from sysid.effect_selection.settings import SelectionSettings
+from sysid.effect_selection.significance import gained_p
 from sysid.identification.linearisation import Linearisation
 from sysid.models.base import LogModel
 from sysid.objective import pseudo_residual
@@ -53,12 +55,30 @@ class Fit:
     def blocks(self) -> NDArray[np.int64]:
         """Number of the block (rows,) of each row."""
         episode = self.model.measurements.episode
-        return blocks_of(self.linearisation, episode, self.settings)
+        return blocks_of(self.linearisation.residual, episode, self.settings)
 
-    def regression(self, blocks: NDArray[np.int64] | None = None) -> BlockRegression:
-        """Returns its normal equations, by blocks (rows,) of its own or of another."""
+    def regression(
+        self,
+        blocks: NDArray[np.int64] | None = None,
+        filtered: Prewhitening | None = None,
+    ) -> BlockRegression:
+        """Returns its normal equations, by blocks (rows,) of its own or of another.
+
+        Args:
+            blocks: (rows,) number of each row's block.
+            filtered: what residuals and derivatives are filtered by.
+        """
         chosen = self.blocks if blocks is None else blocks
-        return BlockRegression.of(self.linearisation, chosen, self.settings)
+        linear = self.linearisation
+        linear = filtered.whitened(linear) if filtered else linear
+        return BlockRegression.of(linear, chosen, self.settings)
+
+    @property
+    def prewhitening(self) -> Prewhitening:
+        """What whitens its residual."""
+        linear, settings = self.linearisation, self.settings
+        episode = self.model.measurements.episode
+        return Prewhitening.of(linear.residual, episode, linear.huber_delta, settings)
 
     @property
     def values(self) -> dict[str, float]:
@@ -152,10 +172,26 @@ def measured_evidence(before: Fit, after: Fit, trial: Evidence, tests: int) -> E
     """Returns the evidence for what was added, by fits before and after.
 
     Each block is judged by what the fit after would cost it, were it fitted to all
-    others; the p-value is for as many tests as there are effects (Bonferroni).
+    others; the p-value is of the prewhitened residuals, by short blocks, and for as
+    many tests as there are effects (Bonferroni).
     """
-    blocks = before.blocks
-    losses = before.regression(blocks).block_losses
+    gains, total = _block_gains(before, after, before.blocks)
+    filtered, settings = after.prewhitening, after.settings
+    white = filtered(after.linearisation.residual)
+    short = blocks_of(white, filtered.episode, settings, settings.max_test_blocks)
+    of_white, _ = _block_gains(before, after, short, filtered)
+    p = min(1.0, tests * gained_p(of_white, settings))
+    return trial.measured(gains, total, p)
+
+
+def _block_gains(
+    before: Fit,
+    after: Fit,
+    blocks: NDArray[np.int64],
+    filtered: Prewhitening | None = None,
+) -> tuple[Array, float]:
+    """Returns what each block gains (B,), and the loss of all before."""
+    losses = before.regression(blocks, filtered).block_losses
     own = np.arange(len(after.theta))
-    gains = losses - after.regression(blocks).held_out_losses(own)
-    return trial.measured(gains, float(losses.sum()), tests)
+    left = after.regression(blocks, filtered).held_out_losses(own)
+    return losses - left, float(losses.sum())

@@ -53,13 +53,6 @@ class SelectionSettings:
         "a smaller gain is of no use to a simulation, however significant",
         _NULL_LOGS,
     )
-    min_block_share: float = _setting(
-        0.8,
-        "share of the blocks",
-        "an effect acts throughout a log; chosen as 8 of 10 so that a few dominant "
-        "blocks can't decide",
-        _NULL_LOGS,
-    )
     idle_block_gain: float = _setting(
         0.1,
         "of the blocks' mean absolute gain",
@@ -80,6 +73,55 @@ class SelectionSettings:
         "blocks",
         "more blocks cost time (one set of normal equations each) and gain no power "
         "to speak of",
+    )
+
+    # How a residual is prewhitened, to test whether a gain is chance.
+    max_test_blocks: int = _setting(
+        40,
+        "blocks",
+        "of the prewhitened residual; enough for 4000 different flips of their signs, "
+        "and as long as the residual allows, for what the filter leaves of its "
+        "correlation",
+    )
+    cell_power: float = _setting(
+        0.9,
+        "share of a channel's power",
+        "means of so many rows are taken as keep this much of each channel: a residual "
+        "that is sampled far too often has no noise at most frequencies",
+        "of a real arm at 200 Hz, filtered at 8 Hz: friction is found in 2 s "
+        "(docs/closing-the-loop.md)",
+    )
+    cell_lengths: tuple[int, ...] = _setting(
+        (2, 3, 5, 8, 12, 20, 30, 50, 80, 120, 200),
+        "rows",
+        "that a mean is taken of, about a factor of 1.6 apart",
+    )
+    min_cells: int = _setting(
+        40, "cells", "as many as `max_test_blocks`, so that each block has one"
+    )
+    max_ar_order: int = _setting(
+        30,
+        "cells",
+        "how far back the autoregressive model of a channel looks at most; Akaike's "
+        "criterion chooses",
+    )
+    cells_per_ar_order: int = _setting(
+        10, "cells", "per coefficient of an autoregressive model, at least"
+    )
+    ar_errors: float = _setting(
+        2.0,
+        "standard errors",
+        "that are added to the first coefficient: noise that is taken for slower than "
+        "it is costs power, noise that is taken for faster raises alarms",
+        "AR(0.98) noise raised alarms in 26 of 60 logs with none, in 2 of 60 with 2, "
+        "before `noise_safety`",
+    )
+    noise_safety: float = _setting(
+        1.5,
+        "times",
+        "the noise that is left when the best candidate is fitted is taken for so much "
+        "larger: that candidate was chosen, and has taken some noise along",
+        _NULL_LOGS,
     )
 
     # The linear account of a residual, block by block.

@@ -1,8 +1,11 @@
-"""p-values of what blocks of rows gain, by signed ranks."""
+"""p-values of what blocks of rows say: by flips of their signs, and by signed ranks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata, wilcoxon
+from scipy.stats import wilcoxon
 
 from sysid.effect_selection.settings import SelectionSettings
 
@@ -10,32 +13,67 @@ Array = NDArray[np.float64]
 
 # Rounding errors, not thresholds: gains that differ by less are the same number.
 _EQUAL = 1e-6  # of the largest gain of a block
-_ROUNDING = 1e-12  # of a sum of unit ranks
+_ROUNDING = 1e-12  # of a sum of unit scores
 
 
-def family_p(gains: Array, settings: SelectionSettings, seed: int = 0) -> Array:
+@dataclass(frozen=True)
+class Scores:
+    """What blocks of rows say of a candidate.
+
+    Attributes:
+        total: (m,) whose squared length is about chi-squared with m degrees of freedom
+            by chance.
+        blocks: (B, m) what it is the sum of by chance; each of either sign.
+    """
+
+    total: Array
+    blocks: Array
+
+
+def family_p(
+    scores: Sequence[Scores], settings: SelectionSettings, seed: int = 0
+) -> Array:
     """Returns each candidate's family-wise p-value (k,) that it explains nothing.
 
-    The statistic is Wilcoxon's sum of signed ranks of what blocks gain by a candidate
-    when they are predicted from all others. Its null distribution is that of the
-    highest over all candidates, with the blocks' signs flipped at random, the same
-    for all candidates (Westfall and Young 1993): this allows for any correlation
-    within a block and between candidates, and no single block dominates. The price of
-    a candidate's parameters is in its gains.
+    The statistic is normalised for its degrees of freedom, and its null distribution
+    is that of the highest over all candidates with the blocks' signs flipped at random,
+    the same for all candidates (Westfall and Young 1993): this allows for any
+    correlation within a block and between candidates, and for noise that differs from
+    block to block.
 
     Args:
-        gains: (B, k), of each block by each candidate.
+        scores: of each candidate.
         settings: number of draws.
         seed: of the signs.
     """
-    draws = settings.sign_flips
-    ranks = np.sign(gains) * rankdata(np.abs(gains), axis=0)
-    unit = ranks / np.maximum(np.linalg.norm(ranks, axis=0), 1e-300)
-    signs = np.random.default_rng(seed).choice([-1.0, 1.0], (draws, len(gains)))
-    highest = (signs @ unit).max(axis=1, initial=0.0)
-    above = (highest[:, None] >= unit.sum(axis=0) - _ROUNDING).sum(axis=0)
-    p: Array = (1.0 + above) / (1.0 + draws)
+    found = np.array([_normalised(each.total[None])[0] for each in scores])
+    highest = highest_by_chance(scores, settings, seed)
+    above = (highest[:, None] >= found - _ROUNDING).sum(axis=0)
+    p: Array = (1.0 + above) / (1.0 + len(highest))
     return p
+
+
+def highest_by_chance(
+    scores: Sequence[Scores], settings: SelectionSettings, seed: int = 0
+) -> Array:
+    """Returns the highest statistic (draws,) of all scores with random signs."""
+    size = (settings.sign_flips, max(len(each.blocks) for each in scores))
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], size)
+    highest = np.full(len(signs), -np.inf)
+    for each in scores:
+        np.maximum(highest, _normalised(signs @ each.blocks), out=highest)
+    return highest
+
+
+def _normalised(sums: Array) -> Array:
+    """Returns the squared sums (n, m) as standard normal variables (n,), about.
+
+    Wilson and Hilferty's (1931) cube root of a chi-squared variable.
+    """
+    m = max(sums.shape[1], 1)
+    spread = 2.0 / (9.0 * m)
+    root = np.cbrt(np.sum(sums**2, axis=1) / m)
+    return np.asarray((root - 1.0 + spread) / np.sqrt(spread))
 
 
 def worse_p(gains: Array, best: Array) -> float:
@@ -53,6 +91,12 @@ def worse_p(gains: Array, best: Array) -> float:
 def greater_p(gains: Array) -> float:
     """Returns the p-value of Wilcoxon's signed ranks that gains (B,) are about zero."""
     return float(wilcoxon(gains, alternative="greater").pvalue)
+
+
+def gained_p(gains: Array, settings: SelectionSettings) -> float:
+    """Returns the p-value that blocks gain (B,) by chance, idle ones not counted."""
+    changed = changed_blocks(gains, settings)
+    return greater_p(changed) if changed.any() else 1.0
 
 
 def changed_blocks(gains: Array, settings: SelectionSettings) -> Array:

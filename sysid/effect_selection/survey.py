@@ -22,6 +22,7 @@ from sysid.effect_selection.evidence import (
 )
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.prewhitening import Prewhitening
 from sysid.effect_selection.residual_curves import Dependence, dependence_curves
 from sysid.identification.linearisation import Linearisation, extend
 from sysid.parameters import nominal_values
@@ -38,6 +39,7 @@ class LinearSurvey:
         fields: of each parameter, the last part of its name.
         raw: the regression of the fit's and the candidates' parameters.
         regression: the same with the fit's parameters projected out.
+        whitened: the same of the prewhitened residual, by short blocks.
         groups: columns of each candidate, by its text.
         dependences: curves, and the columns of each.
         episodes: (B,) number of the episode that each block is of.
@@ -47,6 +49,7 @@ class LinearSurvey:
     fields: tuple[str, ...]
     raw: BlockRegression
     regression: BlockRegression
+    whitened: BlockRegression
     groups: Mapping[str, Columns]
     dependences: Sequence[tuple[Dependence, Columns]]
     episodes: NDArray[np.int64]
@@ -59,7 +62,7 @@ class LinearSurvey:
         They are one family: a log without an effect raises neither alarm.
         """
         columns = [*self._columns(sets), *self.dependences]
-        found = rank_by_regression(self.regression, columns)
+        found = self._ranked(columns)
         return (
             [e for e in found if not isinstance(e.explanation, Dependence)],
             [e for e in found if isinstance(e.explanation, Dependence)],
@@ -77,7 +80,7 @@ class LinearSurvey:
         best = list(promising.values())[: self.regression.settings.pair_pool]
         pairs = list(itertools.combinations(best, 2))
         tests = math.comb(len(promising), 2) / max(1, len(pairs))
-        found = rank_by_regression(self.regression, self._columns(pairs))
+        found = self._ranked(self._columns(pairs))
         return [
             counted
             for e in found
@@ -115,6 +118,9 @@ class LinearSurvey:
             for effect in added
             for c in self.groups[effect.text]
         }
+
+    def _ranked(self, columns: Sequence[tuple[Explanation, Columns]]) -> list[Evidence]:
+        return rank_by_regression(self.regression, self.whitened, columns)
 
     def _held_out_loss(self, columns: Sequence[int]) -> float:
         return float(self.regression.held_out_losses(np.array(columns)).sum())
@@ -182,15 +188,64 @@ def _linear_survey(
     linearisation = extend(fit.linearisation, objective, u)
     episode = model.measurements.episode
     curves, dependences = dependence_curves(model, fitter.settings)
-    blocks = blocks_of(linearisation, episode, fitter.settings)
+    blocks = blocks_of(linearisation.residual, episode, fitter.settings)
     raw = BlockRegression.of(linearisation, blocks, fitter.settings, curves)
-    columns = [np.array(group, dtype=np.int64) for group in groups]
+    columns = {
+        c.text: np.array(group, dtype=np.int64)
+        for c, group in zip(library, groups, strict=True)
+    }
+    of_curves = [(d, begin + np.array(d.columns, np.int64)) for d in dependences]
+    regression = raw.project_out(np.arange(count))
+    sets = [columns[c.text] for c in library] + [c for _, c in of_curves]
+    sets += [_of_group(group, columns) for group in joint_groups(library)]
+    best = regression.best_of([group for group in sets if len(group)])
+    known = np.append(np.arange(count), best)
+    whitened = _whitened(linearisation, episode, curves, known, count, fitter)
     return LinearSurvey(
         linearisation,
         tuple(p.name.rpartition(".")[2] for p in model.parameters),
         raw,
-        raw.project_out(np.arange(count)),
-        {c.text: group for c, group in zip(library, columns, strict=True)},
-        [(d, begin + np.array(d.columns, dtype=np.int64)) for d in dependences],
+        regression,
+        whitened,
+        columns,
+        of_curves,
         episode[np.unique(blocks, return_index=True)[1]],
     )
+
+
+def _of_group(group: Sequence[Candidate], columns: Mapping[str, Columns]) -> Columns:
+    return np.concatenate([columns[c.text] for c in group])
+
+
+def _whitened(
+    linearisation: Linearisation,
+    episode: NDArray[np.int64],
+    curves: Array,
+    known: Columns,
+    own: int,
+    fitter: Fitter,
+) -> BlockRegression:
+    """Returns the regression of the prewhitened residual.
+
+    Args:
+        linearisation: with all candidates at null.
+        episode: (rows,) of each row.
+        curves: (rows, channels, k) columns of dependence curves.
+        known: columns of what may be in the residual: the filter is made of what they
+            leave, since it would take a slow effect for noise.
+        own: number of the fit's own, the first of them; they are projected out.
+        fitter: its settings.
+    """
+    settings, r = fitter.settings, linearisation.residual
+    J = np.concatenate([linearisation.jacobian, curves], axis=2)[..., known]
+    root = np.sqrt(linearisation.weights)
+    a, b = (root[..., None] * J).reshape(r.size, len(known)), (root * r).reshape(-1)
+    left = r - J @ np.linalg.lstsq(a, b, rcond=None)[0]
+    delta = linearisation.huber_delta
+    filtered = Prewhitening.of(left, episode, delta, settings, len(known))
+    found = filtered.whitened(linearisation)
+    most = settings.max_test_blocks
+    blocks = blocks_of(filtered(left), filtered.episode, settings, most)
+    regression = BlockRegression.of(found, blocks, settings, filtered(curves))
+    noise = settings.noise_safety * regression.project_out(known).noise
+    return dataclasses.replace(regression.project_out(known[:own]), noise=noise)

@@ -125,6 +125,10 @@ class Measurements:
             names=tuple(self.names[i] for i in kept),
         )
 
+    def with_values(self, values: Array) -> Self:
+        """Returns the same channels with other measured values (rows, channels)."""
+        return dataclasses.replace(self, values=values)
+
     def with_noise(self, noise: Array, origin: str) -> Self:
         """Returns the same with other standard deviations (channels,)."""
         channels = tuple(

@@ -23,6 +23,8 @@ MODULES = [
 ALLOWED = {
     "_RIDGE",
     "_AT_BOUND",
+    "_LEAST_LEFT",
+    "_MOST",
     "_EQUAL",
     "_ROUNDING",
     "_CURVATURE_STEP",

@@ -5,7 +5,12 @@ import pytest
 from scipy.stats import binom
 
 from sysid.effect_selection.settings import SelectionSettings
-from sysid.effect_selection.significance import family_p, share_better, worse_p
+from sysid.effect_selection.significance import (
+    Scores,
+    family_p,
+    share_better,
+    worse_p,
+)
 
 _FEW = SelectionSettings(sign_flips=399)  # p-values are multiples of 1 / 400
 _FAMILIES = 800
@@ -19,7 +24,15 @@ def null_p(request):
     common = random.standard_normal((*size[:2], 1))
     rho = request.param
     gains = np.sqrt(rho) * common + np.sqrt(1.0 - rho) * random.standard_normal(size)
-    return np.array([family_p(g, _FEW, seed).min() for seed, g in enumerate(gains)])
+    return np.array(
+        [family_p(_scores(g), _FEW, seed).min() for seed, g in enumerate(gains)]
+    )
+
+
+def _scores(values):
+    """Of candidates with a parameter each, of unit power by chance."""
+    unit = values / np.linalg.norm(values, axis=0)
+    return [Scores(v.sum(axis=0, keepdims=True), v[:, None]) for v in unit.T]
 
 
 @pytest.mark.parametrize("alpha", [0.02, 0.05, 0.2])
@@ -33,13 +46,33 @@ def test_a_candidate_that_all_blocks_gain_by_is_significant():
     random = np.random.default_rng(0)
     gains = random.standard_normal((20, 12))
     gains[:, 7] += 2.0
-    p = family_p(gains, SelectionSettings())
+    p = family_p(_scores(gains), SelectionSettings())
     assert p[7] < 0.01 and np.delete(p, 7).min() > 0.05
 
 
 def test_one_dominant_block_decides_nothing():
     gains = np.where(np.arange(20) == 0, 1e3, -0.1)[:, None]
-    assert family_p(gains, SelectionSettings())[0] > 0.5
+    assert family_p(_scores(gains), SelectionSettings())[0] > 0.5
+
+
+def test_ten_blocks_can_reject_among_many_candidates():
+    """Of candidates as strong as they are useless, each has its own sign pattern."""
+    random = np.random.default_rng(1)
+    values = 0.3 * random.standard_normal((10, 113))
+    scores = [Scores(v.sum(keepdims=True), v[:, None]) for v in values.T]
+    scores[5] = Scores(np.array([10.0]), values[:, 5, None])
+    p = family_p(scores, SelectionSettings())
+    assert p[5] < 0.001 and np.delete(p, 5).min() > 0.01
+
+
+def test_parameters_are_allowed_for():
+    """Ten parameters explain as much by chance as ten times one."""
+    random = np.random.default_rng(2)
+    blocks = [random.standard_normal((30, m)) / np.sqrt(30.0) for m in (1, 10)]
+    scores = [Scores(np.full(b.shape[1], 1.5), b) for b in blocks]
+    one, ten = (family_p([s], SelectionSettings())[0] for s in scores)
+    assert ten < one
+    assert family_p([Scores(np.full(10, 0.5), blocks[1])], _FEW)[0] > 0.5
 
 
 def test_gains_are_compared_block_by_block():
