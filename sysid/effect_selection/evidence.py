@@ -13,6 +13,7 @@ from sysid.effect_selection.residual_curves import Dependence
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.effect_selection.significance import (
     family_p,
+    ranks_p,
     share_better,
     worse_p,
 )
@@ -34,6 +35,8 @@ class Evidence:
         parameter_count: number of its parameters.
         gains: (B,) of each block.
         settings: thresholds.
+        ranks_p: family-wise p-value by the signed ranks of the gains alone.
+        is_further: whether it is certain already that the model lacks something.
     """
 
     explanation: Explanation
@@ -43,12 +46,31 @@ class Evidence:
     parameter_count: int
     gains: Array
     settings: SelectionSettings = dataclasses.field(repr=False)
+    ranks_p: float = 1.0
+    is_further: bool = False
 
     @property
     def accepted(self) -> bool:
-        """Whether it is significant, and large enough to be of use."""
+        """Whether it is significant, and large enough to be of use.
+
+        Once it is certain that the model lacks something, what most blocks gain by is
+        added, too: the rest of the residual may be slow because that is missing.
+        """
+        return self.gain >= self.settings.min_gain and (
+            self.is_certain or (self.is_further and self.is_consistent)
+        )
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether it is significant, however slow the noise is."""
+        return self.p < self.settings.alpha
+
+    @property
+    def is_consistent(self) -> bool:
+        """Whether most blocks gain by it, more than by chance if noise is fast."""
         limits = self.settings
-        return self.p < limits.alpha and self.gain >= limits.min_gain
+        enough = self.block_share >= limits.min_block_share
+        return enough and self.ranks_p < limits.alpha
 
     @property
     def name(self) -> str:
@@ -100,6 +122,7 @@ def rank_by_regression(
     regression: BlockRegression,
     whitened: BlockRegression,
     columns: Sequence[tuple[Explanation, Columns]],
+    is_further: bool = False,
 ) -> list[Evidence]:
     """Returns the evidence for groups of columns, the highest gain first.
 
@@ -109,6 +132,7 @@ def rank_by_regression(
         regression: of residuals as they are: what is gained.
         whitened: of the same prewhitened, by short blocks: whether by chance.
         columns: of each explanation.
+        is_further: whether it is certain that the model lacks something.
     """
     if not columns:
         return []
@@ -116,6 +140,7 @@ def rank_by_regression(
     before, total = regression.block_losses, regression.block_losses.sum()
     gains = [before - regression.held_out_losses(group) for _, group in columns]
     p = family_p([whitened.scores(group) for _, group in columns], settings)
+    ranks = ranks_p(np.array(gains).T, settings)
     found = [
         Evidence(
             explanation,
@@ -125,6 +150,8 @@ def rank_by_regression(
             len(group) + _shape_count(explanation),
             own,
             settings,
+            float(ranks[i]),
+            is_further and not isinstance(explanation, Dependence),
         )
         for i, ((explanation, group), own) in enumerate(
             zip(columns, gains, strict=True)

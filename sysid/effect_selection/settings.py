@@ -53,6 +53,13 @@ class SelectionSettings:
         "a smaller gain is of no use to a simulation, however significant",
         _NULL_LOGS,
     )
+    min_block_share: float = _setting(
+        0.8,
+        "share of the blocks",
+        "that get better by what is added to effects that are certain: 8 of 10, so "
+        "that a few dominant blocks can't decide",
+        _NULL_LOGS,
+    )
     idle_block_gain: float = _setting(
         0.1,
         "of the blocks' mean absolute gain",

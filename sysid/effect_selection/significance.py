@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import wilcoxon
+from scipy.stats import rankdata, wilcoxon
 
 from sysid.effect_selection.settings import SelectionSettings
 
@@ -51,6 +51,24 @@ def family_p(
     above = (highest[:, None] >= found - _ROUNDING).sum(axis=0)
     p: Array = (1.0 + above) / (1.0 + len(highest))
     return p
+
+
+def ranks_p(gains: Array, settings: SelectionSettings, seed: int = 0) -> Array:
+    """Returns each candidate's family-wise p-value (k,) of signed ranks of its gains.
+
+    Wilcoxon's sum of signed ranks, against the highest of all candidates with signs
+    flipped at random. Its blocks have to be longer than residuals stay correlated:
+    noise that is slower than a tenth of a log raises alarms.
+
+    Args:
+        gains: (B, k), of each block by each candidate.
+        settings: number of draws.
+        seed: of the signs.
+    """
+    ranks = np.sign(gains) * rankdata(np.abs(gains), axis=0)
+    unit = ranks / np.maximum(np.linalg.norm(ranks, axis=0), 1e-300)
+    columns = [Scores(each.sum(keepdims=True), each[:, None]) for each in unit.T]
+    return family_p(columns, settings, seed)
 
 
 def highest_by_chance(

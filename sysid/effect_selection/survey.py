@@ -43,6 +43,7 @@ class LinearSurvey:
         groups: columns of each candidate, by its text.
         dependences: curves, and the columns of each.
         episodes: (B,) number of the episode that each block is of.
+        is_further: whether the fit has effects: the model surely lacked something.
     """
 
     linearisation: Linearisation
@@ -53,6 +54,7 @@ class LinearSurvey:
     groups: Mapping[str, Columns]
     dependences: Sequence[tuple[Dependence, Columns]]
     episodes: NDArray[np.int64]
+    is_further: bool
 
     def rank(
         self, sets: Sequence[tuple[Candidate, ...]]
@@ -120,7 +122,9 @@ class LinearSurvey:
         }
 
     def _ranked(self, columns: Sequence[tuple[Explanation, Columns]]) -> list[Evidence]:
-        return rank_by_regression(self.regression, self.whitened, columns)
+        return rank_by_regression(
+            self.regression, self.whitened, columns, self.is_further
+        )
 
     def _held_out_loss(self, columns: Sequence[int]) -> float:
         return float(self.regression.held_out_losses(np.array(columns)).sum())
@@ -210,6 +214,7 @@ def _linear_survey(
         columns,
         of_curves,
         episode[np.unique(blocks, return_index=True)[1]],
+        bool(fit.effects),
     )
 
 

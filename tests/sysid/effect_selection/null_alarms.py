@@ -1,0 +1,123 @@
+"""How often closing the loop raises an alarm where nothing is missing.
+
+    python -m tests.sysid.effect_selection.null_alarms static white t3 --logs 200
+    python -m tests.sysid.effect_selection.null_alarms arm ar0.98 sieve --logs 200
+
+The motion or the poses are those of real devices (`../shared/data`); what was measured
+is replaced by the model's own prediction and noise that is drawn. Writes each answer
+to out/null_alarms as it comes, and goes on from there.
+"""
+
+import argparse
+import json
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.learning.statistics import wilson_interval
+from drake_disasm.logs import read_logs
+from sysid.effect_selection.close_loop import close_loop
+from sysid.identification.noise import with_estimated_noise
+from sysid.models import LogModel
+from sysid.models.from_logs import ModelChoice, model_of
+from sysid.validation import null_logs
+from sysid.workers import Workers
+from tests.sysid.real_data import write_arm, write_motion, write_static
+
+_ARM_ROWS = 600  # of 200 Hz: 3 s
+
+
+def static(folder: Path) -> LogModel:
+    """Returns the model of 100 readings of a real sensor at rest."""
+    log = folder / "static"
+    return _model([log if log.exists() else write_static(100, log)])
+
+
+def arm(folder: Path) -> LogModel:
+    """Returns the model of 3 s of a real arm's motion."""
+    urdf, log = folder / "arm.urdf", folder / "arm"
+    model = _model([log if log.exists() else write_motion(1, log, write_arm(urdf))])
+    return model.of_rows(np.arange(model.measurements.rows) < _ARM_ROWS)
+
+
+MODELS: dict[str, Callable[[Path], LogModel]] = {"static": static, "arm": arm}
+
+
+def noise_of(name: str, model: LogModel) -> null_logs.Noise:
+    """Returns the noise of a name: white, t3, proportional, ar0.9, or sieve."""
+    plain = {
+        "white": null_logs.white,
+        "t3": null_logs.heavy_tailed,
+        "proportional": null_logs.in_proportion,
+    }
+    if name in plain:
+        return plain[name]
+    if name == "sieve":
+        return null_logs.sieve(close_loop(model).last.linearisation.residual)
+    return null_logs.autoregressive(float(name.removeprefix("ar")))
+
+
+def answer(model: LogModel, noise: null_logs.Noise, seed: int) -> dict[str, object]:
+    """Returns what closing the loop says of a null log."""
+    drawn = null_logs.null_log(model, noise, seed)
+    unknown = np.full(len(drawn.measurements.channels), np.nan)
+    measured = drawn.measurements.with_noise(unknown, "unknown")
+    try:
+        found = close_loop(drawn.with_measurements(measured)).verdict
+    except DisasmError as error:
+        return {"seed": seed, "ending": "refused", "names": [], "text": str(error)}
+    return {
+        "seed": seed,
+        "ending": found.ending,
+        "names": list(found.names),
+        "text": found.dependence,
+    }
+
+
+def _model(logs: list[Path]) -> LogModel:
+    found = model_of(read_logs(logs), ModelChoice())
+    return with_estimated_noise(found, Workers(), found.default_huber_delta)
+
+
+def _answers(path: Path) -> list[dict[str, object]]:
+    lines = path.read_text().splitlines() if path.exists() else []
+    return [json.loads(line) for line in lines]
+
+
+def _summary(name: str, answers: list[dict[str, object]]) -> str:
+    count = len(answers)
+    named = sum(bool(each["names"]) for each in answers)
+    low, high = wilson_interval(named, count)
+    endings = dict(Counter(str(each["ending"]) for each in answers))
+    return (
+        f"{name}: {named} of {count} name an effect "
+        f"(95 %: {100 * low:.1f} to {100 * high:.1f} %); {endings}"
+    )
+
+
+def main() -> None:
+    """Runs the program."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("model", choices=MODELS)
+    parser.add_argument(
+        "noise", nargs="+", help="white, t3, proportional, ar0.9, sieve"
+    )
+    parser.add_argument("--logs", type=int, default=200)
+    parser.add_argument("--out", type=Path, default=Path("out/null_alarms"))
+    args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    model = MODELS[args.model](args.out / "data")
+    for name in args.noise:
+        path = args.out / f"{args.model}_{name}.jsonl"
+        noise = noise_of(name, model)
+        with path.open("a") as stream:
+            for seed in range(len(_answers(path)), args.logs):
+                print(json.dumps(answer(model, noise, seed)), file=stream, flush=True)
+        print(_summary(f"{args.model}, {name}", _answers(path)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
