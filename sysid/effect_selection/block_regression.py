@@ -188,16 +188,20 @@ class BlockRegression:
         conditioned where blocks are few.
         """
         found = self._held_out(columns)
-        total, g, H = found.gradients.sum(axis=0), found.noise, found.H.sum(axis=0)
-        if not g.any():
-            return Scores(np.zeros(1), np.zeros((len(g), 1)))
-        size = np.sqrt(np.maximum(np.diagonal(H), 1e-300))
-        total, g = total / size, g / size
-        H = H / np.outer(size, size) + _RIDGE * np.eye(len(H))
-        own = g.T @ g
-        noise = np.trace(np.linalg.solve(H, own)) / len(H)
-        L = np.linalg.cholesky(0.5 * (own + noise * H))
-        return Scores(np.linalg.solve(L, total), np.linalg.solve(L, g.T).T)
+        if not found.noise.any():
+            return Scores(np.zeros(1), np.zeros((len(found.noise), 1)))
+        L = _spread(found)
+        total = found.gradients.sum(axis=0)
+        blocks = np.linalg.solve(L, found.noise.T).T
+        return Scores(np.asarray(np.linalg.solve(L, total)), np.asarray(blocks))
+
+    def sensitivity(self, columns: Columns) -> Array:
+        """Returns how long a total of `scores` each column makes by itself (k,)."""
+        found = self._held_out(columns)
+        if found.noise.shape[1] < len(columns) or not found.noise.any():
+            return np.zeros(len(columns))
+        lengths = np.linalg.solve(_spread(found), found.H.sum(axis=0))
+        return np.asarray(np.linalg.norm(lengths, axis=0))
 
     def _held_out(self, columns: Columns) -> "_HeldOut":
         a = self.A[:, self._feasible(columns)]
@@ -341,6 +345,16 @@ def blocks_of(
     length = max(length, rows // (most or settings.max_blocks))
     longest = max(1, rows // settings.min_blocks)
     return block_numbers(episode, int(min(length, longest)))
+
+
+def _spread(found: _HeldOut) -> Array:
+    """Returns L (k, k) with L L^T the spread of the sum of the blocks' gradients."""
+    H, g = found.H.sum(axis=0), found.noise
+    size = np.sqrt(np.maximum(np.diagonal(H), 1e-300))
+    H, g = H / np.outer(size, size) + _RIDGE * np.eye(len(H)), g / size
+    own = g.T @ g
+    noise = np.trace(np.linalg.solve(H, own)) / len(H)
+    return np.asarray(size[:, None] * np.linalg.cholesky(0.5 * (own + noise * H)))
 
 
 def _solve(H: Array, g: Array) -> Array:

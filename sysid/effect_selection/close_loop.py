@@ -12,12 +12,14 @@ from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progre
 from drake_disasm.effects import Effect, Imprecision, registered_effects
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.candidates import Candidate, candidates
+from sysid.effect_selection.channel_checks import refuse_dead_channels
 from sysid.effect_selection.command_scatter import (
     CommandScatter,
     fit_command_scatter,
 )
 from sysid.effect_selection.contradictions import contradictions
 from sysid.effect_selection.data_sufficiency import refuse_few_rows, refuse_short_logs
+from sysid.effect_selection.detection import DetectionLimit, detection_limits
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.held_out import HeldOut, held_out_errors
@@ -119,13 +121,15 @@ def close_loop(
     workers = workers or Workers()
     base = with_estimated_noise(model.of_episodes(train), workers, delta)
     refuse_few_rows(base, settings)
+    refuse_dead_channels(base, settings)
     applicable = _applicable(base, library)
     is_stated = not np.isnan(model.measurements.noise).any()
     fitter = Fitter(base, workers, delta, settings, folder, is_stated)
     found = _search(fitter, applicable, progress or ignore_progress)
-    refuse_short_logs(found.last)
+    limits = detection_limits(found.end.linearised)
+    refuse_short_logs(found.last, limits)
     held_out = _with_noise_of(base, model.of_episodes(test)) if test else None
-    return _judged(fitter, found, held_out, may_scatter=Imprecision in library)
+    return _judged(fitter, found, held_out, limits, Imprecision in library)
 
 
 def _applicable(
@@ -161,14 +165,18 @@ def _search(
 
 
 def _judged(
-    fitter: Fitter, found: SearchResult, held_out: LogModel | None, may_scatter: bool
+    fitter: Fitter,
+    found: SearchResult,
+    held_out: LogModel | None,
+    limits: Sequence[DetectionLimit],
+    may_scatter: bool,
 ) -> ClosedLoop:
     """Returns the verdict on what a search found, with the errors."""
     first, last, end = found.first, found.last, found.end
     errors = held_out_errors(fitter, first, last, held_out)
     scatter = fit_command_scatter(fitter, last) if may_scatter else None
     against = contradictions(last, end.linearised, len(fitter.base.parameters))
-    verdict = judge(first, last, end, found.rounds, against, scatter)
+    verdict = judge(first, last, end, found.rounds, against, scatter, limits)
     return ClosedLoop(
         verdict, errors, first, last, found.rounds, found.begin, end, scatter
     )

@@ -1,8 +1,11 @@
 """Whether a log is long enough to decide anything."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from drake_disasm.common.errors import DisasmError
+from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.models.base import LogModel
@@ -24,34 +27,49 @@ def refuse_few_rows(model: LogModel, settings: SelectionSettings) -> None:
         )
 
 
-def refuse_short_logs(last: Fit) -> None:
-    """Refuses logs whose parts do not predict one another.
+def refuse_short_logs(last: Fit, limits: Sequence[DetectionLimit]) -> None:
+    """Refuses logs that show nothing, and could not have.
 
-    There half of the blocks have a loss several times as large when they are predicted
-    by a fit to all others as in the fit to all: whatever is added to the model overfits
-    them. The excess is in proportion to the parameters over the independent data
-    (Akaike's final prediction error), from which follows how much more is needed.
+    Either no effect would have been found, whatever its amplitude. Or parts of the log
+    do not predict one another: half of the blocks have a loss several times as large
+    when they are predicted by a fit to all others as in the fit to all. The excess is
+    in proportion to the parameters over the independent data (Akaike's final prediction
+    error), from which follows how much more is needed.
 
     Args:
         last: the fit with all effects that were found.
+        limits: of detection, at that fit.
 
     Raises:
         DisasmError: there are too few rows; states how many more are needed.
     """
     if last.effects:
         return
+    rows = last.model.measurements.rows
+    nearest = min((limit.share for limit in limits), default=0.0)
+    if nearest > 1.0:
+        raise DisasmError(
+            f"the log is too short to decide: in its {rows} rows no effect of the "
+            f"library would have been found, however large; record at least "
+            f"{_more_rows(last, nearest**2 - 1.0)} rows more, of other motion or poses"
+        )
     regression = last.regression()
     alone = regression.held_out_losses(np.arange(len(last.theta)))
     fitted = np.maximum(regression.block_losses, 1e-300)
     excess = float(np.median(alone / fitted)) - 1.0
     limit = last.settings.max_block_excess
-    if excess <= limit:
-        return
+    if excess > limit:
+        raise DisasmError(
+            f"the log is too short to decide: the residual of a part of its {rows} rows"
+            f" is {np.sqrt(1.0 + excess):.1f} times as large when that part is not "
+            f"fitted; record at least {_more_rows(last, excess / limit - 1.0)} rows "
+            "more, of other motion or poses"
+        )
+
+
+def _more_rows(last: Fit, times: float) -> int:
+    """Returns so many times the rows of a log, as far as can be foreseen."""
     rows = last.model.measurements.rows
-    longest = last.settings.max_extrapolation * rows
-    more = min(int(np.ceil(rows * (excess / limit - 1.0))), longest)
-    raise DisasmError(
-        f"the log is too short to decide: the residual of a part of its {rows} rows is "
-        f"{np.sqrt(1.0 + excess):.1f} times as large when that part is not fitted; "
-        f"record at least {max(more, 1)} rows more, of other motion or poses"
+    return max(
+        int(min(np.ceil(times * rows), last.settings.max_extrapolation * rows)), 1
     )

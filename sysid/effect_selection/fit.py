@@ -13,7 +13,7 @@ from sysid.effect_selection.candidates import Candidate, is_joint_group
 from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.prewhitening import Prewhitening
 from sysid.effect_selection.settings import SelectionSettings
-from sysid.effect_selection.significance import gained_p
+from sysid.effect_selection.significance import gained_p, greater_p
 from sysid.identification.linearisation import Linearisation
 from sysid.models.base import LogModel
 from sysid.objective import pseudo_residual
@@ -107,6 +107,30 @@ class Fit:
         which = self.significant
         return bool(effects) and all(which[self.columns_of(e)].any() for e in effects)
 
+    def at_bound(self, names: Sequence[str]) -> bool:
+        """Returns whether an amplitude of some effects is at a bound: unphysical."""
+        margin = self.settings.bound_tolerance
+        u = self.linearisation.u
+        columns = [self.columns_of(e) for e in self.effects if e.name in names]
+        return any(
+            ((u[own] <= margin) | (u[own] >= 1.0 - margin)).any() for own in columns
+        )
+
+    def harmed_channels(self, before: "Fit") -> list[str]:
+        """Returns the channels that are significantly worse than in another fit."""
+        limits, blocks = self.settings, before.blocks
+        count = int(blocks.max()) + 1
+        found = []
+        for number, channel in enumerate(self.model.measurements.channels):
+            own = [
+                _channel_losses(fit, number, blocks, count) for fit in (before, self)
+            ]
+            rise, rows = own[1] - own[0], len(blocks)
+            large = rise.sum() > limits.max_channel_rise * max(own[0].sum(), rows)
+            if large and greater_p(rise) < limits.channel_alpha:
+                found.append(channel.name)
+        return found
+
     def within_bounds(self, added: Sequence[Candidate]) -> list[Candidate]:
         """Returns new effects without amplitudes that end at a bound: unphysical.
 
@@ -166,6 +190,15 @@ class Fit:
         """The point (p,) of the unit box at which no parameter has an effect."""
         parameters = self.model.parameters
         return Scaling(parameters).to_unit(nominal_values(parameters))
+
+
+def _channel_losses(
+    fit: Fit, channel: int, blocks: NDArray[np.int64], count: int
+) -> Array:
+    """Returns what a channel adds to the loss of each block (B,)."""
+    linear = fit.linearisation
+    squares = pseudo_residual(linear.residual[:, channel], linear.huber_delta) ** 2
+    return np.asarray(np.bincount(blocks, squares, minlength=count), dtype=float)
 
 
 def measured_evidence(before: Fit, after: Fit, trial: Evidence, tests: int) -> Evidence:

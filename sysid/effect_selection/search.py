@@ -133,8 +133,13 @@ class ForwardSearch(abc.ABC):
             self._report_fit(f"without {least.text}", fit)
 
     def _is_better(self, before: Fit, after: Fit, trial: Evidence) -> bool:
-        """Returns whether the loss falls and a trial's effects are significant."""
+        """Returns whether the loss falls, and a trial's effects make sense.
+
+        They are significant, no amplitude ends at a bound, and no channel pays.
+        """
         if after.loss > (1.0 - self._settings.min_gain) * before.loss:
+            return False
+        if after.at_bound(trial.effects) or after.harmed_channels(before):
             return False
         return after.all_significant(trial.effects)
 

@@ -226,6 +226,55 @@ class SelectionSettings:
         "an estimate of how many more rows are needed means nothing beyond that",
     )
 
+    # What would have been found.
+    detection_power: float = _setting(
+        0.8, "1", "probability with which an effect at its limit of detection is found"
+    )
+
+    # What a channel's residual shows by itself.
+    dead_channel_change: float = _setting(
+        10.0,
+        "times the noise",
+        "a channel that never changes is dead if the model expects so much change",
+    )
+    channel_alpha: float = _setting(
+        0.001,
+        "1",
+        "of one check of one channel: there are two dozen of them in a verdict",
+    )
+    max_channel_rise: float = _setting(
+        0.1,
+        "of a channel's loss, or of its noise's if that is more",
+        "an effect that costs a channel more than that, significantly, is wrong "
+        "however much the others gain",
+    )
+    outlying_alpha: float = _setting(
+        0.003,
+        "1",
+        "that the largest row of a channel is beyond what the tail says; of twelve "
+        "channels with heavy tails one is in 4 % of the logs",
+    )
+    outlying_row: float = _setting(
+        4.0,
+        "times what nine of ten rows are below",
+        "fewer is no outlier, whatever the tail: 6.6 standard deviations of normal "
+        "noise",
+    )
+    line_alpha: float = _setting(
+        1e-4,
+        "1",
+        "of all frequencies of one channel; stricter than `channel_alpha`, since the "
+        "spectrum around a line is taken for smooth",
+    )
+    line_power: float = _setting(
+        0.2,
+        "share of a channel's power",
+        "a line with less is no reason to doubt a verdict",
+    )
+    line_neighbours: int = _setting(
+        8, "frequencies", "on either side, that a line is compared with"
+    )
+
     # Episodes that contradict each other.
     contradiction_max_episodes: int = _setting(
         12,

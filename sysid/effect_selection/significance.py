@@ -94,6 +94,12 @@ def _normalised(sums: Array) -> Array:
     return np.asarray((root - 1.0 + spread) / np.sqrt(spread))
 
 
+def squared_length(normalised: float, m: int) -> float:
+    """Returns the squared sum of m scores that is a normalised statistic."""
+    spread = 2.0 / (9.0 * m)
+    return float(m * max(normalised * np.sqrt(spread) + 1.0 - spread, 0.0) ** 3)
+
+
 def worse_p(gains: Array, best: Array) -> float:
     """Returns the p-value that gains (B,) are no less than the best's, block by block.
 

@@ -25,7 +25,7 @@ from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.prewhitening import Prewhitening
 from sysid.effect_selection.residual_curves import Dependence, dependence_curves
 from sysid.identification.linearisation import Linearisation, extend
-from sysid.parameters import nominal_values
+from sysid.parameters import Parameter, nominal_values
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class LinearSurvey:
 
     Attributes:
         linearisation: at the fit, with the candidates' amplitudes as parameters.
-        fields: of each parameter, the last part of its name.
+        parameters: of the fit and of the candidates.
         raw: the regression of the fit's and the candidates' parameters.
         regression: the same with the fit's parameters projected out.
         whitened: the same of the prewhitened residual, by short blocks.
@@ -47,7 +47,7 @@ class LinearSurvey:
     """
 
     linearisation: Linearisation
-    fields: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
     raw: BlockRegression
     regression: BlockRegression
     whitened: BlockRegression
@@ -55,6 +55,11 @@ class LinearSurvey:
     dependences: Sequence[tuple[Dependence, Columns]]
     episodes: NDArray[np.int64]
     is_further: bool
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Of each parameter, the last part of its name."""
+        return tuple(p.name.rpartition(".")[2] for p in self.parameters)
 
     def rank(
         self, sets: Sequence[tuple[Candidate, ...]]
@@ -207,7 +212,7 @@ def _linear_survey(
     whitened = _whitened(linearisation, episode, curves, known, count, fitter)
     return LinearSurvey(
         linearisation,
-        tuple(p.name.rpartition(".")[2] for p in model.parameters),
+        model.parameters,
         raw,
         regression,
         whitened,

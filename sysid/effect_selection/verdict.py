@@ -9,8 +9,10 @@ import numpy as np
 
 from drake_disasm.effects import Imprecision
 from sysid.effect_selection.candidates import is_joint_group
+from sysid.effect_selection.channel_checks import ChannelFinding, channel_findings
 from sysid.effect_selection.command_scatter import CommandScatter
 from sysid.effect_selection.contradictions import Contradiction
+from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.experiments import separating
 from sysid.effect_selection.fit import Fit
@@ -21,8 +23,9 @@ from sysid.parameters import Scaling
 
 _SCATTER = Imprecision.__name__
 
-#: Nothing is missing; effects explain the residual; no library effect explains it.
-Ending = Literal["none", "explained", "unexplained"]
+#: Nothing is missing; effects explain the residual; they do but for something that
+#: is left in a channel; no library effect explains it.
+Ending = Literal["none", "explained", "partly", "unexplained"]
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,7 @@ class Verdict:
     """What a log shows of its model.
 
     Attributes:
-        ending: "none", "explained" or "unexplained".
+        ending: "none", "explained", "partly" (explained) or "unexplained".
         names: of the effects that are missing, the most important first; of an
             unexplained residual, the nearest.
         gains: for each, the share of the loss without it that it takes away.
@@ -79,6 +82,8 @@ class Verdict:
         contradictions: episodes that no common effect explains.
         excess: objective that is left, in units of the noise, if it is more than noise;
             else 0.
+        findings: what is left in single channels.
+        limits: how large effects that are not named would have to be to be found.
     """
 
     ending: Ending
@@ -90,6 +95,8 @@ class Verdict:
     explained: float
     contradictions: tuple[Contradiction, ...]
     excess: float
+    findings: tuple[ChannelFinding, ...] = ()
+    limits: tuple[DetectionLimit, ...] = ()
 
 
 def judge(
@@ -99,6 +106,7 @@ def judge(
     rounds: Sequence[SelectionRound],
     against: tuple[Contradiction, ...] = (),
     scatter: CommandScatter | None = None,
+    limits: Sequence[DetectionLimit] = (),
 ) -> Verdict:
     """Returns the verdict of a search.
 
@@ -108,6 +116,7 @@ def judge(
         rounds: how the effects were chosen.
         against: episodes that contradict each other.
         scatter: how the arm scatters about its commands, if it does.
+        limits: of detection, at the last fit.
     """
     left = [d for d in end.dependences if d.accepted]
     gains = last.effect_gains | ({_SCATTER: scatter.gain} if scatter else {})
@@ -122,16 +131,18 @@ def judge(
         _explained(first, last, left[0].gain if left else 0.0),
         against,
         _excess(last, scatter),
+        tuple(channel_findings(last)) if scatter is None else (),
+        tuple(limit for limit in limits if limit.effect not in names),
     )
     return dataclasses.replace(found, ending=_ending(found, last))
 
 
 def _ending(found: Verdict, last: Fit) -> Ending:
     enough = found.explained >= last.settings.min_explained_share
+    left = found.dependence or found.contradictions or found.findings
     if found.names and enough and not found.excess:
-        return "explained"
-    left = found.names or found.dependence or found.contradictions or found.excess
-    return "unexplained" if left else "none"
+        return "partly" if left else "explained"
+    return "unexplained" if left or found.names or found.excess else "none"
 
 
 def _scatter_values(scatter: CommandScatter | None) -> tuple[ParameterValue, ...]:

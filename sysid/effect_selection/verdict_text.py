@@ -8,6 +8,7 @@ error on held-out data: 0.5 -> 0.1 N; 5 -> 1 % of the readings
 
 from collections.abc import Sequence
 
+from sysid.effect_selection.channel_checks import findings_text
 from sysid.effect_selection.contradictions import Contradiction
 from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.verdict import ParameterValue, Tie, Verdict
@@ -51,7 +52,7 @@ def contradictions_text(found: Sequence[Contradiction]) -> str:
 def _missing_line(verdict: Verdict, most: int) -> str:
     """Returns what is missing, or that nothing is, or that no effect explains it."""
     if verdict.ending == "none":
-        return "missing: none; the residual is consistent with noise"
+        return f"missing: none; {_limits_text(verdict)}"
     left, effects = _left_text(verdict), _effects_text(verdict, most)
     if verdict.ending == "unexplained":
         nearest = f". Nearest: {effects}" if effects else ""
@@ -79,7 +80,25 @@ def _left_text(verdict: Verdict) -> str:
     other = contradictions_text(verdict.contradictions)
     if verdict.excess and not other:
         other = f"the residual is {verdict.excess:.2g} times the noise"
-    return "; ".join(part for part in (verdict.dependence, other) if part)
+    parts = (verdict.dependence, other, findings_text(verdict.findings))
+    return "; ".join(part for part in parts if part)
+
+
+def _limits_text(verdict: Verdict) -> str:
+    """Returns what would have been found, in words."""
+    effects = list(dict.fromkeys(limit.effect for limit in verdict.limits))
+    hidden = [
+        effect
+        for effect in effects
+        if all(x.amplitude is None for x in verdict.limits if x.effect == effect)
+    ]
+    text = "the residual is consistent with noise"
+    if effects:
+        text += (
+            f"; {len(effects) - len(hidden)} of {len(effects)} effects would have been "
+            "found (from which amplitude on: result.json)"
+        )
+    return text + (f", not {', '.join(hidden)}" if hidden else "")
 
 
 def _alternatives(name: str, ties: Sequence[Tie], most: int) -> str:

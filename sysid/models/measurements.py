@@ -12,6 +12,8 @@ from drake_disasm.logs import Episode, Log
 
 Array = NDArray[np.float64]
 
+_MOST_STEPS, _JITTER = 0.9, 0.1  # so many steps differ by no more from the median
+
 
 @dataclasses.dataclass(frozen=True)
 class Channel:
@@ -40,6 +42,7 @@ class Measurements:
         channels: what the columns are.
         episode: (rows,) number of the episode that each row belongs to, from 0.
         names: of the episodes.
+        period: of the rows' sampling [s]; None if they are not equally spaced.
 
     Raises:
         DisasmError: the shapes do not match.
@@ -49,6 +52,7 @@ class Measurements:
     channels: tuple[Channel, ...]
     episode: NDArray[np.int64]
     names: tuple[str, ...]
+    period: float | None = None
 
     def __post_init__(self) -> None:
         """Refuses arrays whose shapes do not match."""
@@ -103,6 +107,7 @@ class Measurements:
             channels,
             np.repeat(np.arange(len(parts)), [len(part) for part in parts]),
             tuple(f"{log.folder.name}/{episode.name}" for log, episode in episodes),
+            _period([e["time"] for _, e in episodes if "time" in e]),
         )
 
     @property
@@ -118,8 +123,11 @@ class Measurements:
     def select(self, mask: NDArray[np.bool_]) -> Self:
         """Returns the rows where the mask (rows,) is true, episodes renumbered."""
         kept, episode = np.unique(self.episode[mask], return_inverse=True)
+        steps = np.diff(np.flatnonzero(mask)) if self.period else np.zeros(0)
+        step = np.median(steps) if len(steps) else 1.0
         return dataclasses.replace(
             self,
+            period=float(self.period * step) if self.period else None,
             values=self.values[mask],
             episode=episode,
             names=tuple(self.names[i] for i in kept),
@@ -136,3 +144,13 @@ class Measurements:
             for channel, value in zip(self.channels, noise, strict=True)
         )
         return dataclasses.replace(self, channels=channels)
+
+
+def _period(times: Sequence[Array]) -> float | None:
+    """Returns the period [s] of times (n,) of some episodes; None if it varies."""
+    steps = np.concatenate([np.diff(t) for t in times]) if times else np.zeros(0)
+    if not len(steps):
+        return None
+    period = float(np.median(steps))
+    spread = float(np.quantile(np.abs(steps - period), _MOST_STEPS))
+    return period if period > 0.0 and spread <= _JITTER * period else None

@@ -24,6 +24,7 @@ ALLOWED = {
     "_RIDGE",
     "_AT_BOUND",
     "_LEAST_LEFT",
+    "_NEAR",
     "_MOST",
     "_EQUAL",
     "_ROUNDING",

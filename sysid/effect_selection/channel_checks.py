@@ -1,0 +1,182 @@
+"""What a channel's residual shows by itself, whatever effects explain of it.
+
+More than its noise, a line in its spectrum, rows that are missed by far more than all
+others: each is something that a verdict must not be silent about.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, f
+
+from drake_disasm.common.errors import DisasmError
+from sysid.effect_selection.fit import Fit
+from sysid.effect_selection.settings import SelectionSettings
+from sysid.identification.uncertainty import block_length
+from sysid.identification.whiteness import autocorrelation
+from sysid.models.base import HUBER_DELTA, LogModel
+from sysid.models.measurements import Measurements
+from sysid.objective import pseudo_residual
+
+Array = NDArray[np.float64]
+
+_NEAR = 2  # frequencies over which a window spreads a line
+
+
+@dataclass(frozen=True)
+class ChannelFinding:
+    """Something that is left in a channel.
+
+    Attributes:
+        channel: its name.
+        text: what it is, in words.
+    """
+
+    channel: str
+    text: str
+
+    def __str__(self) -> str:
+        """The finding in words."""
+        return f"{self.channel}: {self.text}"
+
+
+def refuse_dead_channels(model: LogModel, settings: SelectionSettings) -> None:
+    """Refuses logs with a channel that never changes where the model expects it to.
+
+    Raises:
+        DisasmError: names the channels and what the model expects.
+    """
+    measured = model.measurements
+    still = np.ptp(measured.values, axis=0) == 0.0
+    if measured.rows < settings.min_rows or not still.any():
+        return
+    predicted = np.ptp(model.predictions(_nominal(model)), axis=0)
+    moves = predicted > settings.dead_channel_change * measured.noise
+    dead = [
+        f"{c.name} (the model expects it to change by {change:.2g} {c.unit})"
+        for c, change, bad in zip(
+            measured.channels, predicted, still & moves, strict=True
+        )
+        if bad
+    ]
+    if dead:
+        raise DisasmError(
+            f"the log is constant in {', '.join(dead)} over all {measured.rows} rows: "
+            "is the sensor alive? Record it anew, or leave its channels out"
+        )
+
+
+def _nominal(model: LogModel) -> Array:
+    return np.array([p.nominal for p in model.parameters])
+
+
+def channel_findings(fit: Fit) -> list[ChannelFinding]:
+    """Returns what is left in each channel of a fit's residual."""
+    measured, residual = fit.model.measurements, fit.linearisation.residual
+    found = []
+    for number, channel in enumerate(measured.channels):
+        texts = [
+            _outlying(residual[:, number], measured, fit.settings),
+            _line(residual[:, number], measured, fit.settings),
+        ]
+        if fit.noise_is_stated:
+            texts.append(_excess(residual[:, number], measured, fit.settings))
+        found += [ChannelFinding(channel.name, text) for text in texts if text]
+    return found
+
+
+def _excess(r: Array, measured: Measurements, settings: SelectionSettings) -> str:
+    """Returns by how much a residual (n,) is more than the noise that is stated.
+
+    A residual that is correlated over b rows has n / b degrees of freedom. Single rows
+    that are missed by far do not count: they are outlying.
+    """
+    size = float(np.sqrt(np.mean(pseudo_residual(r, HUBER_DELTA) ** 2)))
+    freedom = len(r) / block_length(r[:, None], measured.episode)
+    p = float(chi2.sf(size**2 * freedom, freedom))
+    if size < settings.max_objective_at_noise or p > settings.channel_alpha:
+        return ""
+    return f"{size:.2g} times its noise, of unknown origin"
+
+
+def _outlying(r: Array, measured: Measurements, settings: SelectionSettings) -> str:
+    """Returns which rows of a residual (n,) are beyond what its tail has elsewhere.
+
+    The tail of the largest tenth is taken to fall off as a power, estimated from all
+    but the largest hundredth (Hill 1975): of heavy-tailed noise no row is outlying.
+    """
+    size = np.sort(np.abs(r))[::-1]
+    tail, few = len(r) // 10, max(1, len(r) // 100)
+    if tail <= 2 * few or size[tail] <= 0.0:
+        return ""
+    logs = np.log(size[few:tail] / size[tail])
+    # Hill's estimate without the largest few, which may be outliers themselves.
+    index = (logs.sum() + few * logs[0]) / (tail - few)
+    limit = size[tail] * (tail / settings.outlying_alpha) ** index
+    rows = np.flatnonzero(np.abs(r) > max(limit, settings.outlying_row * size[tail]))
+    if not len(rows):
+        return ""
+    names = [measured.names[i] for i in np.unique(measured.episode[rows])]
+    where = f" in {', '.join(names[:3])}{' ...' if len(names) > 3 else ''}"
+    what = "1 outlying row" if len(rows) == 1 else f"{len(rows)} outlying rows"
+    numbers = ", ".join(str(i) for i in rows[:5]) + (" ..." if len(rows) > 5 else "")
+    return f"{what}{where} (row {numbers})"
+
+
+def _line(r: Array, measured: Measurements, settings: SelectionSettings) -> str:
+    """Returns the frequency at which a residual (n,) is periodic, in words.
+
+    The episodes' periodograms are averaged; a line is a frequency that stands out of
+    those around it, by an F-test, over all frequencies (Bonferroni). What the row
+    before predicts is taken out first, which makes the spectrum about level.
+    """
+    parts = [r[measured.episode == e] for e in range(len(measured.names))]
+    longest = max(len(part) for part in parts)
+    parts = [part for part in parts if len(part) > longest // 2]
+    power = np.mean([_periodogram(part, longest) for part in parts], axis=0)
+    level = np.mean([_periodogram(_innovations(p), longest) for p in parts], axis=0)
+    bins = range(_NEAR, len(power) - 1)
+    if not bins or not power.any():
+        return ""
+    around = [_around(level, bin_, settings.line_neighbours) for bin_ in bins]
+    ratio = np.array([level[b] / a.mean() for b, a in zip(bins, around, strict=True)])
+    best = int(np.argmax(ratio))
+    freedom = 2 * len(parts)
+    tail = f.sf(ratio[best], freedom, freedom * len(around[best]))
+    share = float(power[bins[best] - 1 : bins[best] + 2].sum() / power[1:].sum())
+    if len(bins) * tail > settings.line_alpha or share < settings.line_power:
+        return ""
+    cycles = bins[best] / longest
+    if measured.period:
+        return f"periodic at {cycles / measured.period:.3g} Hz ({100 * share:.0f} %)"
+    return f"periodic, every {1.0 / cycles:.3g} rows ({100 * share:.0f} %)"
+
+
+def _around(level: Array, bin_: int, count: int) -> Array:
+    """Returns the power at so many frequencies on either side, but the nearest."""
+    below = level[max(bin_ - _NEAR - count, 1) : max(bin_ - _NEAR + 1, 1)]
+    above = level[bin_ + _NEAR : bin_ + _NEAR + count]
+    return np.concatenate([below, above])
+
+
+def _innovations(part: Array) -> Array:
+    """Returns what the row before does not predict of each."""
+    centred = part - part.mean()
+    rho = autocorrelation(part, 1)[0]
+    return np.asarray(centred[1:] - rho * centred[:-1])
+
+
+def _periodogram(part: Array, longest: int) -> Array:
+    window = np.hanning(len(part) + 2)[1:-1]
+    centred = (part - part.mean()) * window / np.linalg.norm(window)
+    return np.abs(np.fft.rfft(centred, longest)) ** 2
+
+
+def findings_text(found: Sequence[ChannelFinding]) -> str:
+    """Returns findings in words, channels with the same one together."""
+    channels: dict[str, list[str]] = {}
+    for each in found:
+        channels.setdefault(each.text, []).append(each.channel)
+    return "; ".join(f"{', '.join(names)}: {text}" for text, names in channels.items())

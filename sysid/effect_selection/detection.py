@@ -1,0 +1,104 @@
+"""What a log could have shown: the smallest effects that would have been found."""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import ncx2
+
+from sysid.effect_selection.block_regression import Columns
+from sysid.effect_selection.settings import SelectionSettings
+from sysid.effect_selection.significance import highest_by_chance, squared_length
+from sysid.effect_selection.survey import LinearSurvey
+from sysid.parameters import Scaling, nominal_values
+
+
+@dataclass(frozen=True)
+class DetectionLimit:
+    """The smallest amplitude that would have been found with 80 % probability.
+
+    Attributes:
+        effect: its name.
+        field: of its amplitude; the others are null.
+        amplitude: SI, by the linear account; None if none within its bounds would
+            have been found.
+        unit: of the amplitude.
+        share: of the way to its farther bound; above 1 if it is beyond.
+    """
+
+    effect: str
+    field: str
+    amplitude: float | None
+    unit: str
+    share: float
+
+
+def detection_limits(survey: LinearSurvey) -> list[DetectionLimit]:
+    """Returns the limit of each effect's amplitudes, in its best shape.
+
+    An effect is found if the total of its scores, which is about noncentral chi-squared
+    with as many degrees of freedom as it has amplitudes, is beyond what is the highest
+    of all candidates by chance, and if it gains enough to be of use.
+    """
+    settings, regression = survey.whitened.settings, survey.whitened
+    groups = {text: g for text, g in survey.groups.items() if len(g)}
+    if not groups:
+        return []
+    scores = [regression.scores(group) for group in groups.values()]
+    highest = highest_by_chance(scores, settings)
+    critical = float(np.quantile(highest, 1.0 - settings.alpha))
+    best: dict[tuple[str, str], DetectionLimit] = {}
+    for text, group in groups.items():
+        for limit in _limits(survey, text.partition("[")[0], group, critical):
+            known = best.get((limit.effect, limit.field))
+            if known is None or limit.share < known.share:
+                best[limit.effect, limit.field] = limit
+    return list(best.values())
+
+
+def _limits(
+    survey: LinearSurvey, effect: str, group: Columns, critical: float
+) -> list[DetectionLimit]:
+    """Returns the limit of each amplitude of an effect."""
+    scaling, nominal = Scaling(survey.parameters), nominal_values(survey.parameters)
+    at, slope = scaling.to_unit(nominal)[group], scaling.slope(nominal)[group]
+    found = _in_unit_box(survey, group, critical)
+    shares = found / np.maximum(at, 1.0 - at)
+    return [
+        DetectionLimit(
+            effect,
+            survey.fields[column],
+            float(amplitude) if share <= 1.0 else None,
+            survey.parameters[column].unit,
+            float(share),
+        )
+        for column, amplitude, share in zip(group, found * slope, shares, strict=True)
+    ]
+
+
+def _in_unit_box(survey: LinearSurvey, group: Columns, critical: float) -> np.ndarray:
+    """Returns what of parameters' ranges (k,) is found; infinite if none is."""
+    whitened, raw, settings = survey.whitened, survey.regression, survey.raw.settings
+    with np.errstate(divide="ignore"):
+        length = _needed(critical, len(group), settings)
+        by_chance = length / whitened.sensitivity(group) / whitened.scale[group]
+        power = np.sum(raw.A[:, group] ** 2, axis=0)
+        of_use = np.sqrt(settings.min_gain * raw.block_losses.sum() / power)
+        return np.asarray(np.maximum(by_chance, of_use / raw.scale[group]))
+
+
+@functools.lru_cache(maxsize=256)
+def _needed(critical: float, m: int, settings: SelectionSettings) -> float:
+    """Returns how long an effect has to make a total of m scores to be found.
+
+    By chance the squared length has the share 1 / `noise_safety`^2 of m.
+    """
+    scale = settings.noise_safety**2
+    limit = scale * squared_length(critical, m)
+
+    def missed(length: float) -> float:
+        found = ncx2.sf(limit, m, scale * length**2)
+        return float(found) - settings.detection_power
+
+    return float(brentq(missed, 1e-3, 1e3))

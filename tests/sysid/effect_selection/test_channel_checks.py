@@ -1,0 +1,115 @@
+"""What single channels show: against residuals that are made to show it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from drake_disasm.common.errors import DisasmError
+from sysid.effect_selection.channel_checks import (
+    channel_findings,
+    findings_text,
+    refuse_dead_channels,
+)
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.settings import SelectionSettings
+from sysid.models.base import LogModel
+from sysid.models.measurements import Channel, Measurements
+from sysid.parameters import Parameter
+from sysid.validation import null_logs
+from sysid.workers import Workers
+
+_EPISODES, _ROWS, _PERIOD = 8, 60, 0.1
+_SETTINGS = SelectionSettings()
+
+
+class _Ramp(LogModel):
+    """Two channels that rise with time, by as much as a parameter says."""
+
+    affine = True
+
+    def __init__(self, residual):
+        rows = _EPISODES * _ROWS
+        self.time = np.tile(np.arange(_ROWS) * _PERIOD, _EPISODES)
+        self.parameters = (Parameter("slope", 1.0, 0.0, 5.0, "N/s"),)
+        self.measurements = Measurements(
+            self.predict(np.ones(1), slice(None)) + residual,
+            (Channel("fx", "N", 1.0), Channel("fy", "N", 1.0)),
+            np.repeat(np.arange(_EPISODES), _ROWS),
+            tuple(f"episode_{i}" for i in range(_EPISODES)),
+            _PERIOD,
+        )
+        assert len(residual) == rows
+
+    def predict(self, theta, rows):
+        return np.column_stack([theta[0] * self.time[rows]] * 2)
+
+    def select_rows(self, mask):
+        return self.replace(time=self.time[mask])
+
+
+def _white(seed=0):
+    size = (_EPISODES * _ROWS, 2)
+    return np.random.default_rng(seed).standard_normal(size)
+
+
+def _found(residual, noise_is_stated=True):
+    model = _Ramp(residual)
+    fitter = Fitter(
+        model, Workers(), np.inf, _SETTINGS, noise_is_stated=noise_is_stated
+    )
+    return findings_text(channel_findings(fitter.fit(())))
+
+
+def _time():
+    return np.tile(np.arange(_ROWS) * _PERIOD, _EPISODES)
+
+
+def test_a_sine_is_found_with_its_frequency():
+    residual = _white()
+    residual[:, 1] += 3.0 * np.sin(2 * np.pi * 1.3 * _time())
+    text = _found(residual)
+    assert "fy: periodic at 1.33 Hz" in text  # of frequencies 0.17 Hz apart
+    assert "fy: 2.3 times its noise" in text and "fx" not in text
+
+
+def test_a_sine_is_found_where_the_noise_is_not_known():
+    residual = _white()
+    residual[:, 0] += 2.0 * np.sin(2 * np.pi * 2.5 * _time())
+    assert _found(residual, noise_is_stated=False).startswith("fx: periodic at 2.5 Hz")
+
+
+def test_outlying_rows_are_counted_and_placed():
+    residual = _white()
+    residual[[130, 131, 150], 1] += 30.0
+    assert "fy: 3 outlying rows in episode_2 (row 130, 131, 150)" in _found(residual)
+
+
+@pytest.mark.parametrize(
+    "noise", [null_logs.white, null_logs.heavy_tailed, null_logs.autoregressive(0.9)]
+)
+def test_noise_alone_shows_nothing(noise):
+    """In 50 logs: no line where it is slow, no outlier in tails."""
+    shape = np.ones((_EPISODES * _ROWS, 2))
+    drawn = [noise(np.random.default_rng(seed), shape) for seed in range(50)]
+    texts = [_found(residual) for residual in drawn]
+    assert sum(bool(text) for text in texts) <= 2, texts
+
+
+def test_more_than_the_stated_noise_is_said_only_of_its_channel():
+    residual = _white()
+    residual[:, 0] *= 2.0
+    assert _found(residual) == "fx: 1.9 times its noise, of unknown origin"
+
+
+def test_a_dead_channel_is_refused_before_any_fit():
+    model = _Ramp(_white())
+    values = model.measurements.values.copy()
+    values[:, 1] = 0.0
+    steep = model.replace(
+        parameters=(dataclasses.replace(model.parameters[0], nominal=4.0),)
+    )
+    measured = model.measurements.with_values(values)
+    with pytest.raises(DisasmError, match=r"constant in fy .*: is the sensor alive\?"):
+        refuse_dead_channels(steep.with_measurements(measured), _SETTINGS)
+    refuse_dead_channels(model, _SETTINGS)
