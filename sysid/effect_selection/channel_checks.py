@@ -23,6 +23,7 @@ from sysid.objective import pseudo_residual
 Array = NDArray[np.float64]
 
 _NEAR = 2  # frequencies over which a window spreads a line
+_SHOWN = 5  # rows that a text lists: a size of output, no threshold
 
 
 @dataclass(frozen=True)
@@ -119,9 +120,10 @@ def _outlying(r: Array, measured: Measurements, settings: SelectionSettings) -> 
     if not len(rows):
         return ""
     names = [measured.names[i] for i in np.unique(measured.episode[rows])]
-    where = f" in {', '.join(names[:3])}{' ...' if len(names) > 3 else ''}"
+    where = f" in {', '.join(names[:_SHOWN])}{' ...' if len(names) > _SHOWN else ''}"
     what = "1 outlying row" if len(rows) == 1 else f"{len(rows)} outlying rows"
-    numbers = ", ".join(str(i) for i in rows[:5]) + (" ..." if len(rows) > 5 else "")
+    more = " ..." if len(rows) > _SHOWN else ""
+    numbers = ", ".join(str(i) for i in rows[:_SHOWN]) + more
     return f"{what}{where} (row {numbers})"
 
 

@@ -25,6 +25,7 @@ ALLOWED = {
     "_AT_BOUND",
     "_LEAST_LEFT",
     "_NEAR",
+    "_SHOWN",
     "_MOST",
     "_EQUAL",
     "_ROUNDING",
