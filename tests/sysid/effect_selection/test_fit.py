@@ -1,5 +1,7 @@
 """What a fit says of itself, and that it ends at the bottom of its valley."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,31 @@ def test_an_effect_is_worth_what_the_loss_rises_by_without_it(gain):
     whole = fit.effect_gains["CommandGain"]
     assert fit.gains_of([x]) == pytest.approx([whole], abs=0.03)
     assert fit.significant[x].all()
+
+
+def _with(fit, **changes):
+    linearisation = dataclasses.replace(fit.linearisation, **changes)
+    return dataclasses.replace(fit, linearisation=linearisation)
+
+
+def test_a_channel_that_pays_for_a_gain_is_named(gain):
+    """Of a fit whose force is missed by 1.5 times the noise, which is 1."""
+    fitter, effect = gain
+    fit = fitter.fit((effect,))
+    residual = fit.linearisation.residual.copy()
+    number = [c.name for c in fit.model.measurements.channels].index("fy")
+    residual[:, number] = 1.5
+    worse = _with(fit, residual=residual)
+    assert worse.harmed_channels(fit) == ["fy"]
+    assert fit.harmed_channels(fit) == [] and fit.harmed_channels(worse) == []
+
+
+def test_an_amplitude_at_its_bound_is_noticed(gain):
+    fitter, effect = gain
+    fit = fitter.fit((effect.only(["x"]),))
+    assert not fit.at_bound(["CommandGain"])
+    at_bound = _with(fit, u=np.ones_like(fit.linearisation.u))
+    assert at_bound.at_bound(["CommandGain"]) and not at_bound.at_bound(["SensorBias"])
 
 
 def test_amplitudes_that_gain_nothing_are_left_out(gain):

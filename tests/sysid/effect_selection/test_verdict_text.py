@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from sysid.effect_selection.channel_checks import ChannelFinding
 from sysid.effect_selection.contradictions import Contradiction
+from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.verdict import ParameterValue, Tie, Verdict
 from sysid.effect_selection.verdict_text import verdict_text
@@ -23,11 +25,31 @@ _SHAPE = ParameterValue("SensorLag.tau", 0.5, "s", (0.4, 0.6), None)
 _RIVAL = Tie("GrooveBend", "slow pulls both ways")
 
 
-def _text(ending, names=(), ties=(), values=(), dependence="", against=(), excess=0.0):
+def _text(
+    ending,
+    names=(),
+    ties=(),
+    values=(),
+    dependence="",
+    against=(),
+    excess=0.0,
+    findings=(),
+    limits=(),
+):
     gains = tuple(0.5 for _ in names)
     ties = ties or tuple(() for _ in names)
     found = Verdict(
-        ending, names, gains, ties, values, dependence, 1.0, against, excess
+        ending,
+        names,
+        gains,
+        ties,
+        values,
+        dependence,
+        1.0,
+        against,
+        excess,
+        findings,
+        limits,
     )
     return verdict_text(found, _ERRORS, most=3).split("\n")
 
@@ -54,6 +76,25 @@ def test_an_effect_with_its_parameters_and_what_to_record():
 def test_what_effects_leave_is_said():
     missing, *_ = _text("explained", ("SensorLag",), dependence="fx depends on time")
     assert missing == "missing: SensorLag. Left unexplained: fx depends on time"
+
+
+def test_what_is_left_in_channels_is_said_once_for_all_of_them():
+    left = "2 outlying rows in episode_0001 (row 40, 41)"
+    findings = [ChannelFinding(name, left) for name in ("fx", "fy")]
+    missing, *_ = _text("partly", ("SensorLag",), findings=tuple(findings))
+    assert missing == f"missing: SensorLag. Left unexplained: fx, fy: {left}"
+
+
+def test_none_says_what_would_have_been_found():
+    limits = (
+        DetectionLimit("SensorLag", "fx", 0.01, "s", 0.1),
+        DetectionLimit("SensorLag", "fy", None, "s", 1.2),
+        DetectionLimit("GrooveBend", "k", None, "1/m", 3.0),
+    )
+    assert _text("none", limits=limits)[0] == (
+        "missing: none; the residual is consistent with noise; 1 of 2 effects would "
+        "have been found (from which amplitude on: result.json), not GrooveBend"
+    )
 
 
 def test_no_library_effect_explains_it_and_the_nearest():
