@@ -9,6 +9,7 @@ that opens offline. After Ctrl-C the same command resumes.
 """
 
 import argparse
+import math
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -41,6 +42,14 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add = parser.add_argument
     add("--log", nargs="+", required=True, metavar="DIR", help="logs of one kind")
     _add_model_arguments(add)
+    add(
+        "--time-budget",
+        type=options.above_zero_or_inf,
+        default=math.inf,
+        metavar="MIN",
+        help="end the search after so many minutes, with a provisional verdict, that "
+        "the same command goes on from (default: none)",
+    )
     cli.add_import_argument(parser)
     cli.add_workers_argument(parser)
     add("--out", required=True, type=Path, metavar="DIR", help="a folder")
@@ -100,9 +109,11 @@ def main(arguments: Sequence[str]) -> int:
             workers=workers,
             progress=progress,
             folder=fits,
+            time_budget=60.0 * args.time_budget,
         )
     _write(args.out, closed, origin)
-    shutil.rmtree(fits, ignore_errors=True)
+    if not closed.is_provisional:
+        shutil.rmtree(fits, ignore_errors=True)
     print(closed.text)
     print(f"report: {args.out / 'report.html'}")
     return 0

@@ -1,6 +1,8 @@
 """From a model of a log to the effect that the model lacks."""
 
 import dataclasses
+import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,6 +41,11 @@ from sysid.identification.split import train_and_test
 from sysid.models.base import LogModel
 from sysid.workers import Workers
 
+_PROVISIONAL = (
+    "provisional: the time was over; the same command without a budget, or with "
+    "another, goes on from here"
+)
+
 
 @dataclass(frozen=True)
 class ClosedLoop:
@@ -51,6 +58,7 @@ class ClosedLoop:
         rounds: how the effects were chosen.
         begin, end: evidence for each candidate at the first and at the last fit.
         scatter: about the commands, if the arm has that.
+        is_provisional: whether the time was over before the search was.
     """
 
     verdict: Verdict
@@ -61,12 +69,17 @@ class ClosedLoop:
     begin: Survey
     end: Survey
     scatter: CommandScatter | None
+    is_provisional: bool = False
 
     @property
     def text(self) -> str:
-        """The verdict in three lines: what is missing, its parameters, the errors."""
+        """The verdict in three lines: what is missing, its parameters, the errors.
+
+        A provisional one says so in a line before them.
+        """
         most = self.last.settings.max_listed
-        return verdict_text(self.verdict, self.errors, most)
+        text = verdict_text(self.verdict, self.errors, most)
+        return f"{_PROVISIONAL}\n{text}" if self.is_provisional else text
 
     @property
     def scenario(self) -> Scenario | None:
@@ -89,6 +102,7 @@ def close_loop(
     workers: Workers | None = None,
     progress: Progress | None = None,
     folder: Path | None = None,
+    time_budget: float = math.inf,
 ) -> ClosedLoop:
     """Finds what a model lacks to explain its log.
 
@@ -108,11 +122,14 @@ def close_loop(
         workers: evaluate; this process if left out.
         progress: gets a line after each step; may raise to stop.
         folder: of a cache of fits: the same call, stopped and made again, resumes.
+        time_budget: after which the search ends with what it has [s]; a fit that runs
+            is finished.
 
     Raises:
         DisasmError: the log is too short to decide anything, or no effect of the
             library can act on the model.
     """
+    deadline = time.monotonic() + time_budget
     library = registered_effects() if library is None else library
     train, test = train_and_test(
         model.measurements.names, train, test, model.held_out_share
@@ -125,7 +142,7 @@ def close_loop(
     applicable = _applicable(base, library)
     is_stated = not np.isnan(model.measurements.noise).any()
     fitter = Fitter(base, workers, delta, settings, folder, is_stated)
-    found = _search(fitter, applicable, progress or ignore_progress)
+    found = _search(fitter, applicable, progress or ignore_progress, deadline)
     limits = detection_limits(found.end.linearised)
     refuse_short_logs(found.last, limits)
     held_out = _with_noise_of(base, model.of_episodes(test)) if test else None
@@ -150,12 +167,12 @@ def _applicable(
 
 
 def _search(
-    fitter: Fitter, library: Sequence[Candidate], progress: Progress
+    fitter: Fitter, library: Sequence[Candidate], progress: Progress, deadline: float
 ) -> SearchResult:
     """Returns what a search finds; costly models are searched on some rows only."""
     thinned = fitter.with_base(_affordable(fitter.base, fitter.settings))
     kind = LinearSearch if fitter.base.affine else RefitSearch
-    found = kind(thinned, library, progress).run()
+    found = kind(thinned, library, progress, deadline).run()
     if thinned.base is fitter.base:
         return found
     progress(ProgressUpdate(ForwardSearch.stage, message="fitting all rows"))
@@ -178,7 +195,15 @@ def _judged(
     against = contradictions(last, end.linearised, len(fitter.base.parameters))
     verdict = judge(first, last, end, found.rounds, against, scatter, limits)
     return ClosedLoop(
-        verdict, errors, first, last, found.rounds, found.begin, end, scatter
+        verdict,
+        errors,
+        first,
+        last,
+        found.rounds,
+        found.begin,
+        end,
+        scatter,
+        not found.is_complete,
     )
 
 

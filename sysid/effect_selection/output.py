@@ -23,6 +23,7 @@ def to_mapping(closed: ClosedLoop) -> dict[str, Any]:
     return {
         **_verdict(closed.verdict),
         "text": closed.text,
+        "provisional": closed.is_provisional,
         "errors": _errors(closed.errors),
         "residual_before": [dataclasses.asdict(channel) for channel in before],
         "residual_after": [dataclasses.asdict(channel) for channel in after],

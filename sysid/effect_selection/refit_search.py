@@ -36,7 +36,8 @@ class RefitSearch(ForwardSearch):
         # What is not linear at null, as a stop that takes up a force, hides from it;
         # of a costly model more than noise is always left, and minutes would be lost.
         is_left = fit.objective > limits.max_objective_at_noise and not fit.model.costly
-        if survey.effects and not confirmed and (is_far or is_left):
+        is_open = survey.effects and not confirmed and not self._is_over
+        if is_open and (is_far or is_left):
             survey, starts = self._prescreened(fit, survey)
             confirmed, tried = self._try_best(fit, survey, starts)
         if not confirmed:
@@ -111,6 +112,8 @@ class RefitSearch(ForwardSearch):
         """Returns the trials that their fits confirm, and all trials, with fits."""
         confirmed, tried = [], []
         for trial in chosen:
+            if self._is_over:
+                break
             found = self._trial_fit(fit, survey, trial, starts.get(trial.effects))
             tried.append((trial, found))
             if not self._is_confirmed(fit, found, trial):

@@ -1,6 +1,8 @@
 """Adds one effect at a time; where effects are linear, the evidence decides which."""
 
 import abc
+import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -39,6 +41,7 @@ class SearchResult:
         first, last: the fits without effects and with those that were added.
         begin, end: the evidence for each candidate at both.
         rounds: how the effects were chosen.
+        is_complete: whether it ended by itself, not because its time was over.
     """
 
     first: Fit
@@ -46,6 +49,7 @@ class SearchResult:
     begin: Survey
     end: Survey
     rounds: tuple[SelectionRound, ...]
+    is_complete: bool
 
 
 @dataclass
@@ -56,6 +60,7 @@ class ForwardSearch(abc.ABC):
         fitter: fits the model with chosen effects.
         library: candidates.
         progress: gets a line after each step.
+        deadline: when to stop, by `time.monotonic` [s]; a fit that runs is finished.
     """
 
     stage: ClassVar[str] = "selecting effects"
@@ -63,6 +68,7 @@ class ForwardSearch(abc.ABC):
     fitter: Fitter
     library: Sequence[Candidate]
     progress: Progress = ignore_progress
+    deadline: float = math.inf
     _rounds: list[SelectionRound] = field(default_factory=list)
 
     def run(self) -> SearchResult:
@@ -72,9 +78,14 @@ class ForwardSearch(abc.ABC):
         self._report_fit("without effects", first)
         self._report(f"testing {len(self.library)} candidates")
         survey = begin = self._survey(first)
-        while (found := self._next(fit, survey)) is not None:
+        while not self._is_over and (found := self._next(fit, survey)) is not None:
             fit, survey = found, self._survey(found)
-        return SearchResult(first, fit, begin, survey, tuple(self._rounds))
+        rounds, is_complete = tuple(self._rounds), not self._is_over
+        return SearchResult(first, fit, begin, survey, rounds, is_complete)
+
+    @property
+    def _is_over(self) -> bool:
+        return time.monotonic() > self.deadline
 
     def _survey(self, fit: Fit) -> Survey:
         """Returns the evidence for each candidate that a fit does not have."""
@@ -165,6 +176,8 @@ class LinearSearch(ForwardSearch):
                 self._record(trial, ties(trial, survey, accepted), survey, found)
                 return found
             self._report_rejected(trial)
+            if self._is_over:
+                break
         return None
 
 

@@ -50,3 +50,16 @@ def test_what_was_fitted_is_not_fitted_again_and_the_verdict_is_the_same(
     resumed = closed(tmp_path / "fits")
     assert len(fitted) == count - count // 2
     assert to_mapping(resumed) == to_mapping(whole)
+
+
+def test_a_budget_of_time_ends_in_a_provisional_verdict_that_goes_on(tmp_path):
+    hidden = [CommandGain(x=0.03)]
+    transitions_log(tmp_path / "log", nominal(), hidden, 0, episodes=4, steps=8)
+    model = TwinModel([read_log(tmp_path / "log")], nominal(), ())
+    options = {"test": [3], "library": _LIBRARY, "folder": tmp_path / "fits"}
+    first = close_loop(model, time_budget=0.0, **options)
+    assert first.is_provisional and first.text.startswith("provisional: ")
+    assert to_mapping(first)["provisional"] and not first.verdict.names
+    found = close_loop(model, **options)
+    assert not found.is_provisional and found.verdict.names == ("CommandGain",)
+    assert found.text.startswith("missing: CommandGain")
