@@ -78,12 +78,15 @@ def channel_findings(fit: Fit) -> list[ChannelFinding]:
     measured, residual = fit.model.measurements, fit.linearisation.residual
     found = []
     for number, channel in enumerate(measured.channels):
+        r = residual[:, number]
+        # What is far below a known noise is the solver's own, whatever it looks like.
+        least = fit.settings.noticeable if fit.noise_is_stated else 0.0
         texts = [
-            _outlying(residual[:, number], measured, fit.settings),
-            _line(residual[:, number], measured, fit.settings),
+            _outlying(r, measured, fit.settings, least),
+            _line(r, measured, fit.settings, least),
         ]
         if fit.noise_is_stated:
-            texts.append(_excess(residual[:, number], measured, fit.settings))
+            texts.append(_excess(r, measured, fit.settings))
         found += [ChannelFinding(channel.name, text) for text in texts if text]
     return found
 
@@ -102,7 +105,9 @@ def _excess(r: Array, measured: Measurements, settings: SelectionSettings) -> st
     return f"{size:.2g} times its noise, of unknown origin"
 
 
-def _outlying(r: Array, measured: Measurements, settings: SelectionSettings) -> str:
+def _outlying(
+    r: Array, measured: Measurements, settings: SelectionSettings, least: float
+) -> str:
     """Returns which rows of a residual (n,) are beyond what its tail has elsewhere.
 
     The tail of the largest tenth is taken to fall off as a power, estimated from all
@@ -116,7 +121,8 @@ def _outlying(r: Array, measured: Measurements, settings: SelectionSettings) -> 
     # Hill's estimate without the largest few, which may be outliers themselves.
     index = (logs.sum() + few * logs[0]) / (tail - few)
     limit = size[tail] * (tail / settings.outlying_alpha) ** index
-    rows = np.flatnonzero(np.abs(r) > max(limit, settings.outlying_row * size[tail]))
+    limit = max(limit, settings.outlying_row * size[tail], least)
+    rows = np.flatnonzero(np.abs(r) > limit)
     if not len(rows):
         return ""
     names = [measured.names[i] for i in np.unique(measured.episode[rows])]
@@ -127,7 +133,9 @@ def _outlying(r: Array, measured: Measurements, settings: SelectionSettings) -> 
     return f"{what}{where} (row {numbers})"
 
 
-def _line(r: Array, measured: Measurements, settings: SelectionSettings) -> str:
+def _line(
+    r: Array, measured: Measurements, settings: SelectionSettings, least: float
+) -> str:
     """Returns the frequency at which a residual (n,) is periodic, in words.
 
     The episodes' periodograms are averaged; a line is a frequency that stands out of
@@ -148,7 +156,8 @@ def _line(r: Array, measured: Measurements, settings: SelectionSettings) -> str:
     freedom = 2 * len(parts)
     tail = f.sf(ratio[best], freedom, freedom * len(around[best]))
     share = float(power[bins[best] - 1 : bins[best] + 2].sum() / power[1:].sum())
-    if len(bins) * tail > settings.line_alpha or share < settings.line_power:
+    is_small = share < settings.line_power or share * np.mean(r**2) < least**2
+    if is_small or len(bins) * tail > settings.line_alpha:
         return ""
     cycles = bins[best] / longest
     if measured.period:

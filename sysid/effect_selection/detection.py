@@ -97,8 +97,8 @@ def _needed(critical: float, m: int, settings: SelectionSettings) -> float:
     scale = settings.noise_safety**2
     limit = scale * squared_length(critical, m)
 
-    def missed(length: float) -> float:
+    def _missed(length: float) -> float:
         found = ncx2.sf(limit, m, scale * length**2)
         return float(found) - settings.detection_power
 
-    return float(brentq(missed, 1e-3, 1e3))
+    return float(brentq(_missed, 1e-3, 1e3))

@@ -248,6 +248,13 @@ class SelectionSettings:
         "an effect that costs a channel more than that, significantly, is wrong "
         "however much the others gain",
     )
+    noticeable: float = _setting(
+        0.3,
+        "times the noise, if that is stated",
+        "lines and rows below it are what a solver leaves, and of no consequence",
+        "poses of simulated logs have residuals of a thousandth of the noise, periodic "
+        "with the strokes",
+    )
     outlying_alpha: float = _setting(
         0.003,
         "1",

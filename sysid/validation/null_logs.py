@@ -44,14 +44,14 @@ def in_proportion(random: np.random.Generator, predicted: Array) -> Array:
 def autoregressive(rho: float) -> Noise:
     """Returns noise that is correlated from row to row by rho."""
 
-    def draw(random: np.random.Generator, predicted: Array) -> Array:
+    def _draw(random: np.random.Generator, predicted: Array) -> Array:
         rows = len(predicted) + _FORGETS
         noise = random.standard_normal((rows, predicted.shape[1]))
         for row in range(1, rows):
             noise[row] = rho * noise[row - 1] + np.sqrt(1.0 - rho**2) * noise[row]
         return noise[_FORGETS:]
 
-    return draw
+    return _draw
 
 
 def sieve(residual: Array) -> Noise:
@@ -67,7 +67,7 @@ def sieve(residual: Array) -> Noise:
     begin = max(f.order for f in filters)
     power = np.sqrt(np.mean(residual**2, axis=0))
 
-    def draw(random: np.random.Generator, predicted: Array) -> Array:
+    def _draw(random: np.random.Generator, predicted: Array) -> Array:
         rows = len(predicted) + _FORGETS
         drawn = innovations[random.integers(begin, len(residual), rows)]
         noise = np.zeros_like(drawn)
@@ -78,7 +78,7 @@ def sieve(residual: Array) -> Noise:
                 noise[row, column] = drawn[row, column] - past @ known
         return noise[_FORGETS:] / np.maximum(power, 1e-300)
 
-    return draw
+    return _draw
 
 
 def null_log(model: Model, noise: Noise, seed: int) -> Model:

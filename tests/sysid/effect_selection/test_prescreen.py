@@ -37,7 +37,7 @@ def test_a_groove_turned_by_three_degrees_is_named_and_measured(tmp_path):
     with Workers(2) as pool:
         closed = close_loop(model, test=[5], library=_LIBRARY, workers=pool)
     assert closed.first.objective > 10.0
-    assert closed.verdict.ending == "explained"
+    assert closed.verdict.ending == "explained", closed.text
     assert closed.verdict.names == ("GroovePose",)
     found = {value.name: value.value for value in closed.verdict.values}
     assert abs(found["GroovePose.ry"] + 0.0524) < 1e-3
