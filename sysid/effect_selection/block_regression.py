@@ -196,9 +196,13 @@ class BlockRegression:
         return Scores(np.asarray(np.linalg.solve(L, total)), np.asarray(blocks))
 
     def sensitivity(self, columns: Columns) -> Array:
-        """Returns how long a total of `scores` each column makes by itself (k,)."""
-        found = self._held_out(columns)
-        if found.noise.shape[1] < len(columns) or not found.noise.any():
+        """Returns how long a total of `scores` each column makes by itself (k,).
+
+        On the side of null on which it may be, wherever noise has pushed it here.
+        """
+        free = dataclasses.replace(self, side=np.zeros_like(self.side))
+        found = free._held_out(columns)
+        if not found.noise.any():
             return np.zeros(len(columns))
         lengths = np.linalg.solve(_spread(found), found.H.sum(axis=0))
         return np.asarray(np.linalg.norm(lengths, axis=0))
