@@ -7,7 +7,7 @@ from typing import Any
 _NOT_MEASURED = "not measured"
 #: What was measured with all thresholds at their defaults: docs/closing-the-loop.md.
 _NULL_LOGS = (
-    "a wrong name in 3 of 983 logs of a sensor and 0 of 389 of an arm without an effect "
+    "a wrong name in 3 of 983 null logs of a sensor and in 0 of 389 of an arm "
     "(docs/closing-the-loop.md)"
 )
 _BLIND_LOGS = (
