@@ -143,18 +143,21 @@ class BlockRegression:
         left, size = (np.einsum("np,np->p", A, A) for A in (projected, self.A))
         projected *= left > self.settings.min_new_column**2 * size
         r = self.r + own @ phi
-        noise = self._unfitted(own, r)
-        return dataclasses.replace(self, A=projected, r=r, noise=noise)
+        return dataclasses.replace(self, A=projected, r=r, noise=r)
 
-    def _unfitted(self, own: Array, r: Array) -> Array:
-        """Returns residuals (n,) as large as if columns (n, k) were not fitted to them.
+    def noise_left_by(self, base: Columns) -> Array:
+        """Returns what a base leaves (n,), as large as if it had not been fitted.
 
         Of a block of few rows, a base of many parameters takes up a good part: (I -
         P_bb)^-1/2 r_b has the covariance of what was there before if that was white
         (Bell and McCaffrey 2002).
         """
+        if not len(base):
+            return self.r
+        r = self.project_out(base).r
         root = np.sqrt(self._weights(r))
-        Q, size, _ = np.linalg.svd(root[:, None] * own, full_matrices=False)
+        own = root[:, None] * self.A[:, base]
+        Q, size, _ = np.linalg.svd(own, full_matrices=False)
         Q = Q[:, size > _RIDGE * size.max(initial=0.0)]
         found = r.copy()
         for block in self._blocks:
@@ -188,11 +191,12 @@ class BlockRegression:
         conditioned where blocks are few.
         """
         found = self._held_out(columns)
-        if not found.noise.any():
-            return Scores(np.zeros(1), np.zeros((len(found.noise), 1)))
-        L = _spread(found)
+        noise = self._gradients(found.a, found.weights, self.noise)
+        if not noise.any():
+            return Scores(np.zeros(1), np.zeros((len(noise), 1)))
+        L = _spread(found.H.sum(axis=0), noise)
         total = found.gradients.sum(axis=0)
-        blocks = np.linalg.solve(L, found.noise.T).T
+        blocks = np.linalg.solve(L, noise.T).T
         return Scores(np.asarray(np.linalg.solve(L, total)), np.asarray(blocks))
 
     def sensitivity(self, columns: Columns) -> Array:
@@ -202,9 +206,10 @@ class BlockRegression:
         """
         free = dataclasses.replace(self, side=np.zeros_like(self.side))
         found = free._held_out(columns)
-        if not found.noise.any():
+        noise, H = self._gradients(found.a, found.weights, self.noise), found.H.sum(0)
+        if not noise.any():
             return np.zeros(len(columns))
-        lengths = np.linalg.solve(_spread(found), found.H.sum(axis=0))
+        lengths = np.linalg.solve(_spread(H, noise), H)
         return np.asarray(np.linalg.norm(lengths, axis=0))
 
     def _held_out(self, columns: Columns) -> "_HeldOut":
@@ -224,7 +229,7 @@ class BlockRegression:
         """
         w = prior * self._weights(self.r)
         H, g = self._normal_equations(a, w)
-        null, noise = g, self._gradients(a, w, self.noise)
+        null, weights = g, w
         if np.isfinite(self.huber_delta) and a.shape[1]:
             for _ in range(self.settings.reweighting_steps):
                 phi = -_solve(H.sum(axis=0)[None], g.sum(axis=0)[None])[0]
@@ -233,7 +238,7 @@ class BlockRegression:
         others = -_solve(H.sum(axis=0) - H, g.sum(axis=0) - g)
         lengths = np.diff(self.begins, append=len(self.r))
         change = np.einsum("nk,nk->n", a, np.repeat(others, lengths, axis=0))
-        return _HeldOut(self._loss(self.r + change), H, null, noise)
+        return _HeldOut(self._loss(self.r + change), H, null, a, weights)
 
     def best_of(self, groups: Sequence[Columns]) -> Columns:
         """Returns the columns that explain most, by Akaike's criterion; or none.
@@ -321,13 +326,14 @@ class _HeldOut:
         losses: (B,) of the blocks.
         H: (B, k, k) curvature of each block's loss.
         gradients: (B, k) of each block's loss where the columns explain nothing.
-        noise: (B, k) the same, as large as by chance.
+        a, weights: (n, k) and (n,) columns and weights of rows of the gradients.
     """
 
     losses: Array
     H: Array
     gradients: Array
-    noise: Array
+    a: Array
+    weights: Array
 
 
 def blocks_of(
@@ -351,14 +357,13 @@ def blocks_of(
     return block_numbers(episode, int(min(length, longest)))
 
 
-def _spread(found: _HeldOut) -> Array:
-    """Returns L (k, k) with L L^T the spread of the sum of the blocks' gradients."""
-    H, g = found.H.sum(axis=0), found.noise
+def _spread(H: Array, noise: Array) -> Array:
+    """Returns L (k, k) with L L^T the spread of the sum of blocks' gradients (B, k)."""
     size = np.sqrt(np.maximum(np.diagonal(H), 1e-300))
-    H, g = H / np.outer(size, size) + _RIDGE * np.eye(len(H)), g / size
+    H, g = H / np.outer(size, size) + _RIDGE * np.eye(len(H)), noise / size
     own = g.T @ g
-    noise = np.trace(np.linalg.solve(H, own)) / len(H)
-    return np.asarray(size[:, None] * np.linalg.cholesky(0.5 * (own + noise * H)))
+    level = np.trace(np.linalg.solve(H, own)) / len(H)
+    return np.asarray(size[:, None] * np.linalg.cholesky(0.5 * (own + level * H)))
 
 
 def _solve(H: Array, g: Array) -> Array:

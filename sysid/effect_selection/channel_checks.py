@@ -19,6 +19,7 @@ from sysid.identification.whiteness import autocorrelation
 from sysid.models.base import HUBER_DELTA, LogModel
 from sysid.models.measurements import Measurements
 from sysid.objective import pseudo_residual
+from sysid.parameters import nominal_values
 
 Array = NDArray[np.float64]
 
@@ -38,10 +39,6 @@ class ChannelFinding:
     channel: str
     text: str
 
-    def __str__(self) -> str:
-        """The finding in words."""
-        return f"{self.channel}: {self.text}"
-
 
 def refuse_dead_channels(model: LogModel, settings: SelectionSettings) -> None:
     """Refuses logs with a channel that never changes where the model expects it to.
@@ -53,7 +50,7 @@ def refuse_dead_channels(model: LogModel, settings: SelectionSettings) -> None:
     still = np.ptp(measured.values, axis=0) == 0.0
     if measured.rows < settings.min_rows or not still.any():
         return
-    predicted = np.ptp(model.predictions(_nominal(model)), axis=0)
+    predicted = np.ptp(model.predictions(nominal_values(model.parameters)), axis=0)
     moves = predicted > settings.dead_channel_change * measured.noise
     dead = [
         f"{c.name} (the model expects it to change by {change:.2g} {c.unit})"
@@ -67,10 +64,6 @@ def refuse_dead_channels(model: LogModel, settings: SelectionSettings) -> None:
             f"the log is constant in {', '.join(dead)} over all {measured.rows} rows: "
             "is the sensor alive? Record it anew, or leave its channels out"
         )
-
-
-def _nominal(model: LogModel) -> Array:
-    return np.array([p.nominal for p in model.parameters])
 
 
 def channel_findings(fit: Fit) -> list[ChannelFinding]:

@@ -109,12 +109,13 @@ class Fit:
 
     def at_bound(self, names: Sequence[str]) -> bool:
         """Returns whether an amplitude of some effects is at a bound: unphysical."""
-        margin = self.settings.bound_tolerance
-        u = self.linearisation.u
-        columns = [self.columns_of(e) for e in self.effects if e.name in names]
-        return any(
-            ((u[own] <= margin) | (u[own] >= 1.0 - margin)).any() for own in columns
-        )
+        effects = [effect for effect in self.effects if effect.name in names]
+        return not all(self._inside(self.columns_of(e)).all() for e in effects)
+
+    def _inside(self, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Returns which of some parameters (k,) are not at a bound."""
+        margin, u = self.settings.bound_tolerance, self.linearisation.u[columns]
+        return np.asarray((u > margin) & (u < 1.0 - margin))
 
     def harmed_channels(self, before: "Fit") -> list[str]:
         """Returns the channels that are significantly worse than in another fit."""
@@ -137,11 +138,9 @@ class Fit:
         Of one kind of effect at several joints, those that are not significant go.
         """
         found, which = [], self.significant
-        margin = self.settings.bound_tolerance
         for effect in added:
             columns = self.columns_of(effect)
-            u = self.linearisation.u[columns]
-            kept = (u > margin) & (u < 1.0 - margin)
+            kept = self._inside(columns)
             fields = [f for f, keep in zip(effect.fields, kept, strict=True) if keep]
             if fields and (not is_joint_group(added) or which[columns].any()):
                 found.append(effect.only(fields))

@@ -85,10 +85,7 @@ class ArFilter:
             behind = [b + k * f for f, b in pairs]
             predictors.append(predictor)
             variances.append(variance)
-        criterion = [
-            rows * np.log(max(v, 1e-300)) + 2.0 * m for m, v in enumerate(variances)
-        ]
-        end = int(np.argmin(criterion)) + 1
+        end = _akaike_order(variances, rows) + 1
         return cls(tuple(predictors[:end]), tuple(variances[:end]))
 
     @property
@@ -209,6 +206,12 @@ def _means(values: Array, cells: NDArray[np.int64]) -> Array:
 
 def _begins(cells: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.flatnonzero(np.diff(cells, prepend=-1))
+
+
+def _akaike_order(variances: Sequence[float], rows: int) -> int:
+    """Returns the order whose error's variance is worth its coefficients."""
+    fit = rows * np.log(np.maximum(variances, 1e-300))
+    return int(np.argmin(fit + 2.0 * np.arange(len(variances))))
 
 
 def _slowest(rho: float, rows: int, fitted: float, errors: float) -> float:

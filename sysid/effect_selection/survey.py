@@ -257,5 +257,5 @@ def _whitened(
     most = settings.max_test_blocks
     blocks = blocks_of(filtered(left), filtered.episode, settings, most)
     regression = BlockRegression.of(found, blocks, settings, filtered(curves))
-    noise = settings.noise_safety * regression.project_out(known).noise
+    noise = settings.noise_safety * regression.noise_left_by(known)
     return dataclasses.replace(regression.project_out(known[:own]), noise=noise)
