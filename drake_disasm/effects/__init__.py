@@ -7,7 +7,10 @@ anywhere else: `register_effect`.
 from drake_disasm.effects.base import (
     AT_REST,
     ArmEffect,
+    ArmSamples,
+    ArmTorqueEffect,
     BoltMotion,
+    DelayEffect,
     Effect,
     Environment,
     EnvironmentEffect,
@@ -25,6 +28,7 @@ from drake_disasm.effects.chains import (
     sensor_chain,
 )
 from drake_disasm.effects.fields import (
+    acts_at_joint,
     amplitude,
     amplitudes,
     joint_name,
@@ -72,15 +76,24 @@ from drake_disasm.effects.arm.coulomb_friction import JointCoulombFriction
 from drake_disasm.effects.arm.stribeck_friction import JointStribeckFriction
 from drake_disasm.effects.arm.asymmetric_friction import JointAsymmetricFriction
 from drake_disasm.effects.arm.load_friction import JointLoadFriction
+from drake_disasm.effects.arm.quadratic_friction import JointQuadraticFriction
 from drake_disasm.effects.arm.torque_offset import TorqueOffset
 from drake_disasm.effects.arm.torque_gain import TorqueGain
 from drake_disasm.effects.arm.rotor_inertia import RotorInertia
+from drake_disasm.effects.arm.torque_ripple import TorqueRipple
+from drake_disasm.effects.arm.joint_coupling import JointCoupling
+from drake_disasm.effects.arm.time_shift import ArmDelay, JointDelay
+from drake_disasm.effects.arm.base_tilt import ArmTilt
 from drake_disasm.effects.arm.flange_payload import FlangePayload
 # isort: on
 
 __all__ = [
     "AT_REST",
+    "ArmDelay",
     "ArmEffect",
+    "ArmSamples",
+    "ArmTilt",
+    "ArmTorqueEffect",
     "Backlash",
     "BaseTilt",
     "BoltMotion",
@@ -90,6 +103,7 @@ __all__ = [
     "Compliance",
     "ContactExponent",
     "ContactStiffness",
+    "DelayEffect",
     "Effect",
     "Environment",
     "EnvironmentEffect",
@@ -103,8 +117,11 @@ __all__ = [
     "Imprecision",
     "JointAsymmetricFriction",
     "JointCoulombFriction",
+    "JointCoupling",
+    "JointDelay",
     "JointEffect",
     "JointLoadFriction",
+    "JointQuadraticFriction",
     "JointSamples",
     "JointStribeckFriction",
     "JointViscousFriction",
@@ -127,6 +144,8 @@ __all__ = [
     "SensorWarmUp",
     "TorqueGain",
     "TorqueOffset",
+    "TorqueRipple",
+    "acts_at_joint",
     "amplitude",
     "amplitudes",
     "environment_at",

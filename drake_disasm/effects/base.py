@@ -15,13 +15,13 @@ place's method, and put `@register_effect` above it.
 import abc
 import dataclasses
 import inspect
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from drake_disasm.effects.fields import amplitudes
+from drake_disasm.effects.fields import acts_at_joint, amplitudes
 
 #: What an effect keeps from one step to the next: six numbers.
 Memory = np.ndarray
@@ -246,11 +246,66 @@ class JointSamples:
     load: np.ndarray
 
 
+@dataclasses.dataclass(frozen=True)
+class ArmSamples:
+    """Samples of the motion of all joints of an arm, in their order.
+
+    Attributes:
+        joints: their names.
+        q, v, vd: (n, joints) [rad, rad/s, rad/s^2]; m instead of rad for a prismatic
+            joint.
+        load: (n, joints) torques that the rigid bodies need [N m], or forces [N].
+    """
+
+    joints: tuple[str, ...]
+    q: np.ndarray
+    v: np.ndarray
+    vd: np.ndarray
+    load: np.ndarray
+
+    def of(self, joint: str) -> JointSamples:
+        """Returns the samples of one joint."""
+        i = self.joints.index(joint)
+        motion = (a[:, i] for a in (self.q, self.v, self.vd, self.load))
+        return JointSamples(*motion)
+
+
 class ArmEffect(Effect):
     """Acts on an arm, and so on the torques that its joints' sensors measure."""
 
+    @classmethod
+    def places(cls, joints: Sequence[str]) -> list[dict[str, str]]:
+        """Returns where on an arm it can act: the fields that say so, for each.
 
-class JointEffect(ArmEffect, abc.ABC):
+        Args:
+            joints: of the arm, from its base on.
+        """
+        return [{"joint": joint} for joint in joints] if acts_at_joint(cls) else [{}]
+
+
+class ArmTorqueEffect(ArmEffect, abc.ABC):
+    """Adds torques at an arm's joints that depend on the motion of all of them."""
+
+    @abc.abstractmethod
+    def torques(self, samples: ArmSamples) -> np.ndarray:
+        """Returns what it adds to the torques of the rigid bodies, (n, joints)."""
+
+
+class DelayEffect(ArmEffect):
+    """Shifts torques in time, against the motion that they belong to.
+
+    Attributes:
+        delay: of the torque [s]; negative, if it is the motion that comes late.
+    """
+
+    delay: float
+
+    @abc.abstractmethod
+    def delays(self, joint: str) -> bool:
+        """Returns whether the torque of a joint is shifted."""
+
+
+class JointEffect(ArmTorqueEffect):
     """Acts at one joint of an arm, on the torque that its sensor measures.
 
     Attributes:
@@ -258,6 +313,13 @@ class JointEffect(ArmEffect, abc.ABC):
     """
 
     joint: str
+
+    def torques(self, samples: ArmSamples) -> np.ndarray:
+        """See ArmTorqueEffect."""
+        added = np.zeros_like(samples.load)
+        own = samples.joints.index(self.joint)
+        added[:, own] = self.torque(samples.of(self.joint))
+        return added
 
     @abc.abstractmethod
     def torque(self, samples: JointSamples) -> np.ndarray:

@@ -42,6 +42,11 @@ def joint_name() -> Any:
     return quantity("", "", "name of the joint in the URDF")
 
 
+def acts_at_joint(effect: type) -> bool:
+    """Returns whether an effect has a field that names the joint at which it acts."""
+    return any(field.name == "joint" for field in dataclasses.fields(effect))
+
+
 def amplitudes(effect: type) -> tuple[str, ...]:
     """Returns the names of an effect's parameters that are zero at null."""
     return tuple(f.name for f in _numbers(effect) if not f.metadata["grid"])

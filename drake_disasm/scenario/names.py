@@ -18,7 +18,7 @@ from typing import Any
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
-from drake_disasm.effects import Effect, JointEffect, registered_effects
+from drake_disasm.effects import Effect, acts_at_joint, registered_effects
 from drake_disasm.scenario.schema import Scenario
 
 _SECTIONS = frozenset(field.name for field in dataclasses.fields(Scenario))
@@ -77,7 +77,7 @@ def resolve(scenario: Scenario, name: str) -> tuple[Scenario, str]:
     if word not in kinds:
         return scenario, name
     kind, place = kinds[word], {}
-    if issubclass(kind, JointEffect) and "." in rest:
+    if acts_at_joint(kind) and "." in rest:
         place["joint"], _, rest = rest.partition(".")
     numbers = [i for i, e in enumerate(scenario.effects) if _is_at(e, kind, place)]
     if len(numbers) > 1:
@@ -99,7 +99,7 @@ def _with_effect(
     scenario: Scenario, kind: type[Effect], place: Mapping[str, str], name: str
 ) -> tuple[Scenario, list[int]]:
     """Returns the scenario with one more effect, and its number."""
-    if issubclass(kind, JointEffect) and not place:
+    if acts_at_joint(kind) and not place:
         field = name.partition(".")[2]
         raise DisasmError(
             f"{name}: does not say at which joint; write {kind.__name__}.JOINT.{field}"

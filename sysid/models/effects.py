@@ -5,7 +5,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from drake_disasm.effects import Effect, JointEffect, shape_parameters
+from drake_disasm.effects import ArmEffect, Effect, shape_parameters
 from sysid.parameters import Parameter
 
 
@@ -17,7 +17,7 @@ def at_null(kind: type[Effect], joints: Sequence[str]) -> list[Effect]:
         joints: their names.
     """
     make: Callable[..., Effect] = kind
-    places = [{"joint": j} for j in joints] if issubclass(kind, JointEffect) else [{}]
+    places = kind.places(joints) if issubclass(kind, ArmEffect) else [{}]
     grids = shape_parameters(kind)
     return [
         make(**place, **dict(zip(grids, shape, strict=True)))

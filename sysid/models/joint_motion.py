@@ -9,16 +9,11 @@ from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
-from drake_disasm.effects import (
-    ArmEffect,
-    Effect,
-    FlangePayload,
-    JointEffect,
-    JointSamples,
-)
+from drake_disasm.effects import ArmEffect, DelayEffect, Effect
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
+from sysid.models.arm_motion import ArmMotion
 from sysid.models.base import Array, LogModel
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
@@ -69,17 +64,13 @@ class JointMotionModel(LogModel):
             )
         arm = ArmDynamics(urdf, header.joints)
         base = base_set(arm.random_regressor())
-        parts = [arm.regressor(e["q"], e["v"], e["vd"]) for _, e in episodes]
         self._scenario = scenario or Scenario()
         self._effects = tuple(self._scenario.effects)
         _refuse_other_joints(self._effects, header.joints)
-        self._motion = {
-            name: np.concatenate([e[name] for _, e in episodes])
-            for name in ("q", "v", "vd")
-        }
-        Y = np.concatenate(parts)
-        self._Y, self._Y_F = Y[:, :, base.independent], Y[:, :, arm.last_link]
-        self._beta = base.beta(arm.inertia)
+        # Shifts in time need neighbours of rows that are not fitted themselves.
+        self._whole = ArmMotion.of(arm, base, header.joints, [e for _, e in episodes])
+        self._motion = self._whole
+        self._taken = np.ones(len(self._whole.time), dtype=bool)
         channels = tuple(Channel(j, "N m", np.nan, "estimated") for j in header.joints)
         self.measurements = Measurements.of_logs(
             logs, channels, lambda _, episode: episode["tau"]
@@ -88,19 +79,13 @@ class JointMotionModel(LogModel):
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
-        load: Array = self._Y[rows] @ theta[: len(self._beta)]
-        effects = self.effects_at(theta)
-        for effect in effects:
-            if isinstance(effect, FlangePayload):
-                load = load + self._Y_F[rows] @ effect.inertial
-        torque = load.copy()
-        for effect in effects:
-            if isinstance(effect, JointEffect):
-                i = self.joints.index(effect.joint)
-                motion = {name: all_[rows, i] for name, all_ in self._motion.items()}
-                samples = JointSamples(**motion, load=load[:, i])
-                torque[:, i] += effect.torque(samples)
-        return torque
+        beta, effects = theta[: len(self._motion.nominal)], self.effects_at(theta)
+        on_arm = [e for e in effects if isinstance(e, ArmEffect)]
+        shifts = [e for e in on_arm if isinstance(e, DelayEffect) and not e.is_null]
+        if not shifts:
+            return self._motion.rows(rows).torques(beta, on_arm)
+        torque = self._whole.torques(beta, on_arm)
+        return self._whole.shifted(torque, shifts)[self._taken][rows]
 
     def scenario_at(self, theta: Array) -> Scenario:
         """Returns a scenario with the effects; base parameters are no part of it."""
@@ -110,7 +95,7 @@ class JointMotionModel(LogModel):
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: the joint's own motion."""
         names = {"q": "position", "v": "velocity", "vd": "acceleration"}
-        return {word: self._motion[key][:, channel] for key, word in names.items()}
+        return {w: getattr(self._motion, k)[:, channel] for k, w in names.items()}
 
     def only(self, names: Sequence[str]) -> Self:
         """Returns the same model with all but the named parameters frozen.
@@ -135,9 +120,9 @@ class JointMotionModel(LogModel):
         self, arm: ArmDynamics, base: BaseSet
     ) -> tuple[Parameter, ...]:
         """Returns base parameters with bounds wide enough for any real arm."""
-        size = np.sqrt(np.mean(self._Y**2, axis=(0, 1)))
+        size = np.sqrt(np.mean(self._motion.Y**2, axis=(0, 1)))
         torque = float(np.sqrt(np.mean(self.measurements.values**2)))
-        reach = np.abs(self._beta) + _REACH * torque / np.maximum(size, 1e-9)
+        reach = np.abs(self._motion.nominal) + _REACH * torque / np.maximum(size, 1e-9)
         return tuple(
             Parameter(
                 arm.names[base.independent[i]],
@@ -147,24 +132,23 @@ class JointMotionModel(LogModel):
                 arm.units[base.independent[i]],
                 base.label(i, arm.names),
             )
-            for i, value in enumerate(self._beta)
+            for i, value in enumerate(self._motion.nominal)
         )
 
     def select_rows(self, mask: NDArray[np.bool_]) -> Self:
         """See LogModel."""
-        return self.replace(
-            _Y=self._Y[mask],
-            _Y_F=self._Y_F[mask],
-            _motion={name: values[mask] for name, values in self._motion.items()},
-        )
+        taken = self._taken.copy()
+        taken[taken] = mask
+        return self.replace(_motion=self._motion.rows(mask), _taken=taken)
 
 
 def _refuse_other_joints(effects: Sequence[Effect], joints: Sequence[str]) -> None:
     for number, effect in enumerate(effects):
-        if isinstance(effect, JointEffect) and effect.joint not in joints:
+        joint = getattr(effect, "joint", None)
+        if joint is not None and joint not in joints:
             raise DisasmError(
-                f"effects.{number}.joint: the log has no joint '{effect.joint}'; "
-                f"{closest(effect.joint, list(joints))}"
+                f"effects.{number}.joint: the log has no joint '{joint}'; "
+                f"{closest(joint, list(joints))}"
             )
 
 

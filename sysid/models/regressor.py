@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 INERTIAL = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 INERTIAL_UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
 
+#: Where Ixx, Ixy, Ixz, Iyy, Iyz, Izz stand in a symmetric matrix, row by row.
+_SYMMETRIC = ([0, 1, 2], [1, 3, 4], [2, 4, 5])
 _EXCITATION = 200  # random states, to see which parameters matter
 _RANK = 1e-8  # of the largest diagonal element
 
@@ -72,7 +74,27 @@ class ArmDynamics:
 
     def regressor(self, q: Array, v: Array, vd: Array) -> Array:
         """Returns Y (n, joints, parameters) of states (n, joints)."""
-        return np.array([self._row(*state) for state in zip(q, v, vd, strict=True)])
+        links = self._links(q, v, vd)
+        return self._stacked(
+            [k.to_joints(body_regressor(k.w, k.alpha, k.a)) for k in links]
+        )
+
+    def tilt_regressor(self, q: Array) -> Array:
+        """Returns dY (n, joints, parameters, 2) by a tilt [rx, ry] of the base.
+
+        By the gravity that the base then sees, which is linear in Y.
+        """
+        zero = np.zeros_like(q)
+        links = self._links(q, zero, zero)
+        size = np.linalg.norm(self._plant.gravity_field().gravity_vector())
+        changes = size * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+        parts = []
+        for dg in changes:
+            blocks = [
+                k.to_joints(body_regressor(k.w, k.alpha, -dg @ k.R_WB)) for k in links
+            ]
+            parts.append(self._stacked(blocks))
+        return np.stack(parts, axis=-1)
 
     def random_regressor(self) -> Array:
         """Returns Y of random states: it excites all that motion can reveal."""
@@ -82,7 +104,20 @@ class ArmDynamics:
         states = [generator.uniform(k * low, k * high) for k in (3.0, 2.0, 5.0)]
         return self.regressor(*states)
 
-    def _row(self, q: Array, v: Array, vd: Array) -> Array:
+    def _stacked(self, blocks: Sequence[Array]) -> Array:
+        """Returns links' blocks (n, velocities, 10) as Y (n, joints, parameters)."""
+        return np.concatenate(blocks, axis=-1)[:, self._columns]
+
+    def _links(self, q: Array, v: Array, vd: Array) -> "list[_LinkMotion]":
+        """Returns how each link moves in states (n, joints)."""
+        parts = [self._at(*state) for state in zip(q, v, vd, strict=True)]
+        return [
+            _LinkMotion(*(np.array([row[i][k] for row in parts]) for k in range(5)))
+            for i in range(len(self._bodies))
+        ]
+
+    def _at(self, q: Array, v: Array, vd: Array) -> list[tuple[Array, ...]]:
+        """Returns each link's J, R_WB, w, alpha and a in one state (joints,)."""
         plant, context, columns = self._plant, self._context, self._columns
         full = np.zeros(plant.num_velocities())
         positions, velocities, accelerations = full.copy(), full.copy(), full.copy()
@@ -91,44 +126,61 @@ class ArmDynamics:
         plant.SetPositions(context, positions)
         plant.SetVelocities(context, velocities)
         A_W = plant.CalcSpatialAccelerationsFromVdot(context, accelerations)
-        blocks = [self._block(body, A_W[int(body.index())]) for body in self._bodies]
-        return np.hstack(blocks)[columns]
-
-    def _block(self, body: RigidBody, A_WB: object) -> Array:
-        """Returns a link's part (joints, 10) of Y at the plant's state."""
-        plant, context = self._plant, self._context
-        R_BW = plant.EvalBodyPoseInWorld(context, body).rotation().matrix().T
-        w_B = R_BW @ plant.EvalBodySpatialVelocityInWorld(context, body).rotational()
-        alpha_B = R_BW @ A_WB.rotational()  # type: ignore[attr-defined]
         g_W = plant.gravity_field().gravity_vector()
-        a_B = R_BW @ (A_WB.translational() - g_W)  # type: ignore[attr-defined]
-        frame = body.body_frame()
-        J = plant.CalcJacobianSpatialVelocity(
-            context, JacobianWrtVariable.kV, frame, np.zeros(3), plant.world_frame(),
-            frame,
-        )  # fmt: skip
-        block: Array = J.T @ body_regressor(w_B, alpha_B, a_B)
-        return block
+        found: list[tuple[Array, ...]] = []
+        zero, world = np.zeros(3), plant.world_frame()
+        for body in self._bodies:
+            R_WB = plant.EvalBodyPoseInWorld(context, body).rotation().matrix()
+            w_W = plant.EvalBodySpatialVelocityInWorld(context, body).rotational()
+            A_WB, frame = A_W[int(body.index())], body.body_frame()
+            J = plant.CalcJacobianSpatialVelocity(
+                context, JacobianWrtVariable.kV, frame, zero, world, frame
+            )
+            alpha_B, a_B = A_WB.rotational() @ R_WB, (A_WB.translational() - g_W) @ R_WB
+            found.append((J, R_WB, w_W @ R_WB, alpha_B, a_B))
+        return found
+
+
+@dataclass(frozen=True)
+class _LinkMotion:
+    """How a link moves, in many states.
+
+    Attributes:
+        J: (n, 6, velocities) its Jacobian [w; v] at Bo, in B.
+        R_WB: (n, 3, 3) its orientation.
+        w, alpha: (n, 3) angular velocity and acceleration, in B.
+        a: (n, 3) acceleration of Bo minus gravity, in B.
+    """
+
+    J: Array
+    R_WB: Array
+    w: Array
+    alpha: Array
+    a: Array
+
+    def to_joints(self, of_body: Array) -> Array:
+        """Returns a regressor (n, 6, 10) of [tau; f] as (n, velocities, 10)."""
+        return np.swapaxes(self.J, -1, -2) @ of_body
 
 
 def body_regressor(w: Array, alpha: Array, a: Array) -> Array:
-    """Returns Y (6, 10) with [tau; f] = Y [m, mx, my, mz, Ixx, ..., Izz].
+    """Returns Y (..., 6, 10) with [tau; f] = Y [m, mx, my, mz, Ixx, ..., Izz].
 
     Newton's and Euler's equations of a rigid body about its frame's origin Bo:
     f = m a + alpha x c + w x (w x c), tau = c x a + I alpha + w x I w, with c = m
     p_BoBcm.
 
     Args:
-        w, alpha: (3,) angular velocity and acceleration, in B.
-        a: (3,) acceleration of Bo minus gravity, in B.
+        w, alpha: (..., 3) angular velocity and acceleration, in B.
+        a: (..., 3) acceleration of Bo minus gravity, in B.
     """
     W = _skew(w)
     L = _inertia_times(alpha) + W @ _inertia_times(w)
-    Y = np.zeros((6, 10))
-    Y[3:, 0] = a
-    Y[3:, 1:4] = _skew(alpha) + W @ W
-    Y[:3, 1:4] = -_skew(a)
-    Y[:3, 4:] = L
+    Y = np.zeros((*a.shape[:-1], 6, 10))
+    Y[..., 3:, 0] = a
+    Y[..., 3:, 1:4] = _skew(alpha) + W @ W
+    Y[..., :3, 1:4] = -_skew(a)
+    Y[..., :3, 4:] = L
     return Y
 
 
@@ -227,11 +279,13 @@ def _inertial(M_B: SpatialInertia) -> Array:
 
 
 def _skew(a: Array) -> Array:
-    """Returns [a]x with [a]x b = a x b."""
-    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+    """Returns [a]x (..., 3, 3) with [a]x b = a x b."""
+    return np.cross(a[..., None, :], np.eye(3)).swapaxes(-1, -2)
 
 
 def _inertia_times(w: Array) -> Array:
-    """Returns L (3, 6) with I w = L [Ixx, Ixy, Ixz, Iyy, Iyz, Izz]."""
-    x, y, z = w
-    return np.array([[x, y, z, 0, 0, 0], [0, x, 0, y, z, 0], [0, 0, x, 0, y, z]])
+    """Returns L (..., 3, 6) with I w = L [Ixx, Ixy, Ixz, Iyy, Iyz, Izz]."""
+    L = np.zeros((*w.shape[:-1], 3, 6))
+    for row, columns in enumerate(_SYMMETRIC):
+        L[..., row, columns] = w
+    return L

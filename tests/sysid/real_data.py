@@ -2,7 +2,8 @@
 
     python -m tests.sysid.real_data out/real
 
-writes `static_7`, `static_100`, `lwr4_1`, `lwr4_2` and `lwr4.urdf` there.
+writes `static_7`, `static_100`, `lwr4_1`, `lwr4_2`, `emps_1`, `emps_2` and the URDFs
+`lwr4.urdf` and `emps.urdf` there.
 """
 
 import csv
@@ -11,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
+from scipy.signal import butter, filtfilt
 
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, write_static_wrench
 
@@ -28,6 +31,16 @@ _JOINT = """  <joint name="{joint}" type="{type}">
     <limit lower="{lower}" upper="{upper}" velocity="{velocity}" effort="{effort}"/>
   </joint>
 """
+
+_SLIDE = """<robot name="emps"><link name="bed"/>
+  <link name="carriage"><inertial><mass value="95"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+  <joint name="slide" type="prismatic"><parent link="bed"/><child link="carriage"/>
+    <axis xyz="1 0 0"/>
+    <limit lower="-1" upper="1" velocity="1" effort="400"/></joint>
+</robot>
+"""
+_EMPS_ENDS = 50  # rows where the filter has no neighbours
 
 
 def real_folder(name: str) -> Path:
@@ -84,6 +97,52 @@ def write_motion(number: int, folder: Path, urdf: Path) -> Path:
     return folder
 
 
+def write_slide(path: Path) -> Path:
+    """Writes the URDF of EMPS: a carriage on a ball screw."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(_SLIDE)
+    return path
+
+
+def write_emps(number: int, folder: Path, urdf: Path, cutoff: float = 60.0) -> Path:
+    """Writes a record of EMPS as a log of joint motion.
+
+    Position and force pass a Butterworth filter of fourth order, forth and back;
+    velocity and acceleration are central differences.
+
+    Args:
+        number: 1 or 2, with pulses.
+        folder: of the log.
+        urdf: by `write_slide`.
+        cutoff: of the filter [Hz].
+    """
+    source = real_folder("emps") / ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")[number - 1]
+    data = {key: value[:, 0] for key, value in loadmat(source).items() if key[0] != "_"}
+    time = data["t"]
+    low = butter(4, 2.0 * cutoff * np.median(np.diff(time)))
+    q = filtfilt(*low, data["qm"])
+    v = np.gradient(q, time)
+    columns = {
+        "time": time - time[_EMPS_ENDS],
+        "q": q,
+        "v": v,
+        "vd": np.gradient(v, time),
+        "tau": filtfilt(*low, data["gtau"] * data["vir"]),
+    }
+    inner = slice(_EMPS_ENDS, -_EMPS_ENDS)
+    parts = {k: c[inner] if k == "time" else c[inner, None] for k, c in columns.items()}
+    header = LogHeader(
+        kind="joint_motion",
+        task="track",
+        provenance={"source": "EMPS, by forgi86/sysid-neural-continuous"},
+        joints=("slide",),
+        urdf=str(urdf),
+    )
+    with LogWriter(folder, header) as writer:
+        writer.write_episode(flat_columns("joint_motion", parts))
+    return folder
+
+
 if __name__ == "__main__":
     out = Path(sys.argv[1]).resolve()
     for poses in (7, 100):
@@ -91,3 +150,4 @@ if __name__ == "__main__":
     arm = write_arm(out / "lwr4.urdf")
     for recording in (1, 2):
         write_motion(recording, out / f"lwr4_{recording}", arm)
+        write_emps(recording, out / f"emps_{recording}", write_slide(out / "emps.urdf"))

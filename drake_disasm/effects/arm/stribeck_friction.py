@@ -23,7 +23,7 @@ class JointStribeckFriction(JointEffect):
     joint: str = joint_name()
     size: float = amplitude("N m", 0.0, 200.0, "at breakaway, beyond Coulomb friction")
     speed: float = shape_parameter(
-        0.1, "rad/s", 1e-3, 5.0, "v_s, at which the film carries", (0.05, 0.15, 0.5)
+        0.1, "rad/s", 1e-3, 5.0, "v_s, at which the film carries", (0.015, 0.05, 0.15)
     )
     creep: float = shape_parameter(
         0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", (0.02,)

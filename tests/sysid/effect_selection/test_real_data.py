@@ -9,7 +9,13 @@ from drake_disasm.logs import read_logs
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from tests.sysid.effect_selection.blind import sieve
-from tests.sysid.real_data import write_arm, write_motion, write_static
+from tests.sysid.real_data import (
+    write_arm,
+    write_emps,
+    write_motion,
+    write_slide,
+    write_static,
+)
 
 _NULLS = 40
 
@@ -40,6 +46,18 @@ def test_a_real_arm_has_friction_and_offsets(tmp_path):
     assert kinds == {"JointCoulombFriction", "TorqueOffset"}
     assert found.errors.relative(found.errors.before) > 0.06
     assert found.errors.relative(found.errors.after) < 0.03
+
+
+@pytest.mark.slow
+def test_a_real_drives_motion_was_recorded_late(tmp_path):
+    slide = write_slide(tmp_path / "emps.urdf")
+    folders = [write_emps(n, tmp_path / f"record_{n}", slide) for n in (1, 2)]
+    found = _closed(folders, [0], [1])
+    values = {value.name: value for value in found.verdict.values}
+    delay = values["ArmDelay.delay"]
+    assert -0.0011 < delay.value < -0.0007 and delay.excludes_null
+    assert found.errors.relative(found.errors.before) > 0.6
+    assert found.errors.relative(found.errors.after) < 0.031
 
 
 @pytest.mark.slow

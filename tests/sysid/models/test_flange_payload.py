@@ -13,13 +13,8 @@ from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.scenario_parameters import Request
-from tests.sysid.models.test_joint_motion import (
-    JOINT,
-    JOINTS,
-    LINK,
-    drakes_torques,
-    states,
-)
+from tests.sysid.models.arm import JOINT, JOINTS, LINK
+from tests.sysid.models.test_joint_motion import drakes_torques, states
 
 MASS, COM = 1.5, np.array([0.05, -0.03, 0.12])
 NOISE = 0.05  # N m

@@ -12,27 +12,13 @@ from sysid.identification import SearchSettings, Settings, identify
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.regressor import ArmDynamics, base_set, body_regressor
+from tests.sysid.models.arm import JOINTS, write_two_link_arm
 from tests.sysid.real_data import write_arm, write_motion
-
-LINK = """<link name="{0}"><inertial><origin xyz="{1}"/><mass value="{2}"/>
-<inertia ixx="0.02" ixy="0.001" ixz="0" iyy="0.03" iyz="0" izz="0.01"/>
-</inertial></link>"""
-JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>
-<origin xyz="{3}" rpy="{4}"/><axis xyz="0 0 1"/>
-<limit lower="-3" upper="3" velocity="3" effort="99"/></joint>"""
-JOINTS = ("shoulder", "elbow")
 
 
 @pytest.fixture
 def urdf(tmp_path):
-    text = '<robot name="two"><link name="base"/>'
-    text += LINK.format("upper", "0.1 0.02 0.1", 2.0)
-    text += LINK.format("lower", "0.05 0 0.1", 1.0)
-    text += JOINT.format("shoulder", "base", "upper", "0 0 0.3", "1.2 0 0")
-    text += JOINT.format("elbow", "upper", "lower", "0 0.4 0", "0 1.3 0.2")
-    path = tmp_path / "two.urdf"
-    path.write_text(text + "</robot>")
-    return path
+    return write_two_link_arm(tmp_path / "two.urdf")
 
 
 def states(n, seed=0):
@@ -154,7 +140,7 @@ def test_a_real_arm_has_43_base_parameters(tmp_path):
     logs = [read_log(write_motion(i, tmp_path / f"r{i}", arm)) for i in (1, 2)]
     model = JointMotionModel(logs)
     assert len(model.parameters) == 43
-    Y, tau = model._Y.reshape(-1, 43), model.measurements.values.reshape(-1)
+    Y, tau = model._motion.Y.reshape(-1, 43), model.measurements.values.reshape(-1)
     half = len(tau) // 2
     beta = np.linalg.lstsq(Y[:half], tau[:half], rcond=None)[0]
     for rows, expected in ((slice(0, half), 0.0658), (slice(half, None), 0.0626)):

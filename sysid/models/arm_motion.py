@@ -1,0 +1,123 @@
+"""The recorded motion of an arm, and the torques that it takes with given effects."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from drake_disasm.effects import (
+    ArmEffect,
+    ArmSamples,
+    ArmTilt,
+    ArmTorqueEffect,
+    DelayEffect,
+    FlangePayload,
+)
+from drake_disasm.logs import Episode
+from sysid.models.base import Array
+from sysid.models.regressor import ArmDynamics, BaseSet
+
+
+@dataclasses.dataclass(frozen=True)
+class ArmMotion:
+    """Samples of an arm's motion, with what its torques are linear in.
+
+    Attributes:
+        joints: their names.
+        time: (n,) [s].
+        episode: (n,) number of each sample's episode.
+        q, v, vd: (n, joints).
+        Y: (n, joints, b) regressor of the base parameters.
+        Y_payload: (n, joints, 10) of a body in the frame of the last link.
+        Y_tilt: (n, joints, b, 2) derivative of Y by a tilt [rx, ry] of the base.
+        tilt: (n, joints, 2) the same of the torques by the nominal parameters.
+        nominal: (b,) base parameters by the URDF.
+    """
+
+    joints: tuple[str, ...]
+    time: Array
+    episode: NDArray[np.int64]
+    q: Array
+    v: Array
+    vd: Array
+    Y: Array
+    Y_payload: Array
+    Y_tilt: Array
+    tilt: Array
+    nominal: Array
+
+    @classmethod
+    def of(
+        cls,
+        arm: ArmDynamics,
+        base: BaseSet,
+        joints: Sequence[str],
+        episodes: Sequence[Episode],
+    ) -> Self:
+        """Returns all samples of episodes, in their order."""
+        q, v, vd, time = (
+            np.concatenate([e[name] for e in episodes])
+            for name in ("q", "v", "vd", "time")
+        )
+        Y, Y_tilt = arm.regressor(q, v, vd), arm.tilt_regressor(q)
+        return cls(
+            tuple(joints),
+            time,
+            np.repeat(np.arange(len(episodes)), [len(e["time"]) for e in episodes]),
+            q,
+            v,
+            vd,
+            Y[:, :, base.independent],
+            Y[:, :, arm.last_link],
+            Y_tilt[:, :, base.independent],
+            np.einsum("njkt,k->njt", Y_tilt, arm.inertia),
+            base.beta(arm.inertia),
+        )
+
+    def rows(self, chosen: slice | NDArray[np.bool_]) -> Self:
+        """Returns some of the samples."""
+        fields = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        kept: dict[str, Any] = {"joints": self.joints, "nominal": self.nominal}
+        return type(self)(
+            **{k: kept[k] if k in kept else a[chosen] for k, a in fields.items()}
+        )
+
+    def torques(self, beta: Array, effects: Sequence[ArmEffect]) -> Array:
+        """Returns the joints' torques (n, joints), all but shifts in time.
+
+        Args:
+            beta: (b,) base parameters.
+            effects: on the arm.
+        """
+        load: Array = self.Y @ beta
+        for effect in effects:
+            if isinstance(effect, FlangePayload):
+                load = load + self.Y_payload @ effect.inertial
+            elif isinstance(effect, ArmTilt) and not effect.is_null:
+                by_base = np.einsum("njbt,b->njt", self.Y_tilt, beta - self.nominal)
+                load = load + (self.tilt + by_base) @ [effect.rx, effect.ry]
+        samples = ArmSamples(self.joints, self.q, self.v, self.vd, load)
+        torque = load
+        for effect in effects:
+            if isinstance(effect, ArmTorqueEffect):
+                torque = torque + effect.torques(samples)
+        return torque
+
+    def shifted(self, torque: Array, effects: Sequence[DelayEffect]) -> Array:
+        """Returns torques (n, joints) as they are read, late or early.
+
+        Between samples they are interpolated by cubic splines; before the first and
+        after the last of an episode, they stay as they are there.
+        """
+        read = torque.copy()
+        for i, joint in enumerate(self.joints):
+            late = sum(e.delay for e in effects if e.delays(joint))
+            for number in np.unique(self.episode) if late else ():
+                own = self.episode == number
+                t = self.time[own]
+                at = np.clip(t - late, t[0], t[-1])
+                read[own, i] = CubicSpline(t, torque[own, i])(at)
+        return read

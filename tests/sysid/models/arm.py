@@ -1,0 +1,23 @@
+"""A small arm for tests."""
+
+from pathlib import Path
+
+JOINTS = ("shoulder", "elbow")
+
+LINK = """<link name="{0}"><inertial><origin xyz="{1}"/><mass value="{2}"/>
+<inertia ixx="0.02" ixy="0.001" ixz="0" iyy="0.03" iyz="0" izz="0.01"/>
+</inertial></link>"""
+JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>
+<origin xyz="{3}" rpy="{4}"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" velocity="3" effort="99"/></joint>"""
+
+
+def write_two_link_arm(path: Path) -> Path:
+    """Writes the URDF of an arm with two joints."""
+    text = '<robot name="two"><link name="base"/>'
+    text += LINK.format("upper", "0.1 0.02 0.1", 2.0)
+    text += LINK.format("lower", "0.05 0 0.1", 1.0)
+    text += JOINT.format("shoulder", "base", "upper", "0 0 0.3", "1.2 0 0")
+    text += JOINT.format("elbow", "upper", "lower", "0 0.4 0", "0 1.3 0.2")
+    path.write_text(text + "</robot>")
+    return path
