@@ -89,6 +89,10 @@ def _add_model_arguments(add: Callable[..., object]) -> None:
     )
 
 
+#: The learned functions, beside the scenario that names them.
+_RESIDUAL_MODEL = "residual_model.npz"
+
+
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
@@ -132,8 +136,12 @@ def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
 
 def _write(folder: Path, closed: ClosedLoop, origin: dict[str, object]) -> None:
     make_folder(folder)
-    if closed.scenario is not None:
-        write_text(folder / "scenario.yaml", dump_scenario(closed.scenario))
+    learned = closed.verdict.residual_model
+    if learned is not None:
+        learned.functions.save(folder / _RESIDUAL_MODEL)
+    scenario = closed.scenario_with_residual_model(_RESIDUAL_MODEL)
+    if scenario is not None:
+        write_text(folder / "scenario.yaml", dump_scenario(scenario))
     write_json(folder / "result.json", to_mapping(closed) | {"provenance": origin})
     write_text(folder / "report.html", closing_page(closed, origin))
 

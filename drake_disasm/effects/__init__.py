@@ -31,6 +31,7 @@ from drake_disasm.effects.fields import (
     acts_at_joint,
     amplitude,
     amplitudes,
+    files_of,
     joint_name,
     shape_parameter,
     shape_parameters,
@@ -71,6 +72,7 @@ from drake_disasm.effects.sensor.saturation import SensorSaturation
 from drake_disasm.effects.sensor.mounting import SensorMounting
 from drake_disasm.effects.sensor.payload_error import PayloadError
 from drake_disasm.effects.sensor.base_tilt import BaseTilt
+from drake_disasm.effects.sensor.residual_model import SensorResidualModel
 from drake_disasm.effects.arm.viscous_friction import JointViscousFriction
 from drake_disasm.effects.arm.coulomb_friction import JointCoulombFriction
 from drake_disasm.effects.arm.stribeck_friction import JointStribeckFriction
@@ -85,12 +87,14 @@ from drake_disasm.effects.arm.joint_coupling import JointCoupling
 from drake_disasm.effects.arm.time_shift import ArmDelay, JointDelay
 from drake_disasm.effects.arm.base_tilt import ArmTilt
 from drake_disasm.effects.arm.flange_payload import FlangePayload
+from drake_disasm.effects.arm.residual_model import ArmResidualModel
 # isort: on
 
 __all__ = [
     "AT_REST",
     "ArmDelay",
     "ArmEffect",
+    "ArmResidualModel",
     "ArmSamples",
     "ArmTilt",
     "ArmTorqueEffect",
@@ -140,6 +144,7 @@ __all__ = [
     "SensorLag",
     "SensorMemoryEffect",
     "SensorMounting",
+    "SensorResidualModel",
     "SensorSaturation",
     "SensorWarmUp",
     "TorqueGain",
@@ -149,6 +154,7 @@ __all__ = [
     "amplitude",
     "amplitudes",
     "environment_at",
+    "files_of",
     "find_effect",
     "import_effects",
     "is_local",

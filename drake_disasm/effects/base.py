@@ -104,12 +104,14 @@ class Effect:
 
     Attributes:
         is_random: whether it acts on the variance alone; models predict the mean.
+        is_physical: whether it has a meaning beyond its log: searches try no others.
         experiment: the recording that shows it apart from others, in words.
         experiments_against: what separates it from a rival, by the rival's name; one
             of the two need say it.
     """
 
     is_random: ClassVar[bool] = False
+    is_physical: ClassVar[bool] = True
     experiment: ClassVar[str] = ""
     experiments_against: ClassVar[Mapping[str, str]] = {}
 

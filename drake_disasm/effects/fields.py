@@ -42,6 +42,18 @@ def joint_name() -> Any:
     return quantity("", "", "name of the joint in the URDF")
 
 
+def file_name() -> Any:
+    """Returns the field that names a file beside the scenario."""
+    return quantity("", "", "file of the learned function, beside the scenario")
+
+
+def files_of(effect: object) -> dict[str, str]:
+    """Returns the fields of an effect that name files, with the names."""
+    fields = dataclasses.fields(effect)  # type: ignore[arg-type]
+    names = [f.name for f in fields if f.name == "file" and f.type is str]
+    return {name: getattr(effect, name) for name in names if getattr(effect, name)}
+
+
 def acts_at_joint(effect: type) -> bool:
     """Returns whether an effect has a field that names the joint at which it acts."""
     return any(field.name == "joint" for field in dataclasses.fields(effect))

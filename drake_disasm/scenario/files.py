@@ -17,7 +17,7 @@ from drake_disasm.common.plain_data import check_like
 from drake_disasm.common.quantity import check, closest
 from drake_disasm.common.resources import models_dir
 from drake_disasm.common.text import clipped
-from drake_disasm.effects import find_effect
+from drake_disasm.effects import files_of, find_effect
 from drake_disasm.scenario.effect_tags import tagged
 from drake_disasm.scenario.names import find_field, resolve
 from drake_disasm.scenario.older import upgraded
@@ -63,11 +63,19 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     text = read_text(path, "give a scenario in YAML", MOST_BYTES)
     scenario = parse(upgraded(text), Scenario(), str(path))
     _checked(check, scenario, str(path))
+    _find_files(scenario, path.parent)
     for override in overrides:
         scenario = _override(scenario, override)
         _checked(check, scenario, f"--set {override}")
     _checked(validate, scenario, " with --set ".join([str(path), *overrides]))
     return scenario
+
+
+def _find_files(scenario: Scenario, folder: Path) -> None:
+    """Makes the files that effects name in a scenario those beside it."""
+    for effect in scenario.effects:
+        for field, file in files_of(effect).items():
+            setattr(effect, field, str((folder / file).absolute()))
 
 
 def dump_scenario(scenario: Scenario) -> str:

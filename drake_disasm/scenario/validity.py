@@ -1,8 +1,11 @@
 """Checks of scenarios: values within bounds, and consistent with each other."""
 
+import os
+
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import check
-from drake_disasm.effects import find_effect
+from drake_disasm.common.text import clipped
+from drake_disasm.effects import files_of, find_effect
 from drake_disasm.scenario.randomisation import refuse_broken_ranges, with_values
 from drake_disasm.scenario.schema import (
     CartesianImpedanceConfig,
@@ -39,6 +42,7 @@ def _validate_one(scenario: Scenario) -> None:
     """Checks the scenario of one diagram, without its ranges."""
     check(scenario)
     _refuse_unregistered(scenario)
+    _refuse_missing_files(scenario)
     _refuse_broken_periods(scenario)
     _refuse_impossible_stiffness(scenario.arm.cartesian_impedance)
     _refuse_impossible_lock(scenario.lock)
@@ -56,6 +60,16 @@ def _refuse_unregistered(scenario: Scenario) -> None:
                 f"effects.{number}: {known.__name__} has been registered again since "
                 "this one was made; make it again"
             )
+
+
+def _refuse_missing_files(scenario: Scenario) -> None:
+    for number, effect in enumerate(scenario.effects):
+        for field, file in files_of(effect).items():
+            if not effect.is_null and not os.path.isfile(file):
+                raise DisasmError(
+                    f"effects.{number}.{field}: {clipped(file, 200)}: no such file; "
+                    "name the one that closing the loop wrote beside its scenario"
+                )
 
 
 def _refuse_broken_periods(scenario: Scenario) -> None:

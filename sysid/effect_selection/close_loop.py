@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,9 @@ from sysid.effect_selection.detection import DetectionLimit, detection_limits
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.held_out import HeldOut, held_out_errors
+from sysid.effect_selection.left_over import left_over
 from sysid.effect_selection.refit_search import RefitSearch
+from sysid.effect_selection.residual_model import fit_residual_model
 from sysid.effect_selection.search import (
     ForwardSearch,
     LinearSearch,
@@ -83,12 +86,27 @@ class ClosedLoop:
 
     @property
     def scenario(self) -> Scenario | None:
-        """The identified scenario with the effects; None if the model has none."""
+        """The identified scenario with the effects; None if the model has none.
+
+        Without a residual model, which needs a file.
+        """
         scenario = self.last.model.scenario_at(self.last.theta)
         if scenario is None or self.scatter is None:
             return scenario
         more = Imprecision(*self.scatter.std.tolist())
         return dataclasses.replace(scenario, effects=[*scenario.effects, more])
+
+    def scenario_with_residual_model(self, file: str) -> Scenario | None:
+        """Returns the scenario with the learned effect, too, if there is one.
+
+        Args:
+            file: to which its functions are saved, as the scenario names it.
+        """
+        scenario, model = self.scenario, self.verdict.residual_model
+        if scenario is None or model is None:
+            return scenario
+        effects: list[Any] = [*scenario.effects, model.effect(file)]
+        return dataclasses.replace(scenario, effects=effects)
 
 
 def close_loop(
@@ -192,8 +210,12 @@ def _judged(
     first, last, end = found.first, found.last, found.end
     errors = held_out_errors(fitter, first, last, held_out)
     scatter = fit_command_scatter(fitter, last) if may_scatter else None
+    left = left_over(last) if scatter is None else []
+    model = fit_residual_model(last, left, held_out)
     against = contradictions(last, end.linearised, len(fitter.base.parameters))
-    verdict = judge(first, last, end, found.rounds, against, scatter, limits)
+    verdict = judge(
+        first, last, end, found.rounds, against, scatter, limits, left, model
+    )
     return ClosedLoop(
         verdict,
         errors,

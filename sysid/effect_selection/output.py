@@ -7,6 +7,7 @@ from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.residual_diagnosis import diagnose
+from sysid.effect_selection.residual_model import ResidualModel
 from sysid.effect_selection.search import SelectionRound
 from sysid.effect_selection.survey import Survey
 from sysid.effect_selection.verdict import Verdict
@@ -55,7 +56,16 @@ def _verdict(found: Verdict) -> dict[str, Any]:
         "left_in_channels": [dataclasses.asdict(each) for each in found.findings],
         "would_have_been_found": [dataclasses.asdict(each) for each in found.limits],
         "share_explained": found.explained,
+        "left_over": [dataclasses.asdict(each) for each in found.left_over],
+        "residual_model": _residual_model(found.residual_model),
     }
+
+
+def _residual_model(found: ResidualModel | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    errors = {e.channel: dataclasses.asdict(e) for e in found.errors}
+    return {"physical": False, "effect": found.kind.__name__, "errors": errors}
 
 
 def _errors(errors: HeldOut) -> dict[str, Any]:

@@ -470,6 +470,42 @@ class SelectionSettings:
         "than `alpha`, since many covariates are asked of each axis",
     )
 
+    # What a flexible learner finds in what is left.
+    learner_rows: int = _setting(
+        1500, "rows", "more are thinned out evenly: a channel then takes half a second"
+    )
+    learner_folds: int = _setting(
+        5, "folds", "the usual number; contiguous, so that time can't be read off"
+    )
+    learner_lags: tuple[int, ...] = _setting(
+        (1, 4, 16), "rows", "back in time, at which quantities are seen, too"
+    )
+    learner_trees: int = _setting(
+        80, "trees", "at `learner_rate`, as many as scikit-learn's default of 100 fits"
+    )
+    learner_rate: float = _setting(
+        0.08, "1", "shrinkage of each tree; scikit-learn's default is 0.1"
+    )
+    learner_leaves: int = _setting(
+        8, "leaves of a tree", "interactions of up to three quantities"
+    )
+    learner_leaf_rows: int = _setting(
+        20, "rows", "in a leaf, scikit-learn's default: noise averages out"
+    )
+    min_left_over: float = _setting(
+        0.1,
+        "of a channel's mean squared residual",
+        "what a learner explains of rows that it did not see; less is said nothing of: "
+        "about the square of `noticeable`",
+    )
+
+    residual_model_rows: int = _setting(
+        5000, "rows", "more are thinned out evenly: a channel then takes a second"
+    )
+    min_residual_model_gain: float = _setting(
+        0.1, "of the held-out error", "a residual model that gains less is not offered"
+    )
+
     # The verdict.
     min_explained_share: float = _setting(
         0.75,

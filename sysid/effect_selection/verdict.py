@@ -16,6 +16,8 @@ from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.experiments import separating
 from sysid.effect_selection.fit import Fit
+from sysid.effect_selection.left_over import LeftOver
+from sysid.effect_selection.residual_model import ResidualModel
 from sysid.effect_selection.search import SelectionRound
 from sysid.effect_selection.survey import Survey
 from sysid.identification.uncertainty import uncertainty
@@ -84,6 +86,8 @@ class Verdict:
             else 0.
         findings: what is left in single channels.
         limits: how large effects that are not named would have to be to be found.
+        left_over: what a flexible learner explains of what the effects leave.
+        residual_model: learned in their place; not physical. None if it gains little.
     """
 
     ending: Ending
@@ -97,6 +101,8 @@ class Verdict:
     excess: float
     findings: tuple[ChannelFinding, ...] = ()
     limits: tuple[DetectionLimit, ...] = ()
+    left_over: tuple[LeftOver, ...] = ()
+    residual_model: ResidualModel | None = None
 
 
 def judge(
@@ -107,6 +113,8 @@ def judge(
     against: tuple[Contradiction, ...] = (),
     scatter: CommandScatter | None = None,
     limits: Sequence[DetectionLimit] = (),
+    left_over: Sequence[LeftOver] = (),
+    residual_model: ResidualModel | None = None,
 ) -> Verdict:
     """Returns the verdict of a search.
 
@@ -117,6 +125,8 @@ def judge(
         against: episodes that contradict each other.
         scatter: how the arm scatters about its commands, if it does.
         limits: of detection, at the last fit.
+        left_over: what a flexible learner finds in what the last fit leaves.
+        residual_model: of it, if it lowers the held-out error.
     """
     left = [d for d in end.dependences if d.accepted]
     gains = last.effect_gains | ({_SCATTER: scatter.gain} if scatter else {})
@@ -133,13 +143,15 @@ def judge(
         _excess(last, scatter),
         tuple(channel_findings(last)) if scatter is None else (),
         tuple(limit for limit in limits if limit.effect not in names),
+        tuple(left_over),
+        residual_model,
     )
     return dataclasses.replace(found, ending=_ending(found, last))
 
 
 def _ending(found: Verdict, last: Fit) -> Ending:
     enough = found.explained >= last.settings.min_explained_share
-    left = found.dependence or found.contradictions or found.findings
+    left = found.dependence or found.contradictions or found.findings or found.left_over
     if found.names and enough and not found.excess:
         return "partly" if left else "explained"
     return "unexplained" if left or found.names or found.excess else "none"

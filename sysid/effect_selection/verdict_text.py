@@ -15,7 +15,7 @@ from sysid.effect_selection.verdict import ParameterValue, Tie, Verdict
 
 
 def verdict_text(verdict: Verdict, errors: HeldOut, most: int) -> str:
-    """Returns a verdict in three lines.
+    """Returns a verdict in three lines, and one more where a model was learned.
 
     Args:
         verdict: of a search.
@@ -27,6 +27,8 @@ def verdict_text(verdict: Verdict, errors: HeldOut, most: int) -> str:
         _parameter_line(verdict, most),
         f"error on held-out data: {improvement_text(errors)}",
     ]
+    if verdict.residual_model is not None:
+        lines.append(f"besides: {verdict.residual_model.text}")
     return "\n".join(lines)
 
 
@@ -80,7 +82,8 @@ def _left_text(verdict: Verdict) -> str:
     other = contradictions_text(verdict.contradictions)
     if verdict.excess and not other:
         other = f"the residual is {verdict.excess:.2g} times the noise"
-    parts = (verdict.dependence, other, findings_text(verdict.findings))
+    learned = "; ".join(each.text for each in verdict.left_over)
+    parts = (verdict.dependence, other, findings_text(verdict.findings), learned)
     return "; ".join(part for part in parts if part)
 
 

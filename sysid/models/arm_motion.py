@@ -92,6 +92,20 @@ class ArmMotion:
             beta: (b,) base parameters.
             effects: on the arm.
         """
+        samples = self.samples(beta, effects)
+        torque = samples.load
+        for effect in effects:
+            if isinstance(effect, ArmTorqueEffect):
+                torque = torque + effect.torques(samples)
+        return torque
+
+    def samples(self, beta: Array, effects: Sequence[ArmEffect]) -> ArmSamples:
+        """Returns the motion with the load that the rigid bodies are.
+
+        Args:
+            beta: (b,) base parameters.
+            effects: on the arm; bodies that it carries and a tilt are in the load.
+        """
         load: Array = self.Y @ beta
         for effect in effects:
             if isinstance(effect, FlangePayload):
@@ -99,12 +113,7 @@ class ArmMotion:
             elif isinstance(effect, ArmTilt) and not effect.is_null:
                 by_base = np.einsum("njbt,b->njt", self.Y_tilt, beta - self.nominal)
                 load = load + (self.tilt + by_base) @ [effect.rx, effect.ry]
-        samples = ArmSamples(self.joints, self.q, self.v, self.vd, load)
-        torque = load
-        for effect in effects:
-            if isinstance(effect, ArmTorqueEffect):
-                torque = torque + effect.torques(samples)
-        return torque
+        return ArmSamples(self.joints, self.q, self.v, self.vd, load)
 
     def shifted(self, torque: Array, effects: Sequence[DelayEffect]) -> Array:
         """Returns torques (n, joints) as they are read, late or early.

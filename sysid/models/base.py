@@ -129,12 +129,13 @@ class LogModel(abc.ABC):
 
         Args:
             library: classes of effects; those not of `effect_types` are passed over,
-                and those that act on the variance alone.
+                and those that are not physical or act on the variance alone.
         """
         return [
             effect
             for kind in library
-            if issubclass(kind, self.effect_types) and not kind.is_random
+            if issubclass(kind, self.effect_types)
+            if kind.is_physical and not kind.is_random
             for effect in at_null(kind, self.joints)
         ]
 
@@ -301,6 +302,17 @@ class LogModel(abc.ABC):
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """Returns what a channel's residual might depend on, (rows,) each, by name."""
+        return {}
+
+    #: The kind of effect that can stand for what others leave; None for no such.
+    residual_effect: ClassVar[type[Effect] | None] = None
+
+    def residual_inputs(self, theta: Array) -> dict[str, Array]:
+        """Returns what `residual_effect` knows of each channel's rows, (rows, k).
+
+        Args:
+            theta: (p,) values of `parameters`.
+        """
         return {}
 
     # Copies.

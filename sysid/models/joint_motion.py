@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
-from drake_disasm.effects import ArmEffect, DelayEffect, Effect
+from drake_disasm.effects import ArmEffect, ArmResidualModel, DelayEffect, Effect
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
@@ -34,6 +34,7 @@ class JointMotionModel(LogModel):
 
     affine = True
     effect_types = (ArmEffect,)
+    residual_effect = ArmResidualModel
 
     def __init__(
         self,
@@ -79,18 +80,29 @@ class JointMotionModel(LogModel):
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
-        beta, effects = theta[: len(self._motion.nominal)], self.effects_at(theta)
-        on_arm = [e for e in effects if isinstance(e, ArmEffect)]
+        beta, on_arm = theta[: len(self._motion.nominal)], self._on_arm(theta)
         shifts = [e for e in on_arm if isinstance(e, DelayEffect) and not e.is_null]
         if not shifts:
             return self._motion.rows(rows).torques(beta, on_arm)
         torque = self._whole.torques(beta, on_arm)
         return self._whole.shifted(torque, shifts)[self._taken][rows]
 
+    def _on_arm(self, theta: Array) -> list[ArmEffect]:
+        return [e for e in self.effects_at(theta) if isinstance(e, ArmEffect)]
+
     def scenario_at(self, theta: Array) -> Scenario:
         """Returns a scenario with the effects; base parameters are no part of it."""
         effects: list[Any] = list(self.effects_at(theta))
         return dataclasses.replace(self._scenario, effects=effects, randomisation=[])
+
+    def residual_inputs(self, theta: Array) -> dict[str, Array]:
+        """See LogModel; of shifts in time, which are short, they know nothing."""
+        theta = self.with_frozen(theta)
+        samples = self._motion.samples(
+            theta[: len(self._motion.nominal)], self._on_arm(theta)
+        )
+        inputs_of = ArmResidualModel.inputs_of
+        return {joint: inputs_of(samples, joint) for joint in samples.joints}
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: the joint's own motion."""

@@ -14,7 +14,7 @@ from drake_disasm.devices.sensor_chain import (
     sensed_along,
     sensed_at_zeroing,
 )
-from drake_disasm.effects import SensorEffect
+from drake_disasm.effects import Sensing, SensorEffect
 from drake_disasm.scenario import Scenario
 from sysid.models.base import Array
 
@@ -81,6 +81,10 @@ class SensorReading:
         at_rest = self._payload.weight(self._R_WG[None] @ self._R_BS)[0]
         return states[:, 6:] + zero - at_rest + weight
 
+    def sensing(self, states: Array, times: Array) -> Sensing:
+        """Returns the circumstances of readings, of states (n, 12) at times (n,)."""
+        return self._payload.sensing(times, self._R_WS(states))
+
     def read(
         self,
         effects: Sequence[SensorEffect],
@@ -97,7 +101,7 @@ class SensorReading:
             times: (n,) since the episode began [s]; they start anew in each episode.
         """
         raw = self.raw(states, zero)
-        sensing = self._payload.sensing(times, self._R_WS(states))
+        sensing = self.sensing(states, times)
         rest = self._payload.sensing(np.array(0.0), self._R_WG @ self._R_BS)
         load = sensed_along(raw, effects, sensing, zero, rest)
         seen = sensed_at_zeroing(zero, effects, rest)

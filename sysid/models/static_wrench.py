@@ -16,6 +16,7 @@ from drake_disasm.effects import (
     Sensing,
     SensorEffect,
     SensorMemoryEffect,
+    SensorResidualModel,
     sensor_chain,
 )
 from drake_disasm.logs import Episode, Log, rotation_matrices, sensor_wrench
@@ -49,6 +50,7 @@ class StaticWrenchModel(ScenarioModel):
 
     affine = True
     effect_types = (SensorEffect,)
+    residual_effect = SensorResidualModel
 
     def __init__(
         self,
@@ -119,6 +121,12 @@ class StaticWrenchModel(ScenarioModel):
                 }
                 return {"weight": (weight, "N"), **centre}
         return {}
+
+    def residual_inputs(self, theta: Array) -> dict[str, Array]:
+        """See LogModel."""
+        sensing = Sensing(self._time, self._R_WS, _GRAVITY_W)
+        inputs = SensorResidualModel.inputs_of(self.predictions(theta), sensing)
+        return {channel.name: inputs for channel in self.measurements.channels}
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: time, and gravity's direction in S."""

@@ -14,10 +14,12 @@ from drake_disasm.effects import (
     EnvironmentEffect,
     MotionEffect,
     SensorEffect,
+    SensorResidualModel,
     motion_chain,
     sensor_chain,
 )
 from drake_disasm.logs import Log
+from drake_disasm.logs.schema import WRENCH
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.replay import Steps, TwinReplay
@@ -48,6 +50,7 @@ class TwinModel(ScenarioModel):
     """
 
     effect_types = (EnvironmentEffect, MotionEffect, SensorEffect)
+    residual_effect = SensorResidualModel
     held_out_share = 0.25
     has_commands = True
 
@@ -109,8 +112,22 @@ class TwinModel(ScenarioModel):
         states, zero = simulated[:, :12], simulated[0, 12:]
         if not effects:
             return states
-        times = (self._transitions.steps.index[rows] + 1) * self._transitions.period
-        return self._sensing.read(effects, states, zero, times)
+        return self._sensing.read(effects, states, zero, self._times[rows])
+
+    def residual_inputs(self, theta: Array) -> dict[str, Array]:
+        """See LogModel: of readings before zeroing is taken off."""
+        rows = slice(0, self.measurements.rows)
+        simulated = np.concatenate([self.simulate(theta, c) for c in self.chunks()])
+        states = self.read(theta, rows, simulated)
+        raw = self._sensing.raw(states, simulated[0, 12:])
+        sensing = self._sensing.sensing(states, self._times)
+        inputs = SensorResidualModel.inputs_of(raw, sensing)
+        return dict.fromkeys(WRENCH, inputs)
+
+    @property
+    def _times(self) -> Array:
+        """When each step ends (rows,) [s], since its episode began."""
+        return (self._transitions.steps.index + 1) * self._transitions.period
 
     @property
     def simulated(self) -> NDArray[np.bool_]:

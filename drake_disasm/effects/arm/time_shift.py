@@ -1,6 +1,7 @@
 """Torques and motion that were not recorded at the same time."""
 
 import dataclasses
+from collections.abc import Sequence
 
 from drake_disasm.effects.base import DelayEffect
 from drake_disasm.effects.fields import amplitude, joint_name
@@ -42,6 +43,11 @@ class JointDelay(DelayEffect):
     delay: float = amplitude("s", -_MOST, _MOST, "T, of the torque after the motion")
 
     experiment = "fast reversals of this joint, all stamped by one clock"
+
+    @classmethod
+    def places(cls, joints: Sequence[str]) -> list[dict[str, str]]:
+        """See ArmEffect; of a single joint, ArmDelay is the same."""
+        return super().places(joints) if len(joints) > 1 else []
 
     def delays(self, joint: str) -> bool:
         """See DelayEffect: its own."""
