@@ -1,5 +1,6 @@
 """What a log could have shown: the smallest effects that would have been found."""
 
+import dataclasses
 import functools
 from dataclasses import dataclass
 
@@ -45,7 +46,9 @@ def detection_limits(survey: LinearSurvey) -> list[DetectionLimit]:
     groups = {text: g for text, g in survey.groups.items() if len(g)}
     if not groups:
         return []
-    scores = [regression.scores(group) for group in groups.values()]
+    # Whichever side of null noise has pushed them to: there they are all without score.
+    free = dataclasses.replace(regression, side=np.zeros_like(regression.side))
+    scores = [free.scores(group) for group in groups.values()]
     highest = highest_by_chance(scores, settings)
     critical = float(np.quantile(highest, 1.0 - settings.alpha))
     best: dict[tuple[str, str], DetectionLimit] = {}

@@ -362,4 +362,4 @@ def test_a_broken_entry_point_is_named(
 def test_an_effect_acts_at_one_of_the_four_places() -> None:
     assert issubclass(find_effect("GroovePose"), EnvironmentEffect)
     names = [effect.__name__ for effect in registered_effects()]
-    assert names[0] == "GroovePose" and names[-1] == "FlangePayload"
+    assert names[0] == "GroovePose" and names[-1] == "ArmResidualModel"

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+
 JOINTS = ("shoulder", "elbow")
 
 LINK = """<link name="{0}"><inertial><origin xyz="{1}"/><mass value="{2}"/>
@@ -21,3 +23,11 @@ def write_two_link_arm(path: Path) -> Path:
     text += JOINT.format("elbow", "upper", "lower", "0 0.4 0", "0 1.3 0.2")
     path.write_text(text + "</robot>")
     return path
+
+
+def smooth_motion(time: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Returns q, v, vd (n, 2) of two joints at times (n,)."""
+    w = np.array([[2.0, 3.1], [5.3, 7.7]])
+    phase = time[:, None, None] * w
+    q, v = np.sin(phase), w * np.cos(phase)
+    return tuple(a.sum(axis=1) for a in (q, v, -(w**2) * q))

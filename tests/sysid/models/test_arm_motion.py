@@ -21,24 +21,16 @@ from sysid.effect_selection.close_loop import close_loop
 from sysid.models.effects import at_null
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.regressor import ArmDynamics
-from tests.sysid.models.arm import JOINTS, write_two_link_arm
+from tests.sysid.models.arm import JOINTS, smooth_motion, write_two_link_arm
 
 _PERIOD, _ROWS = 0.01, 600
 _NOISE = 0.02  # N m
 
 
-def _motion(time: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Returns q, v, vd (n, 2) of a smooth motion, and the rate of vd."""
-    w = np.array([[2.0, 3.1], [5.3, 7.7]])
-    phase = time[:, None, None] * w
-    q, v = np.sin(phase), w * np.cos(phase)
-    return tuple(a.sum(axis=1) for a in (q, v, -(w**2) * q, -(w**2) * v))
-
-
 def _log(folder, urdf, effects: list[Effect], seed: int = 0) -> Log:
     """Writes what a simulated arm with effects reads, with noise."""
     time = _PERIOD * np.arange(_ROWS)
-    q, v, vd, _ = _motion(time)
+    q, v, vd = smooth_motion(time)
     columns = {"time": time, "q": q, "v": v, "vd": vd, "tau": 5.0 * q}
     header = LogHeader("joint_motion", "excite", {}, joints=JOINTS, urdf=str(urdf))
     with LogWriter(folder / "bare", header) as writer:
@@ -69,7 +61,7 @@ def test_a_late_torque_is_that_of_an_earlier_motion(late, urdf, tmp_path):
     log = _log(tmp_path, urdf, [])
     time = log.episodes[0]["time"]
     arm = ArmDynamics(str(urdf), JOINTS)
-    q, v, vd, _ = _motion(time - late)
+    q, v, vd = smooth_motion(time - late)
     expected = arm.regressor(q, v, vd) @ arm.inertia
     inner = slice(5, -5)  # at its ends the log has no earlier or later motion
     found = _torque(_model(log, [ArmDelay(late)]))
