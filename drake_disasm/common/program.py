@@ -6,6 +6,7 @@ import math
 import signal
 import subprocess
 import sys
+import time
 import warnings
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
@@ -21,6 +22,8 @@ from drake_disasm.common.progress import ProgressUpdate
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 EXIT_TERMINATED = 143
+
+_LINE_PERIOD = 30.0  # s, between lines of progress where stderr is no terminal
 
 
 class Terminated(KeyboardInterrupt):
@@ -117,12 +120,15 @@ def argument_parser(
 
 
 class ProgressBar:
-    """Shows progress on the terminal: one bar per stage, lines above it.
+    """Shows progress on stderr: one bar per stage, lines above it.
 
     Give it to a library call as its `progress`:
 
         with ProgressBar(unit="episode") as progress:
             train(..., progress=progress)
+
+    Where stderr is no terminal but a file, a bar would be written to it thousands of
+    times: there a line says how far it is, twice a minute at most.
 
     Ctrl-C or SIGTERM is raised at the next update even where a library swallowed it.
     """
@@ -132,12 +138,16 @@ class ProgressBar:
 
         Args:
             unit: of the work that is counted, such as "episode".
-            keep: whether a finished bar stays on the terminal.
+            keep: whether a finished bar stays on the terminal, or the last line of a
+                stage is written in any case.
         """
         self._unit = f" {unit}" if unit else ""
         self._keep = keep
         self._bar: tqdm | None = None
         self._stage = ""
+        self._line = ""
+        self._is_terminal = sys.stderr.isatty()
+        self._next_line = time.monotonic() + _LINE_PERIOD
 
     def __call__(self, update: ProgressUpdate) -> None:
         """Shows an update."""
@@ -146,27 +156,44 @@ class ProgressBar:
             if update.message:
                 tqdm.write(update.message)
             return
-        bar = self._bar_of(update)
+        if update.stage != self._stage:
+            self.close()
+            self._stage = update.stage
         remarks = [update.message] if update.message else []
         if math.isfinite(update.value):
             remarks.insert(0, f"{update.value:.4g}")
-        bar.set_postfix_str(", ".join(remarks), refresh=False)
-        bar.update(update.done - bar.n)
+        if self._is_terminal:
+            self._draw(update, ", ".join(remarks))
+        else:
+            self._note(update, remarks)
 
     def close(self) -> None:
         """Ends the bar."""
         if self._bar is not None:
             self._bar.close()
         self._bar = None
+        if self._line and self._keep:
+            self._write()
 
-    def _bar_of(self, update: ProgressUpdate) -> tqdm:
-        """Returns the stage's bar; a new one where the stage is new."""
-        if self._bar is None or update.stage != self._stage:
-            self.close()
-            self._stage = update.stage
+    def _draw(self, update: ProgressUpdate, remarks: str) -> None:
+        """Moves the stage's bar; a new one where the stage is new."""
+        if self._bar is None:
             self._bar = tqdm(desc=update.stage, unit=self._unit, leave=self._keep)
         self._bar.total = update.total or None
-        return self._bar
+        self._bar.set_postfix_str(remarks, refresh=False)
+        self._bar.update(update.done - self._bar.n)
+
+    def _note(self, update: ProgressUpdate, remarks: Sequence[str]) -> None:
+        """Keeps an update as a line, and writes it if the last one is long ago."""
+        count = f"{update.done}/{update.total}" if update.total else f"{update.done}"
+        self._line = f"{update.stage}: " + ", ".join([count + self._unit, *remarks])
+        if time.monotonic() >= self._next_line:
+            self._write()
+
+    def _write(self) -> None:
+        print(self._line, file=sys.stderr, flush=True)
+        self._line = ""
+        self._next_line = time.monotonic() + _LINE_PERIOD
 
     def __enter__(self) -> Self:
         """Returns the bar."""

@@ -1,5 +1,6 @@
 """Progress of library calls on the terminal, and how a program is ended."""
 
+import math
 import signal
 import subprocess
 import sys
@@ -11,23 +12,43 @@ from drake_disasm.common.program import ProgressBar
 from drake_disasm.common.progress import ProgressUpdate
 
 
-def test_a_bar_shows_stage_count_figure_and_remark(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+@pytest.fixture
+def terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    """Has stderr say that it is a terminal; returns what was written."""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    return capsys
+
+
+def test_a_bar_shows_stage_count_figure_and_remark(terminal) -> None:
     with ProgressBar(unit="episode", keep=True) as progress:
         progress(ProgressUpdate("training", 0, 4))
         progress(ProgressUpdate("training", 3, 4, "2/3 solved", 12.345))
-    shown = capsys.readouterr().err
+    shown = terminal.readouterr().err
     for word in ("training", "3/4", "12.3", "2/3 solved", "episode"):
         assert word in shown
 
 
-def test_each_stage_has_its_own_bar(capsys: pytest.CaptureFixture[str]) -> None:
+def test_each_stage_has_its_own_bar(terminal) -> None:
     with ProgressBar(keep=True) as progress:
         progress(ProgressUpdate("fitting", 5))
         progress(ProgressUpdate("simulating", 1, 2))
-    last = capsys.readouterr().err.splitlines()[-1]
+    last = terminal.readouterr().err.splitlines()[-1]
     assert "simulating" in last and "1/2" in last
+
+
+def test_a_file_gets_a_line_now_and_then_and_the_last_of_a_stage_that_is_kept(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(program.time, "monotonic", lambda: now[0])
+    for keep, kept in ((False, ""), (True, "fitting: 1000/4000 run\n")):
+        with ProgressBar("run", keep) as progress:
+            for done in range(1001):
+                now[0] += 0.0625  # s
+                value = 1.5 if done == 479 else math.nan
+                progress(ProgressUpdate("fitting", done, 4000, value=value))
+        lines = "fitting: 479/4000 run, 1.5\nfitting: 959/4000 run\n"
+        assert capsys.readouterr().err == lines + kept
 
 
 def test_a_message_without_a_count_is_a_line(
