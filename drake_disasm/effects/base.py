@@ -15,6 +15,7 @@ place's method, and put `@register_effect` above it.
 import abc
 import dataclasses
 import inspect
+import re
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
@@ -98,6 +99,11 @@ class Sensing:
         return self.g_W @ self.R_WS
 
 
+def name_in_words(name: str) -> str:
+    """Returns a class's name as words: "torque offset" of TorqueOffset."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name).lower()
+
+
 @dataclasses.dataclass
 class Effect:
     """Base of all effects; see the module's docstring.
@@ -105,14 +111,19 @@ class Effect:
     Attributes:
         is_random: whether it acts on the variance alone; models predict the mean.
         is_physical: whether it has a meaning beyond its log: searches try no others.
+        noun: what a sentence calls it: "dry friction"; by default its name in words.
         experiment: the recording that shows it apart from others, in words.
+        task_experiment: the same in steps of the task, if that is no recording of
+            these: readings at rest, say.
         experiments_against: what separates it from a rival, by the rival's name; one
             of the two need say it.
     """
 
     is_random: ClassVar[bool] = False
     is_physical: ClassVar[bool] = True
+    noun: ClassVar[str] = ""
     experiment: ClassVar[str] = ""
+    task_experiment: ClassVar[str] = ""
     experiments_against: ClassVar[Mapping[str, str]] = {}
 
     @property
@@ -125,6 +136,11 @@ class Effect:
         """Returns what it is, in a line: the first paragraph of its docstring."""
         paragraph = inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0]
         return " ".join(paragraph.split())
+
+    @classmethod
+    def in_words(cls) -> str:
+        """Returns what a sentence calls it."""
+        return cls.noun or name_in_words(cls.__name__)
 
 
 class EnvironmentEffect(Effect, abc.ABC):

@@ -38,6 +38,10 @@ from sysid.effect_selection.search import (
 from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
 from sysid.effect_selection.survey import Survey
 from sysid.effect_selection.verdict import Verdict, judge
+from sysid.effect_selection.verdict_sentence import (
+    indistinguishable_text,
+    verdict_sentence,
+)
 from sysid.effect_selection.verdict_text import verdict_text
 from sysid.identification.noise import with_estimated_noise
 from sysid.identification.split import train_and_test
@@ -75,8 +79,14 @@ class ClosedLoop:
     is_provisional: bool = False
 
     @property
+    def sentence(self) -> str:
+        """The verdict in plain English, with what the log can't tell apart."""
+        found = verdict_sentence(self.verdict, self.errors)
+        return " ".join(filter(None, [found, indistinguishable_text(self.verdict)]))
+
+    @property
     def text(self) -> str:
-        """The verdict in three lines: what is missing, its parameters, the errors.
+        """The verdict in lines: a sentence, what is missing, its parameters, errors.
 
         A provisional one says so in a line before them.
         """

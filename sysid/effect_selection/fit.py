@@ -110,9 +110,9 @@ class Fit:
     def at_bound(self, names: Sequence[str]) -> bool:
         """Returns whether an amplitude of some effects is at a bound: unphysical."""
         effects = [effect for effect in self.effects if effect.name in names]
-        return not all(self._inside(self.columns_of(e)).all() for e in effects)
+        return not all(self.inside(self.columns_of(e)).all() for e in effects)
 
-    def _inside(self, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def inside(self, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Returns which of some parameters (k,) are not at a bound."""
         margin, u = self.settings.bound_tolerance, self.linearisation.u[columns]
         return np.asarray((u > margin) & (u < 1.0 - margin))
@@ -140,7 +140,7 @@ class Fit:
         found, which = [], self.significant
         for effect in added:
             columns = self.columns_of(effect)
-            kept = self._inside(columns)
+            kept = self.inside(columns)
             fields = [f for f, keep in zip(effect.fields, kept, strict=True) if keep]
             if fields and (not is_joint_group(added) or which[columns].any()):
                 found.append(effect.only(fields))

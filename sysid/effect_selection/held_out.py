@@ -26,6 +26,8 @@ class HeldOut:
         channels: what the columns are.
         how: how the rows were held out, in words.
         draws: of the bootstrap.
+        names: of the episodes.
+        period: of the rows' sampling [s]; None if they are not equally spaced.
     """
 
     measured: Array
@@ -35,6 +37,17 @@ class HeldOut:
     channels: tuple[Channel, ...]
     how: str
     draws: int
+    names: tuple[str, ...] = ()
+    period: float | None = None
+
+    @property
+    def has_meaningful_share(self) -> bool:
+        """Whether an error as a share of the readings means something.
+
+        Not of readings near zero, nor of forces and torques together.
+        """
+        one_unit = len({channel.unit for channel in self.channels}) == 1
+        return one_unit and self.relative(self.before) <= 1.0
 
     def rms(self, predicted: Array) -> Array:
         """Returns the rms error (channels,) of a prediction, SI."""
@@ -103,6 +116,8 @@ def held_out_errors(
         measured.channels,
         how,
         fitter.settings.bootstrap_draws,
+        measured.names,
+        measured.period,
     )
 
 

@@ -23,9 +23,11 @@ def to_mapping(closed: ClosedLoop) -> dict[str, Any]:
     )
     return {
         **_verdict(closed.verdict),
+        "sentence": closed.sentence,
         "text": closed.text,
         "provisional": closed.is_provisional,
         "errors": _errors(closed.errors),
+        "channels_made_worse": closed.last.harmed_channels(closed.first),
         "residual_before": [dataclasses.asdict(channel) for channel in before],
         "residual_after": [dataclasses.asdict(channel) for channel in after],
         "rounds": [_round(each) for each in closed.rounds],
@@ -49,6 +51,7 @@ def _verdict(found: Verdict) -> dict[str, Any]:
                 "unit": value.unit,
                 "interval_95": list(value.interval),
                 "excludes_null": value.excludes_null,
+                "is_at_bound": value.is_at_bound,
             }
             for value in found.values
         },

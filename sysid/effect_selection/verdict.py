@@ -39,6 +39,7 @@ class ParameterValue:
         value, unit: SI.
         interval: 95 %, by a block bootstrap.
         null: at which the effect vanishes; None for a shape parameter.
+        is_at_bound: whether the fit ended at a bound: the value is none of its own.
     """
 
     name: str
@@ -46,6 +47,7 @@ class ParameterValue:
     unit: str
     interval: tuple[float, float]
     null: float | None
+    is_at_bound: bool = False
 
     @property
     def excludes_null(self) -> bool:
@@ -135,7 +137,7 @@ def judge(
         "none",
         names,
         tuple(gains[name] for name in names),
-        tuple(_ties(name, rounds) for name in names),
+        tuple(_ties(name, rounds, last.model.has_commands) for name in names),
         parameter_values(last, len(first.theta)) + _scatter_values(scatter),
         left[0].name if left else "",
         _explained(first, last, left[0].gain if left else 0.0),
@@ -202,6 +204,7 @@ def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
     scaling = Scaling(fit.model.parameters)
     ends = np.clip(fit.linearisation.u[:, None] + spread.bootstrap, 0.0, 1.0)
     low, high = (scaling.from_unit(side) for side in ends.T)
+    inside = fit.inside(np.arange(len(fit.theta)))
     return tuple(
         ParameterValue(
             p.name,
@@ -209,20 +212,23 @@ def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
             p.unit,
             (float(low[i]), float(high[i])),
             None if p.is_shape else 0.0,
+            not inside[i] and fit.theta[i] != p.nominal,
         )
         for i, p in enumerate(fit.model.parameters)
         if i >= own
     )
 
 
-def _ties(name: str, rounds: Sequence[SelectionRound]) -> tuple[Tie, ...]:
+def _ties(
+    name: str, rounds: Sequence[SelectionRound], at_task: bool
+) -> tuple[Tie, ...]:
     """Returns what explained as much when an effect was added, each once."""
     joint = name.partition(".")[2]
     for found in rounds:
         if name in found.chosen.effects:
             others = [_other(tie, joint) for tie in found.ties]
             return tuple(
-                Tie(other, separating(name, other))
+                Tie(other, separating(name, other, at_task))
                 for other in dict.fromkeys(others)
                 if name not in other.split(" and ")
             )

@@ -29,6 +29,7 @@ class JointAsymmetricFriction(JointEffect):
         0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP
     )
 
+    noun = "friction that depends on the direction"
     experiment = "this joint both ways at the same speeds, with rests"
     experiments_against: ClassVar = {
         "TorqueOffset": "rests: an offset is there at rest",

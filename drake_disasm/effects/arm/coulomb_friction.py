@@ -28,6 +28,7 @@ class JointCoulombFriction(JointEffect):
         0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP
     )
 
+    noun = "dry friction"
     experiment = "this joint at three or more constant speeds, both ways"
     experiments_against: ClassVar = {
         "JointViscousFriction": "three or more constant speeds",

@@ -32,6 +32,7 @@ class FlangePayload(ArmEffect):
     cy: float = amplitude("kg m", -10.0, 10.0, "first moment along y_F")
     cz: float = amplitude("kg m", -10.0, 10.0, "first moment along z_F")
 
+    noun = "a payload on the flange"
     experiment = "rests in several poses, with and without what hangs there"
 
     @property

@@ -27,6 +27,7 @@ class JointLoadFriction(JointEffect):
         0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP
     )
 
+    noun = "friction in proportion to the load"
     experiment = "the same motion with two payloads"
 
     def torque(self, samples: JointSamples) -> np.ndarray:

@@ -29,6 +29,7 @@ class JointStribeckFriction(JointEffect):
         0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", (0.02,)
     )
 
+    noun = "friction that falls with speed"
     experiment = "this joint at constant speeds below 0.1 rad/s, both ways"
     experiments_against: ClassVar = {
         "JointCoulombFriction": "slow ramps through zero speed",

@@ -21,6 +21,7 @@ class TorqueOffset(JointEffect):
     joint: str = joint_name()
     size: float = amplitude("N m", -200.0, 200.0, "offset of the reading")
 
+    noun = "an offset of the torque"
     experiment = "rests of this joint in several poses, each reached from both sides"
 
     def torque(self, samples: JointSamples) -> np.ndarray:

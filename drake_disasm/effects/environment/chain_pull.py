@@ -28,6 +28,7 @@ class ChainPull(EnvironmentEffect):
     )
 
     is_local = True
+    noun = "a constant pull on the bolt"
     experiment = "the same pull both ways: a chain keeps its sign, friction does not"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:

@@ -19,6 +19,7 @@ class ContactExponent(EnvironmentEffect):
     change: float = amplitude("1", -1.0, 3.0, "added to the exponent e")
 
     contact_models = ("impact",)
+    noun = "another exponent of the contact"
     experiment = "slow presses against one wall, from light to strong"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:

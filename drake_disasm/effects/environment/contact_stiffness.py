@@ -21,6 +21,7 @@ class ContactStiffness(EnvironmentEffect):
 
     log_factor: float = amplitude("1", -5.0, 5.0, "natural logarithm of the factor")
 
+    noun = "another stiffness of the contact"
     experiment = "slow presses against one wall, up to three forces or more"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:

@@ -26,6 +26,7 @@ class GrooveBend(EnvironmentEffect):
     kz: float = amplitude("1/m", -2.0, 2.0, "curvature across the groove")
 
     is_local = True
+    noun = "a bent groove"
     experiment = "slow pulls over the whole groove, both ways and along both walls"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:

@@ -21,6 +21,7 @@ class GrooveClearance(EnvironmentEffect):
 
     change: float = amplitude("m", -5e-4, 1e-3, "added to the clearance")
 
+    noun = "a groove of another width"
     experiment = "small steps sideways from wall to wall, at several depths"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:

@@ -20,6 +20,7 @@ class GrooveFriction(EnvironmentEffect):
 
     coefficient: float = amplitude("1", -1.0, 1.0, "added to the nominal mu")
 
+    noun = "friction in the groove"
     experiment = "pulls both ways against one wall under two normal forces"
     experiments_against: ClassVar = {
         "GroovePose": (

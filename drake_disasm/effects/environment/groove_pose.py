@@ -32,6 +32,7 @@ class GroovePose(EnvironmentEffect):
     y: float = amplitude("m", -0.001, 0.001, "offset out of the plate")
     z: float = amplitude("m", -0.002, 0.002, "offset across the groove")
 
+    noun = "a groove that is turned or offset"
     experiment = "pulls in both directions, the bolt turned by a known angle between"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:

@@ -35,6 +35,7 @@ class RustyPatch(EnvironmentEffect):
     )
 
     is_local = True
+    noun = "a patch of friction in the groove"
     experiment = "slow pulls over the whole groove, both ways, under one normal force"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:

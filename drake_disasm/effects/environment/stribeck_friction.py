@@ -25,6 +25,7 @@ class GrooveStribeckFriction(EnvironmentEffect):
     )
 
     is_local = True
+    noun = "friction in the groove that falls with speed"
     experiment = "pulls under one normal force, from very slow to fast"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:

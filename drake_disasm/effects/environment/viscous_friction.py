@@ -21,6 +21,7 @@ class GrooveViscousFriction(EnvironmentEffect):
     coefficient: float = amplitude("N s/m", 0.0, 1000.0, "c, the drag per velocity")
 
     is_local = True
+    noun = "viscous drag in the groove"
     experiment = "pulls under one normal force at three or more speeds"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:

@@ -29,6 +29,7 @@ class Backlash(MotionEffect):
     w: float = amplitude("rad", 0.0, 0.05, "play about z_G")
 
     stage = 2
+    noun = "backlash of the arm"
     experiment = "reversals after long and short steps, in free space and under load"
     experiments_against: ClassVar = {
         "Compliance": "the same reversals under two loads: backlash does not grow",

@@ -26,6 +26,7 @@ class CommandGain(MotionEffect):
     v: float = amplitude("1", -0.5, 0.5, "relative error of the rotation about y_G")
     w: float = amplitude("1", -0.5, 0.5, "relative error of the rotation about z_G")
 
+    noun = "a scale error of the motion"
     experiment = "steps of several lengths in free space"
 
     def execute(

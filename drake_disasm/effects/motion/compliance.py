@@ -29,6 +29,7 @@ class Compliance(MotionEffect):
     w: float = amplitude("rad/(N m)", 0.0, 4e-4, "compliance about z_G")
 
     stage = 3
+    noun = "compliance of arm and gripper"
     experiment = "the same steps under two loads"
 
     def execute(

@@ -30,6 +30,7 @@ class Imprecision(MotionEffect):
 
     stage = 4
     is_random = True
+    noun = "scatter of the arm about its commands"
     experiment = "the same steps many times over in free space: how far they scatter"
 
     def execute(

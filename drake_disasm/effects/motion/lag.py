@@ -23,6 +23,7 @@ class MotionLag(MotionEffect):
     delay: float = amplitude("s", 0.0, 0.1, "of the motion behind its command")
 
     stage = 1
+    noun = "a delay of the motion"
     experiment = "fast and slow steps over the same path in free space"
 
     def execute(

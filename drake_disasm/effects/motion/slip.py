@@ -25,6 +25,7 @@ class BoltSlip(MotionEffect):
     z: float = amplitude("m/(N s)", 0.0, 1e-3, "creep along z_G")
 
     stage = 3
+    noun = "slip of the bolt in the grip"
     experiment = "a strong pull and back: slip stays, compliance returns"
 
     def execute(

@@ -26,6 +26,7 @@ class BaseTilt(SensorEffect):
 
     stage = -1
     removed_by_zeroing = True
+    noun = "a tilted base"
     experiment = "the same orientations of the sensor with the arm's base turned"
 
     def circumstances(self, sensing: Sensing) -> Sensing:

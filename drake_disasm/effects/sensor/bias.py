@@ -27,9 +27,11 @@ class SensorBias(SensorEffect):
     tz: float = amplitude("N m", -5.0, 5.0, "torque offset about z_S")
 
     present_at_zeroing = False
+    noun = "an offset of the sensor"
     experiment = (
         "readings in six or more orientations, which turn the weight but not an offset"
     )
+    task_experiment = "steps in free space, where an offset stays and contact does not"
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
         """Adds the offset."""

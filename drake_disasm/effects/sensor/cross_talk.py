@@ -52,7 +52,9 @@ class SensorCrossTalk(SensorEffect):
     tz_ty: float = amplitude("1", -0.5, 0.5, "what tz picks up of ty")
 
     stage = 2
+    noun = "cross-talk of the sensor"
     experiment = "a known weight along one axis of the sensor at a time"
+    task_experiment = "presses along one axis of the groove at a time"
     experiments_against: ClassVar = {
         "SensorMounting": (
             "a known weight along one axis at a time: rotated axes mix channels "

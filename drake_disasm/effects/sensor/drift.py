@@ -35,7 +35,9 @@ class SensorDrift(SensorEffect):
     )
 
     present_at_zeroing = False
+    noun = "a drift of the sensor"
     experiment = "the first pose again at the end, and a rest of some minutes"
+    task_experiment = "the first steps again at the end, with a rest before them"
     experiments_against: ClassVar = {
         "SensorWarmUp": "a longer rest: a warm-up ends, a drift goes on",
     }

@@ -27,7 +27,9 @@ class SensorGain(SensorEffect):
     tz: float = amplitude("1", -0.5, 0.5, "relative error of the torque about z_S")
 
     stage = 2
+    noun = "a gain error of the sensor"
     experiment = "known weights of several sizes, along each axis of the sensor"
+    task_experiment = "presses of several forces along each axis of the groove"
     experiments_against: ClassVar = {
         "PayloadError": (
             "the same poses with a second, known weight: an error of the payload "

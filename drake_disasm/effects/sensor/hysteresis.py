@@ -27,6 +27,7 @@ class SensorHysteresis(SensorMemoryEffect):
     )
 
     stage = 2
+    noun = "hysteresis of the sensor"
     experiment = "loading and unloading along one axis, in small steps"
 
     def begin(self, wrench_S: np.ndarray) -> np.ndarray:

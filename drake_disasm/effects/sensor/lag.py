@@ -25,6 +25,7 @@ class SensorLag(SensorMemoryEffect):
     )
 
     stage = 3
+    noun = "a slow filter of the sensor"
     experiment = "fast motion and slow motion over the same path"
 
     def begin(self, wrench_S: np.ndarray) -> np.ndarray:

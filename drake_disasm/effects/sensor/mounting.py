@@ -26,10 +26,12 @@ class SensorMounting(SensorEffect):
     rz: float = amplitude("rad", -0.5, 0.5, "rotation about z_S")
 
     stage = 1
+    noun = "a turned mounting of the sensor"
     experiment = (
         "the same poses with two known weights, gravity along each axis of the sensor "
         "in turn"
     )
+    task_experiment = "presses along one axis of the groove at a time"
     experiments_against: ClassVar = {
         "BaseTilt": (
             "the arm's base, or its first joint, rotated: a tilt is fixed to the "

@@ -30,7 +30,9 @@ class PayloadError(SensorEffect):
 
     stage = 0
     removed_by_zeroing = True
+    noun = "an error of the payload"
     experiment = "six or more orientations, with and without the tool"
+    task_experiment = "steps in free space that turn the bolt: a weight turns with it"
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
         """Adds the weight that the tool data lack."""

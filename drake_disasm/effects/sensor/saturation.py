@@ -27,6 +27,7 @@ class SensorSaturation(SensorEffect):
     )
 
     stage = 4
+    noun = "saturation of the sensor"
     experiment = "loads near the end of the range, along each axis"
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:

@@ -33,6 +33,7 @@ class SensorWarmUp(SensorEffect):
     )
 
     present_at_zeroing = False
+    noun = "warm-up of the sensor"
     experiment = "a rest from switching on until the reading stays, pose unchanged"
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:

@@ -1,57 +1,24 @@
 """Verdicts in words."""
 
-import numpy as np
 import pytest
 
 from sysid.effect_selection.channel_checks import ChannelFinding
 from sysid.effect_selection.contradictions import Contradiction
 from sysid.effect_selection.detection import DetectionLimit
-from sysid.effect_selection.held_out import HeldOut
-from sysid.effect_selection.verdict import ParameterValue, Tie, Verdict
+from sysid.effect_selection.verdict import ParameterValue, Tie
+from sysid.effect_selection.verdict_sentence import verdict_sentence
 from sysid.effect_selection.verdict_text import verdict_text
-from sysid.models import Channel
+from tests.sysid.effect_selection.verdicts import ERRORS, made_verdict
 
-_ERRORS = HeldOut(
-    np.array([[10.0], [-10.0]]),
-    np.array([[11.0], [-11.0]]),
-    np.array([[10.1], [-10.1]]),
-    np.zeros(2, dtype=np.int64),
-    (Channel("fx", "N", 0.1, "as given"),),
-    "1 episode",
-    100,
-)
 _VALUE = ParameterValue("GrooveFriction.mu", 0.2, "1", (0.1, 0.3), 0.0)
 _SHAPE = ParameterValue("SensorLag.tau", 0.5, "s", (0.4, 0.6), None)
 _RIVAL = Tie("GrooveBend", "slow pulls both ways")
 
 
-def _text(
-    ending,
-    names=(),
-    ties=(),
-    values=(),
-    dependence="",
-    against=(),
-    excess=0.0,
-    findings=(),
-    limits=(),
-):
-    gains = tuple(0.5 for _ in names)
-    ties = ties or tuple(() for _ in names)
-    found = Verdict(
-        ending,
-        names,
-        gains,
-        ties,
-        values,
-        dependence,
-        1.0,
-        against,
-        excess,
-        findings,
-        limits,
-    )
-    return verdict_text(found, _ERRORS, most=3).split("\n")
+def _text(*arguments, **more):
+    """Returns what is missing, the parameters and the error, each a line."""
+    lines = verdict_text(made_verdict(*arguments, **more), ERRORS, most=3).split("\n")
+    return [line for line in lines[1:] if not line.startswith("that is: ")]
 
 
 def test_nothing_is_missing():
@@ -132,3 +99,21 @@ def test_shape_parameters_are_listed_for_few_effects(count, is_shown):
 def test_a_parameter_that_may_be_null_is_not_listed():
     value = ParameterValue("SensorLag.size", 0.1, "N", (-0.1, 0.3), 0.0)
     assert _text("explained", ("SensorLag",), values=(value,))[1] == "parameters: none"
+
+
+def test_a_value_at_a_bound_is_marked():
+    value = ParameterValue("SensorLag.share", 1.0, "1", (0.9, 1.0), 0.0, True)
+    _, values, _ = _text("explained", ("SensorLag",), values=(value,))
+    assert values.endswith("SensorLag.share = 1 (0.9 to 1, at its bound)")
+
+
+def test_the_sentence_comes_first_and_names_are_said_in_words():
+    names = tuple(f"JointCoulombFriction.j{i}" for i in range(3))
+    found = made_verdict("explained", names)
+    sentence, missing, meaning, *_ = verdict_text(found, ERRORS, 3).split("\n")
+    assert sentence == verdict_sentence(found, ERRORS)
+    assert missing == "missing: JointCoulombFriction of 3 joints"
+    assert meaning == (
+        "that is: JointCoulombFriction: Dry friction of constant size against the "
+        "motion."
+    )

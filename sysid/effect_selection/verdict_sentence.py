@@ -1,0 +1,178 @@
+"""A verdict in plain English: one sentence, and one on what a log can't tell apart.
+
+The model lacks dry friction at six joints and an offset of the torque at four; with
+them the held-out error falls from 6.7 % to 2.1 % of the torque.
+
+Whatever a verdict has to say of what is left is a clause in `left_in_words`.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sysid.effect_selection.channel_checks import ChannelFinding
+from sysid.effect_selection.contradictions import Contradiction
+from sysid.effect_selection.effect_names import (
+    by_kind,
+    effect_class,
+    effects_in_words,
+    enumeration,
+    in_words,
+)
+from sysid.effect_selection.held_out import HeldOut
+from sysid.effect_selection.verdict import Verdict
+
+_QUANTITIES = {"N": "force", "N m": "torque", "m": "position", "rad": "orientation"}
+_SAME = 0.02  # of an error, below which two digits show no change
+
+
+def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
+    """Returns a verdict as one sentence.
+
+    Args:
+        verdict: of a search.
+        errors: on rows that were not fitted.
+    """
+    if verdict.ending == "none":
+        return f"{_nothing(verdict)}."
+    effects, improved = effects_in_words(verdict.names), improvement_in_words(errors)
+    them = "it" if len(verdict.names) == 1 else "them"
+    left = left_in_words(verdict)
+    if verdict.ending == "unexplained":
+        nearest = f"; the nearest is {effects}, with which {improved}"
+        why = f", since {left}" if left else ""
+        text = f"The model lacks something that no effect of the library explains{why}"
+        return f"{text}{nearest if effects else ''}."
+    rest = f", but not all is explained: {left}" if left else ""
+    return f"The model lacks {effects}; with {them} {improved}{rest}."
+
+
+def indistinguishable_text(verdict: Verdict) -> str:
+    """Returns which kinds of effects the log can't tell apart, in sentences."""
+    sentences = []
+    for kind, (rivals, experiments) in indistinguishable(verdict).items():
+        others = enumeration([in_all_words(rival) for rival in rivals], "or")
+        them = "the two" if len(rivals) == 1 else "them"
+        sentences.append(
+            f"This log can't tell {in_words(kind)} from {others}; to separate {them}, "
+            f"record: {' / '.join(experiments)}."
+        )
+    return " ".join(sentences)
+
+
+def indistinguishable(
+    verdict: Verdict,
+) -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
+    """Returns for each kind of effect its rivals' kinds, and experiments."""
+    found: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {}
+    for name, ties in zip(verdict.names, verdict.ties, strict=True):
+        kind = name.partition(".")[0]
+        rivals, experiments = found.get(kind, ((), ()))
+        rivals += tuple(_kinds(tie.name) for tie in ties)
+        experiments += tuple(tie.experiment for tie in ties)
+        if ties:
+            found[kind] = (
+                tuple(dict.fromkeys(rivals)),
+                tuple(dict.fromkeys(experiments)),
+            )
+    return found
+
+
+def in_all_words(name: str) -> str:
+    """Returns an effect, or several that are joined by "and", in words."""
+    return " and ".join(in_words(part) for part in name.split(" and "))
+
+
+def improvement_in_words(errors: HeldOut) -> str:
+    """Returns how the held-out error changes: "the held-out error falls from ..."."""
+    before, after = (errors.rms_by_unit(p) for p in (errors.before, errors.after))
+    if errors.has_meaningful_share:
+        relative = [errors.relative(p) for p in (errors.before, errors.after)]
+        word = _QUANTITIES.get(next(iter(before)), "readings")
+        a, b = (f"{_two_digits(100.0 * share)} %" for share in relative)
+        changes = {f"{a} to {b} of the {word}": relative[1] - relative[0]}
+    else:
+        changes = {
+            f"{before[unit]:.3g} to {after[unit]:.3g} {unit}": after[unit] - old
+            for unit, old in before.items()
+            if unit in _above_noise(errors) and abs(after[unit] - old) > _SAME * old
+        }
+    return _changes_in_words(changes)
+
+
+def _above_noise(errors: HeldOut) -> set[str]:
+    """Returns the units of channels that are above their noise; all if none is."""
+    ends = [errors.rms(predicted) for predicted in (errors.before, errors.after)]
+    below = np.max(ends, axis=0) < [channel.noise for channel in errors.channels]
+    units = np.array([channel.unit for channel in errors.channels])
+    return set(units[~below] if not below.all() else units)
+
+
+def _changes_in_words(changes: dict[str, float]) -> str:
+    verbs = {
+        "falls": [text for text, change in changes.items() if change < 0.0],
+        "rises": [text for text, change in changes.items() if change > 0.0],
+    }
+    clauses = [
+        f"{verb} {enumeration([f'from {text}' for text in texts])}"
+        for verb, texts in verbs.items()
+        if texts
+    ]
+    return f"the held-out error {' but '.join(clauses) or 'stays the same'}"
+
+
+def left_in_words(verdict: Verdict) -> str:
+    """Returns what is left, in a few words; empty if nothing is."""
+    against = _contradictions(verdict.contradictions)
+    excess = ""
+    if verdict.excess and not against:
+        excess = f"the residual is {verdict.excess:.2g} times the noise"
+    clauses = (verdict.dependence, against, excess, _findings(verdict.findings))
+    return enumeration([clause for clause in clauses if clause])
+
+
+def contradictions_text(found: Sequence[Contradiction]) -> str:
+    """Returns which episodes contradict each other, in words; empty if none does."""
+    if not found:
+        return ""
+    each = "; ".join(f"{' against '.join(c.episodes)} ({c.effect})" for c in found)
+    return f"episodes that no common effect explains: {each}"
+
+
+def _contradictions(found: Sequence[Contradiction]) -> str:
+    texts = []
+    for each in found:
+        first, others = each.episodes[0], each.episodes[1:]
+        kind = each.effect.partition("[")[0]
+        why = in_all_words(kind) if effect_class(kind) else kind
+        against = enumeration(others) or "the other episodes"
+        texts.append(f"{first} contradicts {against} by {why}")
+    return enumeration(texts)
+
+
+def _findings(found: Sequence[ChannelFinding]) -> str:
+    names = list(dict.fromkeys(each.channel for each in found))
+    return f"something is left in {enumeration(names)}" if names else ""
+
+
+def _nothing(verdict: Verdict) -> str:
+    """Returns that nothing is missing, and what would have been found."""
+    text = "This log shows nothing that the model lacks: the residual is noise"
+    kinds = by_kind([limit.effect for limit in verdict.limits])
+    seen = by_kind([x.effect for x in verdict.limits if x.amplitude is not None])
+    if not kinds:
+        return text
+    return (
+        f"{text}, in which {len(seen)} of {len(kinds)} kinds of effects would have "
+        "been found if they were large enough"
+    )
+
+
+def _two_digits(value: float) -> str:
+    return f"{value:.2g}" if value < 99.0 else f"{value:.0f}"
+
+
+def _kinds(name: str) -> str:
+    """Returns the effects of a tie without their joints."""
+    parts = [part.partition(".")[0] for part in name.split(" and ")]
+    return " and ".join(dict.fromkeys(parts))

@@ -1,0 +1,132 @@
+"""Verdicts as a sentence of plain English."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from drake_disasm.effects import registered_effects
+from sysid.effect_selection.channel_checks import ChannelFinding
+from sysid.effect_selection.contradictions import Contradiction
+from sysid.effect_selection.detection import DetectionLimit
+from sysid.effect_selection.effect_names import effects_in_words, in_words
+from sysid.effect_selection.experiments import separating
+from sysid.effect_selection.verdict import Tie
+from sysid.effect_selection.verdict_sentence import (
+    improvement_in_words,
+    indistinguishable_text,
+    verdict_sentence,
+)
+from sysid.models import Channel
+from tests.sysid.effect_selection.verdicts import ERRORS, made_verdict
+
+_FALLS = "the held-out error falls from 10 % to 1 % of the force"
+
+
+def _joints(kind, count):
+    return tuple(f"{kind}.j{i}" for i in range(count))
+
+
+def test_an_arm_that_lacks_friction_and_offsets():
+    names = _joints("JointCoulombFriction", 6) + _joints("TorqueOffset", 4)
+    assert verdict_sentence(made_verdict("explained", names), ERRORS) == (
+        "The model lacks dry friction at six joints and an offset of the torque at "
+        f"four; with them {_FALLS}."
+    )
+
+
+def test_none_says_what_the_log_could_have_shown():
+    limits = (
+        DetectionLimit("SensorLag", "share", 0.01, "1", 0.1),
+        DetectionLimit("TorqueOffset.j1", "size", 0.2, "N m", 0.1),
+        DetectionLimit("TorqueOffset.j2", "size", None, "N m", 1.2),
+        DetectionLimit("GrooveBend", "k", None, "1/m", 3.0),
+    )
+    assert verdict_sentence(made_verdict("none", limits=limits), ERRORS) == (
+        "This log shows nothing that the model lacks: the residual is noise, in which "
+        "2 of 3 kinds of effects would have been found if they were large enough."
+    )
+
+
+def test_partly_explained_says_what_is_left():
+    findings = tuple(
+        ChannelFinding(name, "2 outlying rows (row 4, 5)") for name in ("fx", "fy")
+    )
+    found = made_verdict("partly", ("SensorLag",), findings=findings)
+    assert verdict_sentence(found, ERRORS) == (
+        f"The model lacks a slow filter of the sensor; with it {_FALLS}, but not all "
+        "is explained: something is left in fx and fy."
+    )
+
+
+@pytest.mark.parametrize(
+    ("left", "why"),
+    [
+        ({"dependence": "fx depends on time"}, "fx depends on time"),
+        ({"excess": 3.14}, "the residual is 3.1 times the noise"),
+        (
+            {
+                "excess": 3.14,
+                "against": (Contradiction(("a", "b"), "SensorBias", 0.5),),
+            },
+            "a contradicts b by an offset of the sensor",
+        ),
+    ],
+)
+def test_unexplained_says_why_and_what_is_nearest(left, why):
+    lacks = "The model lacks something that no effect of the library explains"
+    nearest = f"the nearest is a slow filter of the sensor, with which {_FALLS}"
+    assert verdict_sentence(made_verdict("unexplained", **left), ERRORS) == (
+        f"{lacks}, since {why}."
+    )
+    found = made_verdict("unexplained", ("SensorLag",), **left)
+    assert verdict_sentence(found, ERRORS) == f"{lacks}, since {why}; {nearest}."
+
+
+def test_a_few_joints_are_named():
+    assert effects_in_words(("RotorInertia.a", "Mine.a", "Mine.b", "MyOwnThing")) == (
+        "inertia of the rotor at a, mine at a and b and my own thing"
+    )
+
+
+def test_what_a_log_cannot_tell_apart_is_said_once_for_all_joints():
+    names = _joints("JointCoulombFriction", 3)
+    ties = tuple(
+        (Tie(name.replace("Coulomb", "Load"), "two payloads"),) for name in names
+    )
+    assert indistinguishable_text(made_verdict("explained", names, ties)) == (
+        "This log can't tell dry friction from friction in proportion to the load; to "
+        "separate the two, record: two payloads."
+    )
+
+
+def test_errors_of_several_units_are_no_shares_and_those_that_rise_are_said():
+    channels = (Channel("fx", "N"), Channel("x", "m"), Channel("tx", "N m"))
+    errors = dataclasses.replace(
+        ERRORS,
+        measured=np.zeros((2, 3)),
+        before=np.tile([2.0, 1e-6, 0.5], (2, 1)),
+        after=np.tile([0.1, 1e-5, 0.499], (2, 1)),
+        channels=channels,
+    )
+    assert improvement_in_words(errors) == (
+        "the held-out error falls from 2 to 0.1 N but rises from 1e-06 to 1e-05 m"
+    )
+
+
+def test_a_share_of_readings_near_zero_is_not_given():
+    errors = dataclasses.replace(ERRORS, measured=0.01 * ERRORS.measured)
+    assert "%" not in improvement_in_words(errors)
+
+
+def test_a_log_of_the_task_is_not_told_to_record_readings_at_rest():
+    for one in registered_effects():
+        for other in registered_effects():
+            told = separating(one.__name__, other.__name__, at_task=True)
+            assert "readings" not in told and "known weight" not in told
+    assert "readings" in separating("SensorBias", "GrooveFriction")
+
+
+def test_effects_of_the_library_have_words_of_their_own():
+    words = [in_words(effect.__name__) for effect in registered_effects()]
+    assert len(set(words)) == len(words) and all(words)
