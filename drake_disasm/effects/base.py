@@ -138,9 +138,26 @@ class Effect:
         return " ".join(paragraph.split())
 
     @classmethod
+    def equation(cls) -> str:
+        """Returns its equation, from its docstring; empty if that has none."""
+        return _docstring_part(cls, "Equation")
+
+    @classmethod
+    def place(cls) -> str:
+        """Returns where it acts, from its docstring; empty if that does not say."""
+        return " ".join(_docstring_part(cls, "Where it acts").split())
+
+    @classmethod
     def in_words(cls) -> str:
         """Returns what a sentence calls it."""
         return cls.noun or name_in_words(cls.__name__)
+
+
+def _docstring_part(effect: type[Effect], word: str) -> str:
+    """Returns what a docstring says after `word:`, up to the next such word."""
+    text = inspect.cleandoc(effect.__doc__ or "")
+    found = re.search(rf"^{word}: (.*?)(?=^Where it acts: |\Z)", text, re.M | re.S)
+    return found.group(1).strip() if found else ""
 
 
 class EnvironmentEffect(Effect, abc.ABC):

@@ -1,8 +1,6 @@
 """The documentation of effects, generated from their classes."""
 
 import dataclasses
-import inspect
-import re
 from collections.abc import Iterator, Sequence
 
 from drake_disasm.effects.base import (
@@ -47,10 +45,10 @@ def _section(title: str, effects: Sequence[type[Effect]]) -> Iterator[str]:
 def _entry(effect: type[Effect]) -> Iterator[str]:
     """Yields an effect's description, equation, fields and experiments."""
     yield from (f"### `{effect.__name__}`", "", effect.description(), "")
-    if equation := _part(effect, "Equation"):
+    if equation := effect.equation():
         yield from ("```text", equation, "```", "")
-    if place := _part(effect, "Where it acts"):
-        yield from (f"Where it acts: {' '.join(place.split())}", "")
+    if place := effect.place():
+        yield from (f"Where it acts: {place}", "")
     yield from (
         "| field | kind | unit | from | to | what |",
         "|---|---|---|---|---|---|",
@@ -74,13 +72,6 @@ def _row(effect: type[Effect], field: dataclasses.Field) -> str:
         kind = f"shape ({field.default:g})"
     cells = (f"`{field.name}`", kind, unit, low, high, data.get("doc", ""))
     return "| " + " | ".join(_cell(cell) for cell in cells) + " |"
-
-
-def _part(effect: type[Effect], word: str) -> str:
-    """Returns what a docstring says after `word:`, up to the next such word."""
-    text = inspect.cleandoc(effect.__doc__ or "")
-    found = re.search(rf"^{word}: (.*?)(?=^Where it acts: |\Z)", text, re.M | re.S)
-    return found.group(1).strip() if found else ""
 
 
 def _cell(text: str) -> str:

@@ -101,7 +101,9 @@ def held_out_errors(
     if test is not None:
         measured = test.measurements
         before, after = (_predicted(test, fit) for fit in (first, last))
-        how = f"{len(measured.names)} episodes that were not fitted"
+        count = len(measured.names)
+        how = f"{count} episode{'s' * (count > 1)} that "
+        how += "were not fitted" if count > 1 else "was not fitted"
     else:
         measured = fitter.base.measurements
         folds = contiguous_folds(measured.episode, fitter.settings.held_out_folds)

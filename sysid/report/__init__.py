@@ -1,4 +1,4 @@
-"""Reports that open offline: one HTML page with its pictures inside."""
+"""Reports that open offline: one HTML page with figures and their script inside."""
 
 from sysid.report.closing import closing_page
 from sysid.report.page import report_page

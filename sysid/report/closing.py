@@ -1,24 +1,15 @@
-"""The report of a closed loop, and its figures."""
+"""The report of a closed loop."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
 from sysid.effect_selection.close_loop import ClosedLoop
-from sysid.effect_selection.evidence import Evidence
-from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.output import to_mapping
-from sysid.effect_selection.survey import Survey
-from sysid.report.figures import as_data_url
+from sysid.report import plots
+from sysid.report.effect_table import kind_rows
+from sysid.report.loss_map import LossMap, loss_map
+from sysid.report.next_recordings import limit_rows, recordings
 from sysid.report.templates import render
-
-_BEFORE, _AFTER, _DARK = "#b0b0b0", "#c03030", "#202020"
-_PASSES, _FAILS = "#2060a0", "#c8d0d8"
-_SHOWN = 15
-_SHOWN_ROWS = 2000
 
 
 def closing_page(closed: ClosedLoop, origin: Mapping[str, Any]) -> str:
@@ -28,70 +19,55 @@ def closing_page(closed: ClosedLoop, origin: Mapping[str, Any]) -> str:
         closed: what was found.
         origin: its provenance, as in `result.json`.
     """
-    pictures = {
-        "residual": residual_figure(closed.errors),
-        "ranking": ranking_figure([r.survey for r in closed.rounds] + [closed.end]),
-    }
+    found = loss_map(closed.errors, closed.last.linearisation.huber_delta)
     return render(
         "closing.html.j2",
         result=to_mapping(closed),
+        kinds=kind_rows(closed.verdict),
+        limits=limit_rows(closed.verdict.limits),
+        recordings=recordings(closed.verdict, closed.last.model.has_commands),
+        worse=_made_worse(closed),
+        losses=found,
+        noise=_noise_origin(closed),
         settings=closed.last.settings,
-        pictures={name: as_data_url(figure) for name, figure in pictures.items()},
+        drawn=_plots(closed, found),
         origin=origin,
     )
 
 
-def residual_figure(errors: HeldOut) -> Figure:
-    """Returns each channel's error on held-out rows, before and after."""
-    channels = errors.channels
-    columns = min(3, len(channels))
-    lines = -(-len(channels) // columns)
-    figure = Figure(figsize=(4.2 * columns, 2.0 * lines), layout="constrained")
-    axes = figure.subplots(lines, columns, squeeze=False, sharex=True).reshape(-1)
-    for number, ax in enumerate(axes[: len(channels)]):
-        _draw_errors(ax, errors, number)
-    for ax in axes[len(channels) :]:
-        ax.set_visible(False)
-    axes[0].legend(fontsize=7)
-    figure.supxlabel("held-out row", fontsize=9)
-    return figure
+def _plots(closed: ClosedLoop, found: LossMap) -> dict[str, plots.Plot | None]:
+    errors, model = closed.errors, closed.last.model
+    channels = model.measurements.channels
+    residuals = [fit.linearisation.residual for fit in (closed.first, closed.last)]
+    covariates = [model.covariates(number) for number in range(len(channels))]
+    marked = [(each.row, each.channel) for each in found.stretches + found.outstanding]
+    return {
+        "fit": plots.fit_plot(errors, marked),
+        "errors": plots.error_plot(errors),
+        "losses": plots.loss_plot(found, errors.channels),
+        "dependence": plots.dependence_plot(residuals, covariates, channels),
+        "candidates": plots.candidate_plot(
+            [r.survey for r in closed.rounds] + [closed.end]
+        ),
+    }
 
 
-def _draw_errors(ax: Axes, errors: HeldOut, number: int) -> None:
-    """Draws a channel's error before and after, over a band of its noise."""
-    channel = errors.channels[number]
-    every = max(1, len(errors.measured) // _SHOWN_ROWS)
-    rows = np.arange(0, len(errors.measured), every)
-    for predicted, colour, label in (
-        (errors.before, _BEFORE, "before"),
-        (errors.after, _AFTER, "after"),
-    ):
-        error = (predicted - errors.measured)[rows, number]
-        ax.plot(rows, error, color=colour, lw=0.9, label=label)
-    ax.axhspan(-channel.noise, channel.noise, color=_DARK, alpha=0.08, lw=0)
-    ax.set_title(f"{channel.name} [{channel.unit}]", fontsize=9)
-    ax.tick_params(labelsize=7)
+def _made_worse(closed: ClosedLoop) -> set[str]:
+    """Returns the channels that effects make worse, in the fit or on held-out rows."""
+    errors = closed.errors
+    before, after = (errors.interval(p) for p in (errors.before, errors.after))
+    held_out = {
+        channel.name
+        for channel, (_, high), (low, _) in zip(
+            errors.channels, before, after, strict=True
+        )
+        if low > high
+    }
+    return held_out | set(closed.last.harmed_channels(closed.first))
 
 
-def ranking_figure(surveys: Sequence[Survey]) -> Figure:
-    """Returns what each candidate would explain, in the first and the last survey."""
-    shown = {"without added effects": surveys[0], "with added effects": surveys[-1]}
-    figure = Figure(figsize=(11.0, 4.6), layout="constrained")
-    for ax, (title, survey) in zip(figure.subplots(1, 2), shown.items(), strict=True):
-        best = _best_shapes(survey.effects)[:_SHOWN][::-1]
-        gains = [max(100.0 * e.gain, 0.0) for e in best]
-        colours = [_PASSES if e.accepted else _FAILS for e in best]
-        ax.barh(range(len(best)), gains, color=colours)
-        names = [f"{e.name}  (p {e.p:.2g})" for e in best]
-        ax.set_yticks(range(len(best)), names, fontsize=7)
-        ax.set_xlabel("share of the held-out loss explained, %", fontsize=8)
-        ax.set_title(title, fontsize=9)
-    return figure
-
-
-def _best_shapes(evidence: Sequence[Evidence]) -> list[Evidence]:
-    """Returns each effect once, with the shape parameters that explain most."""
-    found: dict[str, Evidence] = {}
-    for each in evidence:
-        found.setdefault(" and ".join(each.effects), each)
-    return list(found.values())
+def _noise_origin(closed: ClosedLoop) -> str:
+    """Returns where the channels' noise is from, in words."""
+    if not closed.last.noise_is_stated:
+        return "not stated: estimated from the residual of the first fit"
+    return "as stated"

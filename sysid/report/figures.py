@@ -1,4 +1,4 @@
-"""The figures of a report, as pure functions of a result."""
+"""The pictures of a report on an identification, as pure functions of a result."""
 
 import base64
 import io
@@ -10,15 +10,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from sysid.identification.profile import Profile
-from sysid.identification.result import Comparison, Identification, MethodResult
+from sysid.identification.result import Identification, MethodResult
 from sysid.identification.sensitivity import LOOSE
-from sysid.models.measurements import Channel
 
 Array = NDArray[np.float64]
 
 _COLOURS = {"bees": "#d98c00", "nlopt": "#2060a0"}
 _BEFORE, _AFTER, _MEASURED = "#b0b0b0", "#c03030", "#202020"
-_SHOWN_ROWS = 400
 _DPI = 100
 
 
@@ -27,49 +25,6 @@ def as_data_url(figure: Figure) -> str:
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=_DPI)
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
-
-
-def fit_figure(comparison: Comparison, channels: Sequence[Channel]) -> Figure:
-    """Returns measured and predicted channels over the first rows."""
-    columns = 3 if len(channels) > 3 else len(channels)
-    lines = -(-len(channels) // columns)
-    figure = Figure(figsize=(4.2 * columns, 2.1 * lines), layout="constrained")
-    axes = figure.subplots(lines, columns, squeeze=False, sharex=True).reshape(-1)
-    rows = slice(0, _SHOWN_ROWS)
-    for i, (ax, channel) in enumerate(zip(axes, channels, strict=False)):
-        ax.plot(comparison.before[rows, i], color=_BEFORE, lw=1.0, label="before")
-        ax.plot(comparison.after[rows, i], color=_AFTER, lw=1.2, label="after")
-        ax.plot(comparison.measured[rows, i], ".", color=_MEASURED, ms=2.5, zorder=3)
-        _mark_episodes(ax, comparison.episode[rows])
-        _zoom(ax, comparison.measured[rows, i], comparison.after[rows, i])
-        ax.set_title(f"{channel.name} [{channel.unit}]", fontsize=9)
-        ax.tick_params(labelsize=7)
-    for ax in axes[len(channels) :]:
-        ax.set_visible(False)
-    axes[0].plot([], [], ".", color=_MEASURED, label="measured")
-    axes[0].legend(fontsize=7)
-    figure.supxlabel("row", fontsize=9)
-    return figure
-
-
-def residual_figure(comparison: Comparison, channels: Sequence[Channel]) -> Figure:
-    """Returns each channel's rms error before and after, in units of its noise."""
-    noise = np.array([channel.noise for channel in channels])
-    figure = Figure(figsize=(8.5, 2.8), layout="constrained")
-    ax = figure.subplots()
-    place = np.arange(len(channels))
-    for shift, predicted, colour, label in (
-        (-0.2, comparison.before, _BEFORE, "before"),
-        (0.2, comparison.after, _AFTER, "after"),
-    ):
-        size = comparison.rms(predicted) / noise
-        ax.bar(place + shift, np.maximum(size, 1e-3), 0.4, color=colour, label=label)
-    ax.axhline(1.0, color=_MEASURED, lw=0.8, ls="--", label="noise")
-    ax.set_yscale("log")
-    ax.set_xticks(place, [c.name for c in channels], fontsize=8, rotation=30)
-    ax.set_ylabel("rms residual / noise", fontsize=9)
-    ax.legend(fontsize=8, ncols=3)
-    return figure
 
 
 def trace_figure(methods: Sequence[MethodResult], floor: float) -> Figure:
@@ -148,16 +103,3 @@ def _draw_trace(ax: Axes, method: MethodResult, number: int) -> None:
         evaluations, trace.best_so_far(), where="post", color=colour, label=method.name
     )
     ax.plot(evaluations, trace.values, ".", ms=1.5, color=colour, alpha=0.4)
-
-
-def _mark_episodes(ax: Axes, episode: NDArray[np.int64]) -> None:
-    for row in np.flatnonzero(np.diff(episode)) + 1:
-        ax.axvline(float(row), color="#d0d0d0", lw=0.6, zorder=0)
-
-
-def _zoom(ax: Axes, measured: Array, after: Array) -> None:
-    """Scales the axis to measured and fitted values; those before may be far off."""
-    values = np.concatenate([measured, after])
-    low, high = float(values.min()), float(values.max())
-    margin = 0.08 * (high - low) or 1e-9
-    ax.set_ylim(low - margin, high + margin)

@@ -3,10 +3,13 @@
 from collections.abc import Mapping
 from typing import Any
 
+from sysid.effect_selection.held_out import HeldOut
 from sysid.identification.output import to_mapping
-from sysid.identification.result import Identification
-from sysid.report import figures
+from sysid.identification.result import Comparison, Identification
+from sysid.report import figures, plots
 from sysid.report.templates import render
+
+_DRAWS = 200  # of the bootstrap of an error
 
 
 def report_page(found: Identification, origin: Mapping[str, Any]) -> str:
@@ -21,17 +24,30 @@ def report_page(found: Identification, origin: Mapping[str, Any]) -> str:
         "identification.html.j2",
         result=to_mapping(found),
         shown="held-out" if found.held_out else "fitted",
-        pictures=_pictures(found, shown),
+        pictures=_pictures(found),
+        drawn=_plots(found, shown),
         origin=origin,
         conclusion=_conclusion(found),
     )
 
 
-def _pictures(found: Identification, shown: Any) -> dict[str, str]:
+def _plots(found: Identification, shown: Comparison) -> dict[str, plots.Plot]:
+    rows = HeldOut(
+        shown.measured,
+        shown.before,
+        shown.after,
+        shown.episode,
+        tuple(found.channels),
+        "",
+        _DRAWS,
+        shown.names,
+    )
+    return {"fit": plots.fit_plot(rows), "errors": plots.error_plot(rows)}
+
+
+def _pictures(found: Identification) -> dict[str, str]:
     methods = list(found.methods.values())
     drawn = {
-        "fit": figures.fit_figure(shown, found.channels),
-        "residual": figures.residual_figure(shown, found.channels),
         "traces": figures.trace_figure(methods, found.noise_floor),
         "correlation": figures.correlation_figure(found),
         "identifiability": figures.identifiability_figure(found),

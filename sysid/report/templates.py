@@ -3,6 +3,9 @@
 from typing import Any
 
 import jinja2
+from plotly.offline import get_plotlyjs
+
+from sysid.report.plots import Plot
 
 _ENVIRONMENT = jinja2.Environment(
     loader=jinja2.PackageLoader("sysid.report", "."),
@@ -17,7 +20,32 @@ def _number(value: float) -> str:
     return f"{value:.5g}"
 
 
+def _short(value: float) -> str:
+    return f"{value:.3g}"
+
+
+def _brief(value: float) -> str:
+    return f"{value:.2g}"
+
+
+def _figure(drawn: Plot) -> str:
+    """Returns a figure as HTML, for a page that has Plotly's script."""
+    config = {"displaylogo": False, "responsive": True}
+    return str(
+        drawn.figure.to_html(
+            full_html=False,
+            include_plotlyjs=False,
+            include_mathjax=False,
+            config=config,
+        )
+    )
+
+
 _ENVIRONMENT.filters["number"] = _number
+_ENVIRONMENT.filters["short"] = _short
+_ENVIRONMENT.filters["brief"] = _brief
+_ENVIRONMENT.filters["figure"] = _figure
+_ENVIRONMENT.globals["plotly_script"] = get_plotlyjs
 
 
 def render(template: str, **values: Any) -> str:

@@ -1,0 +1,107 @@
+"""What to record next, and what a log would have shown, kind of effect by kind."""
+
+from dataclasses import dataclass
+
+from sysid.effect_selection.detection import DetectionLimit
+from sysid.effect_selection.effect_names import effect_class, enumeration, in_words
+from sysid.effect_selection.experiments import revealing
+from sysid.effect_selection.verdict import Verdict
+from sysid.effect_selection.verdict_sentence import in_all_words, indistinguishable
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording that is worth making.
+
+    Attributes:
+        purpose: what it would decide, in words.
+        what: to record.
+    """
+
+    purpose: str
+    what: str
+
+
+@dataclass(frozen=True)
+class LimitRow:
+    """Detection limits of one field of a kind of effect, over all joints.
+
+    Attributes:
+        kind: of effect, the class's name.
+        words: what a sentence calls it.
+        field, meaning, unit: of the amplitude.
+        least, greatest: that would have been found, with their joints; None if none.
+        hidden: joints where none would have been found within its bounds, or all that
+            there is if it acts at none.
+    """
+
+    kind: str
+    words: str
+    field: str
+    meaning: str
+    unit: str
+    least: tuple[float, str] | None
+    greatest: tuple[float, str] | None
+    hidden: tuple[str, ...]
+
+
+def recordings(verdict: Verdict, at_task: bool) -> list[Recording]:
+    """Returns what to record next, the most urgent first.
+
+    Args:
+        verdict: of a search.
+        at_task: whether its log is of steps of the task.
+    """
+    found = [
+        Recording(f"whether it is {in_words(kind)} or {_any_of(rivals)}", text)
+        for kind, (rivals, experiments) in indistinguishable(verdict).items()
+        for text in experiments
+    ]
+    if verdict.ending == "unexplained":
+        found += [
+            Recording(f"whether it is {in_words(name)} at all", text)
+            for name in dict.fromkeys(n.partition(".")[0] for n in verdict.names)
+            if (text := _experiment(name, at_task))
+        ]
+    rows = limit_rows(verdict.limits)
+    shown = {row.kind for row in rows if row.least}
+    hidden = [row for row in rows if row.kind not in shown]
+    found += [
+        Recording(f"{in_words(kind)}, which this log could not have shown", text)
+        for kind in dict.fromkeys(row.kind for row in hidden)
+        if (text := _experiment(kind, at_task))
+    ]
+    return found
+
+
+def limit_rows(limits: tuple[DetectionLimit, ...]) -> list[LimitRow]:
+    """Returns detection limits with all joints of a kind in one row."""
+    groups: dict[tuple[str, str], list[DetectionLimit]] = {}
+    for limit in limits:
+        kind = limit.effect.partition(".")[0]
+        groups.setdefault((kind, limit.field), []).append(limit)
+    return [_limit_row(kind, field, own) for (kind, field), own in groups.items()]
+
+
+def _limit_row(kind: str, field: str, limits: list[DetectionLimit]) -> LimitRow:
+    known = effect_class(kind)
+    data = known.__dataclass_fields__[field].metadata if known else {}
+    found = sorted(
+        (abs(limit.amplitude), limit.effect.partition(".")[2])
+        for limit in limits
+        if limit.amplitude is not None
+    )
+    hidden = [x.effect.partition(".")[2] for x in limits if x.amplitude is None]
+    units = " or ".join(dict.fromkeys(limit.unit for limit in limits))
+    least, greatest = (found[0], found[-1]) if found else (None, None)
+    doc, words = str(data.get("doc", "")), in_words(kind)
+    return LimitRow(kind, words, field, doc, units, least, greatest, tuple(hidden))
+
+
+def _experiment(kind: str, at_task: bool) -> str:
+    known = effect_class(kind)
+    return revealing(known, at_task) if known else ""
+
+
+def _any_of(names: tuple[str, ...]) -> str:
+    return enumeration([in_all_words(name) for name in names], "or")

@@ -1,0 +1,82 @@
+"""The report of a closed loop, as a page."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from drake_disasm.effects import SensorDrift
+from sysid.effect_selection.close_loop import ClosedLoop
+from sysid.report import closing_page
+from tests.sysid.effect_selection.blind import closed, static_log
+from tests.sysid.report.pages import own_part
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory) -> ClosedLoop:
+    folder = tmp_path_factory.mktemp("drifting")
+    return closed(static_log(folder, [SensorDrift], 5.0, seed=2).folder)
+
+
+def test_the_page_needs_nothing_else_and_begins_with_the_sentence(found):
+    page = own_part(closing_page(found, {"command": "as told"}))
+    body = page[page.index("<body>") :]
+    sentence = found.sentence.replace("'", "&#39;")
+    assert body.index(sentence) < body.index("<h2>")
+    assert "SensorDrift" in page and "F_read = F + d min(t, T)" in page
+    assert SensorDrift.description() in page and "along" in page
+    for title in (
+        "Effects that were added",
+        "Measured against predicted",
+        "Error before and after",
+        "Where the error is",
+        "What the error depends on",
+        "What would have been found",
+        "Candidates",
+        "as told",
+    ):
+        assert title in page
+    assert page.count('class="plotly-graph-div"') == 5
+
+
+def test_a_channel_that_gets_worse_is_marked(found):
+    errors = found.errors
+    assert "(worse)" not in closing_page(found, {})
+    after = errors.after.copy()
+    after[:, 1] = errors.measured[:, 1] + 100.0
+    harmed = dataclasses.replace(found, errors=dataclasses.replace(errors, after=after))
+    page = closing_page(harmed, {})
+    assert "fy (worse)" in page and "fx (worse)" not in page
+    assert "Worse with the effects than without: fy." in page
+
+
+def test_a_value_at_its_bound_is_marked(found):
+    verdict = found.verdict
+    assert "at its bound" not in own_part(closing_page(found, {}))
+    values = tuple(dataclasses.replace(v, is_at_bound=True) for v in verdict.values)
+    at_bound = dataclasses.replace(verdict, values=values)
+    page = closing_page(dataclasses.replace(found, verdict=at_bound), {})
+    assert "at its bound" in page
+
+
+@pytest.mark.parametrize("ending", ["none", "explained", "partly", "unexplained"])
+def test_the_page_is_yellow_if_something_is_left(found, ending):
+    verdict = dataclasses.replace(found.verdict, ending=ending)
+    page = closing_page(dataclasses.replace(found, verdict=verdict), {})
+    assert ('class="box warn"' in page) == (ending in ("partly", "unexplained"))
+
+
+def test_a_long_log_of_many_channels_stays_small(found):
+    """30 000 rows of six channels: as much as 25 s of seven joints at 1 kHz."""
+    rows = 30_000
+    random = np.random.default_rng(0)
+    errors = found.errors
+    values = random.standard_normal((3, rows, len(errors.channels)))
+    long = dataclasses.replace(
+        errors,
+        measured=values[0],
+        before=values[1],
+        after=values[2],
+        episode=np.zeros(rows, dtype=np.int64),
+    )
+    own_part(closing_page(dataclasses.replace(found, errors=long), {}))
