@@ -15,6 +15,8 @@ from sysid.models.measurements import Channel
 
 Array = NDArray[np.float64]
 
+_MOST_BLOCKS = 1000  # of a bootstrap
+
 
 @dataclass(frozen=True)
 class HeldOut:
@@ -76,7 +78,10 @@ class HeldOut:
     def interval(self, predicted: Array, seed: int = 0) -> Array:
         """Returns 95 % intervals (channels, 2) of the rms, by a block bootstrap."""
         error = predicted - self.measured
-        blocks = block_numbers(self.episode, block_length(error, self.episode))
+        length = block_length(error, self.episode)
+        # Blocks may be longer than need be; more than a thousand cost only time.
+        length = max(length, len(error) // _MOST_BLOCKS)
+        blocks = block_numbers(self.episode, length)
         count = int(blocks.max()) + 1
         squares = np.zeros((count, error.shape[1]))
         np.add.at(squares, blocks, error**2)

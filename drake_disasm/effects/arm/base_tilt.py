@@ -21,4 +21,5 @@ class ArmTilt(ArmEffect):
     rx: float = amplitude("rad", -0.5, 0.5, "rotation of the base about x_W")
     ry: float = amplitude("rad", -0.5, 0.5, "rotation of the base about y_W")
 
+    noun = "a tilted base of the arm"
     experiment = "rests with the arm stretched out, turned about the vertical"

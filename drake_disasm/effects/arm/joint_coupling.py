@@ -30,6 +30,7 @@ class JointCoupling(ArmTorqueEffect):
         0.02, "rad/s", 1e-4, 1.0, "e, velocity of the transition", (0.02,)
     )
 
+    noun = "coupling to another joint"
     experiment = "this joint and the next, alone and together, both ways"
 
     @classmethod

@@ -26,6 +26,7 @@ class JointQuadraticFriction(JointEffect):
         0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", (0.02,)
     )
 
+    noun = "friction that grows with the square of the load"
     experiment = "the same motion with three payloads"
     experiments_against: ClassVar = {
         "JointLoadFriction": "the same motion with three payloads",

@@ -23,6 +23,7 @@ class ArmDelay(DelayEffect):
 
     delay: float = amplitude("s", -_MOST, _MOST, "T, of the torque after the motion")
 
+    noun = "a shift in time between torque and motion"
     experiment = "fast reversals, with torques and motion stamped by one clock"
 
     def delays(self, joint: str) -> bool:
@@ -42,6 +43,7 @@ class JointDelay(DelayEffect):
     joint: str = joint_name()
     delay: float = amplitude("s", -_MOST, _MOST, "T, of the torque after the motion")
 
+    noun = "a shift in time of one torque"
     experiment = "fast reversals of this joint, all stamped by one clock"
 
     @classmethod

@@ -27,6 +27,7 @@ class TorqueRipple(JointEffect):
         4.0, "1/rad", 0.5, 2000.0, "n, periods per turn", (2.0, 4.0, 8.0)
     )
 
+    noun = "torque ripple"
     experiment = "this joint slowly over its whole range, both ways, the others at rest"
 
     def torque(self, samples: JointSamples) -> np.ndarray:
