@@ -15,6 +15,7 @@ from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.base import Array, LogModel
+from sysid.models.joint_units import in_units_of_joints
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
 from sysid.parameters import Parameter
@@ -72,7 +73,12 @@ class JointMotionModel(LogModel):
         self._whole = ArmMotion.of(arm, base, header.joints, [e for _, e in episodes])
         self._motion = self._whole
         self._taken = np.ones(len(self._whole.time), dtype=bool)
-        channels = tuple(Channel(j, "N m", np.nan, "estimated") for j in header.joints)
+        self._prismatic = arm.prismatic
+        units = ["N" if j in self._prismatic else "N m" for j in header.joints]
+        channels = tuple(
+            Channel(joint, unit, np.nan, "estimated")
+            for joint, unit in zip(header.joints, units, strict=True)
+        )
         self.measurements = Measurements.of_logs(
             logs, channels, lambda _, episode: episode["tau"]
         )
@@ -89,6 +95,12 @@ class JointMotionModel(LogModel):
 
     def _on_arm(self, theta: Array) -> list[ArmEffect]:
         return [e for e in self.effects_at(theta) if isinstance(e, ArmEffect)]
+    def with_effects(
+        self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
+    ) -> Self:
+        """See LogModel; additional parameters get the units of their joints."""
+        added = in_units_of_joints(parameters, effects, self._prismatic)
+        return super().with_effects(effects, added)
 
     def scenario_at(self, theta: Array) -> Scenario:
         """Returns a scenario with the effects; base parameters are no part of it."""

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     JacobianWrtVariable,
+    PrismaticJoint,
     RigidBody,
     SpatialInertia,
 )
@@ -39,6 +40,7 @@ class ArmDynamics:
     Attributes:
         links: names of the links that move, in the order of pi.
         inertia: pi by the URDF.
+        prismatic: names of the joints that slide; others turn.
         last_link: where in pi the link is that is farthest from the base.
 
     Args:
@@ -55,6 +57,11 @@ class ArmDynamics:
         plant.Finalize()
         self._context = plant.CreateDefaultContext()
         self._columns = _velocity_columns(plant, joints, urdf)
+        self.prismatic = frozenset(
+            name
+            for name in joints
+            if plant.GetJointByName(name).type_name() == PrismaticJoint.kTypeName
+        )
         self.links = tuple(body.name() for body in self._bodies)
         self.inertia = np.concatenate(
             [_inertial(body.default_spatial_inertia()) for body in self._bodies]

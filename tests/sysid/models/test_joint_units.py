@@ -1,0 +1,67 @@
+"""Units of what acts at a prismatic joint."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.effects import JointCoulombFriction, JointViscousFriction
+from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
+from sysid.effect_selection.candidates import Candidate, extended
+from sysid.models.joint_motion import JointMotionModel
+from sysid.models.joint_units import prismatic_unit
+
+_CART = """<robot name="cart"><link name="rail"/>
+  <link name="slide"><inertial><mass value="3"/>
+    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+  <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="1"/>
+    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+  <joint name="x" type="prismatic"><parent link="rail"/><child link="slide"/>
+    <axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="1" effort="9"/></joint>
+  <joint name="turn" type="revolute"><parent link="slide"/><child link="arm"/>
+    <axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="1" effort="9"/></joint>
+</robot>
+"""
+
+
+@pytest.mark.parametrize(
+    ("rotary", "prismatic"),
+    [
+        ("N m", "N"),
+        ("N m s/rad", "N s/m"),
+        ("rad/s", "m/s"),
+        ("kg m^2", "kg"),
+        ("1/(N m)", "1/N"),
+        ("1", "1"),
+        ("s", "s"),
+    ],
+)
+def test_each_unit_has_its_own_at_a_prismatic_joint(rotary, prismatic):
+    assert prismatic_unit(rotary) == prismatic
+
+
+def test_a_models_channels_and_parameters_have_the_units_of_their_joints(tmp_path):
+    urdf = tmp_path / "cart.urdf"
+    urdf.write_text(_CART)
+    header = LogHeader(
+        "joint_motion", "excite", {}, joints=("x", "turn"), urdf=str(urdf)
+    )
+    columns = {k: np.random.default_rng(0).normal(size=(50, 2)) for k in ("q", "v")}
+    columns |= {"vd": columns["q"], "tau": columns["v"], "time": 0.01 * np.arange(50)}
+    with LogWriter(tmp_path / "log", header) as writer:
+        writer.write_episode(flat_columns("joint_motion", columns))
+    model = JointMotionModel([read_log(tmp_path / "log")])
+    assert [c.unit for c in model.measurements.channels] == ["N", "N m"]
+    chosen = [
+        Candidate.of(kind(joint=joint))
+        for kind in (JointCoulombFriction, JointViscousFriction)
+        for joint in ("x", "turn")
+    ]
+    found, _ = extended(model, chosen, with_shapes=True)
+    units = {p.name: p.unit for p in found.parameters if p.path}
+    assert units == {
+        "JointCoulombFriction.x.size": "N",
+        "JointCoulombFriction.x.creep": "m/s",
+        "JointCoulombFriction.turn.size": "N m",
+        "JointCoulombFriction.turn.creep": "rad/s",
+        "JointViscousFriction.x.coefficient": "N s/m",
+        "JointViscousFriction.turn.coefficient": "N m s/rad",
+    }
