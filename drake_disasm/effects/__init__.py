@@ -73,8 +73,8 @@ from drake_disasm.effects.sensor.mounting import SensorMounting
 from drake_disasm.effects.sensor.payload_error import PayloadError
 from drake_disasm.effects.sensor.base_tilt import BaseTilt
 from drake_disasm.effects.sensor.residual_model import SensorResidualModel
-from drake_disasm.effects.arm.viscous_friction import JointViscousFriction
 from drake_disasm.effects.arm.coulomb_friction import JointCoulombFriction
+from drake_disasm.effects.arm.viscous_friction import JointViscousFriction
 from drake_disasm.effects.arm.stribeck_friction import JointStribeckFriction
 from drake_disasm.effects.arm.asymmetric_friction import JointAsymmetricFriction
 from drake_disasm.effects.arm.load_friction import JointLoadFriction

@@ -9,7 +9,7 @@ _NUMBERS = (
     *("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"),
     *("ten", "eleven", "twelve"),
 )
-_NAMED = 2  # joints that a sentence names; more are counted
+_SHOWN = 2  # joints that a sentence names; more are counted
 
 
 def effect_class(name: str) -> type[Effect] | None:
@@ -43,7 +43,7 @@ def effects_in_words(names: Sequence[str]) -> str:
     for kind, joints in by_kind(names).items():
         where = _place(joints, is_counted)
         phrases.append(f"{in_words(kind)}{f' at {where}' if where else ''}")
-        is_counted = is_counted or len(joints) > _NAMED
+        is_counted = is_counted or len(joints) > _SHOWN
     return enumeration(phrases)
 
 
@@ -61,6 +61,6 @@ def number_in_words(number: int) -> str:
 
 def _place(joints: Sequence[str], is_counted: bool) -> str:
     """Returns where effects of one kind act; "four" after "six joints"."""
-    if len(joints) <= _NAMED:
+    if len(joints) <= _SHOWN:
         return enumeration(joints)
     return number_in_words(len(joints)) + ("" if is_counted else " joints")

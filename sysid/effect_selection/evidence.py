@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.effects import registered_effects
 from sysid.effect_selection.block_regression import BlockRegression, Columns
 from sysid.effect_selection.candidates import Candidate, is_joint_group, kind_text
 from sysid.effect_selection.residual_curves import Dependence
@@ -161,11 +162,33 @@ def rank_by_regression(
 
 
 def most_parsimonious(accepted: Sequence[Evidence]) -> Evidence:
-    """Returns the one with the fewest parameters of those about as good as the best."""
-    best = accepted[0]
-    enough = (1.0 - best.settings.parsimony_tolerance) * best.gain
-    as_good = [e for e in accepted if e.gain >= enough]
-    return min(as_good, key=lambda e: (e.parameter_count, -e.gain))
+    """Returns the simplest of those about as good as the best.
+
+    That is the one with the fewest amplitudes, then the first of the library: dry
+    friction before friction in proportion to the load. Of those that the blocks can't
+    distinguish from the best, a wider margin is about as good, unless they need more
+    parameters.
+    """
+    best, limits = accepted[0], accepted[0].settings
+    order = [effect.__name__ for effect in registered_effects()]
+
+    def is_as_good(other: Evidence) -> bool:
+        if other.gain >= (1.0 - limits.parsimony_tolerance) * best.gain:
+            return True
+        enough = other.gain >= (1.0 - limits.tie_parsimony_tolerance) * best.gain
+        no_larger = other.parameter_count <= best.parameter_count
+        return enough and no_larger and other.ties_with(best)
+
+    as_good = [e for e in accepted if is_as_good(e)]
+    return min(as_good, key=lambda e: (*_complexity(e, order), -e.gain))
+
+
+def _complexity(evidence: Evidence, order: Sequence[str]) -> tuple[int, list[int]]:
+    """Returns how many amplitudes there are, and the effects' places in the library."""
+    kinds = [type(candidate.effect).__name__ for candidate in evidence.candidates]
+    places = [order.index(kind) if kind in order else len(order) for kind in kinds]
+    shapes = _shape_count(evidence.explanation)
+    return evidence.parameter_count - shapes, places
 
 
 def _shape_count(explanation: Explanation) -> int:

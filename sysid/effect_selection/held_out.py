@@ -15,7 +15,7 @@ from sysid.models.measurements import Channel
 
 Array = NDArray[np.float64]
 
-_MOST_BLOCKS = 1000  # of a bootstrap
+_MOST = 1000  # of a bootstrap
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class HeldOut:
         error = predicted - self.measured
         length = block_length(error, self.episode)
         # Blocks may be longer than need be; more than a thousand cost only time.
-        length = max(length, len(error) // _MOST_BLOCKS)
+        length = max(length, len(error) // _MOST)
         blocks = block_numbers(self.episode, length)
         count = int(blocks.max()) + 1
         squares = np.zeros((count, error.shape[1]))

@@ -163,9 +163,15 @@ class SelectionSettings:
     parsimony_tolerance: float = _setting(
         0.05,
         "of the best gain",
-        "the candidate with the fewest parameters is taken if it gains at most this "
+        "the candidate with the fewest amplitudes is taken if it gains at most this "
         "much less than the best; chosen as a few per cent",
         _BLIND_LOGS,
+    )
+    tie_parsimony_tolerance: float = _setting(
+        0.1,
+        "of the best gain",
+        "wider for a rival that the blocks can't distinguish from the best: which of "
+        "the two is named is a matter of which is simpler, not of a tenth of a gain",
     )
     tie_min_gain: float = _setting(
         0.5,

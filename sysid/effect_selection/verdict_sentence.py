@@ -23,7 +23,6 @@ from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.verdict import Verdict
 
 _QUANTITIES = {"N": "force", "N m": "torque", "m": "position", "rad": "orientation"}
-_SAME = 0.02  # of an error, below which two digits show no change
 
 
 def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
@@ -169,7 +168,7 @@ def _nothing(verdict: Verdict) -> str:
 
 
 def _two_digits(value: float) -> str:
-    return f"{value:.2g}" if value < 99.0 else f"{value:.0f}"
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def _kinds(name: str) -> str:

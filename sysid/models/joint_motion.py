@@ -95,6 +95,7 @@ class JointMotionModel(LogModel):
 
     def _on_arm(self, theta: Array) -> list[ArmEffect]:
         return [e for e in self.effects_at(theta) if isinstance(e, ArmEffect)]
+
     def with_effects(
         self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
     ) -> Self:

@@ -1,0 +1,54 @@
+"""Which of several effects that explain about as much is named."""
+
+import numpy as np
+
+from drake_disasm.effects import (
+    JointAsymmetricFriction,
+    JointCoulombFriction,
+    JointLoadFriction,
+)
+from sysid.effect_selection.candidates import Candidate
+from sysid.effect_selection.evidence import Evidence, most_parsimonious
+from sysid.effect_selection.search import trials
+from sysid.effect_selection.settings import DEFAULT_SETTINGS
+
+_SCATTER = np.random.default_rng(0).normal(size=40)
+
+
+def _evidence(kind, gain, count):
+    """Returns evidence that the blocks can't distinguish from others like it."""
+    gains = gain * (1.0 + np.roll(_SCATTER, int(1000 * gain)))
+    candidate = Candidate.of(kind(joint="j1"))
+    return Evidence((candidate,), gain, 0.01, 1.0, count, gains, DEFAULT_SETTINGS)
+
+
+def test_of_a_tie_the_first_of_the_library_with_the_fewest_amplitudes_is_named():
+    load = _evidence(JointLoadFriction, 0.80, 2)
+    asymmetric = _evidence(JointAsymmetricFriction, 0.79, 3)
+    dry = _evidence(JointCoulombFriction, 0.74, 2)
+    assert dry.ties_with(load)
+    found = trials([load, asymmetric, dry], 3)
+    assert [e.effects[0].partition(".")[0] for e in found] == [
+        "JointCoulombFriction",
+        "JointLoadFriction",
+        "JointAsymmetricFriction",
+    ]
+
+
+def test_what_explains_clearly_more_is_named():
+    load, dry = (
+        _evidence(JointLoadFriction, 0.80, 2),
+        _evidence(JointCoulombFriction, 0.60, 2),
+    )
+    assert most_parsimonious([load, dry]) is load
+    # The blocks distinguish them, though they gain nearly as much in all.
+    load, dry = (
+        Evidence(e.explanation, g, 0.01, 1.0, 2, np.full(40, g), DEFAULT_SETTINGS)
+        for e, g in ((load, 0.80), (dry, 0.74))
+    )
+    assert most_parsimonious([load, dry]) is load
+
+
+def test_the_best_shape_of_an_effect_is_taken():
+    low, high = (_evidence(JointCoulombFriction, gain, 2) for gain in (0.79, 0.80))
+    assert most_parsimonious([high, low]) is high
