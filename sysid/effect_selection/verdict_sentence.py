@@ -7,6 +7,7 @@ Whatever a verdict has to say of what is left is a clause in `left_in_words`.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,6 +24,19 @@ from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.verdict import Verdict
 
 _QUANTITIES = {"N": "force", "N m": "torque", "m": "position", "rad": "orientation"}
+
+
+@dataclass(frozen=True)
+class Rivals:
+    """What a log can't tell from a kind of effect.
+
+    Attributes:
+        kinds: of other effects, or of several joined by "and".
+        experiments: that would separate them.
+    """
+
+    kinds: tuple[str, ...]
+    experiments: tuple[str, ...]
 
 
 def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
@@ -49,30 +63,27 @@ def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
 def indistinguishable_text(verdict: Verdict) -> str:
     """Returns which kinds of effects the log can't tell apart, in sentences."""
     sentences = []
-    for kind, (rivals, experiments) in indistinguishable(verdict).items():
-        others = enumeration([in_all_words(rival) for rival in rivals], "or")
-        them = "the two" if len(rivals) == 1 else "them"
+    for kind, rivals in indistinguishable(verdict).items():
+        others = enumeration([in_all_words(rival) for rival in rivals.kinds], "or")
+        them = "the two" if len(rivals.kinds) == 1 else "them"
         sentences.append(
             f"This log can't tell {in_words(kind)} from {others}; to separate {them}, "
-            f"record: {' / '.join(experiments)}."
+            f"record: {' / '.join(rivals.experiments)}."
         )
     return " ".join(sentences)
 
 
-def indistinguishable(
-    verdict: Verdict,
-) -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
-    """Returns for each kind of effect its rivals' kinds, and experiments."""
-    found: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {}
+def indistinguishable(verdict: Verdict) -> dict[str, Rivals]:
+    """Returns the rivals of each kind of effect that has any."""
+    found: dict[str, Rivals] = {}
     for name, ties in zip(verdict.names, verdict.ties, strict=True):
-        kind = name.partition(".")[0]
-        rivals, experiments = found.get(kind, ((), ()))
-        rivals += tuple(_kinds(tie.name) for tie in ties)
-        experiments += tuple(tie.experiment for tie in ties)
         if ties:
-            found[kind] = (
-                tuple(dict.fromkeys(rivals)),
-                tuple(dict.fromkeys(experiments)),
+            kind = name.partition(".")[0]
+            known = found.get(kind, Rivals((), ()))
+            kinds = (*known.kinds, *(_kinds(tie.name) for tie in ties))
+            told = (*known.experiments, *(tie.experiment for tie in ties))
+            found[kind] = Rivals(
+                tuple(dict.fromkeys(kinds)), tuple(dict.fromkeys(told))
             )
     return found
 
@@ -84,19 +95,30 @@ def in_all_words(name: str) -> str:
 
 def improvement_in_words(errors: HeldOut) -> str:
     """Returns how the held-out error changes: "the held-out error falls from ..."."""
-    before, after = (errors.rms_by_unit(p) for p in (errors.before, errors.after))
+    ends = (errors.before, errors.after)
+    before, after = (errors.rms_by_unit(p) for p in ends)
     if errors.has_meaningful_share:
-        relative = [errors.relative(p) for p in (errors.before, errors.after)]
         word = _QUANTITIES.get(next(iter(before)), "readings")
-        a, b = (f"{_two_digits(100.0 * share)} %" for share in relative)
-        changes = {f"{a} to {b} of the {word}": relative[1] - relative[0]}
+        unit = f"% of the {word}"
+        before, after = ({unit: 100.0 * errors.relative(p)} for p in ends)
+        shown = [unit]
     else:
-        changes = {
-            f"{before[unit]:.3g} to {after[unit]:.3g} {unit}": after[unit] - old
-            for unit, old in before.items()
-            if unit in _above_noise(errors) and abs(after[unit] - old) > _SAME * old
-        }
-    return _changes_in_words(changes)
+        shown = [unit for unit in before if unit in _above_noise(errors)]
+    changed = [u for u in shown if _two_digits(before[u]) != _two_digits(after[u])]
+    texts = {u: _change(before[u], after[u], u) for u in changed}
+    verbs = {
+        "falls": [text for u, text in texts.items() if after[u] < before[u]],
+        "rises": [text for u, text in texts.items() if after[u] > before[u]],
+    }
+    clauses = [f"{verb} {enumeration(each)}" for verb, each in verbs.items() if each]
+    return f"the held-out error {' but '.join(clauses) or 'stays the same'}"
+
+
+def _change(before: float, after: float, unit: str) -> str:
+    """Returns "from 6.7 % to 2.1 % of the torque", or "from 0.3 to 0.1 N"."""
+    sign = " %" if unit.startswith("%") else ""
+    digits = _two_digits if sign else _three_digits
+    return f"from {digits(before)}{sign} to {digits(after)} {unit}"
 
 
 def _above_noise(errors: HeldOut) -> set[str]:
@@ -105,19 +127,6 @@ def _above_noise(errors: HeldOut) -> set[str]:
     below = np.max(ends, axis=0) < [channel.noise for channel in errors.channels]
     units = np.array([channel.unit for channel in errors.channels])
     return set(units[~below] if not below.all() else units)
-
-
-def _changes_in_words(changes: dict[str, float]) -> str:
-    verbs = {
-        "falls": [text for text, change in changes.items() if change < 0.0],
-        "rises": [text for text, change in changes.items() if change > 0.0],
-    }
-    clauses = [
-        f"{verb} {enumeration([f'from {text}' for text in texts])}"
-        for verb, texts in verbs.items()
-        if texts
-    ]
-    return f"the held-out error {' but '.join(clauses) or 'stays the same'}"
 
 
 def left_in_words(verdict: Verdict) -> str:
@@ -165,6 +174,10 @@ def _nothing(verdict: Verdict) -> str:
         f"{text}, in which {len(seen)} of {len(kinds)} kinds of effects would have "
         "been found if they were large enough"
     )
+
+
+def _three_digits(value: float) -> str:
+    return f"{value:.3g}"
 
 
 def _two_digits(value: float) -> str:

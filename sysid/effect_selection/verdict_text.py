@@ -69,12 +69,12 @@ def _effects_text(verdict: Verdict, most: int) -> str:
     for kind, joints in by_kind(verdict.names).items():
         text = f"{kind} of {len(joints)} joints" if len(joints) > 1 else kind
         text = f"{kind}.{joints[0]}" if len(joints) == 1 else text
-        names, _ = rivals.get(kind, ((), ()))
+        names = rivals[kind].kinds if kind in rivals else ()
         more = [f"{len(names) - most} more"] if len(names) > most else []
         others = " or ".join([*names[:most], *more])
         parts.append(text + (f" (or {others})" if others else ""))
     text = ", then ".join(parts)
-    tests = dict.fromkeys(test for _, each in rivals.values() for test in each)
+    tests = dict.fromkeys(test for each in rivals.values() for test in each.experiments)
     if tests:
         text += (
             ". Not distinguishable from this log; to separate them, record: "

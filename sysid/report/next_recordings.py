@@ -53,9 +53,9 @@ def recordings(verdict: Verdict, at_task: bool) -> list[Recording]:
         at_task: whether its log is of steps of the task.
     """
     found = [
-        Recording(f"whether it is {in_words(kind)} or {_any_of(rivals)}", text)
-        for kind, (rivals, experiments) in indistinguishable(verdict).items()
-        for text in experiments
+        Recording(f"whether it is {in_words(kind)} or {_any_of(rivals.kinds)}", text)
+        for kind, rivals in indistinguishable(verdict).items()
+        for text in rivals.experiments
     ]
     if verdict.ending == "unexplained":
         found += [
