@@ -37,6 +37,7 @@ class MagneticCatch(EnvironmentEffect):
     force: float = amplitude("N", 0.0, 50.0, "F, of the magnet at the opening")
     reach: float = shape_parameter(0.01, "m", 0.002, 0.05, "d", (0.005, 0.01, 0.02))
     is_local = True
+    noun = "a magnetic catch"
     experiment = "slow pulls to the opening and back, without contact at the walls"
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
