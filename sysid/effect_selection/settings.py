@@ -173,6 +173,11 @@ class SelectionSettings:
         "wider for a rival that the blocks can't distinguish from the best: which of "
         "the two is named is a matter of which is simpler, not of a tenth of a gain",
     )
+    stroke_speed: float = _setting(
+        0.05,
+        "of a joint's greatest speed",
+        "slower than that it rests: noise of a filtered velocity is no reversal",
+    )
     tie_min_gain: float = _setting(
         0.5,
         "of the best gain",

@@ -19,6 +19,7 @@ from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.left_over import LeftOver
 from sysid.effect_selection.residual_model import ResidualModel
 from sysid.effect_selection.search import SelectionRound
+from sysid.effect_selection.strokes import joints_of_one_stroke
 from sysid.effect_selection.survey import Survey
 from sysid.identification.uncertainty import uncertainty
 from sysid.parameters import Scaling
@@ -90,6 +91,7 @@ class Verdict:
         limits: how large effects that are not named would have to be to be found.
         left_over: what a flexible learner explains of what the effects leave.
         residual_model: learned in their place; not physical. None if it gains little.
+        single_strokes: joints of effects with ties that make a single stroke.
     """
 
     ending: Ending
@@ -105,6 +107,7 @@ class Verdict:
     limits: tuple[DetectionLimit, ...] = ()
     left_over: tuple[LeftOver, ...] = ()
     residual_model: ResidualModel | None = None
+    single_strokes: tuple[str, ...] = ()
 
 
 def judge(
@@ -148,7 +151,10 @@ def judge(
         tuple(left_over),
         residual_model,
     )
-    return dataclasses.replace(found, ending=_ending(found, last))
+    tied = {n.partition(".")[2] for n, t in zip(names, found.ties, strict=True) if t}
+    strokes = joints_of_one_stroke(last.model, tied, last.settings)
+    ending = _ending(found, last)
+    return dataclasses.replace(found, ending=ending, single_strokes=strokes)
 
 
 def _ending(found: Verdict, last: Fit) -> Ending:

@@ -62,13 +62,13 @@ def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
 
 def indistinguishable_text(verdict: Verdict) -> str:
     """Returns which kinds of effects the log can't tell apart, in sentences."""
-    sentences = []
+    which, sentences = _single_strokes(verdict.single_strokes), []
     for kind, rivals in indistinguishable(verdict).items():
         others = enumeration([in_all_words(rival) for rival in rivals.kinds], "or")
         them = "the two" if len(rivals.kinds) == 1 else "them"
         sentences.append(
-            f"This log can't tell {in_words(kind)} from {others}; to separate {them}, "
-            f"record: {' / '.join(rivals.experiments)}."
+            f"This log{which} can't tell {in_words(kind)} from {others}; to separate "
+            f"{them}, record: {' / '.join(rivals.experiments)}."
         )
     return " ".join(sentences)
 
@@ -156,6 +156,13 @@ def _contradictions(found: Sequence[Contradiction]) -> str:
         against = enumeration(others) or "the other episodes"
         texts.append(f"{first} contradicts {against} by {why}")
     return enumeration(texts)
+
+
+def _single_strokes(joints: Sequence[str]) -> str:
+    if not joints:
+        return ""
+    makes = "makes" if len(joints) == 1 else "make"
+    return f", in which {enumeration(joints)} {makes} a single stroke,"
 
 
 def _findings(found: Sequence[ChannelFinding]) -> str:

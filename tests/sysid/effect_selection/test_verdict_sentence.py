@@ -11,16 +11,37 @@ from sysid.effect_selection.contradictions import Contradiction
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effects_in_words, in_words
 from sysid.effect_selection.experiments import separating
+from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.effect_selection.strokes import joints_of_one_stroke
 from sysid.effect_selection.verdict import Tie
 from sysid.effect_selection.verdict_sentence import (
     improvement_in_words,
     indistinguishable_text,
     verdict_sentence,
 )
-from sysid.models import Channel
+from sysid.models import Channel, LogModel, Measurements
 from tests.sysid.effect_selection.verdicts import ERRORS, made_verdict
 
 _FALLS = "the held-out error falls from 10 % to 1 % of the force"
+
+
+class Sliding(LogModel):
+    """A joint with a velocity (n,)."""
+
+    parameters = ()
+
+    def __init__(self, v):
+        self.v = v
+        self.measurements = Measurements.of_array(v, [Channel("rack", "N")])
+
+    def covariates(self, channel):
+        return {"velocity": self.v}
+
+    def predict(self, theta, rows):
+        return self.v[rows]
+
+    def select_rows(self, mask):
+        return Sliding(self.v[mask])
 
 
 def _joints(kind, count):
@@ -98,6 +119,32 @@ def test_what_a_log_cannot_tell_apart_is_said_once_for_all_joints():
         "This log can't tell dry friction from friction in proportion to the load; to "
         "separate the two, record: two payloads."
     )
+
+
+def test_a_joint_that_makes_a_single_stroke_is_said_to_be_why():
+    ties = ((Tie("JointLoadFriction.rack", "two payloads"),),)
+    found = made_verdict("explained", ("JointCoulombFriction.rack",), ties)
+    found = dataclasses.replace(found, single_strokes=("rack",))
+    assert indistinguishable_text(found).startswith(
+        "This log, in which rack makes a single stroke, can't tell dry friction from "
+    )
+
+
+@pytest.mark.parametrize(
+    ("position", "is_single"),
+    [
+        (lambda t: t, True),
+        (lambda t: -np.cos(t), True),
+        (lambda t: np.sin(t), False),
+    ],
+)
+def test_strokes_are_counted_by_reversals(position, is_single):
+    t = np.linspace(0.0, 2.0 * np.pi, 200)
+    v = np.gradient(position(t), t) + 1e-3 * np.sin(300.0 * t)
+    model = Sliding(v)
+    found = joints_of_one_stroke(model, {"rack"}, DEFAULT_SETTINGS)
+    assert found == (("rack",) if is_single else ())
+    assert joints_of_one_stroke(model, {"another"}, DEFAULT_SETTINGS) == ()
 
 
 def test_errors_of_several_units_are_no_shares_and_those_that_rise_are_said():
