@@ -172,14 +172,14 @@ def most_parsimonious(accepted: Sequence[Evidence]) -> Evidence:
     best, limits = accepted[0], accepted[0].settings
     order = [effect.__name__ for effect in registered_effects()]
 
-    def is_as_good(other: Evidence) -> bool:
+    def _is_as_good(other: Evidence) -> bool:
         if other.gain >= (1.0 - limits.parsimony_tolerance) * best.gain:
             return True
         enough = other.gain >= (1.0 - limits.tie_parsimony_tolerance) * best.gain
         no_larger = other.parameter_count <= best.parameter_count
         return enough and no_larger and other.ties_with(best)
 
-    as_good = [e for e in accepted if is_as_good(e)]
+    as_good = [e for e in accepted if _is_as_good(e)]
     return min(as_good, key=lambda e: (*_complexity(e, order), -e.gain))
 
 
