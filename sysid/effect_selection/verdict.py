@@ -218,7 +218,7 @@ def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
             p.unit,
             (float(low[i]), float(high[i])),
             None if p.is_shape else 0.0,
-            not inside[i] and fit.theta[i] != p.nominal,
+            bool(not inside[i] and fit.theta[i] != p.nominal),
         )
         for i, p in enumerate(fit.model.parameters)
         if i >= own

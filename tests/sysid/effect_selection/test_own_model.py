@@ -1,5 +1,7 @@
 """A model of one's own, without a scenario, closed as a library call."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -69,7 +71,9 @@ def test_all_but_the_model_has_a_default(closed):
 def test_there_is_no_scenario_and_a_report_all_the_same(closed):
     assert closed.scenario is None
     assert "JointCoulombFriction" in closing_page(closed, {})
-    assert to_mapping(closed)["effects"] == list(closed.verdict.names)
+    mapping = json.loads(json.dumps(to_mapping(closed)))
+    assert mapping["effects"] == list(closed.verdict.names)
+    assert mapping["sentence"] == closed.sentence
 
 
 def test_prints_nothing_unless_progress_is_given(pendulum, capsys):
