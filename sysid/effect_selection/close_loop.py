@@ -80,9 +80,13 @@ class ClosedLoop:
 
     @property
     def sentence(self) -> str:
-        """The verdict in plain English, with what the log can't tell apart."""
-        found = verdict_sentence(self.verdict, self.errors)
-        return " ".join(filter(None, [found, indistinguishable_text(self.verdict)]))
+        """The verdict in plain English."""
+        return verdict_sentence(self.verdict, self.errors)
+
+    @property
+    def not_told_apart(self) -> str:
+        """What the log can't tell apart, in plain English; empty for nothing."""
+        return indistinguishable_text(self.verdict)
 
     @property
     def text(self) -> str:

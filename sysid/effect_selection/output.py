@@ -24,6 +24,7 @@ def to_mapping(closed: ClosedLoop) -> dict[str, Any]:
     return {
         **_verdict(closed.verdict),
         "sentence": closed.sentence,
+        "not_told_apart": closed.not_told_apart,
         "text": closed.text,
         "provisional": closed.is_provisional,
         "errors": _errors(closed.errors),

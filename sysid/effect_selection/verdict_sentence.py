@@ -62,13 +62,13 @@ def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
 
 def indistinguishable_text(verdict: Verdict) -> str:
     """Returns which kinds of effects the log can't tell apart, in sentences."""
-    which, sentences = _single_strokes(verdict.single_strokes), []
+    which, sentences = single_strokes_text(verdict), []
     for kind, rivals in indistinguishable(verdict).items():
         others = enumeration([in_all_words(rival) for rival in rivals.kinds], "or")
         them = "the two" if len(rivals.kinds) == 1 else "them"
         sentences.append(
             f"This log{which} can't tell {in_words(kind)} from {others}; to separate "
-            f"{them}, record: {' / '.join(rivals.experiments)}."
+            f"{them}, record: {'; '.join(rivals.experiments)}."
         )
     return " ".join(sentences)
 
@@ -81,7 +81,8 @@ def indistinguishable(verdict: Verdict) -> dict[str, Rivals]:
             kind = name.partition(".")[0]
             known = found.get(kind, Rivals((), ()))
             kinds = (*known.kinds, *(_kinds(tie.name) for tie in ties))
-            told = (*known.experiments, *(tie.experiment for tie in ties))
+            parts = (part for tie in ties for part in tie.experiment.split("; "))
+            told = (*known.experiments, *parts)
             found[kind] = Rivals(
                 tuple(dict.fromkeys(kinds)), tuple(dict.fromkeys(told))
             )
@@ -158,7 +159,9 @@ def _contradictions(found: Sequence[Contradiction]) -> str:
     return enumeration(texts)
 
 
-def _single_strokes(joints: Sequence[str]) -> str:
+def single_strokes_text(verdict: Verdict) -> str:
+    """Returns a clause on joints that make a single stroke; empty if none does."""
+    joints = verdict.single_strokes
     if not joints:
         return ""
     makes = "makes" if len(joints) == 1 else "make"

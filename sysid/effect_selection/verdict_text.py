@@ -16,6 +16,7 @@ from sysid.effect_selection.verdict import ParameterValue, Verdict
 from sysid.effect_selection.verdict_sentence import (
     contradictions_text,
     indistinguishable,
+    single_strokes_text,
     verdict_sentence,
 )
 
@@ -77,8 +78,10 @@ def _effects_text(verdict: Verdict, most: int) -> str:
     tests = dict.fromkeys(test for each in rivals.values() for test in each.experiments)
     if tests:
         text += (
-            ". Not distinguishable from this log; to separate them, record: "
-            + " / ".join(list(tests)[:most])
+            f". Not distinguishable from this log{single_strokes_text(verdict)}"
+            + ("" if verdict.single_strokes else ";")
+            + " to separate them, record: "
+            + "; ".join(list(tests)[:most])
         )
     return text
 
