@@ -21,6 +21,7 @@ from sysid.effect_selection.effect_names import (
     in_words,
 )
 from sysid.effect_selection.held_out import HeldOut
+from sysid.effect_selection.left_over import LeftOver
 from sysid.effect_selection.verdict import Verdict
 
 _QUANTITIES = {"N": "force", "N m": "torque", "m": "position", "rad": "orientation"}
@@ -136,7 +137,13 @@ def left_in_words(verdict: Verdict) -> str:
     excess = ""
     if verdict.excess and not against:
         excess = f"the residual is {verdict.excess:.2g} times the noise"
-    clauses = (verdict.dependence, against, excess, _findings(verdict.findings))
+    clauses = (
+        verdict.dependence,
+        against,
+        excess,
+        _findings(verdict.findings),
+        _left_over(verdict.left_over),
+    )
     return enumeration([clause for clause in clauses if clause])
 
 
@@ -171,6 +178,17 @@ def single_strokes_text(verdict: Verdict) -> str:
 def _findings(found: Sequence[ChannelFinding]) -> str:
     names = list(dict.fromkeys(each.channel for each in found))
     return f"something is left in {enumeration(names)}" if names else ""
+
+
+def _left_over(found: Sequence[LeftOver]) -> str:
+    """Returns what a flexible learner finds in what is left; empty for nothing."""
+    if not found:
+        return ""
+    channels = enumeration([each.channel for each in found])
+    causes = list(dict.fromkeys(each.depends_on[0] for each in found))
+    most = max(each.share for each in found)
+    share = f"{'up to ' * (len(found) > 1)}{_two_digits(100.0 * most)} %"
+    return f"{share} of what is left in {channels} depends on {enumeration(causes)}"
 
 
 def _nothing(verdict: Verdict) -> str:

@@ -23,6 +23,7 @@ def closing_page(closed: ClosedLoop, origin: Mapping[str, Any]) -> str:
     return render(
         "closing.html.j2",
         result=to_mapping(closed),
+        verdict=closed.verdict,
         kinds=kind_rows(closed.verdict),
         limits=limit_rows(closed.verdict.limits),
         recordings=recordings(closed.verdict, closed.last.model.has_commands),

@@ -11,6 +11,7 @@ from sysid.effect_selection.contradictions import Contradiction
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effects_in_words, in_words
 from sysid.effect_selection.experiments import separating
+from sysid.effect_selection.left_over import LeftOver
 from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.effect_selection.strokes import joints_of_one_stroke
 from sysid.effect_selection.verdict import Tie
@@ -77,6 +78,18 @@ def test_partly_explained_says_what_is_left():
     assert verdict_sentence(found, ERRORS) == (
         f"The model lacks a slow filter of the sensor; with it {_FALLS}, but not all "
         "is explained: something is left in fx and fy."
+    )
+
+
+def test_what_a_flexible_learner_finds_is_said():
+    left = (
+        LeftOver("fx", 0.4, 0.1, "N", ("velocity", "time")),
+        LeftOver("fy", 0.2, 0.1, "N", ("velocity",)),
+    )
+    found = dataclasses.replace(made_verdict("partly", ("SensorLag",)), left_over=left)
+    assert verdict_sentence(found, ERRORS).endswith(
+        "but not all is explained: up to 40 % of what is left in fx and fy depends on "
+        "velocity."
     )
 
 
