@@ -492,10 +492,10 @@ class SelectionSettings:
         (1, 4, 16), "rows", "back in time, at which quantities are seen, too"
     )
     learner_trees: int = _setting(
-        80, "trees", "at `learner_rate`, as many as scikit-learn's default of 100 fits"
+        50, "trees", "at `learner_rate`: about what 100 do at scikit-learn's rate, 0.1"
     )
     learner_rate: float = _setting(
-        0.08, "1", "shrinkage of each tree; scikit-learn's default is 0.1"
+        0.15, "1", "shrinkage of each tree; scikit-learn's default is 0.1"
     )
     learner_leaves: int = _setting(
         8, "leaves of a tree", "interactions of up to three quantities"

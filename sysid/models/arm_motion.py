@@ -95,7 +95,7 @@ class ArmMotion:
         samples = self.samples(beta, effects)
         torque = samples.load
         for effect in effects:
-            if isinstance(effect, ArmTorqueEffect):
+            if isinstance(effect, ArmTorqueEffect) and not effect.is_null:
                 torque = torque + effect.torques(samples)
         return torque
 
