@@ -185,6 +185,24 @@ class Fit:
         return found
 
     @property
+    def error_of_steps(self) -> Array:
+        """By how much the estimate (p,) is off, in the unit box, for its coarse steps.
+
+        One Gauss-Newton step towards the optimum of the same model in finer time
+        steps. No bootstrap of rows sees such an error.
+        """
+        linear, finer = self.linearisation, self.model.refined()
+        if finer is None or not len(linear.u):
+            return np.zeros_like(linear.u)
+        measured = self.model.measurements
+        fine = (finer.predictions(self.theta) - measured.values) / measured.noise
+        root = np.sqrt(linear.weights)
+        J = (root[..., None] * linear.jacobian).reshape(root.size, -1)
+        change = (root * (fine - linear.residual)).reshape(-1)
+        rcond = self.settings.held_out_rcond
+        return np.asarray(-np.linalg.lstsq(J, change, rcond=rcond)[0])
+
+    @property
     def _null(self) -> Array:
         """The point (p,) of the unit box at which no parameter has an effect."""
         parameters = self.model.parameters

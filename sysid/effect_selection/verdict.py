@@ -202,13 +202,18 @@ def _explained(first: Fit, last: Fit, left: float) -> float:
 def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
     """Returns the effects' parameters with their intervals.
 
+    An interval is that of a bootstrap, and as much wider as the model's time steps are
+    known to be off.
+
     Args:
         fit: with the effects.
         own: number of the parameters that the model has anyway, the first ones.
     """
     spread = uncertainty(fit.linearisation, fit.model.measurements.episode)
     scaling = Scaling(fit.model.parameters)
-    ends = np.clip(fit.linearisation.u[:, None] + spread.bootstrap, 0.0, 1.0)
+    off = fit.error_of_steps[:, None]
+    ends = spread.bootstrap + np.hstack([np.minimum(off, 0.0), np.maximum(off, 0.0)])
+    ends = np.clip(fit.linearisation.u[:, None] + ends, 0.0, 1.0)
     low, high = (scaling.from_unit(side) for side in ends.T)
     inside = fit.inside(np.arange(len(fit.theta)))
     return tuple(

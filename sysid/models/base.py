@@ -225,6 +225,10 @@ class LogModel(abc.ABC):
         """
         return self
 
+    def refined(self) -> Self | None:
+        """Returns the same model in finer time steps; None if it takes none coarser."""
+        return None
+
     def chunks(self) -> list[slice]:
         """Returns the rows of each piece of work that an evaluation consists of."""
         return [slice(0, self.measurements.rows)]

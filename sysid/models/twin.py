@@ -166,6 +166,11 @@ class TwinModel(ScenarioModel):
             scenario=dataclasses.replace(self.scenario, contact=contact)
         )
 
+    def refined(self) -> Self | None:
+        """See LogModel: without coarse steps."""
+        is_coarse = self.coarse and self._has_impact and not self.rollout
+        return self.replace(coarse=False) if is_coarse else None
+
     def displaced(self, displacement: Array, push: Array) -> Self:
         """See LogModel."""
         begin = self._transitions.ends_before(displacement)
