@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drake_disasm.common.prefixes import prefixed_unit
 from sysid.effect_selection.channel_checks import ChannelFinding
 from sysid.effect_selection.contradictions import Contradiction
 from sysid.effect_selection.effect_names import (
@@ -118,9 +119,10 @@ def improvement_in_words(errors: HeldOut) -> str:
 
 def _change(before: float, after: float, unit: str) -> str:
     """Returns "from 6.7 % to 2.1 % of the torque", or "from 0.3 to 0.1 N"."""
-    sign = " %" if unit.startswith("%") else ""
-    digits = _two_digits if sign else _three_digits
-    return f"from {digits(before)}{sign} to {digits(after)} {unit}"
+    if unit.startswith("%"):
+        return f"from {_two_digits(before)} % to {_two_digits(after)} {unit}"
+    factor, small = prefixed_unit(before, unit)
+    return f"from {before / factor:.3g} to {after / factor:.3g} {small}"
 
 
 def _above_noise(errors: HeldOut) -> set[str]:
@@ -202,10 +204,6 @@ def _nothing(verdict: Verdict) -> str:
         f"{text}, in which {len(seen)} of {len(kinds)} kinds of effects would have "
         "been found if they were large enough"
     )
-
-
-def _three_digits(value: float) -> str:
-    return f"{value:.3g}"
 
 
 def _two_digits(value: float) -> str:

@@ -191,30 +191,26 @@ def candidate_plot(surveys: Sequence[Survey]) -> Plot:
 
 
 def _channel_view(errors: HeldOut, number: int) -> dict[str, Any]:
-    """Returns the titles and ranges of a channel's two panels.
+    """Returns the titles of a channel's two panels, and the range of the upper one.
 
     What was predicted before may be so far off that nothing else could be seen: then
-    the panels show what was measured and what is predicted now.
+    that shows what was measured and what is predicted now.
     """
     channel = errors.channels[number]
     before, after, measured = (
         values[:, number] for values in (errors.before, errors.after, errors.measured)
     )
-    noise = np.nan_to_num([-channel.noise, channel.noise])
+    main = np.append(measured, after)
+    low, high = float(main.min()), float(main.max())
+    is_far = np.ptp(before) > _FAR_OFF * (high - low)
     view: dict[str, Any] = {
         "yaxis.title.text": f"{channel.name} [{channel.unit}]",
         "yaxis2.title.text": f"error of {channel.name} [{channel.unit}]",
+        "yaxis.autorange": not is_far,
     }
-    for axis, main, other in (
-        ("yaxis", np.append(measured, after), before),
-        ("yaxis2", np.append(after - measured, noise), before - measured),
-    ):
-        low, high = float(main.min()), float(main.max())
-        is_far = np.ptp(other) > _FAR_OFF * (high - low)
+    if is_far:
         margin = 0.08 * (high - low)
-        view[f"{axis}.autorange"] = not is_far
-        if is_far:
-            view[f"{axis}.range"] = [low - margin, high + margin]
+        view["yaxis.range"] = [low - margin, high + margin]
     return view
 
 

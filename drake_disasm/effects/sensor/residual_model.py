@@ -32,6 +32,7 @@ class SensorResidualModel(SensorEffect):
 
     stage = 5
     present_at_zeroing = False
+    noun = "a learned model of the readings"
     experiment = "what shows an effect of which this is the trace"
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:

@@ -170,7 +170,8 @@ def test_errors_of_several_units_are_no_shares_and_those_that_rise_are_said():
         channels=channels,
     )
     assert improvement_in_words(errors) == (
-        "the held-out error falls from 2 to 0.1 N but rises from 1e-06 to 1e-05 m"
+        "the held-out error falls from 2 to 0.1 N but rises from 1 to 10 "
+        "\N{GREEK SMALL LETTER MU}m"
     )
 
 
