@@ -23,15 +23,16 @@ from drake_disasm.common.spatial import (
 from drake_disasm.common.timing import newest_step
 from drake_disasm.devices.sensor_chain import (
     Payload,
+    memory_size,
     sensed_at_zeroing,
     sensed_sample,
 )
-from drake_disasm.effects import Sensing, SensorEffect, SensorMemoryEffect
+from drake_disasm.effects import Sensing, SensorEffect
 from drake_disasm.ports import Health
 from drake_disasm.scenario import SensorConfig
 
-#: For how many effects with a memory a sensor has room.
-MOST_MEMORIES = 4
+#: How many numbers the effects of a sensor may remember together.
+MOST_REMEMBERED = 512
 
 
 class ForceTorqueSensor(LeafSystem):
@@ -96,7 +97,7 @@ class ForceTorqueSensor(LeafSystem):
         self._mount = mount
         if mount:
             self._coordinates = self.DeclareVectorInputPort("mount_coordinates", 6)
-        self._memory = self.DeclareDiscreteState(6 * MOST_MEMORIES)
+        self._memory = self.DeclareDiscreteState(MOST_REMEMBERED)
         self._remembered = self.DeclareDiscreteState([np.nan])  # when [s]
         self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._update)
         self._declare_outputs()
@@ -181,9 +182,9 @@ class ForceTorqueSensor(LeafSystem):
         return self._payload.sensing(np.array(time), R_WS)
 
     def _chain(self, context: Context, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the reading (6,) without noise, and the memories (k, 6) up to now."""
+        """Returns the reading (6,) without noise, and the memories (m,) up to now."""
         load, effects = self.load(context), self.effects(context)
-        memories = context.get_discrete_state(self._memory).value().reshape(-1, 6)
+        memories = context.get_discrete_state(self._memory).value()
         if not effects:
             return load, memories
         interval = time - context.get_discrete_state(self._remembered).value()[0]
@@ -193,13 +194,13 @@ class ForceTorqueSensor(LeafSystem):
         return sensed_sample(load, effects, sensing, memories, max(interval, 0.0))
 
     def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
-        if not any(isinstance(e, SensorMemoryEffect) for e in self.effects(context)):
+        if not memory_size(self.effects(context)):
             return EventStatus.DidNothing()
         if not self.load(context).any():  # no step yet, so nothing to remember
             return EventStatus.DidNothing()
         time = self._sample_time(context)
         _, memories = self._chain(context, time)
-        state.set_value(self._memory, memories.reshape(-1))
+        state.set_value(self._memory, memories)
         state.set_value(self._remembered, [time])
         return EventStatus.Succeeded()
 
@@ -220,10 +221,10 @@ class ForceTorqueSensor(LeafSystem):
 
 
 def _refuse_too_many_memories(effects: Sequence[SensorEffect]) -> None:
-    if sum(isinstance(e, SensorMemoryEffect) for e in effects) > MOST_MEMORIES:
+    if memory_size(effects) > MOST_REMEMBERED:
+        names = ", ".join(type(e).__name__ for e in effects if memory_size([e]))
         raise DisasmError(
-            f"effects: more than {MOST_MEMORIES} of the sensor's have a memory; take "
-            "some out"
+            f"effects: {names} remember more than a sensor has room for; take some out"
         )
 
 

@@ -85,27 +85,32 @@ def sensed_sample(
     memories: np.ndarray,
     interval: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns what a sensor with memory reads, (..., 6), and remembers, (k, ..., 6).
+    """Returns what a sensor with memory reads, (6,), and remembers, (m,).
 
     Args:
-        load: (..., 6) [f; tau] in S.
+        load: (6,) [f; tau] in S.
         effects: in the order of the chain.
         sensing: of the loads.
-        memories: (k, ..., 6) of the sample before, one for each effect that has one,
-            and maybe more; NaN where there was none.
+        memories: (m,) of the sample before, of one effect after the other, and maybe
+            more; NaN where there was none.
         interval: since then [s].
     """
     memories = np.array(memories)
 
     def read(i: int, effect: SensorMemoryEffect, load: np.ndarray) -> np.ndarray:
         """Updates the effect's memory, and reads with it."""
-        slot = sum(isinstance(e, SensorMemoryEffect) for e in effects[:i])
-        before = memories[slot]
+        own = np.s_[memory_size(effects[:i]) : memory_size(effects[: i + 1])]
+        before = memories[own]
         before = np.where(np.isnan(before), effect.begin(load), before)
-        memories[slot] = effect.remember(before, load, interval)
-        return effect.read(load, memories[slot])
+        memories[own] = effect.remember(before, load, interval)
+        return effect.read(load, memories[own])
 
     return sensed(load, effects, sensing, read), memories
+
+
+def memory_size(effects: Sequence[SensorEffect]) -> int:
+    """Returns how many numbers effects remember together."""
+    return sum(e.memory_size for e in effects if isinstance(e, SensorMemoryEffect))
 
 
 def sensed_along(

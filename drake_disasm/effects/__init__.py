@@ -64,11 +64,15 @@ from drake_disasm.effects.motion.imprecision import Imprecision
 from drake_disasm.effects.sensor.bias import SensorBias
 from drake_disasm.effects.sensor.drift import SensorDrift
 from drake_disasm.effects.sensor.warm_up import SensorWarmUp
+from drake_disasm.effects.sensor.step import SensorStep
 from drake_disasm.effects.sensor.gain import SensorGain
+from drake_disasm.effects.sensor.gain_drift import SensorGainDrift
 from drake_disasm.effects.sensor.cross_talk import SensorCrossTalk
 from drake_disasm.effects.sensor.lag import SensorLag
+from drake_disasm.effects.sensor.delay import SensorDelay
 from drake_disasm.effects.sensor.hysteresis import SensorHysteresis
 from drake_disasm.effects.sensor.saturation import SensorSaturation
+from drake_disasm.effects.sensor.dead_band import SensorDeadBand
 from drake_disasm.effects.sensor.mounting import SensorMounting
 from drake_disasm.effects.sensor.payload_error import PayloadError
 from drake_disasm.effects.sensor.base_tilt import BaseTilt
@@ -137,15 +141,19 @@ __all__ = [
     "Sensing",
     "SensorBias",
     "SensorCrossTalk",
+    "SensorDeadBand",
+    "SensorDelay",
     "SensorDrift",
     "SensorEffect",
     "SensorGain",
+    "SensorGainDrift",
     "SensorHysteresis",
     "SensorLag",
     "SensorMemoryEffect",
     "SensorMounting",
     "SensorResidualModel",
     "SensorSaturation",
+    "SensorStep",
     "SensorWarmUp",
     "TorqueGain",
     "TorqueOffset",

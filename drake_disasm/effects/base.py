@@ -22,9 +22,9 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from drake_disasm.effects.fields import acts_at_joint, amplitudes
+from drake_disasm.effects.fields import acts_at_joint, amplitudes, shape_parameters
 
-#: What an effect keeps from one step to the next: six numbers.
+#: What an effect on the motion keeps from one step to the next: six numbers.
 Memory = np.ndarray
 
 
@@ -132,6 +132,15 @@ class Effect:
         return not any(getattr(self, name) for name in amplitudes(type(self)))
 
     @classmethod
+    def grids(cls, duration: float) -> dict[str, tuple[float, ...]]:
+        """Returns values of each shape parameter from which a search starts, by name.
+
+        Args:
+            duration: of a log's longest episode [s]; infinite if it is not known.
+        """
+        return shape_parameters(cls)
+
+    @classmethod
     def description(cls) -> str:
         """Returns what it is, in a line: the first paragraph of its docstring."""
         paragraph = inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0]
@@ -208,7 +217,8 @@ class SensorEffect(Effect, abc.ABC):
 
     Attributes:
         stage: where in the chain from load to reading: 0 the load itself, 1 the
-            sensor's mounting, 2 its elements, 3 its electronics, 4 its range.
+            sensor's mounting, 2 its elements, 3 its electronics, 4 its range, 5 what
+            happens to readings before they are reported.
             Effects act in this order, whatever the order of a scenario's list.
         present_at_zeroing: whether zeroing the sensor before an episode sees it (a
             load that always hangs there) or not (an error that arises afterwards).
@@ -239,7 +249,12 @@ class SensorMemoryEffect(SensorEffect, abc.ABC):
 
     The sensor goes from sample to sample: `remember`, then `read`. Readings at rest do
     not show it.
+
+    Attributes:
+        memory_size: how many numbers m it remembers.
     """
+
+    memory_size: ClassVar[int] = 6
 
     def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
         """Returns readings after a long rest."""
@@ -247,23 +262,23 @@ class SensorMemoryEffect(SensorEffect, abc.ABC):
 
     @abc.abstractmethod
     def begin(self, wrench_S: np.ndarray) -> np.ndarray:
-        """Returns the memory (..., 6) after a long rest under a load (..., 6)."""
+        """Returns the memory (m,) after a long rest under a load (6,)."""
 
     @abc.abstractmethod
     def remember(
         self, memory: np.ndarray, wrench_S: np.ndarray, interval: float
     ) -> np.ndarray:
-        """Returns the memory (..., 6) after a load (..., 6) that held for an interval.
+        """Returns the memory (m,) after a load (6,) that held for an interval.
 
         Args:
-            memory: (..., 6) before.
-            wrench_S: (..., 6) the load now.
+            memory: (m,) before.
+            wrench_S: (6,) the load now.
             interval: since the sample before [s].
         """
 
     @abc.abstractmethod
     def read(self, wrench_S: np.ndarray, memory: np.ndarray) -> np.ndarray:
-        """Returns the reading (..., 6) of a load with the memory up to now."""
+        """Returns the reading (6,) of a load with the memory (m,) up to now."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -115,6 +115,11 @@ class LogModel(abc.ABC):
         """Where effects that act at a joint may act; by default at each channel."""
         return tuple(channel.name for channel in self.measurements.channels)
 
+    @property
+    def duration(self) -> float:
+        """Of the longest episode, in the time of effects [s]; infinite: not known."""
+        return np.inf
+
     def effects_at(self, theta: Array) -> tuple[Effect, ...]:
         """Returns the effects with values of parameters (p,), as `predict` gets it."""
         own = [p for p in self.parameters if field_of(p)]
@@ -136,7 +141,7 @@ class LogModel(abc.ABC):
             for kind in library
             if issubclass(kind, self.effect_types)
             if kind.is_physical and not kind.is_random
-            for effect in at_null(kind, self.joints)
+            for effect in at_null(kind, self.joints, self.duration)
         ]
 
     def with_effects(

@@ -5,20 +5,21 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from drake_disasm.effects import ArmEffect, Effect, shape_parameters
+from drake_disasm.effects import ArmEffect, Effect
 from sysid.parameters import Parameter
 
 
-def at_null(kind: type[Effect], joints: Sequence[str]) -> list[Effect]:
+def at_null(kind: type[Effect], joints: Sequence[str], duration: float) -> list[Effect]:
     """Returns a class of effects at null, in every place and shape.
 
     Args:
         kind: an effect at a joint is made for each joint, any other once.
         joints: their names.
+        duration: of the longest episode [s]; infinite if it is not known.
     """
     make: Callable[..., Effect] = kind
     places = kind.places(joints) if issubclass(kind, ArmEffect) else [{}]
-    grids = shape_parameters(kind)
+    grids = kind.grids(duration)
     return [
         make(**place, **dict(zip(grids, shape, strict=True)))
         for place in places

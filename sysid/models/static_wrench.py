@@ -101,6 +101,11 @@ class StaticWrenchModel(ScenarioModel):
         return sensed(self._payload.weight(self._R_WS[rows]), effects, sensing)
 
     @property
+    def duration(self) -> float:
+        """See LogModel."""
+        return float(self._time.max())
+
+    @property
     def noise_groups(self) -> tuple[str, ...]:
         """Force axes share one unknown noise, torque axes another.
 

@@ -143,6 +143,12 @@ class TwinModel(ScenarioModel):
         )
 
     @property
+    def duration(self) -> float:
+        """See LogModel."""
+        steps = self._transitions.steps.index.max() + 1
+        return float(steps * self._transitions.period)
+
+    @property
     def costly(self) -> bool:
         """See LogModel."""
         return not self._has_impact

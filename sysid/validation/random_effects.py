@@ -59,7 +59,7 @@ def _attempt(
         sign = -1.0 if fields[name]["low"] < 0.0 and random.random() < 0.5 else 1.0
         unit[str(name)] = sign * reach * random.uniform(0.5, 1.0)
     look = {
-        name: float(np.exp(random.uniform(*np.log([min(grid), max(grid)]))))
+        name: _between(min(grid), max(grid), random)
         for name, grid in shape_parameters(kind).items()
     }
     scale, before = _FIRST, None
@@ -76,6 +76,13 @@ def _attempt(
         scale *= float(np.clip(level / max(found, 1e-9), 0.3, 3.0 if found else 10.0))
         before = effect
     return effect, found
+
+
+def _between(low: float, high: float, random: np.random.Generator) -> float:
+    """Returns a number between two, even on a logarithmic scale if both have one."""
+    if low <= 0.0:
+        return float(random.uniform(low, high))
+    return float(np.exp(random.uniform(*np.log([low, high]))))
 
 
 def _within(fields: dict, unit: dict[str, float], scale: float) -> dict[str, float]:

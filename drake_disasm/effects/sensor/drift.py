@@ -10,7 +10,7 @@ from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
 
 _NEVER = 1e6  # s
-_GRID = (10.0, 30.0, 50.0, 100.0, 300.0, _NEVER)
+_GRID = (_NEVER, 10.0, 30.0, 50.0, 100.0, 300.0)
 
 
 @register_effect

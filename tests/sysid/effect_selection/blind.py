@@ -5,7 +5,7 @@ what it did: a verdict has nothing but the log to go by.
 """
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,6 +49,7 @@ def static_log(
     level: float,
     seed: int,
     correlation: float = 0.0,
+    shape: Mapping[str, float] | None = None,
 ) -> Drawn:
     """Writes readings at rest with effects of a kind each.
 
@@ -58,11 +59,13 @@ def static_log(
         level: rms of what an effect leaves unexplained, in units of the noise.
         seed: of everything that is drawn.
         correlation: of the noise from one reading to the next.
+        shape: parameters of the effects' shapes, by name.
     """
     random = np.random.default_rng(seed)
     R_WS = Rotation.random(READINGS, random_state=seed).as_quat()[:, [3, 0, 1, 2]]
     clean = _readings(folder / "clean", R_WS, [])
-    effects = [_drawn(kind, random, folder, R_WS, clean, level) for kind in kinds]
+    shaped = [kind(**(shape or {})) for kind in kinds]
+    effects = [_drawn(e, random, folder, R_WS, clean, level) for e in shaped]
     reading = _readings(folder / "with", R_WS, effects)
     noise = np.array([FORCE_NOISE] * 3 + [TORQUE_NOISE] * 3)
     reading = reading + noise * autoregressive(random, READINGS, 6, correlation)
@@ -104,15 +107,15 @@ def _readings(folder: Path, R_WS: np.ndarray, effects: list[Effect]) -> np.ndarr
 
 
 def _drawn(
-    kind: type[SensorEffect],
+    effect: SensorEffect,
     random: np.random.Generator,
     folder: Path,
     R_WS: np.ndarray,
     clean: np.ndarray,
     level: float,
 ) -> Effect:
-    """Returns an effect of a kind whose unexplained part has the wanted size."""
-    effect = kind()
+    """Returns an effect with amplitudes that leave as much unexplained as wanted."""
+    kind = type(effect)
     fields = amplitudes(kind)
     chosen = random.choice(fields, size=min(2, len(fields)), replace=False)
     directions = random.choice([-1.0, 1.0], len(chosen)) * random.uniform(0.5, 1, 2)

@@ -9,7 +9,9 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     SensorDrift,
     SensorGain,
+    SensorGainDrift,
     SensorMounting,
+    SensorStep,
     registered_effects,
 )
 from drake_disasm.logs import read_log
@@ -25,7 +27,9 @@ _BIASED = ("SensorDrift", "SensorGain", "SensorMounting")
 _LIBRARY = [e for e in registered_effects() if e.__name__ in _BIASED]
 
 
-@pytest.mark.parametrize("kind", [SensorDrift, SensorMounting, SensorGain])
+@pytest.mark.parametrize(
+    "kind", [SensorDrift, SensorMounting, SensorGain, SensorGainDrift]
+)
 def test_names_the_effect_or_a_tie_with_it(kind, tmp_path):
     found = closed(static_log(tmp_path, [kind], 2.0, seed=0).folder)
     verdict = found.verdict
@@ -33,6 +37,32 @@ def test_names_the_effect_or_a_tie_with_it(kind, tmp_path):
     assert kind.__name__ in (verdict.names[0], *(t.name for t in verdict.ties[0]))
     errors = found.errors
     assert errors.in_noise(errors.after) < 0.9 * errors.in_noise(errors.before)
+
+
+@pytest.mark.parametrize("onset", [7.0, 42.0, 85.0])
+def test_names_a_step_and_when_it_set_in(onset, tmp_path):
+    log = static_log(tmp_path, [SensorStep], 3.0, seed=0, shape={"onset": onset})
+    verdict = verdict_of(log.folder)
+    assert (verdict.ending, verdict.names) == ("explained", ("SensorStep",))
+    found = {v.name: v.value for v in verdict.values}
+    middle = found["SensorStep.onset"] + found["SensorStep.rise"] / 2.0
+    assert middle == pytest.approx(onset, abs=1.5)
+
+
+def test_shapes_that_no_row_depends_on_are_not_tried_and_not_estimated(tmp_path):
+    """A drift that ends after the log has looks like one that never does."""
+    short = np.arange(100) < 40
+    log = static_log(tmp_path, [SensorDrift], 5.0, seed=0).folder
+    library = [SensorDrift, SensorGain]
+    model = model_of([read_log(log)], ModelChoice()).of_rows(short)
+    found = close_loop(model, library=library)
+    shapes = found.begin.linearised.groups
+    assert [found.verdict.names, "SensorDrift.duration" in found.text] == [
+        ("SensorDrift",),
+        False,
+    ]
+    assert len(shapes["SensorDrift[duration=30]"])
+    assert not len(shapes["SensorDrift[duration=50]"])
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.5])

@@ -15,8 +15,12 @@ from drake_disasm.effects import (
     GrooveViscousFriction,
     MotionLag,
     RustyPatch,
+    SensorDeadBand,
+    SensorDelay,
+    SensorGainDrift,
     SensorHysteresis,
     SensorMounting,
+    SensorStep,
 )
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
@@ -68,6 +72,10 @@ def _error(log, scenario):
         Compliance(x=2e-5, z=2e-5),
         BoltSlip(x=3e-4),
         SensorMounting(ry=0.1),
+        SensorDelay(0.1),
+        SensorDeadBand(force=1.0, torque=1.0, width=1.0),
+        SensorGainDrift(fx=0.2, ty=0.2),
+        SensorStep(fx=0.5, tz=0.05, onset=1.5),
     ],
     ids=lambda effect: type(effect).__name__,
 )

@@ -1,0 +1,50 @@
+"""The sensor's readings come late."""
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from drake_disasm.effects.base import SensorMemoryEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.history import History
+from drake_disasm.effects.registry import register_effect
+
+_LONGEST = 0.3  # s
+_HISTORY = History(size=6, samples=32, longest=_LONGEST)
+
+
+@register_effect
+@dataclasses.dataclass
+class SensorDelay(SensorMemoryEffect):
+    """The wrench comes late by a fixed time: a transport delay, whole samples or not.
+
+    Equation: F_read(t) = F(t - T), the load between two samples on the straight line
+    through them; before the first sample the load was at rest.
+    Where it acts: between the sensor's electronics and whoever reads it: a buffer, a
+    bus, or a log whose rows have been shifted.
+    """
+
+    delay: float = amplitude("s", 0.0, _LONGEST, "T, of the wrench behind the load")
+
+    memory_size = _HISTORY.numbers
+    stage = 5
+    experiment = "steps that hit a stop, and an impulse: a delay shifts it, unchanged"
+    experiments_against: ClassVar = {
+        "SensorLag": "a knock: a delay shifts it unchanged, a filter makes it longer",
+        "MotionLag": "motion in free space: the measured pose is late then, too",
+    }
+
+    def begin(self, wrench_S: np.ndarray) -> np.ndarray:
+        """Returns a history of nothing but this load."""
+        return _HISTORY.begin(wrench_S)
+
+    def remember(
+        self, memory: np.ndarray, wrench_S: np.ndarray, interval: float
+    ) -> np.ndarray:
+        """Returns the history with one more sample."""
+        return _HISTORY.extended(memory, wrench_S, interval)
+
+    def read(self, wrench_S: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """Returns the load of a while ago."""
+        return _HISTORY.at(memory, self.delay)

@@ -1,0 +1,45 @@
+"""The sensor's gains drift."""
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from drake_disasm.effects.base import Sensing, SensorEffect
+from drake_disasm.effects.fields import amplitude
+from drake_disasm.effects.registry import register_effect
+
+
+@register_effect
+@dataclasses.dataclass
+class SensorGainDrift(SensorEffect):
+    """A relative error of each channel that grows with time.
+
+    Equation: F_read = (1 + g t) F, channel by channel, g = [fx, fy, fz, tx, ty, tz],
+    t the time since zeroing, or since the log began (readings that only have an order
+    count one second each): the linear part of a strain gauge's temperature
+    coefficient of sensitivity.
+    Where it acts: the sensor's elements, on the whole load, the tool's weight included.
+    """
+
+    fx: float = amplitude("1/s", -0.3, 0.3, "growth of the force's error along x_S")
+    fy: float = amplitude("1/s", -0.3, 0.3, "growth of the force's error along y_S")
+    fz: float = amplitude("1/s", -0.3, 0.3, "growth of the force's error along z_S")
+    tx: float = amplitude("1/s", -0.3, 0.3, "growth of the torque's error about x_S")
+    ty: float = amplitude("1/s", -0.3, 0.3, "growth of the torque's error about y_S")
+    tz: float = amplitude("1/s", -0.3, 0.3, "growth of the torque's error about z_S")
+
+    stage = 2
+    experiment = "two known weights in turn, again and again while the sensor warms up"
+    experiments_against: ClassVar = {
+        "SensorGain": "the same loads at the begin and at the end of a recording",
+        "SensorDrift": (
+            "two known weights in turn, again and again: a drift of the zero is the "
+            "same under both"
+        ),
+    }
+
+    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+        """Scales the channels by their gains at this time."""
+        rate = np.array([self.fx, self.fy, self.fz, self.tx, self.ty, self.tz])
+        return wrench_S + np.multiply.outer(sensing.time, rate) * wrench_S
