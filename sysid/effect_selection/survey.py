@@ -40,7 +40,8 @@ class LinearSurvey:
         raw: the regression of the fit's and the candidates' parameters.
         regression: the same with the fit's parameters projected out.
         whitened: the same of the prewhitened residual, by short blocks.
-        groups: columns of each candidate, by its text.
+        groups: columns of each candidate, by its text; none of one that looks like
+            another shape of the same effect.
         dependences: curves, and the columns of each.
         episodes: (B,) number of the episode that each block is of.
         is_further: whether the fit has effects: the model surely lacked something.
@@ -199,10 +200,7 @@ def _linear_survey(
     curves, dependences = dependence_curves(model, fitter.settings)
     blocks = blocks_of(linearisation.residual, episode, fitter.settings)
     raw = BlockRegression.of(linearisation, blocks, fitter.settings, curves)
-    columns = {
-        c.text: np.array(group, dtype=np.int64)
-        for c, group in zip(library, groups, strict=True)
-    }
+    columns = _distinct(library, groups, linearisation.jacobian)
     of_curves = [(d, begin + np.array(d.columns, np.int64)) for d in dependences]
     regression = raw.project_out(np.arange(count))
     sets = [columns[c.text] for c in library] + [c for _, c in of_curves]
@@ -221,6 +219,25 @@ def _linear_survey(
         episode[np.unique(blocks, return_index=True)[1]],
         bool(fit.effects),
     )
+
+
+def _distinct(
+    library: Sequence[Candidate], groups: Sequence[range], jacobian: Array
+) -> dict[str, Columns]:
+    """Returns the columns of each candidate, by its text.
+
+    None of a shape that looks exactly like an earlier one of the same effect in this
+    log, or shows in none of its rows: a drift that ends after the log has.
+    """
+    found = dict[str, Columns]()
+    shapes: dict[str, list[Array]] = {}
+    for candidate, group in zip(library, groups, strict=True):
+        own, seen = jacobian[..., group], shapes.setdefault(candidate.name, [])
+        adds = not seen or (own.any() and not any(np.array_equal(own, s) for s in seen))
+        columns = group if adds else range(0)
+        found[candidate.text] = np.array(columns, dtype=np.int64)
+        seen.append(own)
+    return found
 
 
 def _of_group(group: Sequence[Candidate], columns: Mapping[str, Columns]) -> Columns:

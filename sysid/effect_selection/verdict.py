@@ -203,7 +203,8 @@ def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
     """Returns the effects' parameters with their intervals.
 
     An interval is that of a bootstrap, and as much wider as the model's time steps are
-    known to be off.
+    known to be off. Without shape parameters on which no row of the log depends: they
+    are as assumed.
 
     Args:
         fit: with the effects.
@@ -216,6 +217,7 @@ def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
     ends = np.clip(fit.linearisation.u[:, None] + ends, 0.0, 1.0)
     low, high = (scaling.from_unit(side) for side in ends.T)
     inside = fit.inside(np.arange(len(fit.theta)))
+    shows = fit.linearisation.effect > 0.0
     return tuple(
         ParameterValue(
             p.name,
@@ -226,7 +228,7 @@ def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
             bool(not inside[i] and fit.theta[i] != p.nominal),
         )
         for i, p in enumerate(fit.model.parameters)
-        if i >= own
+        if i >= own and (shows[i] or not p.is_shape)
     )
 
 
