@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -9,7 +10,9 @@ from drake_disasm.effects import ArmEffect, Effect
 from sysid.parameters import Parameter
 
 
-def at_null(kind: type[Effect], joints: Sequence[str], duration: float) -> list[Effect]:
+def at_null(
+    kind: type[Effect], joints: Sequence[str], duration: float = math.inf
+) -> list[Effect]:
     """Returns a class of effects at null, in every place and shape.
 
     Args:
