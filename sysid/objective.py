@@ -109,7 +109,7 @@ class Objective:
     def predicted(self, residual: Array) -> Array:
         """Returns the prediction (rows, channels), SI, that a residual belongs to."""
         measured = self.model.measurements
-        return measured.values + residual * measured.noise
+        return measured.values + residual * measured.sigma
 
     @property
     def start(self) -> Array:
@@ -132,7 +132,7 @@ class Objective:
                 f"{predicted.shape} for all rows, the measurements have "
                 f"{measured.values.shape}; return (rows, channels)"
             )
-        residual = (predicted - measured.values) / measured.noise
+        residual = (predicted - measured.values) / measured.sigma
         return np.clip(residual, -FAILED_RESIDUAL, FAILED_RESIDUAL)
 
 

@@ -88,7 +88,7 @@ class ImpactReplay:
         Where it comes to rest does not depend on the steps' length.
         """
         rest, station = np.zeros((1, 6)), self._diagram.station
-        stay = Steps(np.zeros(1), rest, rest, station.start[None], rest, rest)
+        stay = Steps(np.zeros(1), rest, rest, station.start[None], rest, rest, rest)
         h = self._coarse_step() or self._diagram.time_step
         time_steps = [h] * round(station.settling_time / h)
         settled = self._after(stay, rest, time_steps, until_rest=True)
@@ -106,13 +106,14 @@ class ImpactReplay:
 
         Args:
             steps: where arm and command begin, and how the command moves.
-            q_bolt: (n, 6) where the bolt begins; it moves with the arm.
+            q_bolt: (n, 6) where the bolt begins.
             time_steps: of the plant [s].
             until_rest: whether to stop before, as soon as nothing moves.
         """
         parameters = self._diagram.station.parameters
         conditions = self._conditions(steps, q_bolt)
-        q, v, qd, rate = q_bolt, steps.v, steps.qd, steps.qd_rate
+        q, v = q_bolt, steps.v + steps.give_rate
+        qd, rate = steps.qd, steps.qd_rate
         arm = np.hstack([steps.q, steps.v])
         nodes = {
             h: ArmStep.of(parameters.arm, parameters.grip, h) for h in set(time_steps)

@@ -1,7 +1,7 @@
 """The twin driven open loop: from a measured state, through a measured command.
 
-What the encoders don't see, by how much the grip gives, is known from the measured
-wrench: a step begins where pose and wrench agree with what was measured.
+What the encoders don't see, by how much the grip gives and how fast, is known from the
+measured wrench: a step begins where pose and wrench agree with what was measured.
 """
 
 import dataclasses
@@ -54,7 +54,8 @@ class Steps:
         q, v: (n, 6) measured coordinates at the step's start, and their rates as
             estimated.
         qd, qd_rate: (n, 6) commanded coordinates then, and their rate in the step.
-        wrench: (n, 6) measured on the bolt then, at Bo in Gn.
+        wrench: (n, 6) that the grip's springs carried then, on the bolt at Bo in Gn.
+        give_rate: (n, 6) rates of the bolt against the arm.
     """
 
     index: np.ndarray
@@ -63,6 +64,7 @@ class Steps:
     qd: np.ndarray
     qd_rate: np.ndarray
     wrench: np.ndarray
+    give_rate: np.ndarray
 
     def __len__(self) -> int:
         return len(self.index)
@@ -140,7 +142,12 @@ class TwinReplay:
 
     def _start(self, steps: Steps, i: int) -> None:
         self.start(
-            int(steps.index[i]), steps.q[i], steps.v[i], steps.qd[i], steps.wrench[i]
+            int(steps.index[i]),
+            steps.q[i],
+            steps.v[i],
+            steps.qd[i],
+            steps.wrench[i],
+            steps.give_rate[i],
         )
 
     def start(
@@ -150,6 +157,7 @@ class TwinReplay:
         v: np.ndarray,
         qd: np.ndarray,
         wrench: np.ndarray,
+        give_rate: np.ndarray,
     ) -> None:
         """Sets the twin's state by what was measured.
 
@@ -157,11 +165,12 @@ class TwinReplay:
             step: periods of the MDP since the episode began.
             q, v: (6,) measured coordinates and their rates.
             qd: (6,) commanded coordinates.
-            wrench: (6,) measured on the bolt, at Bo in Gn.
+            wrench: (6,) that the grip's springs carry, on the bolt at Bo in Gn.
+            give_rate: (6,) rates of the bolt against the arm.
         """
         self._step = step
         q_bolt = q + self._diagram.station.deflection(wrench)
-        self._state: TwinState | None = TwinState(q, v, qd, q_bolt, v)
+        self._state: TwinState | None = TwinState(q, v, qd, q_bolt, v + give_rate)
 
     def advance(self, qd_rate: np.ndarray) -> np.ndarray:
         """Moves the command at a rate for one period; returns the state (12,) then.

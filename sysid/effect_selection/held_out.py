@@ -30,6 +30,7 @@ class HeldOut:
         draws: of the bootstrap.
         names: of the episodes.
         period: of the rows' sampling [s]; None if they are not equally spaced.
+        model_error: of the model itself, see `Measurements`.
     """
 
     measured: Array
@@ -41,6 +42,7 @@ class HeldOut:
     draws: int
     names: tuple[str, ...] = ()
     period: float | None = None
+    model_error: Array | None = None
 
     @property
     def has_meaningful_share(self) -> bool:
@@ -71,9 +73,11 @@ class HeldOut:
         return float(error / np.linalg.norm(self.measured))
 
     def in_noise(self, predicted: Array) -> float:
-        """Returns the rms error in units of the channels' noise."""
-        noise = np.array([channel.noise for channel in self.channels])
-        return float(np.sqrt(np.mean(((predicted - self.measured) / noise) ** 2)))
+        """Returns the rms error in units of the noise and of the model's own error."""
+        sigma = np.array([channel.noise for channel in self.channels])
+        if self.model_error is not None:
+            sigma = np.hypot(sigma, self.model_error)
+        return float(np.sqrt(np.mean(((predicted - self.measured) / sigma) ** 2)))
 
     def interval(self, predicted: Array, seed: int = 0) -> Array:
         """Returns 95 % intervals (channels, 2) of the rms, by a block bootstrap."""
@@ -125,6 +129,7 @@ def held_out_errors(
         fitter.settings.bootstrap_draws,
         measured.names,
         measured.period,
+        measured.model_error,
     )
 
 
@@ -169,4 +174,4 @@ def _linearly_predicted(fit: Fit, folds: NDArray[np.int64]) -> Array:
         step = -np.linalg.lstsq(A, b, rcond=fit.settings.held_out_rcond)[0]
         step = np.clip(linearisation.u + step, 0.0, 1.0) - linearisation.u
         residual[own] += linearisation.jacobian[own] @ step
-    return np.asarray(measured.values + residual * measured.noise)
+    return np.asarray(measured.values + residual * measured.sigma)

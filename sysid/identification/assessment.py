@@ -80,7 +80,7 @@ class Assessment:
         start = nominal_values(full.model.parameters)
         theta = full.scaling.from_unit(u)
         fitted = _comparison(full, start, theta)
-        residual = (fitted.after - fitted.measured) / full.model.measurements.noise
+        residual = (fitted.after - fitted.measured) / full.model.measurements.sigma
         return Identification(
             model=model,
             frozen=dict(frozen),

@@ -43,6 +43,8 @@ class Measurements:
         episode: (rows,) number of the episode that each row belongs to, from 0.
         names: of the episodes.
         period: of the rows' sampling [s]; None if they are not equally spaced.
+        model_error: (rows, channels) standard deviation of what the model itself is
+            known to be off by, SI; None: nothing is known.
 
     Raises:
         DisasmError: the shapes do not match.
@@ -53,6 +55,7 @@ class Measurements:
     episode: NDArray[np.int64]
     names: tuple[str, ...]
     period: float | None = None
+    model_error: Array | None = None
 
     def __post_init__(self) -> None:
         """Refuses arrays whose shapes do not match."""
@@ -120,17 +123,29 @@ class Measurements:
         """Standard deviation of each channel (channels,)."""
         return np.array([channel.noise for channel in self.channels])
 
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations that residuals are divided by: noise and model error.
+
+        (channels,), or (rows, channels) where the model's own error is known.
+        """
+        if self.model_error is None:
+            return self.noise
+        return np.hypot(self.noise, self.model_error)
+
     def select(self, mask: NDArray[np.bool_]) -> Self:
         """Returns the rows where the mask (rows,) is true, episodes renumbered."""
         kept, episode = np.unique(self.episode[mask], return_inverse=True)
         steps = np.diff(np.flatnonzero(mask)) if self.period else np.zeros(0)
         step = np.median(steps) if len(steps) else 1.0
+        error = self.model_error
         return dataclasses.replace(
             self,
             period=float(self.period * step) if self.period else None,
             values=self.values[mask],
             episode=episode,
             names=tuple(self.names[i] for i in kept),
+            model_error=None if error is None else error[mask],
         )
 
     def with_values(self, values: Array) -> Self:

@@ -155,7 +155,7 @@ def residual(effect: Effect, folder: str) -> float:
     model = TwinModel([read_log(log)], nominal(), ())
     measured = model.measurements
     error = model.predictions(np.zeros(0)) - measured.values
-    return rms(pseudo_residual(error / measured.noise, model.default_huber_delta))
+    return rms(pseudo_residual(error / measured.sigma, model.default_huber_delta))
 
 
 def run_cases(

@@ -29,6 +29,7 @@ from drake_disasm.task.replay import Steps
 from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
 from sysid.models.commands import twin_coordinates
+from sysid.models.grip_lag import GripLag
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 
 _FORWARD, _BACK = 2.2e-3, -1.2e-3  # m per step, on average
@@ -173,11 +174,11 @@ class _Measured:
     """
 
     def __init__(self, scenario: Scenario, commanded: Array) -> None:
-        self._rates = ArmRates.of(scenario)
+        self._rates, self._grip = ArmRates.of(scenario), GripLag.of(scenario)
         self._p_BoTo_B = Tool.from_models(scenario).p_BoTo_B
         self._qd = self._coordinates(commanded)
         self._q, self._wrench = np.zeros_like(self._qd), np.zeros_like(self._qd)
-        self._v = np.zeros_like(self._qd[:, 0])
+        self._v, self._elastic = np.zeros((2, *self._qd[:, 0].shape))
 
     def steps(self, k: int, states: Array, executed: Array) -> Steps:
         """Returns step k of all episodes; steps are asked for in their order.
@@ -189,15 +190,26 @@ class _Measured:
         """
         self._q[:, k] = self._coordinates(states[:, :6])
         self._wrench[:, k] = states[:, 6:]
-        if k:
+        if not k:
+            self._elastic = np.array(states[:, 6:])
+        else:
             last = np.s_[:, k - 1 : k + 1]
+            self._elastic = self._grip.after(self._elastic, self._wrench[last])
             self._v = self._rates.after(
                 self._v, self._q[last], self._qd[last], self._wrench[last]
             )
         qd = self._coordinates(executed)
         rate = (qd[:, 1] - qd[:, 0]) / self._rates.step.h
-        index = np.full(len(qd), k)
-        return Steps(index, self._q[:, k], self._v, qd[:, 0], rate, self._wrench[:, k])
+        give_rate = self._grip.rates(self._elastic, self._wrench[:, k])
+        return Steps(
+            np.full(len(qd), k),
+            self._q[:, k],
+            self._v,
+            qd[:, 0],
+            rate,
+            self._elastic,
+            give_rate,
+        )
 
     def _coordinates(self, path: Array) -> Array:
         """Returns the twin's coordinates (..., 6) of a path (..., 6)."""

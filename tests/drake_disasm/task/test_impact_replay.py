@@ -39,7 +39,7 @@ def steps(scenario: Scenario) -> Steps:
     away = random.uniform(-1, 1, (COUNT, 6)) * [1e-4, 1e-4, 3e-4, 1e-3, 1e-3, 1e-3]
     rate = random.uniform(-1, 1, (COUNT, 6)) * [2e-2, 3e-3, 3e-3, 1e-2, 2e-2, 1e-2]
     rest = np.zeros((COUNT, 6))
-    return Steps(np.arange(COUNT), q, rest, q + away, rate, wrench)
+    return Steps(np.arange(COUNT), q, rest, q + away, rate, wrench, 0.1 * rate)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,82 @@
+"""By how much the grip gives when a step begins, which no encoder measures."""
+
+import dataclasses
+from typing import Self
+
+import numpy as np
+
+from drake_disasm.cell.grip import AXIS_ORDER, Springs
+from drake_disasm.cell.twin_parameters import twin_of
+from drake_disasm.common.spatial import velocity_shift
+from drake_disasm.scenario import Scenario
+from sysid.models.base import Array
+
+_FORGOTTEN = 0.1  # of a step: with less, e^-10 of what was before is left
+
+
+@dataclasses.dataclass(frozen=True)
+class GripLag:
+    """Splits a measured wrench into what the grip's springs and its dampers carry.
+
+    A spring and a damper in parallel (Kelvin and Voigt): w = k d + c d', so that the
+    deflection d follows w / k with a lag of c / k, 0.06 s for the grip that yields. A
+    bolt that has just run into a stop loads its sensor by the dampers alone: springs
+    that carried all of it would have the bolt a step's travel behind. Between two
+    steps the wrench is taken for linear in time.
+
+    A stiff grip has forgotten what was at the begin; when in the step a force came,
+    nobody knows, and the springs carry all of it.
+
+    Attributes:
+        springs: of the grip, at the pads in Gn.
+        to_grip: (6, 6) wrench at the pads by that on the bolt at Bo, in Gn.
+        period: of the task [s].
+    """
+
+    springs: Springs
+    to_grip: Array
+    period: float
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Self:
+        """Returns the lag of a scenario's grip."""
+        twin = twin_of(scenario)
+        to_grip = velocity_shift(twin.p_BoTo_B).T
+        return cls(twin.grip, to_grip, scenario.task.period)
+
+    @property
+    def lags(self) -> bool:
+        """Whether springs are slow enough for a step's begin to matter at its end."""
+        lag = self.springs.damping / self.springs.stiffness
+        return bool(lag.max() > _FORGOTTEN * self.period)
+
+    def after(self, elastic: Array, wrench: Array) -> Array:
+        """Returns the springs' wrench (n, 6) at the end of steps, at Bo in Gn.
+
+        Args:
+            elastic: (n, 6) the springs' at the begin.
+            wrench: (n, 2, 6) measured at begin and end, [f; tau].
+        """
+        if not self.lags:
+            return wrench[:, 1]
+        lag = self.springs.damping / self.springs.stiffness
+        forgets = np.exp(-self.period / lag)
+        of_begin = lag / self.period * (1.0 - forgets) - forgets
+        of_end = 1.0 - forgets - of_begin
+        parts = (elastic, wrench[:, 0], wrench[:, 1])
+        weights = (forgets, of_begin, of_end)
+        at_grip = sum(
+            weight * (part @ self.to_grip.T)
+            for weight, part in zip(weights, parts, strict=True)
+        )
+        return np.asarray(np.linalg.solve(self.to_grip, at_grip.T).T)
+
+    def rates(self, elastic: Array, wrench: Array) -> Array:
+        """Returns the bolt's rates (n, 6) against the arm, in the twin's coordinates.
+
+        Args:
+            elastic: (n, 6) the springs' share of the wrench, at Bo in Gn.
+            wrench: (n, 6) measured, [f; tau].
+        """
+        at_grip = (wrench - elastic) @ self.to_grip.T
+        return np.asarray((at_grip / self.springs.damping)[:, list(AXIS_ORDER)])

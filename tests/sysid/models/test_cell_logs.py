@@ -1,0 +1,98 @@
+"""Logs of the cell, which the twin predicts to the noise and error that it states."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from drake_disasm.cell.twin_parameters import twin_of
+from drake_disasm.common.spatial import velocity_shift
+from drake_disasm.logs import Log
+from drake_disasm.policies import Exploring, make_policy
+from drake_disasm.scenario import load_scenario
+from drake_disasm.task.recording import record_transitions
+from drake_disasm.task.simulation import TaskSimulation
+from sysid.models.cell_arm import CellArm
+from sysid.models.transitions import FORCE_ERROR
+from sysid.models.twin import TwinModel
+
+_SCENARIO = load_scenario("removal")
+_STEPS = 40
+
+
+@pytest.fixture(scope="module")
+def cell_log(tmp_path_factory) -> Log:
+    """The first steps of an episode, half of which touch the groove."""
+    scenario = load_scenario("removal", [f"task.steps={_STEPS}"])
+    policy = Exploring(make_policy("admittance", scenario), 1.5e-4, 0)
+    simulation = TaskSimulation(scenario, "cell", policy)
+    folder = tmp_path_factory.mktemp("cell") / "log"
+    return record_transitions(folder, simulation, _STEPS)
+
+
+def _as_of(log: Log, station: str) -> Log:
+    """Returns the same log, said to be of another station."""
+    provenance = {**log.header.provenance, "station": station}
+    header = dataclasses.replace(log.header, provenance=provenance)
+    return dataclasses.replace(log, header=header)
+
+
+def _residual(log: Log) -> np.ndarray:
+    model = TwinModel([log], _SCENARIO, ())
+    measured = model.measurements
+    return (model.predictions(np.zeros(0)) - measured.values) / measured.sigma
+
+
+def test_the_twin_predicts_the_cell_to_what_it_states(cell_log):
+    """Each channel, nothing hidden and nothing fitted."""
+    residual = _residual(cell_log)
+    assert np.sqrt(np.mean(residual**2, axis=0)).max() < 1.5
+
+
+def test_the_cells_command_leads_by_half_of_what_it_is_held(cell_log):
+    """Without that the arm was 11 micrometres behind all the way."""
+    led, even = (
+        abs(_residual(_as_of(cell_log, s))[5:, 0].mean()) for s in ("cell", "hardware")
+    )
+    assert led < 0.15 and even > 0.4
+
+
+def test_the_error_grows_with_the_forces_change(cell_log):
+    measured = TwinModel([cell_log], _SCENARIO, ()).measurements
+    (episode,) = cell_log.episodes
+    change = np.linalg.norm(np.diff(episode["wrench"][:, :3], axis=0), axis=1)
+    least, share = FORCE_ERROR
+    force = np.hypot(least, share * change)
+    for axis in (6, 7, 8):
+        np.testing.assert_allclose(measured.model_error[:, axis], force)
+    lever = measured.model_error[:, 9:] / force[:, None]
+    np.testing.assert_allclose(
+        lever, np.tile([0.297, 0.297, 0.0], (_STEPS, 1)), atol=1e-3
+    )
+    assert not measured.model_error[:, :6].any()
+    half = measured.select(np.arange(_STEPS) % 2 == 0)
+    np.testing.assert_array_equal(half.model_error, measured.model_error[::2])
+
+
+def test_a_log_of_the_twin_has_none(cell_log):
+    measured = TwinModel([_as_of(cell_log, "twin")], _SCENARIO, ()).measurements
+    assert measured.model_error is None
+    np.testing.assert_array_equal(measured.sigma, measured.noise)
+
+
+def test_the_compliance_is_that_of_the_arms_posture():
+    """At stop B, along x, the arm is 4 micrometres stiffer per newton than at A."""
+    arm = CellArm.of(_SCENARIO, "cell")
+    at_B, push = np.array([[0.06, 0, 0, 0, 0, 0]]), np.zeros((1, 6))
+    push[0, 0] = -3.0
+    here, there = (
+        np.linalg.inv(twin_of(_SCENARIO, RigidTransform([x, 0, 0])).arm.K)
+        for x in (0.0, 0.06)
+    )
+    S = velocity_shift(twin_of(_SCENARIO).p_BoTo_B)
+    expected = (there - here) @ S.T @ push[0]
+    np.testing.assert_allclose(arm.shifts(at_B, push)[0, :3], expected[:3], rtol=1e-6)
+    assert 8e-6 < arm.shifts(at_B, push)[0, 0] < 2e-5
+    assert not arm.shifts(0.0 * at_B, push).any()
+    assert not CellArm.of(_SCENARIO, "twin").shifts(at_B, push).any()
