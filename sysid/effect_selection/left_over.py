@@ -196,7 +196,8 @@ def _inputs_of(fit: Fit, channel: int) -> _Inputs:
     """Returns what may explain a channel: its own covariates, load, and the others'."""
     measured, settings = fit.model.measurements, fit.settings
     residual = fit.linearisation.residual[:, channel]
-    load = measured.values[:, channel] + residual * measured.noise[channel]
+    sigma = np.broadcast_to(measured.sigma, measured.values.shape)[:, channel]
+    load = measured.values[:, channel] + residual * sigma
     own = {**fit.model.covariates(channel), "the load": load}
     own.setdefault("time", np.arange(measured.rows, dtype=float))
     return _Inputs.of(own, _of_others(fit.model, channel), measured.episode, settings)

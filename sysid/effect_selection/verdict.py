@@ -133,7 +133,7 @@ def judge(
         left_over: what a flexible learner finds in what the last fit leaves.
         residual_model: of it, if it lowers the held-out error.
     """
-    left = [d for d in end.dependences if d.accepted]
+    left = [d for d in end.dependences if d.accepted and _is_noticeable(d, last)]
     gains = last.effect_gains | ({_SCATTER: scatter.gain} if scatter else {})
     names = tuple(sorted(gains, key=lambda name: -gains[name]))
     found = Verdict(
@@ -155,6 +155,16 @@ def judge(
     strokes = joints_of_one_stroke(last.model, tied, last.settings)
     ending = _ending(found, last)
     return dataclasses.replace(found, ending=ending, single_strokes=strokes)
+
+
+def _is_noticeable(dependence: Evidence, last: Fit) -> bool:
+    """Returns whether a dependence takes out more than what a solver leaves.
+
+    Against a noise that is known, of the rows of its one channel.
+    """
+    gained = dependence.gain * last.loss
+    least = last.settings.noticeable**2 * last.model.measurements.rows
+    return not last.noise_is_stated or gained >= least
 
 
 def _ending(found: Verdict, last: Fit) -> Ending:

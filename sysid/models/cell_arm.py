@@ -14,6 +14,43 @@ from sysid.models.base import Array
 
 _FAR = 0.06  # m along x, where the bolt runs into stop B
 
+#: What the cell's sensor reads of free motion, and the twin's does not: force along
+#: x, y and z by the commanded rate, and by its change since the step before [N s/m]. The
+#: twin has no palm behind the sensor, and no command that comes in pieces. Measured
+#: with the shipped gripper under position control (`tests/physics/free_motion.py`).
+_STEADY, _CHANGE = np.array([1.6, 2.0, 4.0]), np.array([3.5, 3.9, 3.3])
+_PALM = np.array([0.0, 0.0, 0.1])  # m, where that force acts, in S
+
+
+@dataclasses.dataclass(frozen=True)
+class Sway:
+    """What moving by itself loads the cell's sensor with, beyond what the twin says.
+
+    Attributes:
+        steady, change: (3,) forces by commanded rate and by its change [N s/m].
+    """
+
+    steady: Array
+    change: Array
+
+    @classmethod
+    def of(cls, scenario: Scenario, station: str) -> Self:
+        """Returns it for a log of a station; zero where it was not measured."""
+        known = scenario.arm.control == "position" and station == "cell"
+        known &= scenario.gripper.compliance == "adaptive"
+        return cls(_STEADY * known, _CHANGE * known)
+
+    def wrenches(self, rates: Array, R_SB: Array) -> Array:
+        """Returns the load (n, 6) at the end of each step, [f; tau] at So in S.
+
+        Args:
+            rates: (n, 3) of an episode, commanded along x, y and z of G [m/s].
+            R_SB: (3, 3) the bolt's axes in S.
+        """
+        change = np.diff(rates, axis=0, prepend=np.zeros((1, 3)))
+        f_S = (rates * self.steady + change * self.change) @ R_SB.T
+        return np.hstack([f_S, np.cross(_PALM, f_S)])
+
 
 @dataclasses.dataclass(frozen=True)
 class CellArm:

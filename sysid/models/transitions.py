@@ -20,7 +20,7 @@ from drake_disasm.scenario import Scenario
 from drake_disasm.task.replay import Steps
 from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
-from sysid.models.cell_arm import CellArm
+from sysid.models.cell_arm import CellArm, Sway
 from sysid.models.commands import Commands, twin_coordinates
 from sysid.models.grip_lag import GripLag
 from sysid.models.measurements import Channel, Measurements
@@ -49,6 +49,7 @@ class Transitions:
         commands: of whole episodes, since effects on the motion have a memory.
         lead: (rows,) by which the command is ahead on average [s].
         shift: (rows, 6) by which it is elsewhere.
+        sway: (rows, 6) what moving loads the sensor with besides, at So in S.
         period: of the MDP [s].
         p_BoTo_B: (3,) of the twin's coordinates [m].
     """
@@ -59,6 +60,7 @@ class Transitions:
     commands: tuple[Commands, ...]
     lead: Array
     shift: Array
+    sway: Array
     period: float
     p_BoTo_B: Array
 
@@ -88,10 +90,11 @@ class Transitions:
             [arm.shifts(*row) for arm, *row in zip(arms, *parts, strict=True)]
         )
         states = [at_sensor(observations(e)[:-1], sensing.X_SB) for e in episodes]
+        sway = np.concatenate([_sway(log, scenario, sensing) for log in logs])
         before = np.concatenate(states)
         commands = tuple(Commands.of(e, period) for e in episodes)
         rows = np.arange(len(steps))
-        found = cls(steps, before, rows, commands, lead, shift, period, p_BoTo_B)
+        found = cls(steps, before, rows, commands, lead, shift, sway, period, p_BoTo_B)
         return dataclasses.replace(found, steps=found._moved(steps.qd, steps.qd_rate))
 
     def select(self, mask: NDArray[np.bool_]) -> Self:
@@ -103,6 +106,7 @@ class Transitions:
             rows=self.rows[mask],
             lead=self.lead[mask],
             shift=self.shift[mask],
+            sway=self.sway[mask],
         )
 
     def executed(self, effects: Sequence[MotionEffect]) -> Steps:
@@ -221,6 +225,15 @@ def _refuse_other_logs(log: Log, scenario: Scenario) -> None:
 def _station(log: Log) -> str:
     """Returns where a log was recorded, as it says."""
     return str(log.header.provenance.get("station", ""))
+
+
+def _sway(log: Log, scenario: Scenario, sensing: SensorReading) -> Array:
+    """Returns what moving loads the sensor with (rows, 6), at So in S."""
+    moves = Sway.of(scenario, _station(log))
+    R_SB = sensing.X_SB.rotation().matrix()
+    paths = [e["X_GB_commanded"][:, :3] for e in log.episodes]
+    rates = [np.diff(path, axis=0) / scenario.task.period for path in paths]
+    return np.concatenate([moves.wrenches(rate, R_SB) for rate in rates])
 
 
 def _begins(episodes: Sequence[Episode]) -> Array:

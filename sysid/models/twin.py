@@ -100,6 +100,7 @@ class TwinModel(ScenarioModel):
                 period = self._transitions.period
                 steps = _displaced(steps, self._displacement[rows], period)
             states = at_sensor(self._states(replay, steps), self._sensing.X_SB)
+            states[:, 6:] += self._transitions.sway[rows]
         except (RuntimeError, DisasmError, ValueError) as error:
             text = " ".join(str(error).split())
             raise PredictionError(text) from None

@@ -1,0 +1,134 @@
+"""What closing the loop says of logs of the cell: nothing hidden, and one effect each.
+
+    python -m tests.sysid.effect_selection.cell_verdicts null --logs 50
+    python -m tests.sysid.effect_selection.cell_verdicts effect --logs 50
+
+Records each log (`removal`, `admittance` with 0.15 mm of exploration, six episodes) and
+judges it by the twin of the same scenario. Amplitudes of effects are two to four times
+what the first null log that was judged would have shown with 80 % probability. Writes
+each answer to out/cell_verdicts as it comes, and goes on from there.
+"""
+
+import argparse
+import copy
+import json
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import Effect
+from drake_disasm.learning.statistics import wilson_interval
+from drake_disasm.logs import Log, read_log
+from drake_disasm.policies import Exploring, make_policy
+from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.task.recording import record_transitions
+from drake_disasm.task.simulation import TaskSimulation
+from sysid.effect_selection.close_loop import close_loop
+from sysid.models.from_logs import ModelChoice, model_of
+from sysid.validation.blind_tests import observable_effects
+
+_STEPS, _EPISODES = 440, 20  # recorded at least; seeds from one log to the next
+_SEEDS = {"null": 3000, "effect": 7000}
+_EXPLORATION = 1.5e-4  # m
+_TIMES = (2.0, 4.0)  # the limit of detection
+_MOST = 0.5  # of the way to an amplitude's bound; beyond it the cell may not start
+
+
+def record(folder: Path, scenario: Scenario, seed: int) -> Log:
+    """Returns a log of the cell; one that is there already is read."""
+    if not (folder / "done").exists():
+        policy = Exploring(make_policy("admittance", scenario), _EXPLORATION, seed)
+        simulation = TaskSimulation(scenario, "cell", policy)
+        record_transitions(folder, simulation, _STEPS, seed)
+        (folder / "done").touch()
+    return read_log(folder)
+
+
+def draw(number: int, limits: list[list[object]]) -> Effect:
+    """Returns the effect of a case: another kind for each, as far as there are."""
+    random = np.random.default_rng(_SEEDS["effect"])
+    known = {str(name) for name, _, size, share in limits if size and share < _MOST / 4}
+    kinds = [kind for kind in observable_effects() if kind.__name__ in known]
+    order = np.concatenate(
+        [random.permutation(len(kinds)) for _ in range(1 + number // len(kinds))]
+    )
+    kind, random = kinds[order[number]], np.random.default_rng([7000, number])
+    own = [row for row in limits if row[0] == kind.__name__ and row[2]]
+    own = [row for row in own if row[3] < _MOST / 4]
+    _, field, size, _ = own[int(random.integers(len(own)))]
+    return kind(**{str(field): float(size) * random.uniform(*_TIMES)})
+
+
+def answer(log: Log, scenario: Scenario) -> dict[str, object]:
+    """Returns what closing the loop says of a log."""
+    model = model_of([log], ModelChoice(scenario=scenario, fixed=True))
+    try:
+        closed = close_loop(model)
+    except DisasmError as error:
+        return {"ending": "refused", "names": [], "ties": [], "text": str(error)}
+    found = closed.verdict
+    residual = closed.last.linearisation.residual
+    return {
+        "ending": found.ending,
+        "names": list(found.names),
+        "ties": [[tie.name for tie in ties] for ties in found.ties],
+        "text": closed.text,
+        "rms": np.sqrt(np.mean(residual**2, axis=0)).round(2).tolist(),
+        "limits": [[x.effect, x.field, x.amplitude, x.share] for x in found.limits],
+    }
+
+
+def _answers(path: Path) -> list[dict[str, object]]:
+    lines = path.read_text().splitlines() if path.exists() else []
+    return [json.loads(line) for line in lines]
+
+
+def _case(kind: str, number: int, out: Path, scenario: Scenario) -> dict[str, object]:
+    """Returns the answer to a case, with what was put in."""
+    real, hidden, name = copy.deepcopy(scenario), "", ""
+    if kind == "effect":
+        effect = draw(number, _answers(out / "null.jsonl")[0]["limits"])
+        real.effects, hidden, name = [effect], repr(effect), type(effect).__name__
+    seed = _SEEDS[kind] + _EPISODES * number
+    try:
+        log = record(out / f"{kind}_{number}", real, seed)
+    except RuntimeError as error:
+        return {"ending": "not recorded", "names": [], "ties": [], "text": str(error)}
+    return {"hidden": hidden, "kind": name} | answer(log, scenario)
+
+
+def _summary(kind: str, answers: list[dict[str, object]]) -> str:
+    """Returns alarms of null logs, or effects named, with Wilson's intervals."""
+    if kind == "effect":
+        right = [a for a in answers if a["names"][:1] == [a.get("kind")]]
+        text = "named first"
+    else:
+        right, text = [a for a in answers if a["names"]], "name an effect"
+    low, high = wilson_interval(len(right), len(answers))
+    endings = dict(Counter(str(each["ending"]) for each in answers))
+    return (
+        f"{kind}: {len(right)} of {len(answers)} {text} "
+        f"(95 %: {100 * low:.1f} to {100 * high:.1f} %); {endings}"
+    )
+
+
+def main() -> None:
+    """Runs the program."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("kind", choices=sorted(_SEEDS))
+    parser.add_argument("--logs", type=int, default=50)
+    parser.add_argument("--out", type=Path, default=Path("out/cell_verdicts"))
+    args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    scenario, path = load_scenario("removal"), args.out / f"{args.kind}.jsonl"
+    with path.open("a") as stream:
+        for number in range(len(_answers(path)), args.logs):
+            found = _case(args.kind, number, args.out, scenario)
+            print(json.dumps(found), file=stream, flush=True)
+    print(_summary(args.kind, _answers(path)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
