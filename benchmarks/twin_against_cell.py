@@ -4,8 +4,8 @@
 
 The cell is recorded under `admittance` with exploration. Each of its steps is then
 predicted by the twin that follows from the same scenario, from the measured state. The
-residuals are in units of the sensor's noise: 1 is not possible, since the wrench at a
-step's beginning is as noisy as that at its end; 1.4 is all that can be had.
+residuals are in units of the sensor's noise, and of what the twin states of itself: the
+noise and the error that it is known to make of forces.
 """
 
 import argparse
@@ -22,6 +22,7 @@ from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
+from sysid.models.measurements import Measurements
 from sysid.models.twin import TwinModel
 from sysid.parameters import nominal_values
 
@@ -35,17 +36,18 @@ def main(arguments: Sequence[str]) -> int:
     print("scenario | quantile | " + " ".join(f"{name:>6}" for name in STATE_NAMES))
     for name, scenario in scenarios.items():
         folder = options.log / name if options.log else None
-        residual = residuals(scenario, options.steps, folder, options.station)
-        for label, row in _rows(residual):
-            numbers = " ".join(f"{value:6.2f}" for value in row)
-            print(f"{name} | {label} | {numbers}", flush=True)
+        error, measured = errors(scenario, options.steps, folder, options.station)
+        for unit, size in (("noise", measured.noise), ("stated", measured.sigma)):
+            for label, row in _rows(error / size):
+                numbers = " ".join(f"{value:6.2f}" for value in row)
+                print(f"{name} | {label}, {unit} | {numbers}", flush=True)
     return 0
 
 
-def residuals(
+def errors(
     scenario: Scenario, steps: int, folder: Path | None = None, station: str = "cell"
-) -> np.ndarray:
-    """Returns residuals (n, 12) in units of the noise, wrench at the sensor.
+) -> tuple[np.ndarray, Measurements]:
+    """Returns the twin's errors (n, 12), wrench at the sensor, and what was measured.
 
     Args:
         scenario: of cell and twin.
@@ -63,7 +65,7 @@ def residuals(
         model = TwinModel([read_log(log)], scenario, ())
     measured = model.measurements
     predicted = model.predict(nominal_values(()), slice(0, measured.rows))
-    return np.asarray((predicted - measured.values) / measured.noise)
+    return predicted - measured.values, measured
 
 
 def _rows(residual: np.ndarray) -> list[tuple[str, np.ndarray]]:

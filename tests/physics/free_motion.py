@@ -12,7 +12,7 @@ import numpy as np
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
 
-_QUIET = ["ft_sensor.noise=[0, 0, 0, 0, 0, 0]", "lock.clearance=0.001"]
+QUIET = ["ft_sensor.noise=[0, 0, 0, 0, 0, 0]", "lock.clearance=0.001"]
 _STEPS = {"x": 9e-4, "y": 3e-5, "z": 3e-5}  # m, that do not end at a wall
 
 
@@ -28,7 +28,7 @@ def responses(simulation: TaskSimulation, axis: int, step: float) -> np.ndarray:
 
 def main() -> None:
     """Prints the table."""
-    scenario = load_scenario("removal", _QUIET)
+    scenario = load_scenario("removal", QUIET)
     for station in ("cell", "twin"):
         simulation = TaskSimulation(scenario, station)
         for axis, (name, step) in enumerate(_STEPS.items()):

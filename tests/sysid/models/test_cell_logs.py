@@ -13,11 +13,13 @@ from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
-from sysid.models.cell_arm import CellArm
+from sysid.models.cell_arm import CellArm, Sway
 from sysid.models.transitions import FORCE_ERROR
 from sysid.models.twin import TwinModel
+from tests.physics import free_motion
 
 _SCENARIO = load_scenario("removal")
+_IMPEDANCE = load_scenario("removal", ["arm.control=joint_impedance"])
 _STEPS = 40
 
 
@@ -96,3 +98,21 @@ def test_the_compliance_is_that_of_the_arms_posture():
     assert 8e-6 < arm.shifts(at_B, push)[0, 0] < 2e-5
     assert not arm.shifts(0.0 * at_B, push).any()
     assert not CellArm.of(_SCENARIO, "twin").shifts(at_B, push).any()
+
+
+def test_the_sway_is_what_cell_and_twin_read_of_free_motion():
+    """Across the groove, within a newton second per metre; of other arms nothing."""
+    scenario = load_scenario("removal", free_motion.QUIET)
+    first, steady = (
+        free_motion.responses(TaskSimulation(scenario, "cell"), 2, 3e-5)
+        - free_motion.responses(TaskSimulation(scenario, "twin"), 2, 3e-5)
+    )[:, 2]
+    sway = Sway.of(_SCENARIO, "cell")
+    assert sway.steady[2] == pytest.approx(steady, abs=0.2)
+    assert sway.change[2] == pytest.approx(first - steady, abs=0.3)
+    rates = np.array([[0.0, 0.0, 2e-3]] * 3)
+    R_SB = np.array([[-1.0, 0, 0], [0, 0, -1], [0, -1, 0]])
+    expected = -2e-3 * np.array([first, steady, steady])  # z of G is -y of S
+    np.testing.assert_allclose(sway.wrenches(rates, R_SB)[:, 1], expected, atol=1e-3)
+    for other in (Sway.of(_SCENARIO, "twin"), Sway.of(_IMPEDANCE, "cell")):
+        assert not other.wrenches(rates, R_SB).any()
