@@ -74,10 +74,14 @@ class HeldOut:
 
     def in_noise(self, predicted: Array) -> float:
         """Returns the rms error in units of the noise and of the model's own error."""
-        sigma = np.array([channel.noise for channel in self.channels])
-        if self.model_error is not None:
-            sigma = np.hypot(sigma, self.model_error)
-        return float(np.sqrt(np.mean(((predicted - self.measured) / sigma) ** 2)))
+        error = (predicted - self.measured) / self.sigma
+        return float(np.sqrt(np.mean(error**2)))
+
+    @property
+    def sigma(self) -> Array:
+        """See `Measurements`."""
+        noise = np.array([channel.noise for channel in self.channels])
+        return noise if self.model_error is None else np.hypot(noise, self.model_error)
 
     def interval(self, predicted: Array, seed: int = 0) -> Array:
         """Returns 95 % intervals (channels, 2) of the rms, by a block bootstrap."""

@@ -21,6 +21,7 @@ from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.effect_selection.significance import gained_p
 from sysid.models.base import HUBER_DELTA, LogModel
+from sysid.models.measurements import Measurements
 from sysid.objective import pseudo_residual
 
 Array = NDArray[np.float64]
@@ -118,7 +119,8 @@ def left_over(fit: Fit) -> list[LeftOver]:
             continue
         if fit.noise_is_stated and gains.sum() < settings.noticeable**2 * len(target):
             continue
-        size = channel.noise * float(np.sqrt(np.mean(learned.predicted**2)))
+        predicted = learned.predicted * _sigma_of(measured, number)[kept]
+        size = float(np.sqrt(np.mean(predicted**2)))
         needed = learned.depends_on(inputs, target, folds)
         found.append(LeftOver(channel.name, share, size, channel.unit, needed))
     return found
@@ -196,11 +198,16 @@ def _inputs_of(fit: Fit, channel: int) -> _Inputs:
     """Returns what may explain a channel: its own covariates, load, and the others'."""
     measured, settings = fit.model.measurements, fit.settings
     residual = fit.linearisation.residual[:, channel]
-    sigma = np.broadcast_to(measured.sigma, measured.values.shape)[:, channel]
+    sigma = _sigma_of(measured, channel)
     load = measured.values[:, channel] + residual * sigma
     own = {**fit.model.covariates(channel), "the load": load}
     own.setdefault("time", np.arange(measured.rows, dtype=float))
     return _Inputs.of(own, _of_others(fit.model, channel), measured.episode, settings)
+
+
+def _sigma_of(measured: Measurements, channel: int) -> Array:
+    """Returns what a channel's residuals are divided by (rows,)."""
+    return np.broadcast_to(measured.sigma, measured.values.shape)[:, channel]
 
 
 def _of_others(model: LogModel, channel: int) -> dict[str, Array]:

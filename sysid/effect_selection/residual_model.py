@@ -125,7 +125,7 @@ class _Rows:
     def fitted(cls, fit: Fit, inputs: Mapping[str, Array]) -> "_Rows":
         """Returns the rows of a fit, single ones of them not counted in full."""
         residual = pseudo_residual(fit.linearisation.residual, HUBER_DELTA)
-        missing = -residual * fit.model.measurements.noise
+        missing = -residual * fit.model.measurements.sigma
         return cls(fit.model, inputs, missing, fit.blocks)
 
     @classmethod

@@ -56,12 +56,11 @@ def loss_map(errors: HeldOut, huber_delta: float) -> LossMap:
     """Returns what held-out rows cost.
 
     Args:
-        errors: with the noise of each channel.
+        errors: with the noise of each channel, and the model's own error.
         huber_delta: residual, in units of the noise, beyond which the loss is linear.
     """
-    noise = np.array([channel.noise for channel in errors.channels])
     before, after = (
-        (predicted - errors.measured) / noise
+        (predicted - errors.measured) / errors.sigma
         for predicted in (errors.before, errors.after)
     )
     parts, labels = _stretches(errors)
