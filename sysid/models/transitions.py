@@ -37,9 +37,9 @@ POSE_NOISE = (2e-5, 1e-4)
 #: within about three standard deviations (docs/physics.md, "Twin against cell").
 FORCE_ERROR = (0.02, 0.15)
 
-#: And of where the arm is [m], beyond what its encoders say: the twin's arm has six axes
-#: instead of seven joints, and follows a change of rate a little differently (10 um along
-#: y in those logs). It is no noise, so it counts twice.
+#: And of where the arm is [m], beyond what its encoders say: the twin's arm has six
+#: axes instead of seven joints, and follows a change of rate a little differently (10 um
+#: along y in those logs). It is no noise, so it counts twice.
 POSITION_ERROR = 2e-5
 
 
