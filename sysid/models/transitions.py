@@ -38,8 +38,8 @@ POSE_NOISE = (2e-5, 1e-4)
 FORCE_ERROR = (0.02, 0.15)
 
 #: And of where the arm is [m], beyond what its encoders say: the twin's arm has six
-#: axes instead of seven joints, and follows a change of rate a little differently (10 um
-#: along y in those logs). It is no noise, so it counts twice.
+#: axes instead of seven joints, and follows a change of rate a little differently (in
+#: those logs by 10 um along y). It is no noise, so it counts twice.
 POSITION_ERROR = 2e-5
 
 
