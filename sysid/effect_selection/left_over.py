@@ -121,7 +121,7 @@ def left_over(fit: Fit) -> list[LeftOver]:
             continue
         predicted = learned.predicted * _sigma_of(measured, number)[kept]
         size = float(np.sqrt(np.mean(predicted**2)))
-        needed = learned.depends_on(inputs, target, folds)
+        needed = learned.depends_on(inputs, target, folds, settings.learner_importance)
         found.append(LeftOver(channel.name, share, size, channel.unit, needed))
     return found
 
@@ -160,11 +160,12 @@ class _Learned:
         return cls(learners, predicted, gain)
 
     def depends_on(
-        self, inputs: _Inputs, target: Array, folds: NDArray[np.int64]
+        self, inputs: _Inputs, target: Array, folds: NDArray[np.int64], share: float
     ) -> tuple[str, ...]:
         """Returns the quantities without which the gain is lost, the first the most.
 
-        Each is shuffled within the folds that were not fitted (Breiman 2001).
+        Each is shuffled within the folds that were not fitted (Breiman 2001). Those
+        count that are worth a share of the first.
         """
         random, lost = np.random.default_rng(0), {}
         for name in dict.fromkeys(inputs.names.tolist()):
@@ -180,7 +181,7 @@ class _Learned:
             lost[name] = worse
         most = max(lost.values())
         ranked = sorted(lost, key=lambda name: -lost[name])
-        return tuple(n for n in ranked[:_SHOWN] if 4.0 * lost[n] >= most)
+        return tuple(n for n in ranked[:_SHOWN] if lost[n] >= share * most)
 
 
 def _learner(settings: SelectionSettings) -> HistGradientBoostingRegressor:

@@ -503,6 +503,11 @@ class SelectionSettings:
     learner_leaf_rows: int = _setting(
         20, "rows", "in a leaf, scikit-learn's default: noise averages out"
     )
+    learner_importance: float = _setting(
+        0.25,
+        "of what the most important quantity is worth",
+        "what is worth less is not listed among what a channel depends on",
+    )
     min_left_over: float = _setting(
         0.1,
         "of a channel's mean squared residual",

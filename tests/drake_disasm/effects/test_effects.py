@@ -1,6 +1,7 @@
 """Effects: declared in full, nothing at their null values, their equation else."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,6 +37,7 @@ from drake_disasm.effects import (
     SensorEffect,
     SensorGain,
     SensorMounting,
+    SensorResidualModel,
     SensorWarmUp,
     TorqueGain,
     TorqueOffset,
@@ -48,6 +50,7 @@ from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation, SimulatedStation, TwinStation
 from drake_disasm.task.simulation import TaskSimulation
 from tests.drake_disasm.conftest import STIFF
+from tests.drake_disasm.effects.learned_files import step_in_fy
 
 G_W = np.array([0.0, 0.0, -9.81])
 ORIENTATIONS = [(0, 0, 0), (np.pi, 0, 0), (0.3, -0.8, 2.0), (np.pi / 2, 0, 0)]
@@ -133,9 +136,13 @@ def test_vanishes_at_null_bit_for_bit(
 
 
 @pytest.mark.parametrize("effect", IN_CELL)
-def test_shows_away_from_null(effect: type[Effect], without: np.ndarray) -> None:
+def test_shows_away_from_null(
+    effect: type[Effect], without: np.ndarray, tmp_path: Path
+) -> None:
     fields = {f.name: f for f in dataclasses.fields(effect)}
     sized = {name: 0.05 * fields[name].metadata["high"] for name in amplitudes(effect)}
+    if effect is SensorResidualModel:
+        sized["file"] = str(step_in_fy(tmp_path))
     if effect is ContactExponent:
         with pytest.raises(DisasmError, match="ContactExponent"):
             _trajectory([effect(**sized)], 1)

@@ -12,57 +12,40 @@ from drake_disasm.effects import (
     Sensing,
     SensorResidualModel,
 )
-from drake_disasm.effects.learned import BoostedTrees, LearnedFunctions
+from drake_disasm.effects.learned import LearnedFunctions
 from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
 from drake_disasm.scenario.validity import validate
-
-_HEIGHT = 2.5  # what a step is high
-
-
-def _step(inputs: int, which: int, low: float, high: float) -> BoostedTrees:
-    """Returns a function that is 2.5 where an input is above zero, else 0."""
-    return BoostedTrees(
-        np.array([[which, -1, -1]]),
-        np.zeros((1, 3)),
-        np.array([[[1, 2], [1, 1], [2, 2]]]),
-        np.array([[0.0, 0.0, _HEIGHT]]),
-        np.array(0.0),
-        np.full(inputs, low),
-        np.full(inputs, high),
-    )
-
-
-def _sensor_file(folder: Path) -> Path:
-    path = folder / "model.npz"
-    outputs = {"fy": _step(10, 0, -20.0, 20.0)}
-    LearnedFunctions(SensorResidualModel.inputs, outputs).save(path)
-    return path
+from tests.drake_disasm.effects.learned_files import (
+    HEIGHT,
+    step_above_zero,
+    step_in_fy,
+)
 
 
 def test_a_tree_is_followed_to_its_leaf_and_zero_outside_the_data() -> None:
     inputs = np.array([[-1.0, 0.0], [0.5, 0.0], [0.5, 9.0], [0.0, 0.0]])
-    found = _step(2, 0, -2.0, 2.0)(inputs)
-    np.testing.assert_array_equal(found, [0.0, _HEIGHT, 0.0, 0.0])
+    found = step_above_zero(2, 0, -2.0, 2.0)(inputs)
+    np.testing.assert_array_equal(found, [0.0, HEIGHT, 0.0, 0.0])
 
 
 def test_a_file_holds_the_same_functions(tmp_path: Path) -> None:
-    path = _sensor_file(tmp_path)
+    path = step_in_fy(tmp_path)
     found = LearnedFunctions.load(path)
     assert found.inputs == SensorResidualModel.inputs
     inputs = np.random.default_rng(0).uniform(-9, 9, (50, 10))
     np.testing.assert_array_equal(
-        found.outputs["fy"](inputs), _step(10, 0, -20.0, 20.0)(inputs)
+        found.outputs["fy"](inputs), step_above_zero(10, 0, -20.0, 20.0)(inputs)
     )
 
 
 @pytest.mark.parametrize("shape", [(), (4,), (2, 3)])
 def test_a_reading_gets_what_was_learned(shape: tuple, tmp_path: Path) -> None:
-    effect = SensorResidualModel(str(_sensor_file(tmp_path)), share=0.5)
+    effect = SensorResidualModel(str(step_in_fy(tmp_path)), share=0.5)
     R_WS = np.broadcast_to(np.eye(3), (*shape, 3, 3))
     sensing = Sensing(np.ones(shape), R_WS, np.array([0.0, 0.0, -9.81]))
     wrench = np.full((*shape, 6), 3.0)
     added = effect.apply(wrench, sensing) - wrench
-    expected = [0.0, 0.5 * _HEIGHT, 0.0, 0.0, 0.0, 0.0]
+    expected = [0.0, 0.5 * HEIGHT, 0.0, 0.0, 0.0, 0.0]
     np.testing.assert_allclose(added, np.broadcast_to(expected, wrench.shape))
     late = Sensing(np.full(shape, 99.0), R_WS, sensing.g_W)
     np.testing.assert_array_equal(effect.apply(wrench, late), wrench)
@@ -70,16 +53,16 @@ def test_a_reading_gets_what_was_learned(shape: tuple, tmp_path: Path) -> None:
 
 def test_a_joint_gets_what_was_learned(tmp_path: Path) -> None:
     path = tmp_path / "model.npz"
-    outputs = {"b": _step(4, 1, -5.0, 5.0)}
+    outputs = {"b": step_above_zero(4, 1, -5.0, 5.0)}
     LearnedFunctions(ArmResidualModel.inputs, outputs).save(path)
     zero, v = np.zeros((2, 2)), np.array([[0.0, 1.0], [1.0, -1.0]])
     samples = ArmSamples(("a", "b"), zero, v, zero, zero)
     found = ArmResidualModel(str(path), share=1.0).torques(samples)
-    np.testing.assert_array_equal(found, [[0.0, _HEIGHT], [0.0, 0.0]])
+    np.testing.assert_array_equal(found, [[0.0, HEIGHT], [0.0, 0.0]])
 
 
 def test_a_scenario_finds_the_file_beside_it(tmp_path: Path) -> None:
-    _sensor_file(tmp_path)
+    step_in_fy(tmp_path)
     effects = [SensorResidualModel("model.npz", share=1.0)]
     (tmp_path / "own.yaml").write_text(dump_scenario(Scenario(effects=effects)))
     found = load_scenario(str(tmp_path / "own.yaml"))
@@ -105,7 +88,7 @@ def test_refuses_what_is_no_such_file(content: bytes | None, tmp_path: Path) -> 
 
 
 def test_refuses_functions_of_something_else(tmp_path: Path) -> None:
-    effect = ArmResidualModel(str(_sensor_file(tmp_path)), share=1.0)
+    effect = ArmResidualModel(str(step_in_fy(tmp_path)), share=1.0)
     zero = np.zeros((1, 1))
     with pytest.raises(DisasmError, match=r"its functions take fx, .* made for it"):
         effect.torques(ArmSamples(("a",), zero, zero, zero, zero))
