@@ -15,16 +15,19 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cli
+import data_options
 
 from drake_disasm.common import options, program
 from drake_disasm.common.files import make_folder, write_json, write_text
 from drake_disasm.logs import Log
 from drake_disasm.scenario import dump_scenario, load_scenario
+from sysid.data_checks import DataFinding
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.effect_selection.output import to_mapping
 from sysid.identification.split import split_episodes
 from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
+from sysid.models.measurements import episode_names
 from sysid.report import closing_page
 from sysid.scenario_parameters import read_requests
 from sysid.workers import Workers
@@ -42,6 +45,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add = parser.add_argument
     add("--log", nargs="+", required=True, metavar="DIR", help="logs of one kind")
     _add_model_arguments(add)
+    data_options.add_data_arguments(add)
     add(
         "--time-budget",
         type=options.above_zero_or_inf,
@@ -96,15 +100,19 @@ _RESIDUAL_MODEL = "residual_model.npz"
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
-    model = _model(args, cli.named_logs(args.log))
-    share = model.held_out_share
-    train, test = split_episodes(model.measurements.names, args.held_out or share)
+    logs = cli.named_logs(args.log)
+    if args.held_out:  # names, which are wrong more often than anything takes time
+        split_episodes(episode_names(logs), args.held_out)
+    model = _model(args, logs)
     origin = program.provenance("close_loop", arguments, 0)
     fits = args.out / "fits"
     with (
         program.ProgressBar(unit="run") as progress,
         Workers(args.workers, progress=progress) as workers,
     ):
+        model, findings = data_options.checked(logs, model, args, workers)
+        share = model.held_out_share
+        train, test = split_episodes(model.measurements.names, args.held_out or share)
         closed = close_loop(
             model,
             train=train,
@@ -115,7 +123,7 @@ def main(arguments: Sequence[str]) -> int:
             folder=fits,
             time_budget=60.0 * args.time_budget,
         )
-    _write(args.out, closed, origin)
+    _write(args.out, closed, findings, origin)
     if not closed.is_provisional:
         shutil.rmtree(fits, ignore_errors=True)
     print(closed.text)
@@ -134,7 +142,12 @@ def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
     return model_of(logs, choice)
 
 
-def _write(folder: Path, closed: ClosedLoop, origin: dict[str, object]) -> None:
+def _write(
+    folder: Path,
+    closed: ClosedLoop,
+    findings: Sequence[DataFinding],
+    origin: dict[str, object],
+) -> None:
     make_folder(folder)
     learned = closed.verdict.residual_model
     if learned is not None:
@@ -142,8 +155,10 @@ def _write(folder: Path, closed: ClosedLoop, origin: dict[str, object]) -> None:
     scenario = closed.scenario_with_residual_model(_RESIDUAL_MODEL)
     if scenario is not None:
         write_text(folder / "scenario.yaml", dump_scenario(scenario))
-    write_json(folder / "result.json", to_mapping(closed) | {"provenance": origin})
-    write_text(folder / "report.html", closing_page(closed, origin))
+    of_data = {"data_findings": [finding.to_mapping() for finding in findings]}
+    mapping = to_mapping(closed) | of_data | {"provenance": origin}
+    write_json(folder / "result.json", mapping)
+    write_text(folder / "report.html", closing_page(closed, origin, findings))
 
 
 if __name__ == "__main__":

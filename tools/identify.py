@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cli
+import data_options
 import numpy as np
 
 from drake_disasm.common import options, program
@@ -18,6 +19,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_json, write_text
 from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
+from sysid.data_checks import DataFinding
 from sysid.identification import (
     Identification,
     Journal,
@@ -31,6 +33,7 @@ from sysid.identification.output import to_mapping
 from sysid.identification.settings import METHODS
 from sysid.identification.split import split_episodes
 from sysid.models.from_logs import OBJECTIVES, ModelChoice, model_of
+from sysid.models.measurements import episode_names
 from sysid.optimise import BeesSettings
 from sysid.report import report_page
 from sysid.scenario_parameters import read_requests
@@ -61,6 +64,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     _add_search_arguments(parser.add_argument)
     cli.add_import_argument(parser)
     cli.add_workers_argument(parser, "; any number gives the same bits")
+    data_options.add_data_arguments(parser.add_argument)
     _add_judgement_arguments(parser.add_argument)
     args = parser.parse_args(arguments)
     if args.preset == "thesis" and args.cycles is None and args.budget is None:
@@ -187,12 +191,15 @@ def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
     logs = cli.named_logs(args.log)
+    split_episodes(episode_names(logs), _held_out(args))  # names, before any work
     model = model_of(logs, _choice(args))
-    train, test = split_episodes(model.measurements.names, _held_out(args))
     settings = _settings(args)
     origin = program.provenance("identify", arguments, args.seed) | _data(logs)
     journal = Journal(args.out, _identity(args, logs), args.resume)
     with program.ProgressBar("evaluation") as bar, Workers(args.workers) as workers:
+        whole = args.objective == "rollout"
+        model, findings = data_options.checked(logs, model, args, workers, whole)
+        train, test = split_episodes(model.measurements.names, _held_out(args))
         found = identify(
             model,
             train=train,
@@ -202,7 +209,7 @@ def main(arguments: Sequence[str]) -> int:
             journal=journal,
             progress=bar,
         )
-    _write(args.out, found, origin)
+    _write(args.out, found, findings, origin)
     print(summary(found))
     print(f"report: {args.out / 'report.html'}")
     return 0
@@ -276,12 +283,18 @@ def _identity(args: argparse.Namespace, logs: Sequence[Log]) -> dict[str, object
     return {**kept, "data": [log.data_hash for log in logs]}
 
 
-def _write(folder: Path, found: Identification, origin: dict[str, object]) -> None:
-    mapping = to_mapping(found) | {"provenance": origin}
+def _write(
+    folder: Path,
+    found: Identification,
+    findings: Sequence[DataFinding],
+    origin: dict[str, object],
+) -> None:
+    of_data = {"data_findings": [finding.to_mapping() for finding in findings]}
+    mapping = to_mapping(found) | of_data | {"provenance": origin}
     if found.scenario:
         write_text(folder / "scenario.yaml", dump_scenario(found.scenario))
     write_json(folder / "result.json", mapping)
-    write_text(folder / "report.html", report_page(found, origin))
+    write_text(folder / "report.html", report_page(found, origin, findings))
 
 
 if __name__ == "__main__":

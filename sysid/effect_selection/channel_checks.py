@@ -11,15 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
-from drake_disasm.common.errors import DisasmError
+from sysid.data_checks.tails import tail_limit
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.identification.uncertainty import block_length
 from sysid.identification.whiteness import autocorrelation
-from sysid.models.base import HUBER_DELTA, LogModel
+from sysid.models.base import HUBER_DELTA
 from sysid.models.measurements import Measurements
 from sysid.objective import pseudo_residual
-from sysid.parameters import nominal_values
 
 Array = NDArray[np.float64]
 
@@ -38,32 +37,6 @@ class ChannelFinding:
 
     channel: str
     text: str
-
-
-def refuse_dead_channels(model: LogModel, settings: SelectionSettings) -> None:
-    """Refuses logs with a channel that never changes where the model expects it to.
-
-    Raises:
-        DisasmError: names the channels and what the model expects.
-    """
-    measured = model.measurements
-    still = np.ptp(measured.values, axis=0) == 0.0
-    if measured.rows < settings.min_rows or not still.any():
-        return
-    predicted = np.ptp(model.predictions(nominal_values(model.parameters)), axis=0)
-    moves = predicted > settings.dead_channel_change * measured.noise
-    dead = [
-        f"{c.name} (the model expects it to change by {change:.2g} {c.unit})"
-        for c, change, bad in zip(
-            measured.channels, predicted, still & moves, strict=True
-        )
-        if bad
-    ]
-    if dead:
-        raise DisasmError(
-            f"the log is constant in {', '.join(dead)} over all {measured.rows} rows: "
-            "is the sensor alive? Record it anew, or leave its channels out"
-        )
 
 
 def channel_findings(fit: Fit) -> list[ChannelFinding]:
@@ -103,18 +76,12 @@ def _outlying(
 ) -> str:
     """Returns which rows of a residual (n,) are beyond what its tail has elsewhere.
 
-    The tail of the largest tenth is taken to fall off as a power, estimated from all
-    but the largest hundredth (Hill 1975): of heavy-tailed noise no row is outlying.
+    Of heavy-tailed noise no row is outlying.
     """
-    size = np.sort(np.abs(r))[::-1]
-    tail, few = len(r) // 10, max(1, len(r) // 100)
-    if tail <= 2 * few or size[tail] <= 0.0:
+    limit, usual = tail_limit(r, settings.outlying_alpha)
+    if not usual:
         return ""
-    logs = np.log(size[few:tail] / size[tail])
-    # Hill's estimate without the largest few, which may be outliers themselves.
-    index = (logs.sum() + few * logs[0]) / (tail - few)
-    limit = size[tail] * (tail / settings.outlying_alpha) ** index
-    limit = max(limit, settings.outlying_row * size[tail], least)
+    limit = max(limit, settings.outlying_row * usual, least)
     rows = np.flatnonzero(np.abs(r) > limit)
     if not len(rows):
         return ""

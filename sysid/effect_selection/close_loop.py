@@ -14,8 +14,9 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.effects import Effect, Imprecision, registered_effects
 from drake_disasm.scenario import Scenario
+from sysid.data_checks.constancy import dead_channels
+from sysid.data_checks.finding import refuse
 from sysid.effect_selection.candidates import Candidate, candidates
-from sysid.effect_selection.channel_checks import refuse_dead_channels
 from sysid.effect_selection.command_scatter import (
     CommandScatter,
     fit_command_scatter,
@@ -170,7 +171,7 @@ def close_loop(
     workers = workers or Workers()
     base = with_estimated_noise(model.of_episodes(train), workers, delta)
     refuse_few_rows(base, settings)
-    refuse_dead_channels(base, settings)
+    refuse(dead_channels(base))
     applicable = _applicable(base, library)
     is_stated = not np.isnan(model.measurements.noise).any()
     fitter = Fitter(base, workers, delta, settings, folder, is_stated)

@@ -1,10 +1,9 @@
 """All thresholds of effect selection, each with its unit and the reason for it."""
 
-import dataclasses
 from dataclasses import dataclass
-from typing import Any
 
-_NOT_MEASURED = "not measured"
+from sysid.thresholds import threshold as _setting
+
 #: What was measured with all thresholds at their defaults: docs/closing-the-loop.md.
 _NULL_LOGS = (
     "a wrong name in 3 of 983 null logs of a sensor and in 0 of 389 of an arm "
@@ -14,14 +13,6 @@ _BLIND_LOGS = (
     "not alone; with the other defaults 351 of 375 hidden effects are named first "
     "(docs/closing-the-loop.md)"
 )
-
-
-def _setting(
-    default: Any, unit: str, reason: str, measured: str = _NOT_MEASURED
-) -> Any:
-    """Returns a field with its unit, why it has its value, and what was measured."""
-    metadata = {"unit": unit, "reason": reason, "measured": measured}
-    return dataclasses.field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True)
@@ -243,11 +234,6 @@ class SelectionSettings:
     )
 
     # What a channel's residual shows by itself.
-    dead_channel_change: float = _setting(
-        10.0,
-        "times the noise",
-        "a channel that never changes is dead if the model expects so much change",
-    )
     channel_alpha: float = _setting(
         0.001,
         "1",

@@ -146,7 +146,8 @@ class JointMotionModel(LogModel):
     ) -> tuple[Parameter, ...]:
         """Returns base parameters with bounds wide enough for any real arm."""
         size = np.sqrt(np.mean(self._motion.Y**2, axis=(0, 1)))
-        torque = float(np.sqrt(np.mean(self.measurements.values**2)))
+        # Of a log of zeros any bounds will do: checks of the data refuse it by name.
+        torque = float(np.sqrt(np.mean(self.measurements.values**2))) or 1.0
         reach = np.abs(self._motion.nominal) + _REACH * torque / np.maximum(size, 1e-9)
         return tuple(
             Parameter(

@@ -109,7 +109,7 @@ class Measurements:
             np.concatenate(parts),
             channels,
             np.repeat(np.arange(len(parts)), [len(part) for part in parts]),
-            tuple(f"{log.folder.name}/{episode.name}" for log, episode in episodes),
+            tuple(episode_names(logs)),
             _period([e["time"] for _, e in episodes if "time" in e]),
         )
 
@@ -159,6 +159,11 @@ class Measurements:
             for channel, value in zip(self.channels, noise, strict=True)
         )
         return dataclasses.replace(self, channels=channels)
+
+
+def episode_names(logs: Sequence[Log]) -> list[str]:
+    """Returns the name of each episode of some logs, such as `log/episode_0003`."""
+    return [f"{log.folder.name}/{e.name}" for log in logs for e in log.episodes]
 
 
 def _period(times: Sequence[Array]) -> float | None:

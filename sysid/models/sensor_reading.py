@@ -55,6 +55,7 @@ class SensorReading:
 
     Attributes:
         X_SB: the bolt in the sensor's frame.
+        payload: what hangs on the twin's sensor: bolt and fingers.
 
     Processing takes the reading at zeroing off, and the change of the known weight
     since then (`contact_wrench`); so what effects add to readings, and to the
@@ -65,8 +66,7 @@ class SensorReading:
         carried = tool.M_gripped_B
         self.X_SB = X_SB = tool.X_SB
         g_W = UniformGravityFieldElement().gravity_vector()
-        # What hangs on the twin's sensor: bolt and fingers.
-        self._payload = Payload(carried.get_mass(), X_SB @ carried.get_com(), g_W)
+        self.payload = Payload(carried.get_mass(), X_SB @ carried.get_com(), g_W)
         self._R_WG = nominal_groove_pose(scenario.placement).rotation().matrix()
         self._R_BS = X_SB.inverse().rotation().matrix()
 
@@ -77,13 +77,13 @@ class SensorReading:
             states: of the task.
             zero: (6,) the reading at zeroing.
         """
-        weight = self._payload.weight(self._R_WS(states))
-        at_rest = self._payload.weight(self._R_WG[None] @ self._R_BS)[0]
+        weight = self.payload.weight(self.orientations(states))
+        at_rest = self.payload.weight(self._R_WG[None] @ self._R_BS)[0]
         return states[:, 6:] + zero - at_rest + weight
 
     def sensing(self, states: Array, times: Array) -> Sensing:
         """Returns the circumstances of readings, of states (n, 12) at times (n,)."""
-        return self._payload.sensing(times, self._R_WS(states))
+        return self.payload.sensing(times, self.orientations(states))
 
     def read(
         self,
@@ -102,12 +102,13 @@ class SensorReading:
         """
         raw = self.raw(states, zero)
         sensing = self.sensing(states, times)
-        rest = self._payload.sensing(np.array(0.0), self._R_WG @ self._R_BS)
+        rest = self.payload.sensing(np.array(0.0), self._R_WG @ self._R_BS)
         load = sensed_along(raw, effects, sensing, zero, rest)
         seen = sensed_at_zeroing(zero, effects, rest)
         change = (load - raw) - (seen - zero)
         return np.hstack([states[:, :6], states[:, 6:] + change])
 
-    def _R_WS(self, states: Array) -> Array:
+    def orientations(self, states: Array) -> Array:
+        """Returns the orientations (n, 3, 3) of the sensor in W, of states (n, 12)."""
         R_GB = Rotation.from_rotvec(states[:, 3:6]).as_matrix()
         return np.asarray(self._R_WG @ R_GB @ self._R_BS)

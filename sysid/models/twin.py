@@ -26,7 +26,7 @@ from drake_disasm.task.replay import Steps, TwinReplay
 from sysid.models.base import Array, PredictionError, even_chunks
 from sysid.models.replays import impact_replay, twin_replay
 from sysid.models.scenario_model import ScenarioModel
-from sysid.models.sensor_reading import SensorReading, at_sensor
+from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 from sysid.models.transitions import Transitions, measured_states
 from sysid.parameters import Parameter
 
@@ -77,9 +77,9 @@ class TwinModel(ScenarioModel):
         """
         self.parameters = tuple(parameters)
         self.scenario, self.rollout, self.coarse = scenario, rollout, coarse
-        self._sensing = SensorReading(scenario, Tool.from_models(scenario))
-        self._transitions = Transitions.of(logs, scenario, self._sensing)
-        self.measurements = measured_states(logs, scenario, self._sensing)
+        self.reading = SensorReading(scenario, Tool.from_models(scenario))
+        self._transitions = Transitions.of(logs, scenario, self.reading)
+        self.measurements = measured_states(logs, scenario, self.reading)
         self._displacement: Array | None = None  # (rows, 2, 3) of begin and end
         self._executed: tuple[str, Steps] | None = None
 
@@ -99,7 +99,7 @@ class TwinModel(ScenarioModel):
             if self._displacement is not None:
                 period = self._transitions.period
                 steps = _displaced(steps, self._displacement[rows], period)
-            states = at_sensor(self._states(replay, steps), self._sensing.X_SB)
+            states = self.at_sensor(self._states(replay, steps))
             states[:, 6:] += self._transitions.sway[rows]
         except (RuntimeError, DisasmError, ValueError) as error:
             text = " ".join(str(error).split())
@@ -113,15 +113,15 @@ class TwinModel(ScenarioModel):
         states, zero = simulated[:, :12], simulated[0, 12:]
         if not effects:
             return states
-        return self._sensing.read(effects, states, zero, self._times[rows])
+        return self.reading.read(effects, states, zero, self._times[rows])
 
     def residual_inputs(self, theta: Array) -> dict[str, Array]:
         """See LogModel: of readings before zeroing is taken off."""
         rows = slice(0, self.measurements.rows)
         simulated = np.concatenate([self.simulate(theta, c) for c in self.chunks()])
         states = self.read(theta, rows, simulated)
-        raw = self._sensing.raw(states, simulated[0, 12:])
-        sensing = self._sensing.sensing(states, self._times)
+        raw = self.reading.raw(states, simulated[0, 12:])
+        sensing = self.reading.sensing(states, self._times)
         inputs = SensorResidualModel.inputs_of(raw, sensing)
         return dict.fromkeys(WRENCH, inputs)
 
@@ -187,6 +187,14 @@ class TwinModel(ScenarioModel):
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: time, place, action and force at the beginning of a step."""
         return self._transitions.covariates()
+
+    def at_bolt(self, states: Array) -> Array:
+        """Returns states (n, 12) with the wrench at Bo in G, of channels (n, 12)."""
+        return at_bolt(states, self.reading.X_SB)
+
+    def at_sensor(self, states: Array) -> Array:
+        """Returns channels (n, 12), of states (n, 12) with the wrench at Bo in G."""
+        return at_sensor(states, self.reading.X_SB)
 
     def _steps_of(self, effects: Sequence[MotionEffect]) -> Steps:
         """Returns the steps as effects on the motion have them executed."""

@@ -1,8 +1,9 @@
 """The report of a closed loop."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from sysid.data_checks import DataFinding
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.output import to_mapping
 from sysid.report import plots
@@ -12,12 +13,17 @@ from sysid.report.next_recordings import limit_rows, recordings
 from sysid.report.templates import render
 
 
-def closing_page(closed: ClosedLoop, origin: Mapping[str, Any]) -> str:
+def closing_page(
+    closed: ClosedLoop,
+    origin: Mapping[str, Any],
+    findings: Sequence[DataFinding] = (),
+) -> str:
     """Returns the report of a closed loop as one self-contained HTML page.
 
     Args:
         closed: what was found.
         origin: its provenance, as in `result.json`.
+        findings: of the check of the data.
     """
     found = loss_map(closed.errors, closed.last.linearisation.huber_delta)
     return render(
@@ -33,6 +39,7 @@ def closing_page(closed: ClosedLoop, origin: Mapping[str, Any]) -> str:
         settings=closed.last.settings,
         drawn=_plots(closed, found),
         origin=origin,
+        findings=findings,
     )
 
 

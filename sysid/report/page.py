@@ -1,8 +1,9 @@
 """The page: a result and its figures in a template."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from sysid.data_checks import DataFinding
 from sysid.effect_selection.held_out import HeldOut
 from sysid.identification.output import to_mapping
 from sysid.identification.result import Comparison, Identification
@@ -12,12 +13,17 @@ from sysid.report.templates import render
 _DRAWS = 200  # of the bootstrap of an error
 
 
-def report_page(found: Identification, origin: Mapping[str, Any]) -> str:
+def report_page(
+    found: Identification,
+    origin: Mapping[str, Any],
+    findings: Sequence[DataFinding] = (),
+) -> str:
     """Returns the report of a result as one HTML page that needs nothing else.
 
     Args:
         found: the result.
         origin: its provenance, as in `result.json`.
+        findings: of the check of the data.
     """
     shown = found.held_out or found.fitted
     return render(
@@ -27,6 +33,7 @@ def report_page(found: Identification, origin: Mapping[str, Any]) -> str:
         pictures=_pictures(found),
         drawn=_plots(found, shown),
         origin=origin,
+        findings=findings,
         conclusion=_conclusion(found),
     )
 

@@ -1,15 +1,11 @@
 """What single channels show: against residuals that are made to show it."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
-from drake_disasm.common.errors import DisasmError
 from sysid.effect_selection.channel_checks import (
     channel_findings,
     findings_text,
-    refuse_dead_channels,
 )
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.settings import SelectionSettings
@@ -100,16 +96,3 @@ def test_more_than_the_stated_noise_is_said_only_of_its_channel():
     residual = _white()
     residual[:, 0] *= 2.0
     assert _found(residual) == "fx: 1.9 times its noise, of unknown origin"
-
-
-def test_a_dead_channel_is_refused_before_any_fit():
-    model = _Ramp(_white())
-    values = model.measurements.values.copy()
-    values[:, 1] = 0.0
-    steep = model.replace(
-        parameters=(dataclasses.replace(model.parameters[0], nominal=4.0),)
-    )
-    measured = model.measurements.with_values(values)
-    with pytest.raises(DisasmError, match=r"constant in fy .*: is the sensor alive\?"):
-        refuse_dead_channels(steep.with_measurements(measured), _SETTINGS)
-    refuse_dead_channels(model, _SETTINGS)

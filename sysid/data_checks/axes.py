@@ -1,0 +1,180 @@
+"""Whether other axes, or other signs, would explain a log far better."""
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drake_disasm.logs.schema import WRENCH
+from sysid.data_checks.expectation import Expectation
+from sysid.data_checks.finding import DataFinding, Severity
+from sysid.data_checks.frames import Frame, frames_of
+from sysid.data_checks.settings import DataSettings
+from sysid.data_checks.subject import Subject
+from sysid.data_checks.units import scale_between, sign_findings
+from sysid.models.base import Array
+
+_REMEDY = "exchange the columns, or turn the signs, and write the log again"
+_FRAME_COST = 0.1  # the frame of the table is looked at first
+_EQUAL = 0.9  # of the least error: explanations that leave less than it / this tie
+
+
+@dataclass(frozen=True)
+class _Change:
+    """Other axes that what was measured might have had.
+
+    Attributes:
+        text: what they are.
+        matrix: (channels, channels) signed permutation.
+        frame: in which it acts.
+        cost: how much it takes: of changes that explain as much, the cheapest is said.
+    """
+
+    text: str
+    matrix: Array
+    frame: Frame
+    cost: float
+
+    def of(self, values: Array) -> Array:
+        """Returns measured values (n, channels) with these axes."""
+        return self.frame.back(self.frame.of(values) @ self.matrix.T)
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What a change leaves.
+
+    Attributes:
+        change: of the axes.
+        left: mean error over all channels, in units of their scale.
+        ratio: of the error of the channels that change, to that as it is.
+    """
+
+    change: _Change
+    left: float
+    ratio: float
+
+
+def axes_findings(subject: Subject, expected: Expectation) -> list[DataFinding]:
+    """Finds swapped axes and wrong signs of forces, torques, or joints.
+
+    A signed permutation must lower the mean error of the channels that it moves to a
+    fraction, and leave less than most of these channels' size.
+    """
+    settings = subject.settings
+    measured = subject.model.measurements.values[expected.rows]
+    if len(measured) < settings.dead_channel_rows:
+        return []
+    frames = frames_of(subject, expected.rows)
+    is_wrench = subject.kind != "joint_motion"
+    changes = _wrench_changes(measured.shape[1] - len(WRENCH), frames)
+    if not is_wrench:
+        changes = _joint_changes(subject, frames[0])
+    tried = [_tried(other, measured, expected, settings) for other in changes]
+    explaining = [each for each in tried if each.ratio <= settings.explained]
+    if not explaining:
+        return [] if is_wrench else _all_signs(measured, expected, settings)
+    least = min(each.left for each in explaining)
+    near = [each for each in explaining if each.left * _EQUAL <= least]
+    best = min(near, key=lambda each: each.change.cost)
+    what = (
+        f"{best.change.text} would explain the readings far better: their error falls "
+        f"to {100 * best.ratio:.0f} %"
+    )
+    return [DataFinding("axes", what, _REMEDY, Severity.REFUSE)]
+
+
+def _all_signs(
+    measured: Array, expected: Expectation, settings: DataSettings
+) -> list[DataFinding]:
+    """Returns a finding if all torques (n, joints) have the other sign.
+
+    A fit takes that up, with negative masses; the nominal model does not.
+    """
+    scales = [
+        scale_between(nominal, tau, settings)
+        for nominal, tau in zip(expected.nominal.T, measured.T, strict=True)
+    ]
+    known = [scale for scale in scales if np.isfinite(scale)]
+    if not known or max(known) > 0.0:
+        return []
+    return sign_findings("tau, at all joints that tell,", max(known), settings)
+
+
+def _tried(
+    change: _Change, measured: Array, expected: Expectation, settings: DataSettings
+) -> _Outcome:
+    """Returns what a change of the axes of measured values (n, channels) leaves.
+
+    The ratio is infinite if it explains nothing either, or something else less.
+    """
+    turned = change.of(measured)
+    size = np.mean(np.abs(measured - measured.mean(axis=0)), axis=0) / expected.scale
+    by = np.mean(np.abs(turned - measured), axis=0) / expected.scale
+    moved = by > settings.least_change * size
+    asis, left = (
+        np.mean(np.abs(expected.residual(values)), axis=0)
+        for values in (measured, turned)
+    )
+    ratio = np.inf
+    explains = left[moved].sum() < settings.explained_share * size[moved].sum()
+    if moved.any() and explains and left.sum() < asis.sum():
+        ratio = float(left[moved].sum() / asis[moved].sum())
+    return _Outcome(change, float(left.mean()), ratio)
+
+
+def _wrench_changes(first: int, frames: Sequence[Frame]) -> Iterator[_Change]:
+    """Yields signed permutations of the forces, of the torques, and of both.
+
+    Args:
+        first: number of the channel fx, of which five more follow.
+        frames: in each of these.
+    """
+    count = first + len(WRENCH)
+    for frame, (axes, signs) in itertools.product(frames, _signed_permutations()):
+        for groups in ((0,), (3,), (0, 3)):
+            matrix = np.eye(count)
+            for group in groups:
+                at = first + group
+                block = np.zeros((3, 3))
+                block[range(3), axes] = signs
+                matrix[at : at + 3, at : at + 3] = block
+            moved = np.flatnonzero((matrix != np.eye(count)).any(axis=1))
+            names = [_signed(matrix[i], int(i), first) for i in moved]
+            where = f" ({frame.name})" if frame.name else ""
+            # One that acts on forces and torques at once is one cause.
+            cost = len(names) / len(groups) + _FRAME_COST * (frame is not frames[0])
+            yield _Change(f"{', '.join(names)}{where}", matrix, frame, cost)
+
+
+def _signed(row: Array, channel: int, first: int) -> str:
+    """Returns what a channel should be, such as `fz = -fy`, of a row of a matrix."""
+    source = int(np.argmax(np.abs(row)))
+    sign = "-" if row[source] < 0 else ""
+    return f"{WRENCH[channel - first]} = {sign}{WRENCH[source - first]}"
+
+
+def _signed_permutations() -> Iterator[tuple[list[int], Array]]:
+    """Yields the 47 signed permutations of three axes that change something."""
+    for axes in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            if axes != (0, 1, 2) or min(signs) < 0:
+                yield list(axes), np.array(signs)
+
+
+def _joint_changes(subject: Subject, frame: Frame) -> Iterator[_Change]:
+    """Yields wrong signs of single joints' torques, and pairs that are exchanged."""
+    names = [channel.name for channel in subject.model.measurements.channels]
+    eye = np.eye(len(names))
+    for i, name in enumerate(names):
+        matrix = eye.copy()
+        matrix[i, i] = -1.0
+        yield _Change(f"the other sign of tau.{i} ({name})", matrix, frame, 1.0)
+    for i, j in itertools.combinations(range(len(names)), 2):
+        for sign in (1.0, -1.0):
+            matrix = eye.copy()
+            matrix[[i, j]] = sign * eye[[j, i]]
+            text = f"tau.{i} and tau.{j} exchanged"
+            text += ", with the other sign" if sign < 0 else ""
+            yield _Change(text, matrix, frame, 2.0 + (sign < 0))

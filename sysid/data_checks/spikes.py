@@ -1,0 +1,71 @@
+"""Spikes: single rows far from their neighbours."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.data_checks.expectation import Expectation
+from sysid.data_checks.finding import DataFinding
+from sysid.data_checks.frames import frames_of
+from sysid.data_checks.subject import Subject
+from sysid.data_checks.tails import tail_limit
+from sysid.models.base import Array
+from sysid.models.measurements import Measurements
+
+_REMEDY = "look at them, or leave them out: --drop-flagged-rows"
+
+
+def spike_findings(subject: Subject, expected: Expectation) -> list[DataFinding]:
+    """Finds rows of a column whose error is far from that of the rows around them."""
+    measured, settings = subject.model.measurements, subject.settings
+    errors = _errors(subject, expected)
+    found = []
+    for number, name in enumerate(subject.column_names):
+        alone = _alone(errors[:, number], measured.episode)
+        limit, usual = tail_limit(alone, settings.spike_alpha)
+        unit = measured.channels[number].unit
+        noise = [
+            scale
+            for scale, c in zip(expected.scale, measured.channels, strict=True)
+            if c.unit == unit
+        ]
+        limit = np.clip(limit, settings.least_spike * usual, settings.spike * usual)
+        limit = max(float(limit), settings.spike_noise * max(noise))
+        rows = np.flatnonzero(np.abs(alone) > limit)
+        if not usual or not 0 < len(rows) <= settings.most_spikes * measured.rows:
+            continue
+        what = f"{name}: {len(rows)} of {measured.rows} rows are far from the others"
+        places = dict(_places(rows, measured, subject))
+        found.append(DataFinding("spikes", what, _REMEDY, rows=places))
+    return found
+
+
+def _errors(subject: Subject, expected: Expectation) -> Array:
+    """Returns the errors (rows, channels) in the frame of the table, SI."""
+    measured = subject.model.measurements
+    explained = measured.values - expected.all_residuals() * expected.scale
+    table = frames_of(subject, np.arange(measured.rows))[0]
+    return table.of(measured.values) - table.of(explained)
+
+
+def _alone(r: Array, episode: NDArray[np.int64]) -> Array:
+    """Returns by how much rows of a residual (n,) are off the median of four around."""
+    found = np.zeros(len(r))
+    for number in np.unique(episode):
+        own = np.flatnonzero(episode == number)
+        if len(own) > 2:
+            padded = np.pad(r[own], 2, mode="reflect")
+            windows = np.lib.stride_tricks.sliding_window_view(padded, 5)
+            found[own] = r[own] - np.median(windows[:, [0, 1, 3, 4]], axis=1)
+    return found
+
+
+def _places(
+    rows: NDArray[np.int64], measured: Measurements, subject: Subject
+) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """Yields an episode and its rows, of the model's rows."""
+    for number in np.unique(measured.episode[rows]):
+        of_episode, first = subject.model_rows(int(number))
+        own = np.flatnonzero(np.isin(of_episode, rows)) + first
+        yield measured.names[number], tuple(int(row) for row in own)

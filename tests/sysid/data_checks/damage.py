@@ -1,0 +1,89 @@
+"""Logs that are damaged in one way each."""
+
+import dataclasses
+from collections.abc import Callable
+from types import MappingProxyType
+
+import numpy as np
+
+from drake_disasm.logs import Log
+
+Columns = dict[str, np.ndarray]
+Damage = Callable[[Columns], None]
+
+
+def damaged(log: Log, damage: Damage, episode: int | None = None) -> Log:
+    """Returns a log with columns changed, in each episode or one; it stays as it is."""
+    episodes = []
+    for number, each in enumerate(log.episodes):
+        columns = {name: values.copy() for name, values in each.columns.items()}
+        if episode in (None, number):
+            damage(columns)
+        frozen = MappingProxyType(columns)
+        episodes.append(dataclasses.replace(each, columns=frozen))
+    return dataclasses.replace(log, episodes=tuple(episodes))
+
+
+def scaled(factor: float, *names: str) -> Damage:
+    """Returns what scales columns; a name ends where that of a column begins."""
+
+    def damage(columns: Columns) -> None:
+        for name in columns:
+            if name.startswith(names):
+                columns[name] = factor * columns[name]
+
+    return damage
+
+
+def changed(
+    name: str, rows: slice | list[int], change: Callable[[np.ndarray], np.ndarray]
+) -> Damage:
+    """Returns what changes some rows of a column."""
+
+    def damage(columns: Columns) -> None:
+        columns[name][rows] = change(columns[name][rows])
+
+    return damage
+
+
+def rounded(step: float, *names: str) -> Damage:
+    """Returns what rounds columns to whole steps."""
+
+    def damage(columns: Columns) -> None:
+        for name, values in columns.items():
+            if name.startswith(names):
+                columns[name] = step * np.round(values / step)
+
+    return damage
+
+
+def swapped(first: str, second: str, sign: float = 1.0) -> Damage:
+    """Returns what exchanges two columns, and maybe turns the sign of both."""
+
+    def damage(columns: Columns) -> None:
+        columns[first], columns[second] = sign * columns[second], sign * columns[first]
+
+    return damage
+
+
+def late(rows: int, *names: str) -> Damage:
+    """Returns what makes columns late by some rows."""
+
+    def damage(columns: Columns) -> None:
+        for name, values in columns.items():
+            if name.startswith(names):
+                late = np.roll(values, rows)
+                late[:rows] = values[0]
+                columns[name] = late
+
+    return damage
+
+
+def both(*damages: Damage) -> Damage:
+    """Returns what does one damage after the other."""
+
+    def damage(columns: Columns) -> None:
+        for each in damages:
+            each(columns)
+
+    return damage

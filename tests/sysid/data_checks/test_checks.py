@@ -1,0 +1,388 @@
+"""Each kind of finding: a damage that it names, beside the log as it was.
+
+That good logs have no finding at all is `test_a_good_log_has_no_finding`: every damage
+starts from one of those.
+"""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.logs import Log, read_log
+from sysid.data_checks import KINDS, Severity, check_data, refuse, without_flagged_rows
+from sysid.data_checks.constancy import dead_channels
+from sysid.data_checks.finding import DataFinding
+from sysid.models.base import LogModel
+from sysid.models.from_logs import ModelChoice, model_of
+from tests.sysid.data_checks.damage import (
+    both,
+    changed,
+    damaged,
+    late,
+    rounded,
+    scaled,
+    swapped,
+)
+from tests.sysid.real_data import write_arm, write_motion, write_static
+
+SENSOR = ("wrench", "ft_sensor")
+
+
+def model(log: Log) -> LogModel:
+    return model_of([log], ModelChoice(fixed=True))
+
+
+def findings(log: Log) -> dict[str, DataFinding]:
+    """Returns the findings of a log by their kinds."""
+    found = check_data([log], model(log))
+    assert {finding.kind for finding in found} <= KINDS.keys()
+    return {finding.kind: finding for finding in reversed(found)}
+
+
+def only(log: Log, kind: str) -> DataFinding:
+    """Returns the finding of a log, which has that one alone."""
+    found = findings(log)
+    assert set(found) == {kind}, [finding.text for finding in found.values()]
+    return found[kind]
+
+
+@pytest.mark.parametrize("name", ["twin_log", "static_log", "world_log", "arm_log"])
+def test_a_good_log_has_no_finding(name, request):
+    assert findings(request.getfixturevalue(name)) == {}
+
+
+@pytest.mark.parametrize("rows", [7, 100])
+def test_a_real_sensor_has_no_finding(rows, tmp_path):
+    assert findings(read_log(write_static(rows, tmp_path / "log"))) == {}
+
+
+@pytest.mark.slow
+def test_a_real_arm_has_no_finding(tmp_path):
+    urdf = write_arm(tmp_path / "arm.urdf")
+    assert findings(read_log(write_motion(1, tmp_path / "log", urdf))) == {}
+
+
+# Channels that don't change.
+
+
+def test_a_wrench_of_zeros_is_refused(twin_log):
+    """Verdicts-2, row 9: its story was saturation, then friction, then gain."""
+    found = findings(damaged(twin_log, scaled(0.0, *SENSOR)))["constant"]
+    assert found.severity is Severity.REFUSE
+    assert "fx (the model expects it to change by" in found.what
+    assert "is the sensor alive?" in found.what
+
+
+def test_one_dead_column_of_the_wrench_is_named(twin_log):
+    found = findings(damaged(twin_log, scaled(0.0, "wrench.fy")))["constant"]
+    assert "wrench.fy (the model" in found.what and "wrench.fx" not in found.what
+
+
+def test_a_dead_axis_of_a_sensor_is_seen_by_what_the_others_weigh(static_log):
+    log = damaged(static_log, scaled(0.0, "wrench.fz"))
+    assert "fz (the model expects it to change by 2" in only(log, "constant").what
+
+
+def test_all_forces_dead_need_no_model(static_log):
+    log = damaged(static_log, scaled(0.0, "wrench.f"))
+    assert "constant in fx, fy, fz over all 100" in findings(log)["constant"].what
+
+
+def test_a_dead_torque_is_refused_in_the_library_call_too(arm_log):
+    log = damaged(arm_log, scaled(0.0, "tau.1"))
+    [found] = dead_channels(model(log))
+    assert "elbow" in found.what and "shoulder" not in found.what
+    with pytest.raises(
+        DisasmError, match=r"constant in elbow .* is the sensor alive\?"
+    ):
+        refuse([found])
+    assert not dead_channels(model(arm_log))
+
+
+def test_a_sensor_that_stops_is_placed(arm_log):
+    held = changed("tau.0", slice(500, 540), lambda values: values[0])
+    found = only(damaged(arm_log, held), "stuck")
+    assert found.rows == {"log/episode_0000": tuple(range(500, 540))}
+    assert "did the sensor stop?" in found.what
+
+
+def test_saturation_is_a_repeated_end_value(arm_log):
+    most = np.quantile(arm_log.episodes[0]["tau"][:, 0], 0.9)
+    clipped = changed("tau.0", slice(None), lambda values: np.minimum(values, most))
+    assert (
+        "tau.0 repeats its end value" in only(damaged(arm_log, clipped), "stuck").what
+    )
+
+
+@pytest.mark.parametrize(("step", "fires"), [(0.5, True), (0.01, False)])
+def test_a_quantum_coarser_than_the_noise_is_named(step, fires, twin_log):
+    found = findings(damaged(twin_log, rounded(step, "wrench.f")))
+    assert ("quantum" in found) == fires
+    if fires:
+        assert f"wrench.fx comes in steps of {step}" in found["quantum"].what
+
+
+def test_a_quantum_that_is_declared_is_none(twin_log):
+    log = damaged(twin_log, rounded(0.5, "wrench.f"))
+    chosen = model(log)
+    chosen.scenario.ft_sensor.quantum[:3] = [0.5] * 3
+    found = check_data([log], chosen)
+    assert not [finding for finding in found if finding.kind == "quantum"]
+
+
+# Time, and rest.
+
+
+def test_a_jump_of_time_is_placed(arm_log):
+    jump = changed("time", slice(400, None), lambda values: values + 0.3)
+    found = findings(damaged(arm_log, jump))["time"]
+    assert found.rows == {"log/episode_0000": (400,)}
+
+
+def test_jitter_is_no_jump(arm_log):
+    jitter = np.random.default_rng(0).uniform(-0.2, 0.2, 800) * 0.01
+    log = damaged(arm_log, changed("time", slice(None), lambda values: values + jitter))
+    assert "time" not in findings(log)
+
+
+def test_a_clock_that_runs_at_another_rate_is_named(twin_log):
+    assert (
+        "steps of 0.13 s" in only(damaged(twin_log, scaled(1.3, "time")), "time").what
+    )
+
+
+def resting(static_log: Log, between: int) -> Log:
+    """Returns a recording at 20 Hz: a second of rest at each pose, then some rows on
+    the way to the next.
+    """
+    first = static_log.episodes[0]
+    q = first["R_WS"][:8]
+    rows = []
+    for here, there in itertools.pairwise(q):
+        there = there * np.sign(here @ there)
+        way = np.linspace(0.0, 1.0, between + 2)[1:-1, None]
+        rows += [here] * 20 + list((1.0 - way) * here + way * there)
+    q = np.array(rows) / np.linalg.norm(rows, axis=1)[:, None]
+    columns = {f"R_WS.q{axis}": q[:, i] for i, axis in enumerate("wxyz")}
+    columns["time"] = 0.05 * np.arange(len(q))
+    columns |= {
+        n: np.resize(first.columns[n], len(q)) for n in first.components("wrench")
+    }
+    return damaged(static_log, lambda own: (own.clear(), own.update(columns)))
+
+
+def test_readings_that_move_are_placed(static_log):
+    """Verdicts-2, row 5: an arm that moves between its poses, recorded whole."""
+    found = findings(resting(static_log, 10))["moving"]
+    moving = np.array(found.rows["log/episode_0000"])
+    expected = np.flatnonzero(np.arange(7 * 30) % 30 >= 20)
+    np.testing.assert_array_equal(moving, expected)
+
+
+def test_poses_one_after_the_other_rest(static_log):
+    assert "moving" not in findings(resting(static_log, 0))
+
+
+# wrench against ft_sensor.
+
+
+def test_rows_whose_wrench_is_not_the_reading_are_placed(twin_log):
+    add = changed("wrench.fy", [4, 9], lambda values: values + 5.0)
+    found = findings(damaged(twin_log, add, episode=2))["processing"]
+    assert found.rows == {"log/episode_0002": (4, 9)}
+
+
+def test_a_reading_that_was_copied_is_refused(twin_log):
+    def copy(columns):
+        for axis in ("fx", "fy", "fz", "tx", "ty", "tz"):
+            columns[f"wrench.{axis}"] = columns[f"ft_sensor.{axis}"]
+
+    found = only(damaged(twin_log, copy), "processing")
+    assert "it is the raw reading" in found.what
+    assert found.severity is Severity.REFUSE
+
+
+def test_another_zero_of_the_sensor_is_allowed(twin_log):
+    log = damaged(twin_log, changed("ft_sensor.fz", slice(None), lambda v: v + 30.0))
+    assert findings(log) == {}
+
+
+# Units.
+
+
+@pytest.mark.parametrize(
+    ("damage", "text"),
+    [
+        (scaled(1e3, *(f"X_GB_measured.{a}" for a in "xyz")), "X_GB_measured is 1e+03"),
+        (scaled(1e-3, "wrench.f", "ft_sensor.f"), "the scale of the forces is 0.001"),
+        (scaled(1e3, "wrench.t", "ft_sensor.t"), "the scale of the torques is 1"),
+        (
+            scaled(57.3, "action.du", "action.dv", "action.dw"),
+            "action.du to dw is 57.3",
+        ),
+    ],
+)
+def test_a_unit_of_transitions_is_named(damage, text, twin_log):
+    assert text in findings(damaged(twin_log, damage))["units"].what
+
+
+@pytest.mark.parametrize(
+    ("damage", "text"),
+    [
+        (scaled(57.3, "q", "v"), "half of the joints are beyond q"),
+        (scaled(57.3, "v."), "v, beside the derivative of q, is 57.3 times"),
+        (scaled(1e3, "tau"), "the scale of the torques is"),
+    ],
+)
+def test_a_unit_of_an_arm_is_named(damage, text, arm_log):
+    assert text in findings(damaged(arm_log, damage))["units"].what
+
+
+@pytest.mark.parametrize("damage", [scaled(1e3, "wrench.t"), scaled(1e-3, "wrench.f")])
+def test_a_lever_that_nothing_has_is_named(damage, static_log):
+    assert "m times the forces" in only(damaged(static_log, damage), "units").what
+
+
+# Axes.
+
+
+@pytest.mark.parametrize(
+    ("damage", "text"),
+    [
+        (swapped("wrench.fy", "wrench.fz"), "fy = fz, fz = fy (wrench, in G at Bo)"),
+        (scaled(-1.0, "wrench.fx"), "fx = -fx (wrench, in G at Bo)"),
+        (scaled(-1.0, *SENSOR), "fx = -fx, fy = -fy, fz = -fz, tx = -tx"),
+    ],
+)
+def test_axes_of_transitions_are_named(damage, text, twin_log):
+    """Verdicts-2, row 11: of swapped axes CrossTalk was said to be the nearest."""
+    found = findings(damaged(twin_log, damage))["axes"]
+    assert text in found.what and found.severity is Severity.REFUSE
+
+
+@pytest.mark.parametrize(
+    ("damage", "text"),
+    [
+        (swapped("wrench.fx", "wrench.fz"), "fx = fz, fz = fx"),
+        (scaled(-1.0, "wrench.fx"), "fx = -fx"),
+        (scaled(-1.0, "wrench"), "it pulls up"),
+    ],
+)
+@pytest.mark.parametrize("name", ["static_log", "world_log"])
+def test_axes_of_readings_are_named(name, damage, text, request):
+    log = damaged(request.getfixturevalue(name), damage)
+    assert text in only(log, "axes").what
+
+
+@pytest.mark.parametrize(
+    ("damage", "text"),
+    [
+        (scaled(-1.0, "tau.0"), "the other sign of tau.0 (shoulder)"),
+        (swapped("tau.0", "tau.1"), "tau.0 and tau.1 exchanged"),
+        (scaled(-1.0, "tau"), "tau, at all joints that tell, has the wrong sign"),
+        (scaled(-1.0, "v."), "v, beside the derivative of q, has the wrong sign"),
+    ],
+)
+def test_axes_of_an_arm_are_named(damage, text, arm_log):
+    assert text in findings(damaged(arm_log, damage))["axes"].what
+
+
+# Delays, and spikes.
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_late_wrench_is_named(rows, twin_log):
+    """Verdicts-2, row 11: MotionLag was said to be the nearest."""
+    found = only(damaged(twin_log, late(rows, *SENSOR)), "late")
+    assert f"wrench is late by {rows} row" in found.what
+    assert found.severity is Severity.WARN
+
+
+def test_a_late_pose_is_named(twin_log):
+    """Verdicts-2, row 11: Backlash was said to be the nearest."""
+    found = findings(damaged(twin_log, late(1, "X_GB_measured")))
+    assert "X_GB_measured is late by 1 row" in found["late"].what
+
+
+@pytest.mark.parametrize(
+    ("damage", "text"),
+    [
+        (late(3, "tau.1"), "tau.1 (elbow) is late by 3 rows"),
+        (late(2, "v."), "v is late by 2 rows"),
+    ],
+)
+def test_late_channels_of_an_arm_are_named(damage, text, arm_log):
+    found = check_data([arm := damaged(arm_log, damage)], model(arm))
+    assert any(text in finding.what for finding in found if finding.kind == "late")
+
+
+def test_spikes_are_placed(arm_log):
+    log = damaged(arm_log, changed("tau.1", [100, 350], lambda v: v + 5.0))
+    found = only(log, "spikes")
+    assert found.rows == {"log/episode_0000": (100, 350)}
+    assert found.what.startswith("tau.1: 2 of 800 rows")
+
+
+def test_spikes_of_a_sensor_are_placed(twin_log):
+    """Verdicts-2, row 10: 5 N in three rows ended as "none"."""
+    add = changed("wrench.fx", [4, 9, 16], lambda v: v + 5.0)
+    log = damaged(twin_log, both(add, changed("ft_sensor.fx", [4, 9, 16], _minus)), 2)
+    assert findings(log)["spikes"].rows == {"log/episode_0002": (4, 9, 16)}
+
+
+def _minus(values: np.ndarray) -> np.ndarray:
+    return values - 5.0  # x of S is opposite to that of B
+
+
+# Rows that are left out.
+
+
+def test_flagged_rows_are_left_out(arm_log):
+    log = damaged(arm_log, changed("tau.1", [100, 350], lambda v: v + 5.0))
+    whole = model(log)
+    kept = without_flagged_rows([log], whole, check_data([log], whole))
+    assert kept.measurements.rows == 798
+    left_out = np.delete(whole.measurements.values, [100, 350], axis=0)
+    np.testing.assert_array_equal(kept.measurements.values, left_out)
+
+
+def test_a_step_that_begins_or_ends_at_a_flagged_row_is_left_out(twin_log):
+    add = changed("wrench.fy", [4], lambda values: values + 5.0)
+    log = damaged(twin_log, add, episode=2)
+    whole = model(log)
+    found = check_data([log], whole)
+    kept = without_flagged_rows([log], whole, found)
+    rows = whole.measurements.rows
+    expected = np.delete(whole.measurements.values, [53, 54], axis=0)
+    np.testing.assert_array_equal(kept.measurements.values, expected)
+    of_rollout = without_flagged_rows([log], whole, found, whole_episodes=True)
+    assert of_rollout.measurements.rows == rows - 25
+    assert "log/episode_0002" not in of_rollout.measurements.names
+
+
+def test_no_finding_leaves_the_model_as_it_is(arm_log):
+    whole = model(arm_log)
+    assert without_flagged_rows([arm_log], whole, ()) is whole
+
+
+def test_nothing_left_is_refused(arm_log):
+    rows = {"log/episode_0000": range(800)}
+    everything = DataFinding("spikes", "all", "none", rows=rows)
+    with pytest.raises(DisasmError, match="leaves no row"):
+        without_flagged_rows([arm_log], model(arm_log), [everything])
+
+
+def test_what_is_accepted_is_not_refused():
+    found = [DataFinding("axes", "wrong", "turn them", Severity.REFUSE)]
+    with pytest.raises(DisasmError, match="--accept-findings axes"):
+        refuse(found)
+    refuse(found, ["axes"])
+    refuse([DataFinding("late", "by a row", "shift it")])
+
+
+def test_rows_read_as_ranges():
+    found = DataFinding("spikes", "fy", "look", rows={"log/episode_0001": (3, 4, 5, 9)})
+    assert found.text == "spikes: fy (log/episode_0001 row 3 to 5, 9); look"
+    assert found.to_mapping()["rows"] == {"log/episode_0001": [3, 4, 5, 9]}
