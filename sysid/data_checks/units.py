@@ -46,7 +46,7 @@ def predicted_unit_findings(
     for unit, name in (("N", "forces"), ("N m", "torques")):
         own = [i for i, c in enumerate(measured.channels) if c.unit == unit]
         scale = scale_between(nominal[:, own], values[:, own], settings, noise[own])
-        wrong = _ofscale_between(f"the scale of the {name}", scale, settings)
+        wrong = _unit_findings(f"the scale of the {name}", scale, settings)
         if is_arm:  # a URDF's inertias may be placeholders
             wrong = _as_warnings(wrong)
         found += wrong
@@ -72,7 +72,7 @@ def _transitions(subject: Subject) -> list[DataFinding]:
     }
     found = []
     for name, scale in scales.items():
-        wrong = _ofscale_between(name, scale, settings, _DEGREES)
+        wrong = _unit_findings(name, scale, settings, _DEGREES)
         # The twin replays commanded poses, no actions.
         found += wrong if name == "X_GB_measured" else _as_warnings(wrong)
     reach = float(np.abs(np.concatenate(commanded)).max())
@@ -125,7 +125,7 @@ def _joint_motion(subject: Subject) -> list[DataFinding]:
         slopes, rates = derivatives(subject, of, by)
         scale = scale_between(slopes, rates, subject.settings)
         name = f"{by}, beside the derivative of {of},"
-        found += _ofscale_between(name, scale, subject.settings, _DEGREES)
+        found += _unit_findings(name, scale, subject.settings, _DEGREES)
         found += sign_findings(name, scale, subject.settings)
     return found
 
@@ -175,7 +175,7 @@ def scale_between(
     return float(size / most) if is_huge else np.nan
 
 
-def _ofscale_between(
+def _unit_findings(
     name: str, scale: float, settings: DataSettings, *more: float
 ) -> list[DataFinding]:
     """Returns a finding if a scale is that of a wrong unit.

@@ -2,11 +2,13 @@
 
 import json
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from drake_disasm.effects import CommandGain, SensorDrift
+from drake_disasm.logs import Log, LogWriter, read_log
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
@@ -33,6 +35,61 @@ def test_the_tool_writes_a_scenario_and_a_report(tmp_path):
     assert any(isinstance(effect, SensorDrift) for effect in scenario.effects)
     assert json.loads((out / "result.json").read_text())["ending"] == "explained"
     assert "Measured against predicted" in own_part((out / "report.html").read_text())
+
+
+def _spoilt(source: Log, folder: Path, **columns: np.ndarray) -> Path:
+    """Writes readings at rest with other columns of the wrench."""
+    values = {name: each.copy() for name, each in source.episodes[0].columns.items()}
+    values |= {f"wrench.{name}": column for name, column in columns.items()}
+    with LogWriter(folder, source.header) as writer:
+        writer.write_episode(values)
+    return folder
+
+
+def test_what_is_wrong_with_the_data_is_said_before_the_fit(tmp_path):
+    log = read_log(static_log(tmp_path, [], 0.0, seed=0).folder)
+    episode = log.episodes[0]
+    fx = episode["wrench.fx"].copy()
+    fx[[30, 60]] += 5.0
+    spoilt = _spoilt(log, tmp_path / "spikes", fx=fx)
+    arguments = ("--log", spoilt, "--workers", "1")
+    out = tmp_path / "out"
+    result = run(*arguments, "--drop-flagged-rows", "--out", out)
+    assert result.returncode == 0, result.stderr
+    assert "data: spikes: wrench.fx: 2 of 100 rows" in result.stderr
+    assert "spikes/episode_0000 row 30, 60" in result.stderr
+    assert "data: 2 of 100 rows are left out" in result.stderr
+    assert "outlying" not in result.stdout
+    mapping = json.loads((out / "result.json").read_text())
+    [found] = mapping["data_findings"]
+    assert found["rows"] == {"spikes/episode_0000": [30, 60]}
+    assert "<b>spikes</b>" in (out / "report.html").read_text()
+
+
+def test_data_that_no_fit_makes_sense_of_are_refused_unless_accepted(tmp_path):
+    log = read_log(static_log(tmp_path, [], 0.0, seed=0).folder)
+    turned = -log.episodes[0]["wrench.fx"]
+    spoilt = _spoilt(log, tmp_path / "turned", fx=turned)
+    arguments = ("--log", spoilt, "--workers", "1", "--out", tmp_path / "out")
+    refused = run(*arguments)
+    assert refused.returncode == 2 and refused.stderr.count("\n") == 1
+    assert "error: axes: fx = -fx would explain" in refused.stderr
+    assert "--accept-findings axes" in refused.stderr
+    assert not (tmp_path / "out").exists()
+    accepted = run(*arguments, "--accept-findings", "axes")
+    assert accepted.returncode == 0, accepted.stderr
+    assert "data: axes: fx = -fx" in accepted.stderr
+
+
+def test_a_wrong_name_is_refused_before_any_work(tmp_path, monkeypatch):
+    log = static_log(tmp_path, [], 0.0, seed=0).folder
+
+    def model_of(*_):
+        raise AssertionError("the names come first")
+
+    monkeypatch.setattr("close_loop.model_of", model_of)
+    result = run("--log", log, "--out", tmp_path / "out", "--held-out", "nothing")
+    assert result.returncode == 2 and "no such episode" in result.stderr
 
 
 @pytest.mark.slow

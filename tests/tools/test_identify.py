@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from drake_disasm.logs import read_log, write_static_wrench
+from drake_disasm.logs import LogWriter, read_log, write_static_wrench
 from drake_disasm.scenario import load_scenario
 from tests.tools.programs import interrupt, run_program
 
@@ -190,6 +190,36 @@ def test_nan_in_the_middle_names_file_and_column(
     assert done.returncode == 2
     assert "episode_0000.csv" in done.stderr and "wrench.tz" in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_wrong_name_is_refused_before_any_work(
+    readings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def model_of(*_: object) -> None:
+        raise AssertionError("the names come first")
+
+    monkeypatch.setattr("identify.model_of", model_of)
+    arguments = ("--log", readings / "log_0", "--out", tmp_path / "fit")
+    done = run(*arguments, "--held-out", "nothing")
+    assert done.returncode == 2 and "no such episode" in done.stderr
+
+
+def test_flagged_rows_are_said_and_left_out(readings: Path, tmp_path: Path) -> None:
+    source = read_log(readings / "log_0")
+    columns = {name: v.copy() for name, v in source.episodes[0].columns.items()}
+    columns["time"] = np.arange(len(columns.pop("order")))
+    columns["wrench.fx"][:12] = 1.0
+    with LogWriter(tmp_path / "log", source.header) as writer:
+        writer.write_episode(columns)
+    out = tmp_path / "fit"
+    done = run("--log", tmp_path / "log", "--drop-flagged-rows", "--out", out, *QUICK)
+    assert done.returncode == 0, done.stderr
+    assert "data: stuck: wrench.fx" in done.stderr
+    assert "12 of 15 rows are left out" in done.stderr
+    result = json.loads((out / "result.json").read_text())
+    assert result["data_findings"][0]["kind"] == "stuck"
+    assert result["objective"]["fitted"]["rows"] == 3
+    assert "<b>stuck</b>" in (out / "report.html").read_text()
 
 
 def test_help_teaches() -> None:
