@@ -107,7 +107,8 @@ def observable_effects() -> tuple[type[Effect], ...]:
     return tuple(
         effect
         for effect in registered_effects()
-        if issubclass(effect, acts) and not getattr(effect, "removed_by_zeroing", False)
+        if issubclass(effect, acts) and effect.is_physical
+        if not getattr(effect, "removed_by_zeroing", False)
     )
 
 
