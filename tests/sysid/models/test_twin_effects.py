@@ -1,6 +1,7 @@
 """What the simulator does with an effect, the model of a log says, too."""
 
 import copy
+import dataclasses
 
 import numpy as np
 import pytest
@@ -20,8 +21,10 @@ from drake_disasm.effects import (
     SensorGainDrift,
     SensorHysteresis,
     SensorMounting,
+    SensorResidualModel,
     SensorStep,
 )
+from drake_disasm.logs import read_log
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.recording import record_transitions
@@ -29,8 +32,11 @@ from drake_disasm.task.simulation import TaskSimulation
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.validation.blind_tests import nominal
+from sysid.validation.synthetic_logs import transitions_log
 from sysid.workers import Workers
 from tests.drake_disasm.conftest import STIFF
+from tests.drake_disasm.effects.learned_files import HEIGHT, step_in_fy
 
 _NOTHING = np.zeros(0)
 _STEPS = 30
@@ -127,3 +133,21 @@ def test_sensor_effects_share_one_simulation(tmp_path, monkeypatch):
     np.testing.assert_allclose(change[:, 6], 0.5, atol=1e-9)
     alone = model.predict(thetas[2], slice(0, _STEPS)) - model.measurements.values
     np.testing.assert_allclose(found[2], alone / model.measurements.noise, atol=1e-9)
+
+
+def test_a_learned_effect_knows_what_the_models_say_it_knows(tmp_path):
+    """What it adds to predictions is its function of `residual_inputs`."""
+    transitions_log(tmp_path / "log", nominal(), [], 0, episodes=2, steps=8)
+    logs, theta = [read_log(tmp_path / "log")], np.zeros(0)
+    bare = TwinModel(logs, nominal(), ())
+    learned = SensorResidualModel(str(step_in_fy(tmp_path)), share=1.0)
+    scenario = dataclasses.replace(nominal(), effects=[learned])
+    more = TwinModel(logs, scenario, ()).predictions(theta) - bare.predictions(theta)
+    inputs = bare.residual_inputs(theta)["fy"]
+    inside = np.all(np.abs(inputs) <= 20.0, axis=1)
+    expected = np.where(inside & (inputs[:, 0] > 0.0), HEIGHT, 0.0)
+    assert 0 < np.count_nonzero(expected) < len(expected)
+    channels = [c.name for c in bare.measurements.channels]
+    np.testing.assert_allclose(more[:, channels.index("fy")], expected, atol=1e-9)
+    rest = np.delete(more, channels.index("fy"), axis=1)
+    np.testing.assert_allclose(rest, 0.0, atol=1e-9)
