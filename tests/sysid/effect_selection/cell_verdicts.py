@@ -4,7 +4,7 @@
     python -m tests.sysid.effect_selection.cell_verdicts effect --logs 50
 
 Records each log (`removal`, `admittance` with 0.15 mm of exploration, six episodes) and
-judges it by the twin of the same scenario. Amplitudes of effects are two to four times
+judges it by the twin of the same scenario. Amplitudes of effects are four to ten times
 what the first null log that was judged would have shown with 80 % probability. Writes
 each answer to out/cell_verdicts as it comes, and goes on from there.
 """
@@ -32,7 +32,7 @@ from sysid.validation.blind_tests import observable_effects
 _STEPS, _EPISODES = 440, 20  # recorded at least; seeds from one log to the next
 _SEEDS = {"null": 3000, "effect": 7000}
 _EXPLORATION = 1.5e-4  # m
-_TIMES = (2.0, 4.0)  # the limit of detection
+_TIMES = (4.0, 10.0)  # the limit of detection
 _MOST = 0.5  # of the way to an amplitude's bound; beyond it the cell may not start
 
 
