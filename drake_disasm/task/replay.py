@@ -157,7 +157,7 @@ class TwinReplay:
         v: np.ndarray,
         qd: np.ndarray,
         wrench: np.ndarray,
-        give_rate: np.ndarray,
+        give_rate: np.ndarray | None = None,
     ) -> None:
         """Sets the twin's state by what was measured.
 
@@ -166,11 +166,12 @@ class TwinReplay:
             q, v: (6,) measured coordinates and their rates.
             qd: (6,) commanded coordinates.
             wrench: (6,) that the grip's springs carry, on the bolt at Bo in Gn.
-            give_rate: (6,) rates of the bolt against the arm.
+            give_rate: (6,) rates of the bolt against the arm; None: it moves along.
         """
         self._step = step
         q_bolt = q + self._diagram.station.deflection(wrench)
-        self._state: TwinState | None = TwinState(q, v, qd, q_bolt, v + give_rate)
+        v_bolt = v if give_rate is None else v + give_rate
+        self._state: TwinState | None = TwinState(q, v, qd, q_bolt, v_bolt)
 
     def advance(self, qd_rate: np.ndarray) -> np.ndarray:
         """Moves the command at a rate for one period; returns the state (12,) then.
