@@ -81,16 +81,19 @@ def sieve(residual: Array) -> Noise:
     return _draw
 
 
-def null_log(model: Model, noise: Noise, seed: int) -> Model:
+def null_log(
+    model: Model, noise: Noise, seed: int, theta: Array | None = None
+) -> Model:
     """Returns the model with its own prediction and noise as what was measured.
 
     Args:
         model: whose channels state the noise.
         noise: is drawn.
         seed: of the draws.
+        theta: (p,) values of its parameters; the nominal ones if left out.
     """
     measured = model.measurements
-    theta = nominal_values(model.parameters)
+    theta = nominal_values(model.parameters) if theta is None else theta
     predicted = model.predictions(theta)
     drawn = noise(np.random.default_rng(seed), predicted) * measured.noise
     return model.with_measurements(measured.with_values(predicted + drawn))

@@ -20,6 +20,8 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.logs import read_logs
 from sysid.effect_selection.close_loop import close_loop
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.identification.noise import with_estimated_noise
 from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
@@ -60,9 +62,15 @@ def noise_of(name: str, model: LogModel) -> null_logs.Noise:
     return null_logs.autoregressive(float(name.removeprefix("ar")))
 
 
+def fitted(model: LogModel) -> np.ndarray:
+    """Returns the parameters (p,) of the real log: nominally, a sensor carries nothing."""
+    fitter = Fitter(model, Workers(), model.default_huber_delta, DEFAULT_SETTINGS)
+    return fitter.fit(()).theta
+
+
 def answer(model: LogModel, noise: null_logs.Noise, seed: int) -> dict[str, object]:
     """Returns what closing the loop says of a null log."""
-    drawn = null_logs.null_log(model, noise, seed)
+    drawn = null_logs.null_log(model, noise, seed, fitted(model))
     unknown = np.full(len(drawn.measurements.channels), np.nan)
     measured = drawn.measurements.with_noise(unknown, "unknown")
     try:
