@@ -12,6 +12,7 @@ from sysid.effect_selection.fitter import Fitter
 from sysid.identification.uncertainty import block_length, block_numbers
 from sysid.models.base import LogModel
 from sysid.models.measurements import Channel
+from sysid.objective import pseudo_residual
 
 Array = NDArray[np.float64]
 
@@ -165,8 +166,28 @@ def _cross_predicted(fitter: Fitter, fit: Fit, folds: NDArray[np.int64]) -> Arra
     return found
 
 
+def held_out_loss(fit: Fit) -> float:
+    """Returns the loss of contiguous blocks, each predicted by a fit to the others.
+
+    All parameters are fitted to the others, the model's own, too, one Gauss-Newton
+    step away from the fit to all.
+    """
+    episode = fit.model.measurements.episode
+    folds = contiguous_folds(episode, fit.settings.held_out_folds)
+    residual = _linear_residual(fit, folds)
+    bent = pseudo_residual(residual, fit.linearisation.huber_delta)
+    return float(np.sum(bent**2))
+
+
 def _linearly_predicted(fit: Fit, folds: NDArray[np.int64]) -> Array:
-    linearisation, measured = fit.linearisation, fit.model.measurements
+    measured = fit.model.measurements
+    residual = _linear_residual(fit, folds)
+    return np.asarray(measured.values + residual * measured.sigma)
+
+
+def _linear_residual(fit: Fit, folds: NDArray[np.int64]) -> Array:
+    """Returns residuals (rows, channels) of each fold by a fit to the others."""
+    linearisation = fit.linearisation
     residual = linearisation.residual.copy()
     root = np.sqrt(linearisation.weights)
     J, r = root[..., None] * linearisation.jacobian, root * linearisation.residual
@@ -178,4 +199,4 @@ def _linearly_predicted(fit: Fit, folds: NDArray[np.int64]) -> Array:
         step = -np.linalg.lstsq(A, b, rcond=fit.settings.held_out_rcond)[0]
         step = np.clip(linearisation.u + step, 0.0, 1.0) - linearisation.u
         residual[own] += linearisation.jacobian[own] @ step
-    return np.asarray(measured.values + residual * measured.sigma)
+    return residual

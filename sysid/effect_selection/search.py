@@ -12,6 +12,7 @@ from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence, most_parsimonious
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.held_out import held_out_loss
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.effect_selection.survey import Survey, survey_candidates
 
@@ -163,7 +164,9 @@ class ForwardSearch(abc.ABC):
 class LinearSearch(ForwardSearch):
     """Where a model is affine in its effects: the evidence is exact, up to the noise.
 
-    The first accepted candidate that its fit confirms is added.
+    The first accepted candidate that its fit confirms is added. Gains of the survey
+    are of blocks to which the effect was not fitted, but all other parameters were:
+    what is added has to lower the loss of blocks to which nothing was, too.
     """
 
     def _next(self, fit: Fit, survey: Survey) -> Fit | None:
@@ -172,13 +175,18 @@ class LinearSearch(ForwardSearch):
             accepted = survey.linearised.accepted_pairs(survey.effects)
         for trial in trials(accepted, self._settings.max_trials):
             found = self._without_needless(self._fit_chosen(fit, survey, trial))
-            if self._is_better(fit, found, trial):
+            if self._is_better(fit, found, trial) and self._predicts(fit, found):
                 self._record(trial, ties(trial, survey, accepted), survey, found)
                 return found
             self._report_rejected(trial)
             if self._is_over:
                 break
         return None
+
+    def _predicts(self, before: Fit, after: Fit) -> bool:
+        """Returns whether blocks to which nothing was fitted are predicted better."""
+        least = 1.0 - self._settings.min_gain
+        return held_out_loss(after) <= least * held_out_loss(before)
 
 
 def trials(accepted: Sequence[Evidence], count: int) -> list[Evidence]:

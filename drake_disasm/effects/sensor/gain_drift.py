@@ -30,6 +30,7 @@ class SensorGainDrift(SensorEffect):
     tz: float = amplitude("1/s", -0.3, 0.3, "growth of the torque's error about z_S")
 
     stage = 2
+    task_experiment = "the same presses at the begin and at the end of a recording"
     experiment = "two known weights in turn, again and again while the sensor warms up"
     experiments_against: ClassVar = {
         "SensorGain": "the same loads at the begin and at the end of a recording",

@@ -63,7 +63,7 @@ def noise_of(name: str, model: LogModel) -> null_logs.Noise:
 
 
 def fitted(model: LogModel) -> np.ndarray:
-    """Returns the parameters (p,) of the real log: nominally, a sensor carries nothing."""
+    """Returns the parameters (p,) of the log: nominally a sensor carries nothing."""
     fitter = Fitter(model, Workers(), model.default_huber_delta, DEFAULT_SETTINGS)
     return fitter.fit(()).theta
 

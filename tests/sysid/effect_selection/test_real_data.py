@@ -27,14 +27,14 @@ def _closed(folders, train, test) -> ClosedLoop:
 
 def test_a_real_force_sensor_drifts_and_stops(tmp_path):
     found = _closed([write_static(100, tmp_path / "log")], [0], [])
-    assert found.verdict.names == ("SensorDrift",)
+    assert found.verdict.names[0] == "SensorDrift"
     values = {value.name: value for value in found.verdict.values}
     assert values["SensorDrift.fz"].interval[1] < 0.0
     assert 45.0 < values["SensorDrift.duration"].value < 65.0
     before, after = (
         found.errors.rms_by_unit(p) for p in (found.errors.before, found.errors.after)
     )
-    assert before["N"] > 0.29 and after["N"] < 0.1 and after["N m"] < before["N m"]
+    assert before["N"] > 0.29 and after["N"] < 0.064 and after["N m"] < 0.00087
 
 
 @pytest.mark.slow
