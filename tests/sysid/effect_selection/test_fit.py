@@ -15,6 +15,7 @@ from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.refit_search import at_own_minimum, simplified
 from sysid.effect_selection.settings import SelectionSettings
+from sysid.effect_selection.verdict import parameter_values
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.validation.blind_tests import nominal
@@ -31,6 +32,14 @@ def gain(tmp_path_factory):
     folder = tmp_path_factory.mktemp("gain") / "log"
     transitions_log(folder, nominal(), [CommandGain(x=0.03)], 0, episodes=6, steps=12)
     return _fitter(TwinModel([read_log(folder)], nominal(), ()), CommandGain)
+
+
+@pytest.fixture(scope="module")
+def turned_impact(tmp_path_factory):
+    """A fitter of a log of a groove that is turned, and its effect."""
+    folder = tmp_path_factory.mktemp("turned") / "log"
+    transitions_log(folder, nominal(), [GroovePose(ry=0.02)], 0, episodes=4, steps=12)
+    return _fitter(TwinModel([read_log(folder)], nominal(), ()), GroovePose)
 
 
 def _fitter(model, kind):
@@ -50,6 +59,21 @@ def test_an_effect_is_worth_what_the_loss_rises_by_without_it(gain):
     whole = fit.effect_gains["CommandGain"]
     assert fit.gains_of([x]) == pytest.approx([whole], abs=0.03)
     assert fit.significant[x].all()
+
+
+def test_the_error_of_coarse_time_steps_leads_to_the_fit_in_fine_ones(turned_impact):
+    """Where a fit in fine steps ends, the estimate is off no more."""
+    fitter, effect = turned_impact
+    turn = effect.only(["ry"])
+    coarse = fitter.fit((turn,))
+    fine = fitter.with_base(fitter.base.refined()).fit((turn,), coarse)
+    moved = fine.linearisation.u - coarse.linearisation.u
+    assert np.abs(moved).max() > 1e-7
+    np.testing.assert_allclose(coarse.error_of_steps, moved, rtol=0.5, atol=1e-7)
+    assert not fine.error_of_steps.any()
+    (value,) = parameter_values(coarse, 0)[:1]
+    most_of_the_way = coarse.theta[0] + 0.8 * (fine.theta[0] - coarse.theta[0])
+    assert value.interval[0] <= most_of_the_way <= value.interval[1]
 
 
 def _with(fit, **changes):
