@@ -321,7 +321,13 @@ class ArmSamples:
 
 
 class ArmEffect(Effect):
-    """Acts on an arm, and so on the torques that its joints' sensors measure."""
+    """Acts on an arm, and so on the torques that its joints' sensors measure.
+
+    Attributes:
+        is_common: whether an arm that has it at one joint likely has it at the others.
+    """
+
+    is_common: ClassVar[bool] = True
 
     @classmethod
     def places(cls, joints: Sequence[str]) -> list[dict[str, str]]:

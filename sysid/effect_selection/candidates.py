@@ -69,7 +69,8 @@ def joint_groups(library: Sequence[Candidate]) -> list[tuple[Candidate, ...]]:
     """
     groups: dict[str, list[Candidate]] = {}
     for candidate in library:
-        groups.setdefault(kind_text(candidate), []).append(candidate)
+        if getattr(candidate.effect, "is_common", True):
+            groups.setdefault(kind_text(candidate), []).append(candidate)
     return [tuple(group) for group in groups.values() if len(group) > 1]
 
 

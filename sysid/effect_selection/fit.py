@@ -117,6 +117,29 @@ class Fit:
         margin, u = self.settings.bound_tolerance, self.linearisation.u[columns]
         return np.asarray((u > margin) & (u < 1.0 - margin))
 
+    def is_misshapen(self, names: Sequence[str]) -> bool:
+        """Returns whether some effects would explain more beyond a shape's bound.
+
+        Dry friction whose transition is as wide as it may be, say, where what is
+        missing is viscous: past the bound it would lower the loss by `min_gain`.
+        """
+        linear, least = self.linearisation, self.settings.min_gain * self.loss
+        for effect in (e for e in self.effects if e.name in names):
+            for i in self._shapes_of(effect):
+                column = linear.weights * linear.jacobian[..., i]
+                slope = float(np.sum(column * linear.residual))
+                power = float(np.sum(column * linear.jacobian[..., i]))
+                is_pushed = slope * (0.5 - linear.u[i]) > 0.0
+                at_bound = not self.inside(np.array([i])).all()
+                if at_bound and is_pushed and slope**2 > least * power:
+                    return True
+        return False
+
+    def _shapes_of(self, effect: Candidate) -> list[int]:
+        """Returns which of the parameters are an effect's shape parameters."""
+        names = [f"{effect.name}.{field}" for field in effect.shape]
+        return [i for i, p in enumerate(self.model.parameters) if p.name in names]
+
     def harmed_channels(self, before: "Fit") -> list[str]:
         """Returns the channels that are significantly worse than in another fit."""
         limits, blocks = self.settings, before.blocks

@@ -147,11 +147,14 @@ class ForwardSearch(abc.ABC):
     def _is_better(self, before: Fit, after: Fit, trial: Evidence) -> bool:
         """Returns whether the loss falls, and a trial's effects make sense.
 
-        They are significant, no amplitude ends at a bound, and no channel pays.
+        They are significant, no amplitude ends at a bound, nor a shape that would go
+        further, and no channel pays.
         """
         if after.loss > (1.0 - self._settings.min_gain) * before.loss:
             return False
         if after.at_bound(trial.effects) or after.harmed_channels(before):
+            return False
+        if after.is_misshapen(trial.effects):
             return False
         return after.all_significant(trial.effects)
 

@@ -26,7 +26,7 @@ class JointAsymmetricFriction(JointEffect):
     coulomb: float = amplitude("N m", -200.0, 200.0, "dry part")
     viscous: float = amplitude("N m s/rad", -500.0, 500.0, "viscous part")
     creep: float = shape_parameter(
-        0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP
+        0.02, "rad/s", 1e-4, 0.1, "velocity of the transition", _CREEP
     )
 
     noun = "friction that depends on the direction"

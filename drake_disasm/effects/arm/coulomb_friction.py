@@ -25,7 +25,7 @@ class JointCoulombFriction(JointEffect):
     joint: str = joint_name()
     size: float = amplitude("N m", 0.0, 200.0, "friction torque")
     creep: float = shape_parameter(
-        0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP
+        0.02, "rad/s", 1e-4, 0.1, "velocity of the transition", _CREEP
     )
 
     noun = "dry friction"

@@ -27,10 +27,11 @@ class JointCoupling(ArmTorqueEffect):
     viscous: float = amplitude("N m s/rad", -500.0, 500.0, "b, of its bearings")
     dry: float = amplitude("N m", -200.0, 200.0, "c, of its bearings")
     creep: float = shape_parameter(
-        0.02, "rad/s", 1e-4, 1.0, "e, velocity of the transition", (0.02,)
+        0.02, "rad/s", 1e-4, 0.1, "e, velocity of the transition", (0.02,)
     )
 
     noun = "coupling to another joint"
+    is_common = False
     experiment = "this joint and the next, alone and together, both ways"
 
     @classmethod

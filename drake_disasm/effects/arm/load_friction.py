@@ -24,7 +24,7 @@ class JointLoadFriction(JointEffect):
     joint: str = joint_name()
     coefficient: float = amplitude("1", 0.0, 1.0, "friction per load")
     creep: float = shape_parameter(
-        0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", _CREEP
+        0.02, "rad/s", 1e-4, 0.1, "velocity of the transition", _CREEP
     )
 
     noun = "friction in proportion to the load"

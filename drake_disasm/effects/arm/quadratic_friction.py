@@ -23,7 +23,7 @@ class JointQuadraticFriction(JointEffect):
     joint: str = joint_name()
     coefficient: float = amplitude("1/(N m)", 0.0, 10.0, "friction per squared load")
     creep: float = shape_parameter(
-        0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", (0.02,)
+        0.02, "rad/s", 1e-4, 0.1, "velocity of the transition", (0.02,)
     )
 
     noun = "friction that grows with the square of the load"

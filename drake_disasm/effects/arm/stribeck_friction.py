@@ -26,7 +26,7 @@ class JointStribeckFriction(JointEffect):
         0.1, "rad/s", 1e-3, 5.0, "v_s, at which the film carries", (0.015, 0.05, 0.15)
     )
     creep: float = shape_parameter(
-        0.02, "rad/s", 1e-4, 1.0, "velocity of the transition", (0.02,)
+        0.02, "rad/s", 1e-4, 0.1, "velocity of the transition", (0.02,)
     )
 
     noun = "friction that falls with speed"

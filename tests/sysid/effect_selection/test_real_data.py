@@ -43,9 +43,9 @@ def test_a_real_arm_has_friction_and_offsets(tmp_path):
     folders = [write_motion(n, tmp_path / f"run_{n}", arm) for n in (1, 2)]
     found = _closed(folders, [0], [1])
     kinds = {name.partition(".")[0] for name in found.verdict.names}
-    assert kinds == {"JointCoulombFriction", "TorqueOffset"}
+    assert {"JointCoulombFriction", "TorqueOffset"} <= kinds
     assert found.errors.relative(found.errors.before) > 0.06
-    assert found.errors.relative(found.errors.after) < 0.03
+    assert found.errors.relative(found.errors.after) < 0.021
 
 
 @pytest.mark.slow
