@@ -12,6 +12,7 @@ _MOST_FIELDS = 2
 _ROUNDS = 6  # to come close; more only to reach the given size at all
 _MOST_ROUNDS = 15
 _ATTEMPTS = 4
+_MOST_OF_RANGE = 0.9
 _ENOUGH = 0.5  # of the given size
 _CLOSE = 0.05  # of the given size
 
@@ -86,8 +87,14 @@ def _between(low: float, high: float, random: np.random.Generator) -> float:
 
 
 def _within(fields: dict, unit: dict[str, float], scale: float) -> dict[str, float]:
-    """Returns amplitudes within their bounds."""
+    """Returns amplitudes within their bounds; one at a bound would not be confirmed."""
     return {
-        name: float(np.clip(scale * value, fields[name]["low"], fields[name]["high"]))
+        name: float(
+            np.clip(
+                scale * value,
+                _MOST_OF_RANGE * fields[name]["low"],
+                _MOST_OF_RANGE * fields[name]["high"],
+            )
+        )
         for name, value in unit.items()
     }
