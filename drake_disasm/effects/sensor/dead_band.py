@@ -37,6 +37,7 @@ class SensorDeadBand(SensorEffect):
         0.0, "1", 0.0, 1.0, "b, share of W that is missing beyond the band", (0.0, 1.0)
     )
 
+    noun = "a dead band of the sensor"
     stage = 5
     experiment = "a load that grows slowly through zero, along each axis of the sensor"
 

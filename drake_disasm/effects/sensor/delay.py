@@ -28,6 +28,7 @@ class SensorDelay(SensorMemoryEffect):
     delay: float = amplitude("s", 0.0, _LONGEST, "T, of the wrench behind the load")
 
     memory_size = _HISTORY.numbers
+    noun = "readings that come late"
     stage = 5
     experiment = "steps that hit a stop, and an impulse: a delay shifts it, unchanged"
     experiments_against: ClassVar = {

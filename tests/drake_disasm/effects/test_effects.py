@@ -272,3 +272,10 @@ def test_imprecision_scatters_about_the_command_and_repeats_itself():
         np.std(away, axis=0), [1e-3, 0, 5e-4, 0, 0, 0], rtol=0.05
     )
     np.testing.assert_allclose(np.mean(away, axis=0), 0.0, atol=8e-5)
+
+
+@pytest.mark.parametrize(
+    "effect", [e for e in registered_effects() if e.__module__.startswith("drake_")]
+)
+def test_a_sentence_has_a_word_for_it(effect: type[Effect]) -> None:
+    assert effect.noun and not effect.noun[0].isupper()
