@@ -29,6 +29,7 @@ class SensorGainDrift(SensorEffect):
     ty: float = amplitude("1/s", -0.3, 0.3, "growth of the torque's error about y_S")
     tz: float = amplitude("1/s", -0.3, 0.3, "growth of the torque's error about z_S")
 
+    noun = "a gain of the sensor that drifts"
     stage = 2
     task_experiment = "the same presses at the begin and at the end of a recording"
     experiment = "two known weights in turn, again and again while the sensor warms up"
