@@ -11,15 +11,12 @@ each answer to out/cell_verdicts as it comes, and goes on from there.
 
 import argparse
 import copy
-import json
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Effect
-from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.logs import Log, read_log
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
@@ -28,6 +25,12 @@ from drake_disasm.task.simulation import TaskSimulation
 from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.validation.blind_tests import observable_effects
+from tests.sysid.effect_selection.answers import (
+    Answer,
+    complete,
+    counted,
+    read_answers,
+)
 
 _STEPS, _EPISODES = 440, 20  # recorded at least; seeds from one log to the next
 _SEEDS = {"null": 3000, "effect": 7000}
@@ -61,7 +64,7 @@ def draw(number: int, limits: list[list[object]]) -> Effect:
     return kind(**{str(field): float(size) * random.uniform(*_TIMES)})
 
 
-def answer(log: Log, scenario: Scenario) -> dict[str, object]:
+def answer(log: Log, scenario: Scenario) -> Answer:
     """Returns what closing the loop says of a log."""
     model = model_of([log], ModelChoice(scenario=scenario, fixed=True))
     try:
@@ -80,16 +83,11 @@ def answer(log: Log, scenario: Scenario) -> dict[str, object]:
     }
 
 
-def _answers(path: Path) -> list[dict[str, object]]:
-    lines = path.read_text().splitlines() if path.exists() else []
-    return [json.loads(line) for line in lines]
-
-
-def _case(kind: str, number: int, out: Path, scenario: Scenario) -> dict[str, object]:
+def _case(kind: str, number: int, out: Path, scenario: Scenario) -> Answer:
     """Returns the answer to a case, with what was put in."""
     real, hidden, name = copy.deepcopy(scenario), "", ""
     if kind == "effect":
-        effect = draw(number, _answers(out / "null.jsonl")[0]["limits"])
+        effect = draw(number, read_answers(out / "null.jsonl")[0]["limits"])
         real.effects, hidden, name = [effect], repr(effect), type(effect).__name__
     seed = _SEEDS[kind] + _EPISODES * number
     try:
@@ -99,18 +97,13 @@ def _case(kind: str, number: int, out: Path, scenario: Scenario) -> dict[str, ob
     return {"hidden": hidden, "kind": name} | answer(log, scenario)
 
 
-def _summary(kind: str, answers: list[dict[str, object]]) -> str:
+def _summary(kind: str, answers: list[Answer]) -> str:
     """Returns alarms of null logs, or effects named, with Wilson's intervals."""
     if kind == "effect":
-        right = [a for a in answers if a["names"][:1] == [a.get("kind")]]
-        text = "named first"
-    else:
-        right, text = [a for a in answers if a["names"]], "name an effect"
-    low, high = wilson_interval(len(right), len(answers))
-    endings = dict(Counter(str(each["ending"]) for each in answers))
-    return (
-        f"{kind}: {len(right)} of {len(answers)} {text} "
-        f"(95 %: {100 * low:.1f} to {100 * high:.1f} %); {endings}"
+        right = sum(a["names"][:1] == [a.get("kind")] for a in answers)
+        return counted(kind, "named first", right, answers)
+    return counted(
+        kind, "name an effect", sum(bool(a["names"]) for a in answers), answers
     )
 
 
@@ -123,11 +116,10 @@ def main() -> None:
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     scenario, path = load_scenario("removal"), args.out / f"{args.kind}.jsonl"
-    with path.open("a") as stream:
-        for number in range(len(_answers(path)), args.logs):
-            found = _case(args.kind, number, args.out, scenario)
-            print(json.dumps(found), file=stream, flush=True)
-    print(_summary(args.kind, _answers(path)), flush=True)
+    answers = complete(
+        path, args.logs, lambda number: _case(args.kind, number, args.out, scenario)
+    )
+    print(_summary(args.kind, answers), flush=True)
 
 
 if __name__ == "__main__":

@@ -9,15 +9,13 @@ to out/null_alarms as it comes, and goes on from there.
 """
 
 import argparse
-import json
-from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.logs import read_logs
 from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.fitter import Fitter
@@ -27,6 +25,7 @@ from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.validation import null_logs
 from sysid.workers import Workers
+from tests.sysid.effect_selection.answers import Answer, complete, counted
 from tests.sysid.real_data import write_arm, write_motion, write_static
 
 _ARM_ROWS = 600  # of 200 Hz: 3 s
@@ -68,7 +67,7 @@ def fitted(model: LogModel) -> np.ndarray:
     return fitter.fit(()).theta
 
 
-def answer(model: LogModel, noise: null_logs.Noise, seed: int) -> dict[str, object]:
+def answer(model: LogModel, noise: null_logs.Noise, seed: int) -> Answer:
     """Returns what closing the loop says of a null log."""
     drawn = null_logs.null_log(model, noise, seed, fitted(model))
     unknown = np.full(len(drawn.measurements.channels), np.nan)
@@ -90,22 +89,6 @@ def _model(logs: list[Path]) -> LogModel:
     return with_estimated_noise(found, Workers(), found.default_huber_delta)
 
 
-def _answers(path: Path) -> list[dict[str, object]]:
-    lines = path.read_text().splitlines() if path.exists() else []
-    return [json.loads(line) for line in lines]
-
-
-def _summary(name: str, answers: list[dict[str, object]]) -> str:
-    count = len(answers)
-    named = sum(bool(each["names"]) for each in answers)
-    low, high = wilson_interval(named, count)
-    endings = dict(Counter(str(each["ending"]) for each in answers))
-    return (
-        f"{name}: {named} of {count} name an effect "
-        f"(95 %: {100 * low:.1f} to {100 * high:.1f} %); {endings}"
-    )
-
-
 def main() -> None:
     """Runs the program."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -120,11 +103,11 @@ def main() -> None:
     model = MODELS[args.model](args.out / "data")
     for name in args.noise:
         path = args.out / f"{args.model}_{name}.jsonl"
-        noise = noise_of(name, model)
-        with path.open("a") as stream:
-            for seed in range(len(_answers(path)), args.logs):
-                print(json.dumps(answer(model, noise, seed)), file=stream, flush=True)
-        print(_summary(f"{args.model}, {name}", _answers(path)), flush=True)
+        answer_to = partial(answer, model, noise_of(name, model))
+        found = complete(path, args.logs, answer_to)
+        named = sum(bool(each["names"]) for each in found)
+        text = counted(f"{args.model}, {name}", "name an effect", named, found)
+        print(text, flush=True)
 
 
 if __name__ == "__main__":
