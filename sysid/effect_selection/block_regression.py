@@ -197,7 +197,18 @@ class BlockRegression:
         L = _spread(found.H.sum(axis=0), noise)
         total = found.gradients.sum(axis=0)
         blocks = np.linalg.solve(L, noise.T).T
-        return Scores(np.asarray(np.linalg.solve(L, total)), np.asarray(blocks))
+        total = np.asarray(np.linalg.solve(L, total))
+        return Scores(total, np.asarray(blocks), self.least_p(columns))
+
+    def least_p(self, columns: Columns) -> float:
+        """Returns the least p-value that flips of the blocks' signs can give columns.
+
+        Of columns that act in a few rows alone, whatever noise is there decides.
+        """
+        power = np.add.reduceat(self.A[:, columns] ** 2, self.begins)
+        shares = (power / np.maximum(power.sum(axis=0), 1e-300)).sum(axis=1)
+        count = shares.sum() ** 2 / max(float(np.sum(shares**2)), 1e-300)
+        return float(min(1.0, 2.0 ** (1.0 - count)))
 
     def sensitivity(self, columns: Columns) -> Array:
         """Returns how long a total of `scores` each column makes by itself (k,).

@@ -88,6 +88,8 @@ def _in_unit_box(survey: LinearSurvey, group: Columns, critical: float) -> np.nd
         by_chance = length / whitened.sensitivity(group) / whitened.scale[group]
         power = np.sum(raw.A[:, group] ** 2, axis=0)
         of_use = np.sqrt(settings.min_gain * raw.block_losses.sum() / power)
+        if whitened.least_p(group) >= settings.alpha:
+            return np.full(len(group), np.inf)
         return np.asarray(np.maximum(by_chance, of_use / raw.scale[group]))
 
 

@@ -24,10 +24,12 @@ class Scores:
         total: (m,) whose squared length is about chi-squared with m degrees of freedom
             by chance.
         blocks: (B, m) what it is the sum of by chance; each of either sign.
+        least_p: of n blocks that count, no flips of signs give less than 2^(1 - n).
     """
 
     total: Array
     blocks: Array
+    least_p: float = 0.0
 
 
 def family_p(
@@ -50,7 +52,7 @@ def family_p(
     highest = highest_by_chance(scores, settings, seed)
     above = (highest[:, None] >= found - _ROUNDING).sum(axis=0)
     p: Array = (1.0 + above) / (1.0 + len(highest))
-    return p
+    return np.maximum(p, [each.least_p for each in scores])
 
 
 def ranks_p(gains: Array, settings: SelectionSettings, seed: int = 0) -> Array:

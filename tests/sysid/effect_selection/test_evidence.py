@@ -1,16 +1,18 @@
 """Which of several effects that explain about as much is named."""
 
 import numpy as np
+import pytest
 
 from drake_disasm.effects import (
     JointAsymmetricFriction,
     JointCoulombFriction,
     JointLoadFriction,
 )
+from sysid.effect_selection.block_regression import BlockRegression
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence, most_parsimonious
 from sysid.effect_selection.search import trials
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
 
 _SCATTER = np.random.default_rng(0).normal(size=40)
 
@@ -52,3 +54,16 @@ def test_what_explains_clearly_more_is_named():
 def test_the_best_shape_of_an_effect_is_taken():
     low, high = (_evidence(JointCoulombFriction, gain, 2) for gain in (0.79, 0.80))
     assert most_parsimonious([high, low]) is high
+
+
+def test_columns_that_act_in_few_blocks_have_a_least_p_value():
+    """Spread evenly over n blocks no flips give less than 2^(1 - n)."""
+    rows, size = 80, 4
+    A = np.zeros((rows, 2))
+    A[:, 0], A[: 3 * size, 1] = 1.0, 1.0
+    regression = BlockRegression(
+        A, np.ones(rows), np.arange(0, rows, size), np.ones(2), np.zeros(2), 1, np.inf,
+        SelectionSettings(), np.ones(rows),
+    )  # fmt: skip
+    assert regression.least_p(np.array([0])) == pytest.approx(2.0**-19)
+    assert regression.least_p(np.array([1])) == pytest.approx(0.25)

@@ -86,3 +86,13 @@ def test_gains_are_compared_block_by_block():
 def test_blocks_that_hardly_change_have_no_vote():
     gains = np.array([1.0, 1.0, 1.0, -1.0, -1e-3, -1e-3])
     assert share_better(gains, SelectionSettings()) == 0.75
+
+
+def test_a_candidate_of_few_blocks_cannot_be_more_certain_than_their_signs():
+    """Of three blocks that count, one flip of signs in four gives as much by chance."""
+    blocks = np.zeros((40, 1))
+    blocks[:3] = 1.0
+    certain = Scores(np.array([30.0]), blocks)
+    bounded = Scores(np.array([30.0]), blocks, 0.25)
+    assert family_p([certain], _FEW)[0] < 0.01
+    assert family_p([bounded], _FEW)[0] == 0.25
