@@ -30,7 +30,8 @@ def refuse_few_rows(model: LogModel, settings: SelectionSettings) -> None:
 def refuse_short_logs(last: Fit, limits: Sequence[DetectionLimit]) -> None:
     """Refuses logs that show nothing, and could not have.
 
-    Either no effect would have been found, whatever its amplitude. Or parts of the log
+    More than a noise that is known is something, whatever effect it is of. Either no
+    effect would have been found, whatever its amplitude. Or parts of the log
     do not predict one another: half of the blocks have a loss several times as large
     when they are predicted by a fit to all others as in the fit to all. The excess is
     in proportion to the parameters over the independent data (Akaike's final prediction
@@ -47,7 +48,9 @@ def refuse_short_logs(last: Fit, limits: Sequence[DetectionLimit]) -> None:
         return
     rows = last.model.measurements.rows
     nearest = min((limit.share for limit in limits), default=0.0)
-    if nearest > 1.0:
+    at_noise = last.settings.max_objective_at_noise
+    shows_more = last.noise_is_stated and last.objective > at_noise
+    if nearest > 1.0 and not shows_more:
         raise DisasmError(
             f"the log is too short to decide: in its {rows} rows no effect of the "
             f"library would have been found, however large; record at least "

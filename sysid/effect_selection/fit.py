@@ -129,7 +129,8 @@ class Fit:
                 column = linear.weights * linear.jacobian[..., i]
                 slope = float(np.sum(column * linear.residual))
                 power = float(np.sum(column * linear.jacobian[..., i]))
-                is_pushed = slope * (0.5 - linear.u[i]) > 0.0
+                outward = np.sign(2.0 * linear.u[i] - 1.0)
+                is_pushed = outward * slope < 0.0
                 at_bound = not self.inside(np.array([i])).all()
                 if at_bound and is_pushed and slope**2 > least * power:
                     return True

@@ -39,7 +39,7 @@ def test_names_the_effect_or_a_tie_with_it(kind, tmp_path):
     assert errors.in_noise(errors.after) < 0.9 * errors.in_noise(errors.before)
 
 
-@pytest.mark.parametrize("onset", [7.0, 42.0, 85.0])
+@pytest.mark.parametrize("onset", [25.0, 42.0, 75.0])
 def test_names_a_step_and_when_it_set_in(onset, tmp_path):
     log = static_log(tmp_path, [SensorStep], 3.0, seed=0, shape={"onset": onset})
     verdict = verdict_of(log.folder)
