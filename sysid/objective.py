@@ -108,8 +108,7 @@ class Objective:
 
     def predicted(self, residual: Array) -> Array:
         """Returns the prediction (rows, channels), SI, that a residual belongs to."""
-        measured = self.model.measurements
-        return measured.values + residual * measured.sigma
+        return self.model.measurements.predicted(residual)
 
     @property
     def start(self) -> Array:
@@ -132,7 +131,7 @@ class Objective:
                 f"{predicted.shape} for all rows, the measurements have "
                 f"{measured.values.shape}; return (rows, channels)"
             )
-        residual = (predicted - measured.values) / measured.sigma
+        residual = measured.weighted(predicted)
         return np.clip(residual, -FAILED_RESIDUAL, FAILED_RESIDUAL)
 
 

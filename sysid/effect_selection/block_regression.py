@@ -210,13 +210,16 @@ class BlockRegression:
         count = shares.sum() ** 2 / max(float(np.sum(shares**2)), 1e-300)
         return float(min(1.0, 2.0 ** (1.0 - count)))
 
+    def either_way(self) -> Self:
+        """Returns the same with parameters that may go up and down."""
+        return dataclasses.replace(self, side=np.zeros_like(self.side))
+
     def sensitivity(self, columns: Columns) -> Array:
         """Returns how long a total of `scores` each column makes by itself (k,).
 
         On the side of null on which it may be, wherever noise has pushed it here.
         """
-        free = dataclasses.replace(self, side=np.zeros_like(self.side))
-        found = free._held_out(columns)
+        found = self.either_way()._held_out(columns)
         noise, H = self._gradients(found.a, found.weights, self.noise), found.H.sum(0)
         if not noise.any():
             return np.zeros(len(columns))

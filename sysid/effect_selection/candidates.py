@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Self
 
 from drake_disasm.effects import (
+    ArmEffect,
     Effect,
     amplitudes,
     registered_effects,
@@ -69,7 +70,7 @@ def joint_groups(library: Sequence[Candidate]) -> list[tuple[Candidate, ...]]:
     """
     groups: dict[str, list[Candidate]] = {}
     for candidate in library:
-        if getattr(candidate.effect, "is_common", True):
+        if isinstance(candidate.effect, ArmEffect) and candidate.effect.is_common:
             groups.setdefault(kind_text(candidate), []).append(candidate)
     return [tuple(group) for group in groups.values() if len(group) > 1]
 

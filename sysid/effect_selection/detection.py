@@ -1,6 +1,5 @@
 """What a log could have shown: the smallest effects that would have been found."""
 
-import dataclasses
 import functools
 from dataclasses import dataclass
 
@@ -47,7 +46,7 @@ def detection_limits(survey: LinearSurvey) -> list[DetectionLimit]:
     if not groups:
         return []
     # Whichever side of null noise has pushed them to: there they are all without score.
-    free = dataclasses.replace(regression, side=np.zeros_like(regression.side))
+    free = regression.either_way()
     scores = [free.scores(group) for group in groups.values()]
     highest = highest_by_chance(scores, settings)
     critical = float(np.quantile(highest, 1.0 - settings.alpha))
@@ -83,13 +82,13 @@ def _limits(
 def _in_unit_box(survey: LinearSurvey, group: Columns, critical: float) -> np.ndarray:
     """Returns what of parameters' ranges (k,) is found; infinite if none is."""
     whitened, raw, settings = survey.whitened, survey.regression, survey.raw.settings
+    if whitened.least_p(group) >= settings.alpha:
+        return np.full(len(group), np.inf)
     with np.errstate(divide="ignore"):
         length = _needed(critical, len(group), settings)
         by_chance = length / whitened.sensitivity(group) / whitened.scale[group]
         power = np.sum(raw.A[:, group] ** 2, axis=0)
         of_use = np.sqrt(settings.min_gain * raw.block_losses.sum() / power)
-        if whitened.least_p(group) >= settings.alpha:
-            return np.full(len(group), np.inf)
         return np.asarray(np.maximum(by_chance, of_use / raw.scale[group]))
 
 

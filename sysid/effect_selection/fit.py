@@ -1,7 +1,7 @@
 """A fitted model with effects, and which of its parameters are significant."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,7 +88,10 @@ class Fit:
 
     def columns_of(self, effect: Candidate) -> NDArray[np.int64]:
         """Returns which of the parameters are an effect's amplitudes."""
-        names = [f"{effect.name}.{field}" for field in effect.fields]
+        return self._columns(effect, effect.fields)
+
+    def _columns(self, effect: Candidate, fields: Iterable[str]) -> NDArray[np.int64]:
+        names = [f"{effect.name}.{field}" for field in fields]
         own = [i for i, p in enumerate(self.model.parameters) if p.name in names]
         return np.array(own, dtype=np.int64)
 
@@ -125,7 +128,7 @@ class Fit:
         """
         linear, least = self.linearisation, self.settings.min_gain * self.loss
         for effect in (e for e in self.effects if e.name in names):
-            for i in self._shapes_of(effect):
+            for i in self._columns(effect, effect.shape):
                 column = linear.weights * linear.jacobian[..., i]
                 slope = float(np.sum(column * linear.residual))
                 power = float(np.sum(column * linear.jacobian[..., i]))
@@ -135,11 +138,6 @@ class Fit:
                 if at_bound and is_pushed and slope**2 > least * power:
                     return True
         return False
-
-    def _shapes_of(self, effect: Candidate) -> list[int]:
-        """Returns which of the parameters are an effect's shape parameters."""
-        names = [f"{effect.name}.{field}" for field in effect.shape]
-        return [i for i, p in enumerate(self.model.parameters) if p.name in names]
 
     def harmed_channels(self, before: "Fit") -> list[str]:
         """Returns the channels that are significantly worse than in another fit."""
@@ -218,8 +216,7 @@ class Fit:
         linear, finer = self.linearisation, self.model.refined()
         if finer is None or not len(linear.u):
             return np.zeros_like(linear.u)
-        measured = self.model.measurements
-        fine = (finer.predictions(self.theta) - measured.values) / measured.noise
+        fine = self.model.measurements.weighted(finer.predictions(self.theta))
         root = np.sqrt(linear.weights)
         J = (root[..., None] * linear.jacobian).reshape(root.size, -1)
         change = (root * (fine - linear.residual)).reshape(-1)

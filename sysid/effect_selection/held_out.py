@@ -180,9 +180,7 @@ def held_out_loss(fit: Fit) -> float:
 
 
 def _linearly_predicted(fit: Fit, folds: NDArray[np.int64]) -> Array:
-    measured = fit.model.measurements
-    residual = _linear_residual(fit, folds)
-    return np.asarray(measured.values + residual * measured.sigma)
+    return fit.model.measurements.predicted(_linear_residual(fit, folds))
 
 
 def _linear_residual(fit: Fit, folds: NDArray[np.int64]) -> Array:

@@ -20,8 +20,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.effect_selection.significance import gained_p
-from sysid.models.base import HUBER_DELTA, LogModel
-from sysid.models.measurements import Measurements
+from sysid.models.base import HUBER_DELTA
 from sysid.objective import pseudo_residual
 
 Array = NDArray[np.float64]
@@ -107,9 +106,11 @@ def left_over(fit: Fit) -> list[LeftOver]:
     kept = every_few(measured.rows, settings.learner_rows)
     blocks = fit.blocks[kept]
     folds = contiguous_blocks(blocks, settings.learner_folds)
+    sigma = np.broadcast_to(measured.sigma, measured.values.shape)
+    covariates = [fit.model.covariates(n) for n in range(len(measured.channels))]
     found = []
     for number, channel in enumerate(measured.channels):
-        inputs = _inputs_of(fit, number).select(kept)
+        inputs = _inputs_of(fit, number, covariates).select(kept)
         target = pseudo_residual(fit.linearisation.residual[kept, number], HUBER_DELTA)
         learned = _Learned.of(inputs, target, folds, settings)
         gains = np.bincount(blocks, learned.gain).astype(float)
@@ -119,8 +120,7 @@ def left_over(fit: Fit) -> list[LeftOver]:
             continue
         if fit.noise_is_stated and gains.sum() < settings.noticeable**2 * len(target):
             continue
-        predicted = learned.predicted * _sigma_of(measured, number)[kept]
-        size = float(np.sqrt(np.mean(predicted**2)))
+        size = float(np.sqrt(np.mean((learned.predicted * sigma[kept, number]) ** 2)))
         needed = learned.depends_on(inputs, target, folds, settings.learner_importance)
         found.append(LeftOver(channel.name, share, size, channel.unit, needed))
     return found
@@ -195,30 +195,27 @@ def _learner(settings: SelectionSettings) -> HistGradientBoostingRegressor:
     )
 
 
-def _inputs_of(fit: Fit, channel: int) -> _Inputs:
-    """Returns what may explain a channel: its own covariates, load, and the others'."""
-    measured, settings = fit.model.measurements, fit.settings
-    residual = fit.linearisation.residual[:, channel]
-    sigma = _sigma_of(measured, channel)
-    load = measured.values[:, channel] + residual * sigma
-    own = {**fit.model.covariates(channel), "the load": load}
+def _inputs_of(
+    fit: Fit, channel: int, covariates: Sequence[Mapping[str, Array]]
+) -> _Inputs:
+    """Returns what may explain a channel: its own covariates, load, and the others'.
+
+    Args:
+        fit: whose residual it is.
+        channel: its number.
+        covariates: of each channel; the others' count where they are not this one's.
+    """
+    measured = fit.model.measurements
+    other = {
+        f"{name} of {each.name}": values
+        for each, known in zip(measured.channels, covariates, strict=True)
+        for name, values in known.items()
+        if not np.array_equal(values, covariates[channel].get(name, np.zeros(0)))
+    }
+    load = measured.predicted(fit.linearisation.residual)[:, channel]
+    own = {**covariates[channel], "the load": load}
     own.setdefault("time", np.arange(measured.rows, dtype=float))
-    return _Inputs.of(own, _of_others(fit.model, channel), measured.episode, settings)
-
-
-def _sigma_of(measured: Measurements, channel: int) -> Array:
-    """Returns what a channel's residuals are divided by (rows,)."""
-    return np.broadcast_to(measured.sigma, measured.values.shape)[:, channel]
-
-
-def _of_others(model: LogModel, channel: int) -> dict[str, Array]:
-    """Returns the covariates of other channels that are not this one's, too."""
-    own, found = model.covariates(channel), {}
-    for number, other in enumerate(model.measurements.channels):
-        for name, values in model.covariates(number).items():
-            if not np.array_equal(values, own.get(name, np.zeros(0))):
-                found[f"{name} of {other.name}"] = values
-    return found
+    return _Inputs.of(own, other, measured.episode, fit.settings)
 
 
 def _rows_before(episode: NDArray[np.int64], back: int) -> NDArray[np.int64]:

@@ -140,10 +140,7 @@ class _Rows:
         self, channel: int, name: str, settings: SelectionSettings
     ) -> BoostedTrees:
         """Returns what a channel's rows teach."""
-        kept = every_few(len(self.blocks), settings.residual_model_rows)
-        learner = _learner(settings)
-        inputs = self.inputs[name][kept]
-        return _trees(learner.fit(inputs, self.missing[kept, channel]), inputs)
+        return _taught(self.inputs[name], self.missing[:, channel], settings)
 
     def error(self, channel: int, name: str, learned: BoostedTrees) -> ChannelError:
         """Returns a channel's error without and with what other rows taught."""
@@ -155,16 +152,11 @@ class _Rows:
     ) -> ChannelError:
         """Returns a channel's error where each fold is predicted by all others."""
         folds = contiguous_blocks(self.blocks, settings.learner_folds)
-        left = self.missing[:, channel].copy()
+        inputs, missing = self.inputs[name], self.missing[:, channel]
+        left = missing.copy()
         for fold in range(int(folds.max()) + 1):
             out = folds == fold
-            others = _Rows(
-                self.model,
-                {name: self.inputs[name][~out]},
-                self.missing[~out],
-                self.blocks[~out],
-            )
-            left[out] -= others.learned(channel, name, settings)(self.inputs[name][out])
+            left[out] -= _taught(inputs[~out], missing[~out], settings)(inputs[out])
         return self._error(channel, left)
 
     def _error(self, channel: int, left: Array) -> ChannelError:
@@ -174,6 +166,13 @@ class _Rows:
             for values in (self.missing[:, channel], left)
         )
         return ChannelError(each.name, each.unit, before, after)
+
+
+def _taught(inputs: Array, missing: Array, settings: SelectionSettings) -> BoostedTrees:
+    """Returns what rows of inputs (n, k) teach of what is missing (n,) there."""
+    kept = every_few(len(inputs), settings.residual_model_rows)
+    learner = _learner(settings).fit(inputs[kept], missing[kept])
+    return _trees(learner, inputs[kept])
 
 
 def _learner(settings: SelectionSettings) -> GradientBoostingRegressor:

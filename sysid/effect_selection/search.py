@@ -176,20 +176,18 @@ class LinearSearch(ForwardSearch):
         accepted = [e for e in survey.effects if e.accepted]
         if not accepted and not fit.effects:
             accepted = survey.linearised.accepted_pairs(survey.effects)
+        if not accepted:
+            return None
+        enough = (1.0 - self._settings.min_gain) * held_out_loss(fit)
         for trial in trials(accepted, self._settings.max_trials):
             found = self._without_needless(self._fit_chosen(fit, survey, trial))
-            if self._is_better(fit, found, trial) and self._predicts(fit, found):
+            if self._is_better(fit, found, trial) and held_out_loss(found) <= enough:
                 self._record(trial, ties(trial, survey, accepted), survey, found)
                 return found
             self._report_rejected(trial)
             if self._is_over:
                 break
         return None
-
-    def _predicts(self, before: Fit, after: Fit) -> bool:
-        """Returns whether blocks to which nothing was fitted are predicted better."""
-        least = 1.0 - self._settings.min_gain
-        return held_out_loss(after) <= least * held_out_loss(before)
 
 
 def trials(accepted: Sequence[Evidence], count: int) -> list[Evidence]:

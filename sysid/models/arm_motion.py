@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from drake_disasm.effects import (
 from drake_disasm.logs import Episode
 from sysid.models.base import Array
 from sysid.models.regressor import ArmDynamics, BaseSet
+
+_BY_SAMPLE = ("time", "episode", "q", "v", "vd", "Y", "Y_payload", "Y_tilt", "tilt")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,10 +81,8 @@ class ArmMotion:
 
     def rows(self, chosen: slice | NDArray[np.bool_]) -> Self:
         """Returns some of the samples."""
-        fields = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        kept: dict[str, Any] = {"joints": self.joints, "nominal": self.nominal}
-        return type(self)(
-            **{k: kept[k] if k in kept else a[chosen] for k, a in fields.items()}
+        return dataclasses.replace(
+            self, **{name: getattr(self, name)[chosen] for name in _BY_SAMPLE}
         )
 
     def torques(self, beta: Array, effects: Sequence[ArmEffect]) -> Array:

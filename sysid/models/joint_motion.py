@@ -74,10 +74,9 @@ class JointMotionModel(LogModel):
         self._motion = self._whole
         self._taken = np.ones(len(self._whole.time), dtype=bool)
         self._prismatic = arm.prismatic
-        units = ["N" if j in self._prismatic else "N m" for j in header.joints]
         channels = tuple(
-            Channel(joint, unit, np.nan, "estimated")
-            for joint, unit in zip(header.joints, units, strict=True)
+            Channel(j, "N" if j in self._prismatic else "N m", np.nan, "estimated")
+            for j in header.joints
         )
         self.measurements = Measurements.of_logs(
             logs, channels, lambda _, episode: episode["tau"]

@@ -133,6 +133,14 @@ class Measurements:
             return self.noise
         return np.hypot(self.noise, self.model_error)
 
+    def weighted(self, predicted: Array) -> Array:
+        """Returns residuals (rows, channels) of a prediction, in units of `sigma`."""
+        return np.asarray((predicted - self.values) / self.sigma)
+
+    def predicted(self, residual: Array) -> Array:
+        """Returns the prediction (rows, channels), SI, that residuals belong to."""
+        return np.asarray(self.values + residual * self.sigma)
+
     def select(self, mask: NDArray[np.bool_]) -> Self:
         """Returns the rows where the mask (rows,) is true, episodes renumbered."""
         kept, episode = np.unique(self.episode[mask], return_inverse=True)

@@ -73,7 +73,10 @@ def test_a_scenario_finds_the_file_beside_it(tmp_path: Path) -> None:
 
 
 def test_without_share_no_file_is_needed() -> None:
-    validate(Scenario(effects=[SensorResidualModel("gone.npz")]))
+    null = SensorResidualModel("gone.npz")
+    validate(Scenario(effects=[null]))
+    wrench, at_rest = np.arange(6.0), Sensing(np.zeros(()), np.eye(3), np.zeros(3))
+    np.testing.assert_array_equal(null.apply(wrench, at_rest), wrench)
 
 
 @pytest.mark.parametrize("content", [b"", b"no archive", None])
