@@ -1,5 +1,7 @@
 """Data that are not what they say: found before any fit, by name, with the rows.
 
+::
+
     findings = check_data(logs, model)
     for finding in findings:
         print(finding.text)
