@@ -5,12 +5,22 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from drake_disasm.cell.grip import AXIS_ORDER, Springs
+from drake_disasm.common.arrays import (
+    Array,
+    apply_matrix,
+    array_device,
+    array_like,
+    cross,
+    matrix_of,
+    namespace,
+    segment_sums,
+    transposed,
+)
 from drake_disasm.effects import Environment
 from drake_disasm.impact.law import ImpactLaw
-from drake_disasm.impact.shape import LockShape
+from drake_disasm.impact.shape import NORMALS, LockShape
 
 _ITERATIONS = 60
 _HALVINGS = 12
@@ -28,10 +38,10 @@ class Surroundings:
         f_Gn: (m, 3) force on the bolt at Bo other than the contact's, in Gn [N].
     """
 
-    friction: np.ndarray
-    R_GnG: np.ndarray
-    p_GnG: np.ndarray
-    f_Gn: np.ndarray
+    friction: Array
+    R_GnG: Array
+    p_GnG: Array
+    f_Gn: Array
 
     @classmethod
     def of(cls, environments: Sequence[Environment]) -> Self:
@@ -45,9 +55,10 @@ class Surroundings:
 
     def spread(self, count: int) -> Self:
         """Returns the same for each of `count` states."""
+        xp = namespace(self.friction)
         return type(self)(
             *(
-                np.broadcast_to(value, (count, *value.shape[1:]))
+                xp.broadcast_to(value, (count, *value.shape[1:]))
                 for value in (self.friction, self.R_GnG, self.p_GnG, self.f_Gn)
             )
         )
@@ -56,6 +67,8 @@ class Surroundings:
 @dataclasses.dataclass(frozen=True)
 class ImpactConditions:
     """All that the contact depends on except the state.
+
+    Of one twin, or with n as an axis before the shapes below, of one for each state.
 
     Attributes:
         law: of the normal force.
@@ -69,39 +82,39 @@ class ImpactConditions:
     law: ImpactLaw
     shape: LockShape
     around: Surroundings
-    M: np.ndarray
-    K: np.ndarray
-    D: np.ndarray
-    p_BoTo_B: np.ndarray
+    M: Array
+    K: Array
+    D: Array
+    p_BoTo_B: Array
 
     def sprung(self, springs: Springs) -> Self:
         """Returns the same with other springs in the twin's joints."""
         order = list(AXIS_ORDER)
-        K, D = springs.stiffness[order], springs.damping[order]
+        K, D = springs.stiffness[..., order], springs.damping[..., order]
         return dataclasses.replace(self, K=K, D=D)
 
 
 @dataclasses.dataclass(frozen=True)
 class _Balance:
-    """How contact balances the rest at some velocities, for m states.
+    """How contact balances the rest at some twists, for m states.
 
     Attributes:
-        Q: (m, 6) generalised contact force J^T f.
-        r: (m, 6) what is out of balance.
-        slope: (m, 6, 6) dr/dv.
+        W: (m, 6) the contact's wrench on the bolt [f; tau] at To in G.
+        r: (m, 6) what is out of balance, likewise.
+        slope: (m, 6, 6) dr by the twist.
     """
 
-    Q: np.ndarray
-    r: np.ndarray
-    slope: np.ndarray
+    W: Array
+    r: Array
+    slope: Array
 
-    def select(self, which: np.ndarray) -> "_Balance":
+    def select(self, which: Array) -> "_Balance":
         """Returns some of the states, by mask or index."""
-        return _Balance(self.Q[which], self.r[which], self.slope[which])
+        return _Balance(self.W[which], self.r[which], self.slope[which])
 
-    def put(self, where: np.ndarray, other: "_Balance") -> None:
+    def put(self, where: Array, other: "_Balance") -> None:
         """Overwrites some of the states."""
-        self.Q[where], self.r[where] = other.Q, other.r
+        self.W[where], self.r[where] = other.W, other.r
         self.slope[where] = other.slope
 
 
@@ -115,8 +128,10 @@ class ImpactStep:
         (M + h D + h^2 K) v+ = M v + h K (qd - q) + h D vd + h J^T f(q + h v+, v+)
 
     by Newton's method; f is IMPACT's at the end of the step, with Coulomb friction,
-    regularised. Vectors are in Gn unless a name says G. States don't see each other:
-    what one gives does not depend on its company.
+    regularised. The unknown is the bolt's twist [velocity of To; angular velocity] in
+    G, T v+, where the groove's normals are the axes. Vectors are in Gn unless a name
+    says G. States don't see each other: what one gives does not depend on its company.
+    Arrays are NumPy's or torch's.
 
     Args:
         conditions: of the contact.
@@ -129,50 +144,108 @@ class ImpactStep:
         self,
         conditions: ImpactConditions,
         h: float,
-        q: np.ndarray,
-        v: np.ndarray,
-        qd: np.ndarray,
-        vd: np.ndarray,
+        q: Array,
+        v: Array,
+        qd: Array,
+        vd: Array,
     ) -> None:
         c = self._c = conditions
-        self._h = h
-        self._A = c.M + np.diag(h * c.D + h**2 * c.K)
-        self._around = c.around.spread(len(q))
-        self.E, R_GnB = turning(q[:, 3:])
-        self._p_ToBo = -R_GnB @ c.p_BoTo_B
+        self._h, self._xp = h, namespace(q)
+        around = self._around = c.around.spread(len(q))
+        E, R_GnB = turning(q[:, 3:])
+        self._p_ToBo = -apply_matrix(R_GnB, c.p_BoTo_B)
+        self._T, self._T_inverse = self._twist_by_rates(E, q[:, 3:])
+        one = array_like(np.eye(6), q)
+        A = c.M + one * (h * c.D + h**2 * c.K)[..., None, :]
         pull = c.K * (qd - q) + c.D * vd
-        pull[:, :3] += self._around.f_Gn
-        turn = np.cross(self._p_ToBo, self._around.f_Gn)
-        pull[:, 3:] += np.einsum("nji,nj->ni", self.E, turn)
-        self._b = _times(c.M, v) + h * pull
+        pull[:, :3] += around.f_Gn
+        turn = cross(self._p_ToBo, around.f_Gn)
+        pull[:, 3:] += apply_matrix(transposed(E), turn)
+        back = transposed(self._T_inverse)
+        self._A = self._xp.matmul(back, self._xp.matmul(A, self._T_inverse))
+        self._b = apply_matrix(back, apply_matrix(c.M, v) + h * pull)
+        self._before = apply_matrix(self._T, v)
         self._place(R_GnB, q[:, :3] + c.p_BoTo_B + self._p_ToBo)
 
-    def solve(self) -> tuple[np.ndarray, np.ndarray]:
+    def solve(self) -> tuple[Array, Array]:
         """Returns v+ (n, 6) and the wrench on the bolt at Bo, [f; tau] (n, 6).
 
         Raises:
             RuntimeError: no force balances the step of some state.
         """
-        v = np.linalg.solve(self._A, self._b[..., None])[..., 0]
-        todo = np.arange(len(v))
-        balance = self._balance(todo, v)
+        v, wrench, is_solved = self.attempt()
+        if not bool(self._xp.all(is_solved)):
+            raise RuntimeError("IMPACT contact: no force balances this step")
+        return v, wrench
+
+    def attempt(self) -> tuple[Array, Array, Array]:
+        """Returns what `solve` does, and for which states it found a balance (n,)."""
+        xp = self._xp
+        alone = xp.linalg.solve(self._A, self._b[..., None])[..., 0]
+        every = xp.arange(len(alone), device=array_device(alone))
+        twist, balance = xp.asarray(alone, copy=True), self._balance(every, alone)
+        is_finite = xp.isfinite(xp.sum(balance.r, axis=1))
+        touching = is_finite & xp.any(balance.W != 0.0, axis=1)
+        # A bolt that leans on a wall mostly goes on doing so.
+        guessed = every[touching]
+        guessed = guessed[
+            self._take_better(guessed, self._before[guessed], twist, balance)
+        ]
+        failed = xp.concat(self._newton(guessed, twist, balance))
+        twist[failed] = alone[failed]
+        balance.put(failed, self._balance(failed, alone[failed]))
+        is_other = touching
+        is_other[guessed] = False
+        is_other[failed] = True
+        _, unfinished = self._newton(every[is_other], twist, balance)
+        is_finite[unfinished] = False
+        f, t_To = (self._in_Gn(part) for part in (balance.W[:, :3], balance.W[:, 3:]))
+        wrench = xp.concat([f, t_To - cross(self._p_ToBo, f)], axis=1)
+        return apply_matrix(self._T_inverse, twist), wrench, is_finite
+
+    def _newton(
+        self, todo: Array, twist: Array, balance: _Balance
+    ) -> tuple[Array, Array]:
+        """Solves some states, by index (m,), from their twists on.
+
+        Returns:
+            those that stay where no step leads to less error, and those that were not
+            done after the last iteration.
+        """
+        xp, stuck = self._xp, [todo[:0]]
         for _ in range(_ITERATIONS):
             now = balance.select(todo)
-            step = np.linalg.solve(now.slope, -now.r[..., None])[..., 0]
-            moves = np.abs(step).max(axis=1) >= _TOLERANCE
+            step = xp.linalg.solve(now.slope, -now.r[..., None])[..., 0]
+            moves = xp.max(xp.abs(step), axis=1) >= _TOLERANCE
             todo = todo[moves]
-            todo = self._descend(todo, v, step[moves], balance)
+            todo, stays = self._descend(todo, twist, step[moves], balance)
+            stuck.append(stays)
             if not len(todo):
                 break
-        else:
-            raise RuntimeError("IMPACT contact: no force balances this step")
-        f = balance.Q[:, :3]
-        turn = np.linalg.solve(self.E.swapaxes(1, 2), balance.Q[:, 3:, None])
-        return v, np.hstack([f, turn[..., 0] - np.cross(self._p_ToBo, f)])
+        return xp.concat(stuck), todo
+
+    def _take_better(
+        self, rows: Array, there: Array, twist: Array, balance: _Balance
+    ) -> Array:
+        """Takes other twists (m, 6) for some rows (m,) where their error is lower.
+
+        Args:
+            rows: (m,) which states.
+            there: (m, 6).
+            twist, balance: of all states; changed in place.
+
+        Returns:
+            for which of the rows (m,) it did.
+        """
+        found = self._balance(rows, there)
+        lower = _squares(found.r) < _squares(balance.r[rows])
+        twist[rows[lower]] = there[lower]
+        balance.put(rows[lower], found.select(lower))
+        return lower
 
     def _descend(
-        self, todo: np.ndarray, v: np.ndarray, step: np.ndarray, balance: _Balance
-    ) -> np.ndarray:
+        self, todo: Array, twist: Array, step: Array, balance: _Balance
+    ) -> tuple[Array, Array]:
         """Goes to the first point along each Newton step whose error is lower.
 
         Where the law jumps (an exponent below 1, full damping at once) there may be
@@ -180,105 +253,156 @@ class ImpactStep:
 
         Args:
             todo: (m,) which states.
-            v, balance: of all states; changed in place.
+            twist, balance: of all states; changed in place.
             step: (m, 6).
 
         Returns:
-            those of `todo` that have moved.
+            those of `todo` that have moved, and those that have not.
         """
-        moved = np.zeros(len(todo), bool)
+        xp = self._xp
+        moved = xp.zeros_like(todo, dtype=xp.bool)
+        left = xp.arange(len(todo), device=array_device(todo))
         for scale in 0.5 ** np.arange(_HALVINGS):
-            left = np.flatnonzero(~moved)
             if not len(left):
                 break
             rows = todo[left]
-            there = v[rows] + scale * step[left]
-            found = self._balance(rows, there)
-            lower = _squares(found.r) < _squares(balance.r[rows])
-            v[rows[lower]] = there[lower]
-            balance.put(rows[lower], found.select(lower))
+            there = twist[rows] + float(scale) * step[left]
+            lower = self._take_better(rows, there, twist, balance)
             moved[left[lower]] = True
-        return todo[moved]
+            left = left[~lower]
+        return todo[moved], todo[~moved]
 
-    def _place(self, R_GnB: np.ndarray, p_GnBo: np.ndarray) -> None:
-        """Finds the places that could touch, and their Jacobians."""
-        R_GnG = self._around.R_GnG
-        p_GBo = np.einsum("nji,nj->ni", R_GnG, p_GnBo - self._around.p_GnG)
-        found = self._c.shape.contacts(np.einsum("nji,njk->nik", R_GnG, R_GnB), p_GBo)
+    def _twist_by_rates(self, E: Array, angles: Array) -> tuple[Array, Array]:
+        """Returns T (n, 6, 6), the twist in G by the coordinates' rates, and T^-1."""
+        xp, R_GnG = self._xp, self._around.R_GnG
+        R_GGn, zero = transposed(R_GnG), xp.zeros_like(E)
+        E_inverse = _rates_by_turning(angles)
+        T = _blocks(R_GGn, zero, xp.matmul(R_GGn, E))
+        return T, _blocks(R_GnG, zero, xp.matmul(E_inverse, R_GnG))
+
+    def _in_Gn(self, vectors: Array) -> Array:
+        """Returns vectors (n, 3) of G in Gn."""
+        return apply_matrix(self._around.R_GnG, vectors)
+
+    def _place(self, R_GnB: Array, p_GnBo: Array) -> None:
+        """Finds the places that could touch, about To in G."""
+        xp, around = self._xp, self._around
+        R_GGn = transposed(around.R_GnG)
+        p_GBo = apply_matrix(R_GGn, p_GnBo - around.p_GnG)
+        found = self._c.shape.contacts(xp.matmul(R_GGn, R_GnB), p_GBo)
+        self._normals = array_like(NORMALS, p_GBo)
         self._p = found.penetration
-        self._n = np.einsum("nij,kj->nki", R_GnG, found.normal)
-        self._arm = np.einsum("nij,nkj->nki", R_GnG, found.arm)
-        self._arm = self._arm + self._p_ToBo[:, None]  # from To, which the joints move
-        lever = np.cross(self._arm, self._n)
-        turn = np.einsum("nki,nij->nkj", lever, self.E)
-        self._Jn = np.concatenate([self._n, turn], axis=2)
+        p_ToBo_G = apply_matrix(R_GGn, self._p_ToBo)
+        self._arm = found.arm + p_ToBo_G[:, None]  # from To, which the joints move
+        lever = cross(self._arm, self._normals[None])
+        normals = xp.broadcast_to(self._normals[None], lever.shape)
+        self._Jn = xp.concat([normals, lever], axis=2)
 
-    def _balance(self, rows: np.ndarray, v: np.ndarray) -> _Balance:
-        """Returns the balance of some states, at v+ = v (m, 6)."""
-        h = self._h
-        rate = -np.einsum("nkj,nj->nk", self._Jn[rows], v)
+    def _balance(self, rows: Array, twist: Array) -> _Balance:
+        """Returns the balance of some states, at twists (m, 6) after the step."""
+        xp, h, places = self._xp, self._h, len(self._normals)
+        rate = -apply_matrix(self._Jn[rows], twist)
         depth = self._p[rows] + h * rate
-        state, place = np.nonzero(depth > 0.0)  # a pair is a touching place
-        F, kp, kd = self._c.law.force_and_slopes(
-            depth[state, place], rate[state, place]
+        pair = xp.nonzero(xp.reshape(depth > 0.0, (-1,)))[0]  # a touching place
+        state, place = pair // places, pair % places
+        F, kp, kd = self._c.law.select(rows[state]).force_and_slopes(
+            xp.reshape(depth, (-1,))[pair], xp.reshape(rate, (-1,))[pair]
         )
+        arm = xp.reshape(self._arm, (-1, 3))[rows[state] * places + place]
+        n = self._normals[place]
         mu = self._around.friction[rows[state]]
-        Jn = self._Jn[rows[state], place]
-        Jt = self._tangent(rows[state], place, Jn)
-        slip = np.einsum("nij,nj->ni", Jt, v[state])
-        speed = np.sqrt(_squares(slip) + _STICTION**2)
-        drag, along = mu * F / speed, slip / speed[:, None]
-        Q = F[:, None] * Jn - np.einsum("n,ni,nij->nj", drag, slip, Jt)
-        dF = -(h * kp + kd)[:, None] * Jn
-        turning = np.einsum("ni,nij->nj", along, Jt)
-        d_slip = Jt - along[:, :, None] * turning[:, None, :]
-        rubbing = drag[:, None, None] * d_slip
-        rubbing += (mu[:, None] * along)[:, :, None] * dF[:, None, :]
-        dQ = Jn[:, :, None] * dF[:, None, :] - Jt.swapaxes(1, 2) @ rubbing
-        total, slope = (_sums(part, state, len(rows)) for part in (Q, dQ))
-        r = _times(self._A, v) - self._b[rows] - h * total
-        return _Balance(total, r, self._A - h * slope)
-
-    def _tangent(
-        self, row: np.ndarray, place: np.ndarray, Jn: np.ndarray
-    ) -> np.ndarray:
-        """Returns the Jacobians (c, 3, 6) of sliding at pairs (c,)."""
-        J = np.empty((len(row), 3, 6))
-        J[:, :, :3] = np.eye(3)
-        J[:, :, 3:] = -_skew(self._arm[row, place]) @ self.E[row]
-        return J - self._n[row, place][:, :, None] * Jn[:, None, :]
+        velocity = twist[state, :3] + cross(twist[state, 3:], arm)
+        force, slope = _force_and_slope(n, velocity, F, h * kp + kd, mu)
+        W, dW = _wrench_and_slope(arm, force, slope)
+        parts = xp.concat([W, xp.reshape(dW, (-1, 36))], axis=1)
+        sums = segment_sums(parts, state, len(rows))
+        W, dW = sums[:, :6], xp.reshape(sums[:, 6:], (-1, 6, 6))
+        A = self._A[rows]
+        r = apply_matrix(A, twist) - self._b[rows] - h * W
+        return _Balance(W, r, A - h * dW)
 
 
-def turning(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _force_and_slope(
+    n: Array, velocity: Array, F: Array, dF: Array, mu: Array
+) -> tuple[Array, Array]:
+    """Returns forces (c, 3) at touching places, and their slopes (c, 3, 3).
+
+    Coulomb friction, regularised: mu F s / sqrt(s^2 + stiction^2) against the slip s.
+
+    Args:
+        n: (c, 3) normals, along the axes.
+        velocity: (c, 3) of the bolt there.
+        F: (c,) normal force [N].
+        dF: (c,) by which it falls with the velocity along the normal [N s/m].
+        mu: (c,) coefficient of friction.
+    """
+    xp = namespace(velocity)
+    across = 1.0 - n * n  # the two axes along which it slips
+    slip = velocity * across
+    speed = xp.sqrt(_squares(slip) + _STICTION**2)
+    along, drag = slip / speed[:, None], mu * F / speed
+    force = F[:, None] * n - drag[:, None] * slip
+    by_normal = dF[:, None] * (mu[:, None] * along - n)
+    by_slip = drag[:, None] * along
+    slope = by_normal[:, :, None] * n[:, None, :]
+    slope += by_slip[:, :, None] * along[:, None, :]
+    for axis in range(3):
+        slope[:, axis, axis] -= drag * across[:, axis]
+    return force, slope
+
+
+def _wrench_and_slope(arm: Array, force: Array, slope: Array) -> tuple[Array, Array]:
+    """Returns wrenches (c, 6) about a point, and their slopes (c, 6, 6) by the twist.
+
+    Args:
+        arm: (c, 3) from the point to the place.
+        force, slope: (c, 3), (c, 3, 3) there, by the place's velocity.
+    """
+    xp = namespace(arm)
+    wrench = xp.concat([force, cross(arm, force)], axis=1)
+    top = xp.concat([slope, cross(arm[:, None], slope)], axis=2)
+    x, y, z = (arm[:, i, None] for i in range(3))
+    fx, fy, fz = (top[:, i] for i in range(3))
+    turns = xp.stack([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx], axis=1)
+    return wrench, xp.concat([top, turns], axis=1)
+
+
+def turning(angles: Array) -> tuple[Array, Array]:
     """Returns E (n, 3, 3), w = E [yaw', pitch', roll'], and R_GnB of angles (n, 3)."""
-    R_GnB = Rotation.from_euler("ZYX", angles).as_matrix()
-    s, c, zero = np.sin(angles[:, 0]), np.cos(angles[:, 0]), 0.0 * angles[:, 0]
-    axes = [[zero, zero, 1.0 + zero], [-s, c, zero], list(R_GnB[:, :, 0].T)]
-    return np.moveaxis(np.array(axes), 2, 0).swapaxes(1, 2), R_GnB
+    xp = namespace(angles)
+    sines, cosines = xp.sin(angles), xp.cos(angles)
+    sy, sp, sr = (sines[:, i] for i in range(3))
+    cy, cp, cr = (cosines[:, i] for i in range(3))
+    zero, one = xp.zeros_like(sy), xp.ones_like(sy)
+    R_GnB = matrix_of(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+    E = matrix_of([[zero, -sy, cy * cp], [zero, cy, sy * cp], [one, zero, -sp]])
+    return E, R_GnB
 
 
-def _times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Returns a matrix times each of vectors (..., n)."""
-    return np.einsum("ij,...j->...i", matrix, vectors)
+def _rates_by_turning(angles: Array) -> Array:
+    """Returns the inverse (n, 3, 3) of `turning`'s E."""
+    xp = namespace(angles)
+    s, c = xp.sin(angles[:, 0]), xp.cos(angles[:, 0])
+    sp, cp = xp.sin(angles[:, 1]), xp.cos(angles[:, 1])
+    zero, one = xp.zeros_like(s), xp.ones_like(s)
+    return matrix_of(
+        [[c * sp / cp, s * sp / cp, one], [-s, c, zero], [c / cp, s / cp, zero]]
+    )
 
 
-def _squares(vectors: np.ndarray) -> np.ndarray:
+def _blocks(one: Array, zero: Array, other: Array) -> Array:
+    """Returns matrices (n, 6, 6) of two blocks (n, 3, 3) on the diagonal."""
+    xp = namespace(one)
+    rows = xp.concat([one, zero], axis=2), xp.concat([zero, other], axis=2)
+    return xp.concat(rows, axis=1)
+
+
+def _squares(vectors: Array) -> Array:
     """Returns the squared length of each of vectors (n, d)."""
-    return np.einsum("ni,ni->n", vectors, vectors)
-
-
-def _sums(parts: np.ndarray, state: np.ndarray, count: int) -> np.ndarray:
-    """Returns for each of `count` states the sum of its parts; `state` ascends."""
-    total = np.zeros((count, *parts.shape[1:]))
-    present, first = np.unique(state, return_index=True)
-    if len(present):
-        total[present] = np.add.reduceat(parts, first, axis=0)
-    return total
-
-
-def _skew(a: np.ndarray) -> np.ndarray:
-    """Returns [a]x (n, 3, 3) of vectors (n, 3)."""
-    x, y, z = a.T
-    zero = np.zeros_like(x)
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.moveaxis(np.array(rows), 2, 0)
+    return namespace(vectors).sum(vectors * vectors, axis=1)

@@ -219,7 +219,7 @@ class ImpactContactForce(ContactStrategy):
                 stiffness=environment.impact_stiffness,
                 exponent=environment.impact_exponent,
             ),
-            shape=LockShape(dataclasses.replace(config, clearance=clearance)),
+            shape=LockShape.of(dataclasses.replace(config, clearance=clearance)),
             around=Surroundings.of([environment]),
             M=self._M,
             K=K,

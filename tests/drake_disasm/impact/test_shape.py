@@ -10,7 +10,8 @@ MM = 1e-3
 
 
 def deepest(position):
-    found = LockShape(LockConfig()).contacts(np.eye(3)[None], np.array([position]) * MM)
+    p_GBo = np.array([position]) * MM
+    found = LockShape.of(LockConfig()).contacts(np.eye(3)[None], p_GBo)
     i = int(np.argmax(found.penetration[0]))
     return found.penetration[0, i] / MM, found.normal[i]
 
@@ -43,7 +44,7 @@ def test_at_the_keyhole_the_lips_hold_nothing():
 def test_a_quarter_turn_changes_nothing_for_a_round_bolt():
     """Its rim has eight points, so they take each other's places."""
     quarter = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-    found = LockShape(LockConfig()).contacts(
+    found = LockShape.of(LockConfig()).contacts(
         np.array([np.eye(3), quarter]), np.array([[0.02, 0.0, 1e-4]] * 2)
     )
     straight, turned = np.sort(found.penetration, axis=1)

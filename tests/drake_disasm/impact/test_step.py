@@ -20,7 +20,7 @@ M = np.diag([3.0, 3.0, 3.0, 0.02, 0.02, 0.02])
 K, D = np.array([15e3] * 3 + [150.0] * 3), np.array([400.0] * 3 + [3.0] * 3)
 TURNED = ImpactConditions(
     law=ImpactLaw(300.0, 1.4, 2.0, 0.1),
-    shape=LockShape(LockConfig()),
+    shape=LockShape.of(LockConfig()),
     around=Surroundings(
         np.array([0.2]),
         RollPitchYaw(0.0, 0.03, 0.0).ToRotationMatrix().matrix()[None],
