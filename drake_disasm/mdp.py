@@ -18,11 +18,12 @@ the measured one plus what the measured wrench makes it yield (`TaskGeometry.pla
 
 import dataclasses
 import enum
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from drake_disasm.cell.grip import bolt_compliance
+from drake_disasm.common.arrays import Array, apply_matrix, as_number, namespace
 from drake_disasm.scenario import Scenario, TaskConfig
 
 _MM = 1000.0  # the reward speaks millimetres, because the thesis does
@@ -37,31 +38,31 @@ class BoltState:
     """What the agent sees, all in the groove's nominal frame G.
 
     Attributes:
-        p: (3,) displacement of Bo since the start of the episode, as the arm's
+        p: (..., 3) displacement of Bo since the start of the episode, as the arm's
             encoders have it: in a grip that yields the bolt is elsewhere [m].
-        r: (3,) rotation vector of B since then [rad].
-        f, t: (3,) force and torque of the environment on the bolt at Bo [N, N m].
+        r: (..., 3) rotation vector of B since then [rad].
+        f, t: (..., 3) force and torque of the environment on the bolt at Bo [N, N m].
     """
 
-    p: np.ndarray
-    r: np.ndarray
-    f: np.ndarray
-    t: np.ndarray
+    p: Array
+    r: Array
+    f: Array
+    t: Array
 
     @classmethod
-    def from_vector(cls, s: np.ndarray) -> Self:
-        """Returns the state of an observation (12,), in the order STATE_NAMES."""
-        return cls(s[0:3], s[3:6], s[6:9], s[9:12])
+    def from_vector(cls, s: Array) -> Self:
+        """Returns the state of observations (..., 12), in the order STATE_NAMES."""
+        return cls(s[..., 0:3], s[..., 3:6], s[..., 6:9], s[..., 9:12])
 
     @property
-    def force(self) -> float:
-        """Magnitude of the force [N]."""
-        return float(np.sqrt(self.f @ self.f))
+    def force(self) -> Any:
+        """Magnitude of the force [N]; a number, or (...,)."""
+        return _length(self.f)
 
     @property
-    def torque(self) -> float:
-        """Magnitude of the torque [N m]."""
-        return float(np.sqrt(self.t @ self.t))
+    def torque(self) -> Any:
+        """Magnitude of the torque [N m]; a number, or (...,)."""
+        return _length(self.t)
 
 
 class Outcome(enum.IntEnum):
@@ -101,13 +102,15 @@ class TaskGeometry:
             in G, beyond which an episode has failed [m].
         compliance: (3, 6) displacement of Bo in the grip by the wrench [f; tau] on
             the bolt at Bo, in G [m/N, m/(N m)].
+
+    Of n tasks each has n as an axis before these shapes.
     """
 
-    lift_needed: float
-    groove_end: float
-    low: np.ndarray
-    high: np.ndarray
-    compliance: np.ndarray
+    lift_needed: float | Array
+    groove_end: float | Array
+    low: Array
+    high: Array
+    compliance: Array
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
@@ -117,23 +120,29 @@ class TaskGeometry:
         high = np.array([end, lift, 0.0]) + room
         return cls(lift, end, -room, high, bolt_compliance(scenario)[:3])
 
-    def place(self, state: BoltState) -> np.ndarray:
-        """Returns the displacement of Bo since the start (3,) [m], grip included."""
-        return state.p + self.compliance @ np.concatenate([state.f, state.t])
+    def place(self, state: BoltState) -> Array:
+        """Returns where Bo is since the start (..., 3) [m], grip included."""
+        wrench = namespace(state.f).concat([state.f, state.t], axis=-1)
+        return state.p + apply_matrix(self.compliance, wrench)
+
+
+def _length(vectors: Array) -> Any:
+    """Returns the length of vectors (..., 3): a number, or (...,)."""
+    xp = namespace(vectors)
+    return as_number(xp.sqrt(xp.sum(vectors * vectors, axis=-1)))
 
 
 def reward_terms(
     before: BoltState, after: BoltState, task: TaskConfig, geometry: TaskGeometry
-) -> dict[str, float]:
-    """Returns the weighted reward terms of one step by name.
+) -> dict[str, Any]:
+    """Returns the weighted reward terms of one step by name, numbers or (...,).
 
     They are those of eq. 3.4 and 4.3 as long as the bolt goes on and up; see the
     module for where they are not.
     """
     w = task.reward
-    progress, rise = (
-        _MM * (counts(after, task, geometry) - counts(before, task, geometry))
-    ).tolist()
+    gained = _MM * (counts(after, task, geometry) - counts(before, task, geometry))
+    progress, rise = as_number(gained[..., 0]), as_number(gained[..., 1])
     return {
         "progress": w.w_dis * progress,
         "force": -w.w_f * after.force / w.f_max,
@@ -142,10 +151,12 @@ def reward_terms(
     }
 
 
-def counts(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> np.ndarray:
-    """Returns the way along x and the height [m] that the reward counts, (2,)."""
-    x, y = geometry.place(state)[:2]
-    return np.array([min(x, geometry.groove_end), y if x > task.travel_success else 0])
+def counts(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> Array:
+    """Returns the way along x and the height [m] that the reward counts, (..., 2)."""
+    p = geometry.place(state)
+    xp, x, y = namespace(p), p[..., 0], p[..., 1]
+    way = xp.where(x < geometry.groove_end, x, geometry.groove_end)
+    return xp.stack([way, xp.where(x > task.travel_success, y, 0.0)], axis=-1)
 
 
 def outcome(
@@ -159,29 +170,42 @@ def outcome(
         task: limits and what counts as success.
         geometry: where the groove ends and the bolt is out.
     """
-    if state.force > task.reward.f_max:
-        return Outcome.FORCE_LIMIT
-    if state.torque > task.reward.t_max:
-        return Outcome.TORQUE_LIMIT
-    if succeeded(state, task, geometry):
-        return Outcome.SUCCESS
-    if not within_workspace(state, geometry):
-        return Outcome.WORKSPACE
-    return Outcome.STEP_LIMIT if steps_done >= task.steps else Outcome.RUNNING
+    return Outcome(int(outcomes(state, steps_done, task, geometry)))
 
 
-def succeeded(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> bool:
-    """Returns whether the task is done."""
-    x, y = geometry.place(state)[:2]
-    if task.success == "travelled":
-        return bool(x > task.travel_success)
-    return bool(y >= geometry.lift_needed)
+def outcomes(
+    state: BoltState,
+    steps_done: int | Array,
+    task: TaskConfig,
+    geometry: TaskGeometry,
+) -> Array:
+    """Returns the numbers (...,) of the outcomes of states; see `outcome`."""
+    xp = namespace(state.p)
+    found = xp.where(
+        within_workspace(state, geometry), Outcome.RUNNING, Outcome.WORKSPACE
+    )
+    is_last = (steps_done >= task.steps) & (found == Outcome.RUNNING)
+    found = xp.where(is_last, Outcome.STEP_LIMIT, found)
+    found = xp.where(succeeded(state, task, geometry), Outcome.SUCCESS, found)
+    has_turned = xp.asarray(state.torque > task.reward.t_max)
+    found = xp.where(has_turned, Outcome.TORQUE_LIMIT, found)
+    has_pushed = xp.asarray(state.force > task.reward.f_max)
+    return xp.where(has_pushed, Outcome.FORCE_LIMIT, found)
 
 
-def within_workspace(state: BoltState, geometry: TaskGeometry) -> bool:
-    """Returns whether the bolt is where the task has any business."""
+def succeeded(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> Array:
+    """Returns whether the task is done (...,)."""
     p = geometry.place(state)
-    return bool(np.all((geometry.low <= p) & (p <= geometry.high)))
+    if task.success == "travelled":
+        return p[..., 0] > task.travel_success
+    return p[..., 1] >= geometry.lift_needed
+
+
+def within_workspace(state: BoltState, geometry: TaskGeometry) -> Array:
+    """Returns whether the bolt is where the task has any business (...,)."""
+    p = geometry.place(state)
+    is_inside = (geometry.low <= p) & (p <= geometry.high)
+    return namespace(p).all(is_inside, axis=-1)
 
 
 def action_bounds(task: TaskConfig) -> np.ndarray:

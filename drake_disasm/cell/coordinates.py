@@ -8,7 +8,7 @@ station maps both ways, so pose targets and observations need not know which.
 import abc
 
 import numpy as np
-from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.inverse_kinematics import (
     DifferentialInverseKinematicsParameters,
     DifferentialInverseKinematicsStatus,
@@ -21,7 +21,9 @@ from pydrake.solvers import Solve
 
 from drake_disasm.cell.arm_dynamics import add_frames, bolt_jacobian
 from drake_disasm.cell.parsing import add_arm
+from drake_disasm.common.arrays import Array, apply_matrix, namespace
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.rotations import Pose, matrices_of_rpy, rpy_of_matrices
 from drake_disasm.common.spatial import rotation_vector
 from drake_disasm.scenario import ArmConfig
 
@@ -49,25 +51,36 @@ class BoltCoordinates(Coordinates):
     """The twin's joints: x, y, z [m], then yaw, pitch, roll [rad] of B in Gn.
 
     Args:
-        p_BoTo_B: (3,) point of the bolt that x, y, z are displacements of [m].
+        p_BoTo_B: (3,), or (n, 3), point of the bolt that x, y, z are displacements
+            of [m].
     """
 
     size = 6
 
-    def __init__(self, p_BoTo_B: np.ndarray = _ZERO) -> None:
-        self._X_BT = RigidTransform(p_BoTo_B)
-        self._X_TB = self._X_BT.inverse()
+    def __init__(self, p_BoTo_B: Array = _ZERO) -> None:
+        self._p_BoTo_B = p_BoTo_B
 
     def pose(self, coordinates: np.ndarray) -> RigidTransform:
         """See Coordinates."""
-        X = RigidTransform(RollPitchYaw(coordinates[:2:-1]), coordinates[:3])
-        return self._X_BT @ X @ self._X_TB
+        return self.poses(coordinates).to_drake()
+
+    def poses(self, coordinates: Array) -> Pose:
+        """Returns X_GB of coordinates (..., 6), in NumPy or torch."""
+        xp = namespace(coordinates)
+        R = matrices_of_rpy(xp.flip(coordinates[..., 3:], axis=-1))
+        p_BoTo = apply_matrix(R, self._p_BoTo_B)
+        return Pose(R, coordinates[..., :3] + self._p_BoTo_B - p_BoTo)
 
     def solve(self, X_GB: RigidTransform, near: np.ndarray) -> np.ndarray:
         """See Coordinates; exact, `near` is not needed."""
-        X = self._X_TB @ X_GB @ self._X_BT
-        rpy = RollPitchYaw(X.rotation()).vector()
-        return np.concatenate([X.translation(), rpy[::-1]])
+        return np.asarray(self.of_poses(Pose.of(X_GB)))
+
+    def of_poses(self, X_GB: Pose) -> Array:
+        """Returns the coordinates (..., 6) of poses."""
+        xp = namespace(X_GB.p)
+        p = X_GB.p + apply_matrix(X_GB.R, self._p_BoTo_B) - self._p_BoTo_B
+        yaw_pitch_roll = xp.flip(rpy_of_matrices(X_GB.R), axis=-1)
+        return xp.concat([p, yaw_pitch_roll], axis=-1)
 
 
 class ArmCoordinates(Coordinates):

@@ -1,4 +1,4 @@
-"""Array operations for NumPy and torch alike, by the Python array API standard.
+"""Array operations for both NumPy and torch, by the Python array API standard.
 
 A function that is given arrays asks for their `namespace` and computes with that: one
 equation serves one state in NumPy and thousands in torch, on a GPU if that holds them.
@@ -84,9 +84,39 @@ def apply_matrix(matrices: Array, vectors: Array) -> Array:
     return xp.matmul(matrices, vectors[..., None])[..., 0]
 
 
-def at_least(low: float, values: Array) -> Array:
-    """Returns values, or a bound where they are below; faster than `clip`."""
+def at_least(low: float | Array, values: float | Array) -> float | Array:
+    """Returns values, or a bound where they are below; faster than `clip`.
+
+    A number stays a number.
+    """
+    if isinstance(values, float | int):
+        return max(low, values)
     return namespace(values).where(values < low, low, values)
+
+
+def at_most(high: float | Array, values: float | Array) -> float | Array:
+    """Returns values, or a bound where they are above; a number stays a number."""
+    if isinstance(values, float | int):
+        return min(high, values)
+    return namespace(values).where(values > high, high, values)
+
+
+def limited(values: Array, low: Array, high: Array) -> Array:
+    """Returns values within bounds, arrays that fit by broadcasting."""
+    xp = namespace(values)
+    return xp.minimum(xp.maximum(values, low), high)
+
+
+def exponential(values: float | Array) -> float | Array:
+    """Returns e to the power of values; a number stays a number."""
+    if isinstance(values, float | int):
+        return float(np.exp(values))
+    return namespace(values).exp(values)
+
+
+def as_number(value: float | Array) -> float | Array:
+    """Returns a number as Python has it, if it is one; arrays stay arrays."""
+    return value if getattr(value, "ndim", 0) else float(value)
 
 
 def transposed(matrices: Array) -> Array:

@@ -7,6 +7,8 @@ from pydrake.common.eigen_geometry import AngleAxis, Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialForce
 
+from drake_disasm.common.arrays import Array, apply_matrix, cross, namespace
+
 
 def rotation_from_vector(vector: np.ndarray) -> RotationMatrix:
     """Returns Exp(vector): a turn about `vector` (3,) by its length [rad]."""
@@ -34,31 +36,34 @@ def shift_and_express(wrench_So_S: np.ndarray, X_AS: RigidTransform) -> np.ndarr
         wrench_So_S: (6,) [f; tau] at So, expressed in S.
         X_AS: pose of S in A.
     """
-    R, p = X_AS.rotation().matrix(), X_AS.translation()
-    f = R @ wrench_So_S[:3]
-    return np.concatenate([f, R @ wrench_So_S[3:] + cross(p, f)])
+    return shifted_wrench(wrench_So_S, X_AS.rotation().matrix(), X_AS.translation())
+
+
+def shifted_wrench(wrench: Array, R: Array, p: Array) -> Array:
+    """Returns wrenches at Ao in A from the same at So in S, (..., 6) [f; tau].
+
+    Args:
+        wrench: (..., 6) at So, expressed in S.
+        R: (..., 3, 3) of S in A.
+        p: (..., 3) of So in A [m].
+    """
+    f, t = apply_matrix(R, wrench[..., :3]), apply_matrix(R, wrench[..., 3:])
+    return namespace(f).concat([f, t + cross(p, f)], axis=-1)
 
 
 def weight_wrench(
-    mass: float, p_SoScm_S: np.ndarray, R_WS: np.ndarray, g_W: np.ndarray
-) -> np.ndarray:
+    mass: float | Array, p_SoScm_S: Array, R_WS: Array, g_W: Array
+) -> Array:
     """Returns what a hanging mass loads the sensor with, (..., 6) [f; tau] in S.
 
     Args:
-        mass: [kg].
-        p_SoScm_S: (3,) its centre of mass from So, about which the torque is [m].
+        mass: [kg]; (..., 1) where each has its own.
+        p_SoScm_S: (..., 3) its centre of mass from So, about which the torque is [m].
         R_WS: (..., 3, 3) orientations of the sensor.
-        g_W: (3,) gravity [m/s^2].
+        g_W: (..., 1, 3) or (3,) gravity [m/s^2].
     """
     f = mass * (g_W @ R_WS)
-    return np.concatenate([f, cross(p_SoScm_S, f)], axis=-1)
-
-
-def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Returns a x b, (..., 3), of a (3,) and b (..., 3); faster than `np.cross`."""
-    a1, a2, a3 = a
-    b1, b2, b3 = b.T
-    return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1]).T
+    return namespace(f).concat([f, cross(p_SoScm_S, f)], axis=-1)
 
 
 def skew(a: np.ndarray) -> np.ndarray:

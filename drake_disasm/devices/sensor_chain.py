@@ -5,13 +5,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from drake_disasm.common.arrays import Array, namespace
 from drake_disasm.common.spatial import weight_wrench
 from drake_disasm.effects import Sensing, SensorEffect, SensorMemoryEffect
 
 _SAMPLES = 10  # of the sensor between two loads of a trajectory
 
 #: Reads a load (..., 6) through the i-th effect of a chain, which has a memory.
-ReadMemory = Callable[[int, SensorMemoryEffect, np.ndarray], np.ndarray]
+ReadMemory = Callable[[int, SensorMemoryEffect, Array], Array]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,20 +26,19 @@ class Payload:
     """
 
     mass: float
-    p_SoScm_S: np.ndarray
-    g_W: np.ndarray
+    p_SoScm_S: Array
+    g_W: Array
 
-    def sensing(self, time: np.ndarray, R_WS: np.ndarray) -> Sensing:
+    def sensing(self, time: Array, R_WS: Array) -> Sensing:
         """Returns the circumstances of readings.
 
         Args:
             time: (...,) [s].
             R_WS: (..., 3, 3) orientations of the sensor.
         """
-        x, y, z = self.p_SoScm_S
-        return Sensing(time, R_WS, self.g_W, self.mass, (x, y, z))
+        return Sensing(time, R_WS, self.g_W, self.mass, self.p_SoScm_S)
 
-    def weight(self, R_WS: np.ndarray) -> np.ndarray:
+    def weight(self, R_WS: Array) -> Array:
         """Returns its load on the sensor, (..., 6) [f; tau] at So in S.
 
         Args:
@@ -48,11 +48,11 @@ class Payload:
 
 
 def sensed(
-    load: np.ndarray,
+    load: Array,
     effects: Sequence[SensorEffect],
     sensing: Sensing,
     read_memory: ReadMemory | None = None,
-) -> np.ndarray:
+) -> Array:
     """Returns what a sensor with effects reads of loads, (..., 6) [f; tau] in S.
 
     Args:
@@ -72,38 +72,40 @@ def sensed(
 
 
 def sensed_at_zeroing(
-    load: np.ndarray, effects: Sequence[SensorEffect], sensing: Sensing
-) -> np.ndarray:
-    """Returns the reading (6,) that zeroing takes, of the load (6,) at that moment."""
+    load: Array, effects: Sequence[SensorEffect], sensing: Sensing
+) -> Array:
+    """Returns the reading (..., 6) that zeroing takes, of the load then (..., 6)."""
     return sensed(load, [e for e in effects if e.present_at_zeroing], sensing)
 
 
 def sensed_sample(
-    load: np.ndarray,
+    load: Array,
     effects: Sequence[SensorEffect],
     sensing: Sensing,
-    memories: np.ndarray,
+    memories: Array,
     interval: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns what a sensor with memory reads, (6,), and remembers, (m,).
+) -> tuple[Array, Array]:
+    """Returns what a sensor with memory reads, (..., 6), and remembers, (..., m).
 
     Args:
-        load: (6,) [f; tau] in S.
+        load: (..., 6) [f; tau] in S.
         effects: in the order of the chain.
         sensing: of the loads.
-        memories: (m,) of the sample before, of one effect after the other, and maybe
-            more; NaN where there was none.
+        memories: (..., m) of the sample before, of one effect after the other, and
+            maybe more; NaN where there was none.
         interval: since then [s].
     """
-    memories = np.array(memories)
+    xp = namespace(memories)
+    memories = xp.asarray(memories, copy=True)
 
-    def read(i: int, effect: SensorMemoryEffect, load: np.ndarray) -> np.ndarray:
+    def read(i: int, effect: SensorMemoryEffect, load: Array) -> Array:
         """Updates the effect's memory, and reads with it."""
-        own = np.s_[memory_size(effects[:i]) : memory_size(effects[: i + 1])]
-        before = memories[own]
-        before = np.where(np.isnan(before), effect.begin(load), before)
-        memories[own] = effect.remember(before, load, interval)
-        return effect.read(load, memories[own])
+        first, end = memory_size(effects[:i]), memory_size(effects[: i + 1])
+        before = memories[..., first:end]
+        before = xp.where(xp.isnan(before), effect.begin(load), before)
+        now = effect.remember(before, load, interval)
+        memories[..., first:end] = now
+        return effect.read(load, now)
 
     return sensed(load, effects, sensing, read), memories
 
@@ -114,12 +116,12 @@ def memory_size(effects: Sequence[SensorEffect]) -> int:
 
 
 def sensed_along(
-    loads: np.ndarray,
+    loads: Array,
     effects: Sequence[SensorEffect],
     sensing: Sensing,
-    at_rest: np.ndarray,
+    at_rest: Array,
     rest: Sensing,
-) -> np.ndarray:
+) -> Array:
     """Returns what a sensor reads of loads one after the other, (n, 6) [f; tau] in S.
 
     Args:
@@ -130,7 +132,7 @@ def sensed_along(
         rest: the circumstances then.
     """
 
-    def read(i: int, effect: SensorMemoryEffect, loads: np.ndarray) -> np.ndarray:
+    def read(i: int, effect: SensorMemoryEffect, loads: Array) -> Array:
         """Reads all loads, from what reaches this effect at rest."""
         times = np.asarray(sensing.time)
         return _along(effect, loads, sensed(at_rest, effects[:i], rest), times)
@@ -140,10 +142,10 @@ def sensed_along(
 
 def _along(
     effect: SensorMemoryEffect,
-    loads: np.ndarray,
-    at_rest: np.ndarray,
-    times: np.ndarray,
-) -> np.ndarray:
+    loads: Array,
+    at_rest: Array,
+    times: Array,
+) -> Array:
     """Returns what an effect with a memory reads of loads (n, 6), each in its turn.
 
     Between two of them the load changes linearly. An episode begins at rest.

@@ -7,6 +7,10 @@ bit for bit; or a `shape_parameter`, a time constant say, which says how the eff
 looks and matters only away from null. What it does is a pure function, so that the
 simulator, identification and closing the loop share one implementation.
 
+The functions take arrays of any leading shape, in NumPy or torch, and fields that are
+arrays (n,) of n environments: `BatchedTwin` refuses an effect whose equation doesn't.
+`Effect.vector` and `Effect.column` give fields in such shapes.
+
 To write one: derive a dataclass from the place where it acts (EnvironmentEffect,
 MotionEffect, SensorEffect or JointEffect), give it a docstring and fields, define the
 place's method, and put `@register_effect` above it.
@@ -22,10 +26,21 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
+from drake_disasm.common.arrays import (
+    Array,
+    apply_matrix,
+    array_like,
+    cross,
+    last_axis,
+    namespace,
+    to_numpy,
+    transposed,
+)
+from drake_disasm.common.rotations import Pose
 from drake_disasm.effects.fields import acts_at_joint, amplitudes, shape_parameters
 
 #: What an effect on the motion keeps from one step to the next: six numbers.
-Memory = np.ndarray
+Memory = Array
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,17 +56,19 @@ class Environment:
         impact_stiffness, impact_exponent: IMPACT's k [N/mm^e] and e.
         force_Gn: (fx, fy, fz) that pulls on the bolt at Bo besides the contact, in
             Gn [N].
+
+    Of n environments each number is an array (n,), and the pose a `Pose`.
     """
 
-    X_GnG: RigidTransform
-    friction: float
-    modulus: float
-    head_modulus: float
-    dissipation: float
-    clearance: float
-    impact_stiffness: float
-    impact_exponent: float
-    force_Gn: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    X_GnG: RigidTransform | Pose
+    friction: float | Array
+    modulus: float | Array
+    head_modulus: float | Array
+    dissipation: float | Array
+    clearance: float | Array
+    impact_stiffness: float | Array
+    impact_exponent: float | Array
+    force_Gn: tuple[float | Array, float | Array, float | Array] = (0.0, 0.0, 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,12 +78,12 @@ class BoltMotion:
     As at the beginning of a step of the MDP; constant for the whole step.
 
     Attributes:
-        p: (3,) Bo in Gn [m].
-        v: (3,) its commanded velocity in Gn [m/s].
+        p: (..., 3) Bo in Gn [m].
+        v: (..., 3) its commanded velocity in Gn [m/s].
     """
 
-    p: np.ndarray
-    v: np.ndarray
+    p: Array
+    v: Array
 
 
 #: As an episode starts: at A, at rest.
@@ -82,21 +99,30 @@ class Sensing:
     Attributes:
         time: (...,) seconds since the episode (or the log) began.
         R_WS: (..., 3, 3) orientation of the sensor in the world.
-        g_W: gravity vector, (3,) [m/s^2].
-        mass: of the payload on the sensor, as the tool data have it [kg].
-        p_SoScm_S: (3,) its centre of mass [m].
+        g_W: gravity vector, (3,), or (..., 3) [m/s^2].
+        mass: of the payload on the sensor, as the tool data have it [kg]; (..., 1)
+            where each reading has its own.
+        p_SoScm_S: (3,), or (..., 3), its centre of mass [m].
     """
 
-    time: np.ndarray
-    R_WS: np.ndarray
-    g_W: np.ndarray
-    mass: float = 0.0
-    p_SoScm_S: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    time: Array
+    R_WS: Array
+    g_W: Array
+    mass: float | Array = 0.0
+    p_SoScm_S: tuple[float, float, float] | Array = (0.0, 0.0, 0.0)
 
     @property
-    def g_S(self) -> np.ndarray:
+    def g_S(self) -> Array:
         """Gravity in the sensor's frame, (..., 3) [m/s^2]."""
-        return self.g_W @ self.R_WS
+        return apply_matrix(transposed(self.R_WS), self.g_W)
+
+    @property
+    def weight(self) -> Array:
+        """The payload's load on the sensor (..., 6), [f; tau] at So in S."""
+        f = self.mass * self.g_S
+        return namespace(f).concat(
+            [f, cross(array_like(self.p_SoScm_S, f), f)], axis=-1
+        )
 
 
 def name_in_words(name: str) -> str:
@@ -129,7 +155,24 @@ class Effect:
     @property
     def is_null(self) -> bool:
         """Whether all its amplitudes are zero: it does nothing."""
-        return not any(getattr(self, name) for name in amplitudes(type(self)))
+        return not any(
+            np.any(to_numpy(value)) if getattr(value, "ndim", 0) else value
+            for value in (getattr(self, name) for name in amplitudes(type(self)))
+        )
+
+    def vector(self, like: Array, *names: str) -> Array:
+        """Returns some of its numbers side by side, (k,), or (n, k) of n of them.
+
+        Args:
+            like: an array of the kind that is wanted, NumPy's or torch's.
+            names: of k fields.
+        """
+        return last_axis([getattr(self, name) for name in names], like)
+
+    def column(self, name: str) -> float | Array:
+        """Returns a number, or (n, 1) of n of them: what scales vectors (..., k)."""
+        value = getattr(self, name)
+        return value[..., None] if getattr(value, "ndim", 0) else value
 
     @classmethod
     def grids(cls, duration: float) -> dict[str, tuple[float, ...]]:
@@ -200,14 +243,15 @@ class MotionEffect(Effect, abc.ABC):
 
     @abc.abstractmethod
     def execute(
-        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
-    ) -> tuple[np.ndarray, Memory]:
-        """Returns what is executed (6,), and the memory for the next step.
+        self, commanded: Array, wrench: Array, memory: Memory, period: float
+    ) -> tuple[Array, Memory]:
+        """Returns what is executed (..., 6), and the memory for the next step.
 
         Args:
-            commanded: (6,) for the end of the step [m, rad].
-            wrench: (6,) [f; tau] on the bolt at Bo in G, measured as the step begins.
-            memory: (6,) of the step before; zeros at the start.
+            commanded: (..., 6) for the end of the step [m, rad].
+            wrench: (..., 6) [f; tau] on the bolt at Bo in G, measured as the step
+                begins.
+            memory: (..., 6) of the step before; zeros at the start.
             period: of the MDP [s].
         """
 
@@ -231,7 +275,7 @@ class SensorEffect(Effect, abc.ABC):
     removed_by_zeroing: ClassVar[bool] = False
 
     @abc.abstractmethod
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Returns readings with this effect in them.
 
         Args:
@@ -256,29 +300,27 @@ class SensorMemoryEffect(SensorEffect, abc.ABC):
 
     memory_size: ClassVar[int] = 6
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Returns readings after a long rest."""
         return wrench_S
 
     @abc.abstractmethod
-    def begin(self, wrench_S: np.ndarray) -> np.ndarray:
-        """Returns the memory (m,) after a long rest under a load (6,)."""
+    def begin(self, wrench_S: Array) -> Array:
+        """Returns the memory (..., m) after a long rest under a load (..., 6)."""
 
     @abc.abstractmethod
-    def remember(
-        self, memory: np.ndarray, wrench_S: np.ndarray, interval: float
-    ) -> np.ndarray:
-        """Returns the memory (m,) after a load (6,) that held for an interval.
+    def remember(self, memory: Array, wrench_S: Array, interval: float) -> Array:
+        """Returns the memory (..., m) after a load (..., 6) that held for an interval.
 
         Args:
-            memory: (m,) before.
-            wrench_S: (6,) the load now.
+            memory: (..., m) before.
+            wrench_S: (..., 6) the load now.
             interval: since the sample before [s].
         """
 
     @abc.abstractmethod
-    def read(self, wrench_S: np.ndarray, memory: np.ndarray) -> np.ndarray:
-        """Returns the reading (6,) of a load with the memory (m,) up to now."""
+    def read(self, wrench_S: Array, memory: Array) -> Array:
+        """Returns the reading (..., 6) of a load with the memory (..., m) up to now."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,6 +4,8 @@ import dataclasses
 
 import numpy as np
 
+from drake_disasm.common.arrays import Array, array_like, namespace
+
 
 @dataclasses.dataclass(frozen=True)
 class History:
@@ -28,33 +30,54 @@ class History:
         """Length of the array."""
         return self.samples * (1 + self.size)
 
-    def begin(self, value: np.ndarray) -> np.ndarray:
-        """Returns the history (numbers,) of a value (size,) that was always there."""
-        ages = np.linspace(0.0, 2.0 * self.longest, self.samples)
-        return np.column_stack([ages, np.tile(value, (self.samples, 1))]).reshape(-1)
+    def begin(self, value: Array) -> Array:
+        """Returns the history (..., numbers) of values (..., size) always there."""
+        xp, count = namespace(value), self.samples
+        leading = value.shape[:-1]
+        ages = array_like(np.linspace(0.0, 2.0 * self.longest, count), value)
+        ages = xp.broadcast_to(ages[:, None], (*leading, count, 1))
+        values = xp.broadcast_to(value[..., None, :], (*leading, count, self.size))
+        return self._flat(xp.concat([ages, values], axis=-1))
 
-    def extended(
-        self, history: np.ndarray, value: np.ndarray, interval: float
-    ) -> np.ndarray:
-        """Returns the history (numbers,) with a value (size,) that is there now.
+    def extended(self, history: Array, value: Array, interval: float) -> Array:
+        """Returns the history (..., numbers) with values (..., size) now.
 
         Args:
-            history: (numbers,) up to the sample before.
+            history: (..., numbers) up to the sample before.
             value: now.
             interval: since then [s].
         """
-        rows = history.reshape(self.samples, -1).copy()
-        rows[:, 0] += interval
+        xp, rows = namespace(history), self._rows(history)
+        ages, values = rows[..., :1] + interval, rows[..., 1:]
+        rows = xp.concat([ages, values], axis=-1)
         spacing = self.longest / (self.samples - 2)
-        if interval > 0.0 and rows[1, 0] - rows[0, 0] > 0.999 * spacing:
-            rows[1:] = rows[:-1].copy()
-        rows[0, 0], rows[0, 1:] = 0.0, value
-        return np.asarray(rows.reshape(-1))
+        apart = ages[..., 1:2, :] - ages[..., :1, :]
+        older = xp.concat([rows[..., :1, :], rows[..., :-1, :]], axis=-2)
+        rows = xp.where((apart > 0.999 * spacing) & (interval > 0.0), older, rows)
+        now = xp.concat([0.0 * value[..., :1], value], axis=-1)[..., None, :]
+        return self._flat(xp.concat([now, rows[..., 1:, :]], axis=-2))
 
-    def at(self, history: np.ndarray, age: float) -> np.ndarray:
-        """Returns the value (size,) of a while [s] ago, at most `longest`."""
-        rows = history.reshape(self.samples, -1)
-        ages = rows[:, 0]
-        i = int(np.clip(np.searchsorted(ages, age), 1, self.samples - 1))
-        share = (age - ages[i - 1]) / (ages[i] - ages[i - 1])
-        return np.asarray(rows[i - 1, 1:] + share * (rows[i, 1:] - rows[i - 1, 1:]))
+    def at(self, history: Array, age: float | Array) -> Array:
+        """Returns the values (..., size) of a while [s] ago, at most `longest`.
+
+        Args:
+            history: (..., numbers).
+            age: a number, or (..., 1).
+        """
+        xp, rows = namespace(history), self._rows(history)
+        ages = rows[..., 0]
+        after = xp.sum(xp.astype(ages < age, xp.int64), axis=-1)
+        after = xp.clip(after, 1, self.samples - 1)[..., None, None]
+        every = xp.broadcast_to(after, (*after.shape[:-1], 1 + self.size))
+        new = xp.take_along_axis(rows, every - 1, axis=-2)[..., 0, :]
+        old = xp.take_along_axis(rows, every, axis=-2)[..., 0, :]
+        share = (age - new[..., :1]) / (old[..., :1] - new[..., :1])
+        return new[..., 1:] + share * (old[..., 1:] - new[..., 1:])
+
+    def _rows(self, history: Array) -> Array:
+        """Returns (..., samples, 1 + size), each an age and a value."""
+        shape = (*history.shape[:-1], self.samples, 1 + self.size)
+        return namespace(history).reshape(history, shape)
+
+    def _flat(self, rows: Array) -> Array:
+        return namespace(rows).reshape(rows, (*rows.shape[:-2], self.numbers))

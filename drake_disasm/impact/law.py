@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Self
 
-from drake_disasm.common.arrays import Array, at_least, namespace
+from drake_disasm.common.arrays import Array, at_least, at_most, namespace
 from drake_disasm.scenario import ImpactConfig
 
 _MM = 1000.0
@@ -56,12 +56,9 @@ class ImpactLaw:
     ) -> tuple[Array, Array, Array]:
         """Returns F [N], dF/dp [N/m] and dF/d(dp/dt) [N s/m], (n,) each."""
         xp = namespace(penetration)
-        p = at_least(_LEAST, penetration * _MM)
-        if isinstance(self.depth, float):
-            depth = max(self.depth, _LEAST)
-        else:
-            depth = at_least(_LEAST, self.depth)
-        x = -at_least(-1.0, -p / depth)
+        p: Array = at_least(_LEAST, penetration * _MM)
+        depth = at_least(_LEAST, self.depth)
+        x = at_most(1.0, p / depth)
         elastic = self.stiffness * p**self.exponent
         damping = self.damping * x * x * (3.0 - 2.0 * x)
         force = elastic + damping * rate * _MM

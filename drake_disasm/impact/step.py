@@ -18,6 +18,7 @@ from drake_disasm.common.arrays import (
     segment_sums,
     transposed,
 )
+from drake_disasm.common.rotations import matrices_of_rpy
 from drake_disasm.effects import Environment
 from drake_disasm.impact.law import ImpactLaw
 from drake_disasm.impact.shape import NORMALS, LockShape
@@ -370,19 +371,11 @@ def _wrench_and_slope(arm: Array, force: Array, slope: Array) -> tuple[Array, Ar
 def turning(angles: Array) -> tuple[Array, Array]:
     """Returns E (n, 3, 3), w = E [yaw', pitch', roll'], and R_GnB of angles (n, 3)."""
     xp = namespace(angles)
-    sines, cosines = xp.sin(angles), xp.cos(angles)
-    sy, sp, sr = (sines[:, i] for i in range(3))
-    cy, cp, cr = (cosines[:, i] for i in range(3))
-    zero, one = xp.zeros_like(sy), xp.ones_like(sy)
-    R_GnB = matrix_of(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-    E = matrix_of([[zero, -sy, cy * cp], [zero, cy, sy * cp], [one, zero, -sp]])
-    return E, R_GnB
+    R_GnB = matrices_of_rpy(xp.flip(angles, axis=-1))
+    s, c = xp.sin(angles[:, 0]), xp.cos(angles[:, 0])
+    zero, one = xp.zeros_like(s), xp.ones_like(s)
+    axes = [xp.stack(axis, axis=1) for axis in ([zero, zero, one], [-s, c, zero])]
+    return xp.stack([*axes, R_GnB[:, :, 0]], axis=2), R_GnB
 
 
 def _rates_by_turning(angles: Array) -> Array:

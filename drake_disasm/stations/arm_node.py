@@ -9,6 +9,7 @@ from scipy.linalg import expm
 
 from drake_disasm.cell.grip import AXIS_ORDER, Springs
 from drake_disasm.cell.twin_parameters import ControlledArm
+from drake_disasm.common.arrays import Array, apply_matrix
 
 _ORDER = list(AXIS_ORDER)
 
@@ -63,18 +64,25 @@ class ArmStep:
         springs = _softer(grip, G)
         return cls(h, step[:, :12], C, G @ _gains(springs), G, H, springs)
 
-    def ahead(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def ahead(self, x: Array, u: Array) -> Array:
         """Returns x' (n, 12) for states and commands (n, 12)."""
-        return x @ self.F.T + u @ self.C.T
+        return _times(self.F, x) + _times(self.C, u)
 
-    def after(self, x_ahead: np.ndarray, s: np.ndarray) -> np.ndarray:
+    def after(self, x_ahead: Array, s: Array) -> Array:
         """Returns x+ (n, 12) once the bolt is at s (n, 12)."""
-        return x_ahead + (s - x_ahead) @ self.P.T
+        return x_ahead + _times(self.P, s - x_ahead)
 
     @property
     def is_stable(self) -> bool:
         """Whether an arm that leans on a bolt in contact comes to rest."""
         return bool(np.abs(np.linalg.eigvals(self.F - self.P @ self.F)).max() < 1.0)
+
+
+def _times(matrices: Array, vectors: Array) -> Array:
+    """Returns one matrix, or one for each, times vectors (n, k)."""
+    if matrices.ndim > 2:
+        return apply_matrix(matrices, vectors)
+    return vectors @ matrices.T
 
 
 def _gains(springs: Springs) -> np.ndarray:

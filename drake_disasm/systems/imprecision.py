@@ -1,12 +1,45 @@
 """A robot made less precise on purpose (thesis, algorithm 3.2)."""
 
+import dataclasses
+from typing import Self
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from drake_disasm.common.arrays import Array, limited
 
-def clamped(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:
+
+def clamped(values: Array, bounds: Array) -> Array:
     """Returns values within [-bounds, bounds]; a third of the time of `np.clip`."""
-    return np.minimum(np.maximum(values, -bounds), bounds)
+    return limited(values, -bounds, bounds)
+
+
+@dataclasses.dataclass(frozen=True)
+class Imprecise:
+    """Algorithm 3.2, steps 6 and 7: a_psi = clip(a + N(0, psi), low - psi, high + psi).
+
+    Attributes:
+        psi: (..., 6) standard deviation of each part of the action [m].
+        bounds: (..., 6) largest imprecise action [m, rad].
+    """
+
+    psi: Array
+    bounds: Array
+
+    @classmethod
+    def of(cls, psi: float, bounds: np.ndarray) -> Self:
+        """Returns that of the translations alone.
+
+        Args:
+            psi: [m].
+            bounds: (6,) largest action [m, rad].
+        """
+        along = psi * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+        return cls(along, bounds + along)
+
+    def action(self, action: Array, noise: Array) -> Array:
+        """Returns actions (..., 6) that are imprecise, by unit noise (..., 6)."""
+        return clamped(action + self.psi * noise, self.bounds)
 
 
 class ImprecisionNoise(LeafSystem):
@@ -32,8 +65,7 @@ class ImprecisionNoise(LeafSystem):
 
     def __init__(self, psi: float, bounds: np.ndarray) -> None:
         super().__init__()
-        self._psi = psi * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-        self._bounds = bounds + self._psi
+        self._imprecise = Imprecise.of(psi, bounds)
         self._action = self.DeclareVectorInputPort("action", 6)
         self._noise = self.DeclareVectorInputPort("noise", 6)
         self.DeclareVectorOutputPort(
@@ -44,5 +76,5 @@ class ImprecisionNoise(LeafSystem):
         )
 
     def _calc(self, context: Context, output: BasicVector) -> None:
-        noisy = self._action.Eval(context) + self._psi * self._noise.Eval(context)
-        output.SetFromVector(clamped(noisy, self._bounds))
+        action, noise = self._action.Eval(context), self._noise.Eval(context)
+        output.SetFromVector(self._imprecise.action(action, noise))

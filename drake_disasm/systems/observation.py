@@ -4,18 +4,18 @@ import dataclasses
 import functools
 
 import numpy as np
-from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from drake_disasm.cell.coordinates import Coordinates
-from drake_disasm.common.spatial import (
-    pose_to_vector,
-    rotation_vector,
-    shift_and_express,
-    weight_wrench,
+from drake_disasm.common.arrays import Array, apply_matrix, namespace
+from drake_disasm.common.rotations import (
+    Pose,
+    as_matrices,
+    rotation_vectors,
+    rpy_of_matrices,
 )
-
-_ZERO = np.zeros(3)
+from drake_disasm.common.spatial import pose_to_vector, shifted_wrench, weight_wrench
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,28 +27,35 @@ class Mounting:
         R_WG: the groove's nominal frame in the world.
         mass, p_SoScm_S: payload of the sensor [kg], (3,) [m].
         g_W: gravity (3,) [m/s^2].
+
+    Of n sensors poses and rotations are arrays, mass is (n, 1), vectors are (n, 3).
     """
 
-    X_SB: RigidTransform
-    R_WG: RotationMatrix
-    mass: float
-    p_SoScm_S: np.ndarray
-    g_W: np.ndarray
+    X_SB: RigidTransform | Pose
+    R_WG: RotationMatrix | Array
+    mass: float | Array
+    p_SoScm_S: Array
+    g_W: Array
 
     @functools.cached_property
-    def X_BS(self) -> RigidTransform:
+    def X_BS(self) -> Pose:
         """The sensor in the bolt's frame."""
-        return self.X_SB.inverse()
+        X_SB = self.X_SB if isinstance(self.X_SB, Pose) else Pose.of(self.X_SB)
+        return X_SB.inverse()
 
-    def weight(self, R_GS: RotationMatrix) -> np.ndarray:
-        """Returns the payload's own load on the sensor, (6,) [f; tau] at So in S."""
-        R_WS = (self.R_WG @ R_GS).matrix()
+    def R_WS(self, R_GS: Array) -> Array:
+        """Returns the sensor's orientation in the world (..., 3, 3)."""
+        return namespace(R_GS).matmul(as_matrices(self.R_WG), R_GS)
+
+    def weight(self, R_GS: RotationMatrix | Array) -> Array:
+        """Returns the payload's load on the sensor, (..., 6) [f; tau] at So in S."""
+        R_WS = self.R_WS(as_matrices(R_GS))
         return weight_wrench(self.mass, self.p_SoScm_S, R_WS, self.g_W)
 
 
 def contact_wrench(
-    reading: np.ndarray, offset: np.ndarray, R_GB: RotationMatrix, mounting: Mounting
-) -> np.ndarray:
+    reading: Array, offset: Array, R_GB: RotationMatrix | Array, mounting: Mounting
+) -> Array:
     """Returns the environment's wrench on the bolt at Bo in G, exactly.
 
     Takes off the zeroing offset and the payload's weight at this orientation,
@@ -56,19 +63,20 @@ def contact_wrench(
     their small-angle and on-axis assumptions).
 
     Args:
-        reading: (6,) raw [f; tau] at So in S.
-        offset: (6,) the reading at zeroing less the payload's weight.
-        R_GB: measured orientation of the bolt.
+        reading: (..., 6) raw [f; tau] at So in S.
+        offset: (..., 6) the reading at zeroing less the payload's weight.
+        R_GB: measured orientation of the bolt, (..., 3, 3) or Drake's.
         mounting: geometry and payload.
     """
-    X_GS = RigidTransform(R_GB, _ZERO) @ mounting.X_BS
-    load = reading - offset - mounting.weight(X_GS.rotation())
-    return shift_and_express(load, X_GS)
+    X_BS, R = mounting.X_BS, as_matrices(R_GB)
+    R_GS = namespace(R).matmul(R, X_BS.R)
+    load = reading - offset - mounting.weight(R_GS)
+    return shifted_wrench(load, R_GS, apply_matrix(R, X_BS.p))
 
 
 def small_angle_contact_wrench(
-    reading: np.ndarray, tare: np.ndarray, R_GB: RotationMatrix, mounting: Mounting
-) -> np.ndarray:
+    reading: Array, tare: Array, R_GB: RotationMatrix | Array, mounting: Mounting
+) -> Array:
     """Returns the same by the thesis's equations 4.4, 4.6 and 4.7.
 
     They hold for a sensor whose axis (their y) is upright when zeroed, a payload
@@ -79,20 +87,62 @@ def small_angle_contact_wrench(
 
     Args:
         reading, R_GB, mounting: as in `contact_wrench`.
-        tare: (6,) the reading at zeroing.
+        tare: (..., 6) the reading at zeroing.
     """
-    R_BS = mounting.X_BS.rotation().matrix()
-    f, t = R_BS @ (reading - tare)[:3], R_BS @ (reading - tare)[3:]
-    alpha, _, gamma = RollPitchYaw(R_GB).vector()
-    G = mounting.mass * np.linalg.norm(mounting.g_W)
-    l1, l2 = (
-        np.linalg.norm(mounting.p_SoScm_S),
-        np.linalg.norm(mounting.X_SB.translation()),
-    )
-    rise = 2.0 - np.cos(alpha) - np.cos(gamma)
-    f = f - G * np.array([-np.sin(gamma), rise, np.sin(alpha)])
-    t = t + G * l1 * np.array([np.sin(alpha), 0.0, np.sin(gamma)])
-    return np.concatenate([f, t + l2 * np.array([f[2], 0.0, -f[0]])])
+    xp, X_BS = namespace(reading), mounting.X_BS
+    change = reading - tare
+    f, t = (apply_matrix(X_BS.R, part) for part in (change[..., :3], change[..., 3:]))
+    rpy = rpy_of_matrices(as_matrices(R_GB))
+    alpha, gamma = rpy[..., 0:1], rpy[..., 2:3]
+    G = mounting.mass * _length(mounting.g_W)
+    l1, l2 = _length(mounting.p_SoScm_S), _length(X_BS.p)
+    rise = 2.0 - xp.cos(alpha) - xp.cos(gamma)
+    f = f - G * xp.concat([-xp.sin(gamma), rise, xp.sin(alpha)], axis=-1)
+    zero = xp.zeros_like(alpha)
+    t = t + G * l1 * xp.concat([xp.sin(alpha), zero, xp.sin(gamma)], axis=-1)
+    lever = xp.concat([f[..., 2:], zero, -f[..., :1]], axis=-1)
+    return xp.concat([f, t + l2 * lever], axis=-1)
+
+
+def _length(vectors: Array) -> Array:
+    """Returns the length (..., 1) of vectors (..., 3)."""
+    return namespace(vectors).sum(vectors * vectors, axis=-1, keepdims=True) ** 0.5
+
+
+@dataclasses.dataclass(frozen=True)
+class Processing:
+    """From readings to the state, as a pure function (thesis 4.2.4).
+
+    Attributes:
+        mounting: geometry and payload of the sensor.
+        is_exact: or by the thesis's equations, for small angles.
+    """
+
+    mounting: Mounting
+    is_exact: bool = True
+
+    def offset(self, reading: Array) -> Array:
+        """Returns what zeroing takes off, of readings (..., 6) with X_GB = identity."""
+        if not self.is_exact:
+            return reading
+        return reading - self.mounting.weight(self.mounting.X_BS.rotation())
+
+    def state(self, X_GB: Pose, reading: Array, offset: Array) -> Array:
+        """Returns states s (..., 12) of measured poses and raw readings (..., 6).
+
+        Args:
+            X_GB: measured.
+            reading: [f; tau] at So in S.
+            offset: (..., 6) from `offset`.
+        """
+        wrench = self.wrench(X_GB.R, reading, offset)
+        to_vector = rotation_vectors if self.is_exact else rpy_of_matrices
+        return namespace(wrench).concat([X_GB.p, to_vector(X_GB.R), wrench], axis=-1)
+
+    def wrench(self, R_GB: Array, reading: Array, offset: Array) -> Array:
+        """Returns the wrench (..., 6) of readings; see `state`."""
+        process = contact_wrench if self.is_exact else small_angle_contact_wrench
+        return process(reading, offset, R_GB, self.mounting)
 
 
 class ObservationProcessor(LeafSystem):
@@ -127,9 +177,9 @@ class ObservationProcessor(LeafSystem):
         reading: np.ndarray | None = None,
     ) -> None:
         super().__init__()
-        self._coordinates, self._mounting = coordinates, mounting
-        self._exact = variant == "exact"
-        offset = np.zeros(6) if reading is None else self._offset_of(reading)
+        self._coordinates = coordinates
+        self._processing = Processing(mounting, variant == "exact")
+        offset = np.zeros(6) if reading is None else self._processing.offset(reading)
         self._offset = self.DeclareNumericParameter(BasicVector(offset))
         self._position = self.DeclareVectorInputPort(
             "position_measured", coordinates.size
@@ -153,26 +203,14 @@ class ObservationProcessor(LeafSystem):
     def zero(self, context: Context, reading: np.ndarray) -> None:
         """Zeroes the sensor: `reading` (6,) was taken at the start, X_GB = identity."""
         parameter = context.get_mutable_numeric_parameter(self._offset)
-        parameter.SetFromVector(self._offset_of(reading))
-
-    def _offset_of(self, reading: np.ndarray) -> np.ndarray:
-        if not self._exact:
-            return reading
-        return reading - self._mounting.weight(self._mounting.X_BS.rotation())
+        parameter.SetFromVector(self._processing.offset(reading))
 
     def observation(
         self, context: Context, X_GB: RigidTransform, reading: np.ndarray
     ) -> np.ndarray:
         """Returns the state (12,) of a pose and a raw reading (6,), as zeroed."""
         offset = context.get_numeric_parameter(self._offset).value()
-        process = contact_wrench if self._exact else small_angle_contact_wrench
-        wrench = process(reading, offset, X_GB.rotation(), self._mounting)
-        rotation = (
-            rotation_vector(X_GB.rotation())
-            if self._exact
-            else RollPitchYaw(X_GB.rotation()).vector()
-        )
-        return np.concatenate([X_GB.translation(), rotation, wrench])
+        return np.asarray(self._processing.state(Pose.of(X_GB), reading, offset))
 
     def _calc_observation(self, context: Context, output: BasicVector) -> None:
         X_GB = self._coordinates.pose(self._position.Eval(context))

@@ -14,13 +14,10 @@ from pydrake.systems.framework import (
 )
 
 from drake_disasm.cell.coordinates import Coordinates
+from drake_disasm.common.arrays import Array, namespace
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.spatial import (
-    pose_from_vector,
-    pose_to_vector,
-    rotation_from_vector,
-    rotation_vector,
-)
+from drake_disasm.common.rotations import Pose, rotation_matrices, rotation_vectors
+from drake_disasm.common.spatial import pose_from_vector, pose_to_vector
 from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.common.timing import MOTION_DELAY
 from drake_disasm.effects import MotionEffect
@@ -132,16 +129,11 @@ class PoseTarget(LeafSystem):
         memory = context.get_discrete_state(self._memory).value()
         if not effects:
             return X_GB, memory
-        turn = rotation_vector(X_GB.rotation())
-        commanded = np.concatenate([X_GB.translation(), turn])
-        wrench = self._observation.Eval(context)[6:]
-        executed, memories = through_motion(
+        wrench, commanded = self._observation.Eval(context)[6:], Pose.of(X_GB)
+        executed, memories = executed_pose(
             effects, commanded, wrench, memory.reshape(-1, 6), self._period
         )
-        if np.array_equal(executed, commanded):
-            return X_GB, memories.reshape(-1)
-        R = rotation_from_vector(executed[3:])
-        return RigidTransform(R, executed[:3]), memories.reshape(-1)
+        return executed.to_drake(), memories.reshape(-1)
 
     def _calc_velocity(self, context: Context, output: BasicVector) -> None:
         way = (
@@ -161,27 +153,59 @@ def _refuse_too_many(effects: Sequence[MotionEffect]) -> None:
 
 def through_motion(
     effects: Sequence[MotionEffect],
-    commanded: np.ndarray,
-    wrench: np.ndarray,
-    memories: np.ndarray,
+    commanded: Array,
+    wrench: Array,
+    memories: Array,
     period: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns what is executed (6,) of a command, and what effects remember (k, 6).
+) -> tuple[Array, Array]:
+    """Returns what is executed (..., 6) of a command, and what effects remember.
 
     Args:
         effects: in the order of the chain.
-        commanded: (6,) position and rotation vector of B in G [m, rad].
-        wrench: (6,) [f; tau] on the bolt at Bo in G, at the step's beginning.
-        memories: (k, 6) of the step before, one for each effect and maybe more.
+        commanded: (..., 6) position and rotation vector of B in G [m, rad].
+        wrench: (..., 6) [f; tau] on the bolt at Bo in G, at the step's beginning.
+        memories: (..., k, 6) of the step before, one for each effect and maybe more.
         period: of the MDP [s].
     """
-    memories = np.array(memories)
+    memories = namespace(memories).asarray(memories, copy=True)
     for i, effect in enumerate(effects):
-        commanded, memories[i] = effect.execute(commanded, wrench, memories[i], period)
+        commanded, memories[..., i, :] = effect.execute(
+            commanded, wrench, memories[..., i, :], period
+        )
     return commanded, memories
+
+
+def executed_pose(
+    effects: Sequence[MotionEffect],
+    X_GB: Pose,
+    wrench: Array,
+    memories: Array,
+    period: float,
+) -> tuple[Pose, Array]:
+    """Returns where a commanded pose leads, and what effects remember.
+
+    See `through_motion`. What the effects leave as it is stays so, bit for bit.
+    """
+    xp = namespace(X_GB.p)
+    commanded = xp.concat([X_GB.p, rotation_vectors(X_GB.R)], axis=-1)
+    executed, memories = through_motion(effects, commanded, wrench, memories, period)
+    is_same = xp.all(executed == commanded, axis=-1)
+    R = rotation_matrices(executed[..., 3:])
+    return (
+        Pose(
+            xp.where(is_same[..., None, None], X_GB.R, R),
+            xp.where(is_same[..., None], X_GB.p, executed[..., :3]),
+        ),
+        memories,
+    )
 
 
 def moved(X_GB: RigidTransform, action: np.ndarray) -> RigidTransform:
     """Returns the pose after an action (6,) [m, rad], both in G, about Bo."""
-    R = rotation_from_vector(action[3:]) @ X_GB.rotation()
-    return RigidTransform(R, X_GB.translation() + action[:3])
+    return moved_poses(Pose.of(X_GB), action).to_drake()
+
+
+def moved_poses(X_GB: Pose, action: Array) -> Pose:
+    """Returns poses after actions (..., 6) [m, rad], both in G, about Bo."""
+    R = namespace(action).matmul(rotation_matrices(action[..., 3:]), X_GB.R)
+    return Pose(R, X_GB.p + action[..., :3])

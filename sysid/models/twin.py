@@ -122,7 +122,7 @@ class TwinModel(ScenarioModel):
         states = self.read(theta, rows, simulated)
         raw = self.reading.raw(states, simulated[0, 12:])
         sensing = self.reading.sensing(states, self._times)
-        inputs = SensorResidualModel.inputs_of(raw, sensing)
+        inputs: Array = SensorResidualModel.inputs_of(raw, sensing)
         return dict.fromkeys(WRENCH, inputs)
 
     @property

@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import as_number
 from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -33,8 +32,8 @@ class ChainPull(EnvironmentEffect):
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds the pull at this place."""
-        pull = [self.fx - self.k * bolt.p[0], self.fy, self.fz]
-        fx, fy, fz = np.array(environment.force_Gn) + pull
+        fx, fy, fz = environment.force_Gn
+        back = as_number(self.k * bolt.p[..., 0])
         return dataclasses.replace(
-            environment, force_Gn=(float(fx), float(fy), float(fz))
+            environment, force_Gn=(fx + self.fx - back, fy + self.fy, fz + self.fz)
         )

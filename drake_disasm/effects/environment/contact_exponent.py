@@ -2,6 +2,7 @@
 
 import dataclasses
 
+from drake_disasm.common.arrays import at_least
 from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -24,5 +25,5 @@ class ContactExponent(EnvironmentEffect):
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Changes the exponent."""
-        exponent = max(0.0, environment.impact_exponent + self.change)
+        exponent = at_least(0.0, environment.impact_exponent + self.change)
         return dataclasses.replace(environment, impact_exponent=exponent)

@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import exponential
 from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -26,7 +25,7 @@ class ContactStiffness(EnvironmentEffect):
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Scales the stiffness."""
-        factor = float(np.exp(self.log_factor))
+        factor = exponential(self.log_factor)
         return dataclasses.replace(
             environment,
             modulus=environment.modulus * factor,

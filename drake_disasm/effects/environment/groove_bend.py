@@ -2,10 +2,8 @@
 
 import dataclasses
 
-import numpy as np
-from pydrake.math import RigidTransform
-
-from drake_disasm.common.spatial import rotation_from_vector
+from drake_disasm.common.arrays import as_number, last_axis
+from drake_disasm.common.rotations import pose_from_vectors
 from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -31,8 +29,10 @@ class GrooveBend(EnvironmentEffect):
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Composes the tangent groove at the bolt onto the pose so far."""
-        x = float((environment.X_GnG.inverse() @ bolt.p)[0])
-        R = rotation_from_vector(np.array([0.0, -self.kz * x, self.ky * x]))
-        c = np.array([x, self.ky * x**2 / 2.0, self.kz * x**2 / 2.0])
-        tangent = RigidTransform(R, c - R @ np.array([x, 0.0, 0.0]))
+        x = as_number((environment.X_GnG.inverse() @ bolt.p)[..., 0])
+        turn = last_axis([0.0, -self.kz * x, self.ky * x], bolt.p)
+        c = last_axis([x, self.ky * x**2 / 2.0, self.kz * x**2 / 2.0], bolt.p)
+        here = pose_from_vectors(turn, 0.0 * c)
+        p = c - here @ last_axis([x, 0.0, 0.0], bolt.p)
+        tangent = pose_from_vectors(turn, p)
         return dataclasses.replace(environment, X_GnG=environment.X_GnG @ tangent)

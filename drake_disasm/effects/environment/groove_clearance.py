@@ -2,6 +2,7 @@
 
 import dataclasses
 
+from drake_disasm.common.arrays import at_least, at_most
 from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -26,7 +27,6 @@ class GrooveClearance(EnvironmentEffect):
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Changes the clearance."""
-        clearance = max(
-            min(_LEAST, environment.clearance), environment.clearance + self.change
-        )
+        nominal = environment.clearance
+        clearance = at_least(at_most(_LEAST, nominal), nominal + self.change)
         return dataclasses.replace(environment, clearance=clearance)

@@ -3,6 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
+from drake_disasm.common.arrays import at_least
 from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -30,5 +31,5 @@ class GrooveFriction(EnvironmentEffect):
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds the coefficient, never below a frictionless groove."""
-        friction = max(0.0, environment.friction + self.coefficient)
+        friction = at_least(0.0, environment.friction + self.coefficient)
         return dataclasses.replace(environment, friction=friction)

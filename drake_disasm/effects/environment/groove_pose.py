@@ -2,10 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-from pydrake.math import RigidTransform
-
-from drake_disasm.common.spatial import rotation_from_vector
+from drake_disasm.common.rotations import pose_from_vectors
 from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -37,6 +34,6 @@ class GroovePose(EnvironmentEffect):
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Composes the true groove frame onto the pose so far."""
-        R = rotation_from_vector(np.array([self.rx, self.ry, self.rz]))
-        X_GnG = environment.X_GnG @ RigidTransform(R, [self.x, self.y, self.z])
-        return dataclasses.replace(environment, X_GnG=X_GnG)
+        turn = self.vector(bolt.p, "rx", "ry", "rz")
+        moved = pose_from_vectors(turn, self.vector(bolt.p, "x", "y", "z"))
+        return dataclasses.replace(environment, X_GnG=environment.X_GnG @ moved)

@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import as_number, at_least, exponential
 from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
@@ -40,7 +39,7 @@ class RustyPatch(EnvironmentEffect):
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds the friction at this place."""
-        away = (bolt.p[0] - self.position) / self.width
-        added = self.coefficient * np.exp(-(away**2))
-        friction = max(0.0, float(environment.friction + added))
+        away = (as_number(bolt.p[..., 0]) - self.position) / self.width
+        added = self.coefficient * exponential(-(away**2))
+        friction = at_least(0.0, environment.friction + added)
         return dataclasses.replace(environment, friction=friction)

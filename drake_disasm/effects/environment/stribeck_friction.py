@@ -2,8 +2,12 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import (
+    as_number,
+    at_least,
+    exponential,
+    namespace,
+)
 from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
@@ -30,7 +34,7 @@ class GrooveStribeckFriction(EnvironmentEffect):
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds what is left at this speed."""
-        speed = float(np.linalg.norm(bolt.v))
-        added = self.coefficient * np.exp(-((speed / self.velocity) ** 2))
-        friction = max(0.0, float(environment.friction + added))
+        speed = as_number(namespace(bolt.v).sum(bolt.v**2, axis=-1)) ** 0.5
+        added = self.coefficient * exponential(-((speed / self.velocity) ** 2))
+        friction = at_least(0.0, environment.friction + added)
         return dataclasses.replace(environment, friction=friction)

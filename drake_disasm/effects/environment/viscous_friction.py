@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import as_number
 from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -26,7 +25,8 @@ class GrooveViscousFriction(EnvironmentEffect):
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds the drag."""
-        fx, fy, fz = np.array(environment.force_Gn) - self.coefficient * bolt.v
-        return dataclasses.replace(
-            environment, force_Gn=(float(fx), float(fy), float(fz))
+        fx, fy, fz = (
+            force - self.coefficient * as_number(bolt.v[..., axis])
+            for axis, force in enumerate(environment.force_Gn)
         )
+        return dataclasses.replace(environment, force_Gn=(fx, fy, fz))

@@ -3,8 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array, limited
 from drake_disasm.effects.base import Memory, MotionEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -36,10 +35,9 @@ class Backlash(MotionEffect):
     }
 
     def execute(
-        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
-    ) -> tuple[np.ndarray, Memory]:
+        self, commanded: Array, wrench: Array, memory: Memory, period: float
+    ) -> tuple[Array, Memory]:
         """See MotionEffect; the memory is the pose before."""
-        play = np.array([self.x, self.y, self.z, self.u, self.v, self.w])
-        near, far = commanded - play / 2.0, commanded + play / 2.0
-        executed = np.minimum(np.maximum(memory, near), far)
+        play = self.vector(commanded, "x", "y", "z", "u", "v", "w")
+        executed = limited(memory, commanded - play / 2.0, commanded + play / 2.0)
         return executed, executed

@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array
 from drake_disasm.effects.base import Memory, MotionEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -30,8 +29,8 @@ class CommandGain(MotionEffect):
     experiment = "steps of several lengths in free space"
 
     def execute(
-        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
-    ) -> tuple[np.ndarray, Memory]:
+        self, commanded: Array, wrench: Array, memory: Memory, period: float
+    ) -> tuple[Array, Memory]:
         """See MotionEffect."""
-        gain = np.array([self.x, self.y, self.z, self.u, self.v, self.w])
+        gain = self.vector(commanded, "x", "y", "z", "u", "v", "w")
         return commanded + gain * commanded, memory

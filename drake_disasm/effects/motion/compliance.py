@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array
 from drake_disasm.effects.base import Memory, MotionEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -33,8 +32,8 @@ class Compliance(MotionEffect):
     experiment = "the same steps under two loads"
 
     def execute(
-        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
-    ) -> tuple[np.ndarray, Memory]:
+        self, commanded: Array, wrench: Array, memory: Memory, period: float
+    ) -> tuple[Array, Memory]:
         """See MotionEffect."""
-        yields = np.array([self.x, self.y, self.z, self.u, self.v, self.w])
+        yields = self.vector(commanded, "x", "y", "z", "u", "v", "w")
         return commanded + yields * wrench, memory

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+from drake_disasm.common.arrays import Array, array_like, last_axis, to_numpy
 from drake_disasm.effects.base import Memory, MotionEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -34,10 +35,18 @@ class Imprecision(MotionEffect):
     experiment = "the same steps many times over in free space: how far they scatter"
 
     def execute(
-        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
-    ) -> tuple[np.ndarray, Memory]:
+        self, commanded: Array, wrench: Array, memory: Memory, period: float
+    ) -> tuple[Array, Memory]:
         """See MotionEffect; the memory counts commands."""
-        seed = np.concatenate([commanded, memory[:1]]).view(np.uint32)
-        n = np.random.default_rng(seed).standard_normal(3)
-        away = np.array([self.x, self.y, self.z]) * n
-        return commanded + np.append(away, np.zeros(3)), memory + 1.0
+        count = to_numpy(memory)[..., :1]
+        keys = np.concatenate([to_numpy(commanded), count], axis=-1)
+        drawn = [_numbers(key) for key in keys.reshape(-1, keys.shape[-1])]
+        n = array_like(np.reshape(drawn, commanded.shape), commanded)
+        away = last_axis([self.x, self.y, self.z, 0.0, 0.0, 0.0], commanded)
+        return commanded + away * n, memory + 1.0
+
+
+def _numbers(key: np.ndarray) -> np.ndarray:
+    """Returns normal numbers (6,) that are a function of others (7,)."""
+    seed = np.ascontiguousarray(key).view(np.uint32)
+    return np.append(np.random.default_rng(seed).standard_normal(3), np.zeros(3))

@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array, at_most
 from drake_disasm.effects.base import Memory, MotionEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -27,8 +26,8 @@ class MotionLag(MotionEffect):
     experiment = "fast and slow steps over the same path in free space"
 
     def execute(
-        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
-    ) -> tuple[np.ndarray, Memory]:
+        self, commanded: Array, wrench: Array, memory: Memory, period: float
+    ) -> tuple[Array, Memory]:
         """See MotionEffect; the memory is the command before."""
-        share = min(self.delay / period, 1.0)
+        share = at_most(1.0, self.column("delay") / period)
         return commanded + share * (memory - commanded), commanded

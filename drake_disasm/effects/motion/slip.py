@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array, last_axis
 from drake_disasm.effects.base import Memory, MotionEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -29,9 +28,9 @@ class BoltSlip(MotionEffect):
     experiment = "a strong pull and back: slip stays, compliance returns"
 
     def execute(
-        self, commanded: np.ndarray, wrench: np.ndarray, memory: Memory, period: float
-    ) -> tuple[np.ndarray, Memory]:
+        self, commanded: Array, wrench: Array, memory: Memory, period: float
+    ) -> tuple[Array, Memory]:
         """See MotionEffect; the memory is the slip so far."""
-        creep = np.array([self.x, self.y, self.z, 0.0, 0.0, 0.0])
+        creep = last_axis([self.x, self.y, self.z, 0.0, 0.0, 0.0], commanded)
         slip = memory + creep * wrench * period
         return commanded + slip, slip

@@ -2,9 +2,13 @@
 
 import dataclasses
 
-import numpy as np
-
-from drake_disasm.common.spatial import rotation_from_vector
+from drake_disasm.common.arrays import (
+    Array,
+    apply_matrix,
+    last_axis,
+    transposed,
+)
+from drake_disasm.common.rotations import rotation_matrices
 from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -31,15 +35,15 @@ class BaseTilt(SensorEffect):
 
     def circumstances(self, sensing: Sensing) -> Sensing:
         """Returns the circumstances under the true gravity."""
-        return dataclasses.replace(sensing, g_W=self._R @ sensing.g_W)
+        R = self._tilt(sensing.g_W)
+        return dataclasses.replace(sensing, g_W=apply_matrix(R, sensing.g_W))
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Adds the change of the payload's weight; `sensing` has the true gravity."""
-        believed = self._R.T @ sensing.g_W
-        change = sensing.mass * ((sensing.g_W - believed) @ sensing.R_WS)
-        torque = np.cross(sensing.p_SoScm_S, change)
-        return wrench_S + np.concatenate([change, torque], axis=-1)
+        R = self._tilt(sensing.g_W)
+        believed = apply_matrix(transposed(R), sensing.g_W)
+        change = dataclasses.replace(sensing, g_W=sensing.g_W - believed)
+        return wrench_S + change.weight
 
-    @property
-    def _R(self) -> np.ndarray:
-        return rotation_from_vector(np.array([self.rx, self.ry, 0.0])).matrix()
+    def _tilt(self, like: Array) -> Array:
+        return rotation_matrices(last_axis([self.rx, self.ry, 0.0], like))

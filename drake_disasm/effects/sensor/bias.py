@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array
 from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -33,7 +32,6 @@ class SensorBias(SensorEffect):
     )
     task_experiment = "steps in free space, where an offset stays and contact does not"
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Adds the offset."""
-        offset = [self.fx, self.fy, self.fz, self.tx, self.ty, self.tz]
-        return wrench_S + np.array(offset)
+        return wrench_S + self.vector(wrench_S, "fx", "fy", "fz", "tx", "ty", "tz")

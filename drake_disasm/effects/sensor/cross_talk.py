@@ -3,8 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array, apply_matrix, last_axis, namespace
 from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -62,8 +61,12 @@ class SensorCrossTalk(SensorEffect):
         ),
     }
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Mixes the channels."""
-        C = np.zeros((6, 6))
-        C[~np.eye(6, dtype=bool)] = dataclasses.astuple(self)
-        return wrench_S + wrench_S @ C.T
+        shares = iter([getattr(self, field.name) for field in dataclasses.fields(self)])
+        rows = [
+            last_axis([0.0 if i == j else next(shares) for j in range(6)], wrench_S)
+            for i in range(6)
+        ]
+        C = namespace(wrench_S).stack(rows, axis=-2)
+        return wrench_S + apply_matrix(C, wrench_S)

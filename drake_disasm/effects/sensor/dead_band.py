@@ -2,10 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-from scipy.special import expit
-
-from drake_disasm.common.spatial import weight_wrench
+from drake_disasm.common.arrays import Array, last_axis, namespace
 from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
@@ -41,13 +38,15 @@ class SensorDeadBand(SensorEffect):
     stage = 5
     experiment = "a load that grows slowly through zero, along each axis of the sensor"
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Takes off what the band hides."""
-        p = np.array(sensing.p_SoScm_S)
-        load = wrench_S - weight_wrench(sensing.mass, p, sensing.R_WS, sensing.g_W)
-        width = self.width * np.array([1.0, 1.0, 1.0, _LEVER, _LEVER, _LEVER])
-        share = np.array([self.force] * 3 + [self.torque] * 3)
-        outside = expit((np.abs(load) - width) / (_EDGE * width))
+        xp = namespace(wrench_S)
+        load = wrench_S - sensing.weight
+        width = last_axis([self.width] * 3 + [_LEVER * self.width] * 3, wrench_S)
+        share = last_axis([self.force] * 3 + [self.torque] * 3, wrench_S)
+        # The logistic function, which does not overflow as a tangent.
+        beyond = (xp.abs(load) - width) / (_EDGE * width)
+        outside = 0.5 + 0.5 * xp.tanh(beyond / 2.0)
         hidden = (1.0 - outside) * load
-        missing = self.beyond * outside * width * np.sign(load)
+        missing = self.column("beyond") * outside * width * xp.sign(load)
         return wrench_S - share * (hidden + missing)

@@ -3,8 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array
 from drake_disasm.effects.base import SensorMemoryEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.history import History
@@ -36,16 +35,14 @@ class SensorDelay(SensorMemoryEffect):
         "MotionLag": "motion in free space: the measured pose is late then, too",
     }
 
-    def begin(self, wrench_S: np.ndarray) -> np.ndarray:
+    def begin(self, wrench_S: Array) -> Array:
         """Returns a history of nothing but this load."""
         return _HISTORY.begin(wrench_S)
 
-    def remember(
-        self, memory: np.ndarray, wrench_S: np.ndarray, interval: float
-    ) -> np.ndarray:
+    def remember(self, memory: Array, wrench_S: Array, interval: float) -> Array:
         """Returns the history with one more sample."""
         return _HISTORY.extended(memory, wrench_S, interval)
 
-    def read(self, wrench_S: np.ndarray, memory: np.ndarray) -> np.ndarray:
+    def read(self, wrench_S: Array, memory: Array) -> Array:
         """Returns the load of a while ago."""
-        return _HISTORY.at(memory, self.delay)
+        return _HISTORY.at(memory, self.column("delay"))

@@ -3,8 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array, limited
 from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
@@ -42,8 +41,10 @@ class SensorDrift(SensorEffect):
         "SensorWarmUp": "a longer rest: a warm-up ends, a drift goes on",
     }
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Adds the offset at this time."""
-        elapsed = np.minimum(sensing.time, self.duration)
-        rate = [self.fx, self.fy, self.fz, self.tx, self.ty, self.tz]
-        return wrench_S + np.multiply.outer(elapsed, rate)
+        time = sensing.time[..., None]
+        elapsed = limited(time, 0.0 * time, 0.0 * time + self.column("duration"))
+        return wrench_S + elapsed * self.vector(
+            wrench_S, "fx", "fy", "fz", "tx", "ty", "tz"
+        )

@@ -3,8 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array
 from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -37,7 +36,7 @@ class SensorGain(SensorEffect):
         ),
     }
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Scales the channels."""
-        gain = np.array([self.fx, self.fy, self.fz, self.tx, self.ty, self.tz])
+        gain = self.vector(wrench_S, "fx", "fy", "fz", "tx", "ty", "tz")
         return wrench_S + gain * wrench_S

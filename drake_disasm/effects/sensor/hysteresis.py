@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array, last_axis, limited
 from drake_disasm.effects.base import SensorMemoryEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
@@ -30,17 +29,15 @@ class SensorHysteresis(SensorMemoryEffect):
     noun = "hysteresis of the sensor"
     experiment = "loading and unloading along one axis, in small steps"
 
-    def begin(self, wrench_S: np.ndarray) -> np.ndarray:
+    def begin(self, wrench_S: Array) -> Array:
         """Returns the play centred on the load."""
         return wrench_S
 
-    def remember(
-        self, memory: np.ndarray, wrench_S: np.ndarray, interval: float
-    ) -> np.ndarray:
+    def remember(self, memory: Array, wrench_S: Array, interval: float) -> Array:
         """Returns where the play has been taken to."""
-        width = self.width * np.array([1.0, 1.0, 1.0, _LEVER, _LEVER, _LEVER])
-        return np.minimum(np.maximum(memory, wrench_S - width), wrench_S + width)
+        width = last_axis([self.width] * 3 + [_LEVER * self.width] * 3, wrench_S)
+        return limited(memory, wrench_S - width, wrench_S + width)
 
-    def read(self, wrench_S: np.ndarray, memory: np.ndarray) -> np.ndarray:
+    def read(self, wrench_S: Array, memory: Array) -> Array:
         """Returns the reading."""
-        return wrench_S + self.share * (memory - wrench_S)
+        return wrench_S + self.column("share") * (memory - wrench_S)

@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array, exponential
 from drake_disasm.effects.base import SensorMemoryEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
@@ -28,17 +27,15 @@ class SensorLag(SensorMemoryEffect):
     noun = "a slow filter of the sensor"
     experiment = "fast motion and slow motion over the same path"
 
-    def begin(self, wrench_S: np.ndarray) -> np.ndarray:
+    def begin(self, wrench_S: Array) -> Array:
         """Returns the settled filter."""
         return wrench_S
 
-    def remember(
-        self, memory: np.ndarray, wrench_S: np.ndarray, interval: float
-    ) -> np.ndarray:
+    def remember(self, memory: Array, wrench_S: Array, interval: float) -> Array:
         """Returns the filter's output."""
-        stays = np.exp(-interval / self.time_constant)
+        stays = exponential(-interval / self.column("time_constant"))
         return wrench_S + stays * (memory - wrench_S)
 
-    def read(self, wrench_S: np.ndarray, memory: np.ndarray) -> np.ndarray:
+    def read(self, wrench_S: Array, memory: Array) -> Array:
         """Returns the reading."""
-        return wrench_S + self.share * (memory - wrench_S)
+        return wrench_S + self.column("share") * (memory - wrench_S)

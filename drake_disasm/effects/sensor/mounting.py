@@ -3,9 +3,8 @@
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
-from drake_disasm.common.spatial import rotation_from_vector
+from drake_disasm.common.arrays import Array, apply_matrix, namespace, transposed
+from drake_disasm.common.rotations import rotation_matrices
 from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -39,7 +38,10 @@ class SensorMounting(SensorEffect):
         ),
     }
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Expresses the wrench in the true axes."""
-        R = rotation_from_vector(np.array([self.rx, self.ry, self.rz])).matrix()
-        return np.concatenate([wrench_S[..., :3] @ R, wrench_S[..., 3:] @ R], axis=-1)
+        R = transposed(rotation_matrices(self.vector(wrench_S, "rx", "ry", "rz")))
+        parts = (wrench_S[..., :3], wrench_S[..., 3:])
+        return namespace(wrench_S).concat(
+            [apply_matrix(R, part) for part in parts], axis=-1
+        )

@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array, cross, namespace
 from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
@@ -34,8 +33,9 @@ class PayloadError(SensorEffect):
     experiment = "six or more orientations, with and without the tool"
     task_experiment = "steps in free space that turn the bolt: a weight turns with it"
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Adds the weight that the tool data lack."""
         g_S = sensing.g_S
-        torque = np.cross([self.cx, self.cy, self.cz], g_S)
-        return wrench_S + np.concatenate([self.mass * g_S, torque], axis=-1)
+        torque = cross(self.vector(g_S, "cx", "cy", "cz"), g_S)
+        force = self.column("mass") * g_S
+        return wrench_S + namespace(g_S).concat([force, torque], axis=-1)

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from drake_disasm.common.arrays import Array, array_like, namespace, to_numpy
 from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude, file_name
 from drake_disasm.effects.learned import learned_functions
@@ -35,22 +36,23 @@ class SensorResidualModel(SensorEffect):
     noun = "a learned model of the readings"
     experiment = "what shows an effect of which this is the trace"
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """See SensorEffect."""
         if self.is_null:
             return wrench_S
         functions = learned_functions(self.file, self.inputs)
-        inputs = self.inputs_of(wrench_S, sensing)
+        inputs = to_numpy(self.inputs_of(wrench_S, sensing))
         added = np.zeros((len(inputs), len(_WRENCH)))
         for name, function in functions.outputs.items():
             added[:, _WRENCH.index(name)] = function(inputs)
-        return wrench_S + self.share * added.reshape(wrench_S.shape)
+        found = array_like(added.reshape(wrench_S.shape), wrench_S)
+        return wrench_S + self.column("share") * found
 
     @staticmethod
-    def inputs_of(wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def inputs_of(wrench_S: Array, sensing: Sensing) -> Array:
         """Returns what the functions take (n, 10), of readings (..., 6)."""
-        leading = wrench_S.shape[:-1]
-        g_S = np.broadcast_to(sensing.g_S, (*leading, 3))
-        time = np.broadcast_to(np.asarray(sensing.time), leading)[..., None]
-        both = np.concatenate([wrench_S, g_S, time], axis=-1)
-        return np.asarray(both.reshape(-1, both.shape[-1]))
+        xp, leading = namespace(wrench_S), wrench_S.shape[:-1]
+        g_S = xp.broadcast_to(sensing.g_S, (*leading, 3))
+        time = xp.broadcast_to(xp.asarray(sensing.time), leading)[..., None]
+        both = xp.concat([wrench_S, g_S, time], axis=-1)
+        return xp.reshape(both, (-1, both.shape[-1]))

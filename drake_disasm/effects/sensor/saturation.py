@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array, last_axis, limited
 from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
@@ -30,8 +29,8 @@ class SensorSaturation(SensorEffect):
     noun = "saturation of the sensor"
     experiment = "loads near the end of the range, along each axis"
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Removes what is lost beyond the limit."""
-        limit = self.limit * np.array([1.0, 1.0, 1.0, _LEVER, _LEVER, _LEVER])
-        held = np.minimum(np.maximum(wrench_S, -limit), limit)
-        return wrench_S - self.share * (wrench_S - held)
+        limit = last_axis([self.limit] * 3 + [_LEVER * self.limit] * 3, wrench_S)
+        held = limited(wrench_S, -limit, limit)
+        return wrench_S - self.column("share") * (wrench_S - held)

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from drake_disasm.common.arrays import Array, limited
 from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
@@ -53,8 +54,11 @@ class SensorStep(SensorEffect):
         onsets = part * (np.arange(1.0, _PARTS) - 0.5)
         return {"onset": tuple(onsets.tolist()), "rise": (part,)}
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Adds the offset at this time."""
-        offset = [self.fx, self.fy, self.fz, self.tx, self.ty, self.tz]
-        set_in = np.clip((sensing.time - self.onset) / self.rise, 0.0, 1.0)
-        return wrench_S + np.multiply.outer(set_in, offset)
+        time = sensing.time[..., None]
+        since = (time - self.column("onset")) / self.column("rise")
+        set_in = limited(since, 0.0 * since, 1.0 + 0.0 * since)
+        return wrench_S + set_in * self.vector(
+            wrench_S, "fx", "fy", "fz", "tx", "ty", "tz"
+        )

@@ -2,8 +2,7 @@
 
 import dataclasses
 
-import numpy as np
-
+from drake_disasm.common.arrays import Array, namespace
 from drake_disasm.effects.base import Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
@@ -36,8 +35,11 @@ class SensorWarmUp(SensorEffect):
     noun = "warm-up of the sensor"
     experiment = "a rest from switching on until the reading stays, pose unchanged"
 
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+    def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Adds the offset at this time."""
-        final = [self.fx, self.fy, self.fz, self.tx, self.ty, self.tz]
-        settled = -np.expm1(-sensing.time / self.time_constant)
-        return wrench_S + np.multiply.outer(settled, final)
+        xp = namespace(wrench_S)
+        time = sensing.time[..., None]
+        settled = -xp.expm1(-time / self.column("time_constant"))
+        return wrench_S + settled * self.vector(
+            wrench_S, "fx", "fy", "fz", "tx", "ty", "tz"
+        )
