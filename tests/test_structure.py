@@ -24,7 +24,7 @@ FLOORS = {
         {"safety"},
         {"systems"},
         {"stations", "policies"},
-        {"task"},
+        {"task", "batch"},
         {"visualization", "learning", "fakes"},
         {"studies"},
     ),

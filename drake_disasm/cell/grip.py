@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 
 from drake_disasm.cell.tool import Tool
+from drake_disasm.common.arrays import Array
 from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import GripperConfig, Scenario
 
@@ -44,6 +45,12 @@ class Springs:
             inertia: (6,) [kg, kg m^2].
         """
         return cls(stiffness, 2.0 * ratio * np.sqrt(stiffness * inertia))
+
+
+def in_joint_order(springs: Springs) -> tuple[Array, Array]:
+    """Returns stiffness and damping (..., 6) in the order of the twin's joints."""
+    order = list(AXIS_ORDER)
+    return springs.stiffness[..., order], springs.damping[..., order]
 
 
 def gripped_inertia(tool: Tool) -> np.ndarray:

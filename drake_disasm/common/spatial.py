@@ -7,7 +7,13 @@ from pydrake.common.eigen_geometry import AngleAxis, Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialForce
 
-from drake_disasm.common.arrays import Array, apply_matrix, cross, namespace
+from drake_disasm.common.arrays import (
+    Array,
+    apply_matrix,
+    cross,
+    namespace,
+    transposed,
+)
 
 
 def rotation_from_vector(vector: np.ndarray) -> RotationMatrix:
@@ -60,9 +66,9 @@ def weight_wrench(
         mass: [kg]; (..., 1) where each has its own.
         p_SoScm_S: (..., 3) its centre of mass from So, about which the torque is [m].
         R_WS: (..., 3, 3) orientations of the sensor.
-        g_W: (..., 1, 3) or (3,) gravity [m/s^2].
+        g_W: (..., 3) gravity [m/s^2].
     """
-    f = mass * (g_W @ R_WS)
+    f = mass * apply_matrix(transposed(R_WS), g_W)
     return namespace(f).concat([f, cross(p_SoScm_S, f)], axis=-1)
 
 

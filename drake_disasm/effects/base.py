@@ -30,13 +30,12 @@ from drake_disasm.common.arrays import (
     Array,
     apply_matrix,
     array_like,
-    cross,
     last_axis,
-    namespace,
     to_numpy,
     transposed,
 )
 from drake_disasm.common.rotations import Pose
+from drake_disasm.common.spatial import weight_wrench
 from drake_disasm.effects.fields import acts_at_joint, amplitudes, shape_parameters
 
 #: What an effect on the motion keeps from one step to the next: six numbers.
@@ -119,10 +118,8 @@ class Sensing:
     @property
     def weight(self) -> Array:
         """The payload's load on the sensor (..., 6), [f; tau] at So in S."""
-        f = self.mass * self.g_S
-        return namespace(f).concat(
-            [f, cross(array_like(self.p_SoScm_S, f), f)], axis=-1
-        )
+        p_SoScm_S = array_like(self.p_SoScm_S, self.g_W)
+        return weight_wrench(self.mass, p_SoScm_S, self.R_WS, self.g_W)
 
 
 def name_in_words(name: str) -> str:

@@ -3,6 +3,7 @@
 from drake_disasm.impact.law import ImpactLaw
 from drake_disasm.impact.shape import Contacts, LockShape
 from drake_disasm.impact.step import (
+    NO_BALANCE,
     ImpactConditions,
     ImpactStep,
     Surroundings,
@@ -10,6 +11,7 @@ from drake_disasm.impact.step import (
 )
 
 __all__ = [
+    "NO_BALANCE",
     "Contacts",
     "ImpactConditions",
     "ImpactLaw",

@@ -99,6 +99,10 @@ class LockShape:
             bottom=top - lock.head_thickness,
         )
 
+    def with_clearance(self, clearance: float | Array) -> "LockShape":
+        """Returns the shape with another slot: its width less the neck's diameter."""
+        return dataclasses.replace(self, slot=self.neck + clearance / 2.0)
+
     def contacts(self, R_GB: Array, p_GBo: Array) -> Contacts:
         """Returns all places.
 

@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from drake_disasm.cell.grip import AXIS_ORDER, Springs
+from drake_disasm.cell.grip import Springs, in_joint_order
 from drake_disasm.common.arrays import (
     Array,
     apply_matrix,
@@ -22,6 +22,9 @@ from drake_disasm.common.rotations import matrices_of_rpy
 from drake_disasm.effects import Environment
 from drake_disasm.impact.law import ImpactLaw
 from drake_disasm.impact.shape import NORMALS, LockShape
+
+#: What an error says.
+NO_BALANCE = "IMPACT contact: no force balances this step"
 
 _ITERATIONS = 60
 _HALVINGS = 12
@@ -90,8 +93,7 @@ class ImpactConditions:
 
     def sprung(self, springs: Springs) -> Self:
         """Returns the same with other springs in the twin's joints."""
-        order = list(AXIS_ORDER)
-        K, D = springs.stiffness[..., order], springs.damping[..., order]
+        K, D = in_joint_order(springs)
         return dataclasses.replace(self, K=K, D=D)
 
 
@@ -176,7 +178,7 @@ class ImpactStep:
         """
         v, wrench, is_solved = self.attempt()
         if not bool(self._xp.all(is_solved)):
-            raise RuntimeError("IMPACT contact: no force balances this step")
+            raise RuntimeError(NO_BALANCE)
         return v, wrench
 
     def attempt(self) -> tuple[Array, Array, Array]:

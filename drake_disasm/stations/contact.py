@@ -211,7 +211,6 @@ class ImpactContactForce(ContactStrategy):
         self.system.set_conditions(parts(self.system), conditions)
 
     def _conditions(self, environment: Environment) -> ImpactConditions:
-        config, clearance = self._lock.config, environment.clearance
         K, D = self._spring.gains()
         return ImpactConditions(
             law=dataclasses.replace(
@@ -219,7 +218,7 @@ class ImpactContactForce(ContactStrategy):
                 stiffness=environment.impact_stiffness,
                 exponent=environment.impact_exponent,
             ),
-            shape=LockShape.of(dataclasses.replace(config, clearance=clearance)),
+            shape=LockShape.of(self._lock.config).with_clearance(environment.clearance),
             around=Surroundings.of([environment]),
             M=self._M,
             K=K,

@@ -11,14 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drake_disasm.cell.tool import summed
+from drake_disasm.batch.motion import TwinState, plant_step
+from drake_disasm.batch.numbers import TwinNumbers
 from drake_disasm.effects import environment_at, is_local
-from drake_disasm.impact import (
-    ImpactConditions,
-    ImpactStep,
-    Surroundings,
-    turning,
-)
+from drake_disasm.impact import NO_BALANCE, ImpactConditions, Surroundings
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.arm_node import ArmStep
 from drake_disasm.task.replay import ReplayDiagram, Steps
@@ -31,9 +27,8 @@ class ImpactReplay:
     """Computes `TwinReplay.transitions` for a scenario with IMPACT contact, faster.
 
     The diagram stays the reference: it holds the parameters, zeroes the sensor and
-    processes observations; only the steps themselves are computed here, by the equation
-    with which the diagram's `ImpactContact` predicts them. What it neglects (the change
-    of inertia with the angles, Coriolis forces) is far below the sensor's noise.
+    processes observations; only the steps themselves are computed here, by those of
+    the batched twin (`plant_step`).
 
     Args:
         scenario: what the twin is, `contact.model` being impact.
@@ -46,13 +41,7 @@ class ImpactReplay:
 
     def _build(self, scenario: Scenario) -> None:
         self._diagram, self._scenario = ReplayDiagram(scenario), scenario
-        station = self._diagram.station
-        M_B = station.lock.bolt.default_spatial_inertia()
-        M_B = summed([M_B, station.parameters.M_fingers_B])
-        I_B = M_B.CalcRotationalInertia().CopyToFullMatrix3()
-        R_WGn, g_W = station.X_WG.rotation(), station.plant.gravity_field()
-        g_Gn = R_WGn.matrix().T @ g_W.gravity_vector()
-        self._bolt = (M_B.get_mass(), M_B.get_com(), I_B, g_Gn)
+        self._body = TwinNumbers.of(scenario).body
         self._zero()
 
     def reconfigure(self, scenario: Scenario) -> None:
@@ -102,7 +91,7 @@ class ImpactReplay:
         time_steps: Sequence[float],
         until_rest: bool = False,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns coordinates of arm and bolt, and loads on the sensor (see `_loads`).
+        """Returns coordinates of arm and bolt, and loads on the sensor (n, 6) each.
 
         Args:
             steps: where arm and command begin, and how the command moves.
@@ -112,26 +101,21 @@ class ImpactReplay:
         """
         parameters = self._diagram.station.parameters
         conditions = self._conditions(steps, q_bolt)
-        q, v = q_bolt, steps.v + steps.give_rate
-        qd, rate = steps.qd, steps.qd_rate
-        arm = np.hstack([steps.q, steps.v])
-        nodes = {
+        arms = {
             h: ArmStep.of(parameters.arm, parameters.grip, h) for h in set(time_steps)
         }
+        before = np.hstack([steps.q, steps.v])
+        state = TwinState(before, q_bolt, steps.v + steps.give_rate, steps.qd)
         for h in time_steps:
-            qd, node = qd + h * rate, nodes[h]
-            ahead = node.ahead(arm, np.hstack([qd, rate]))
-            step = ImpactStep(
-                conditions.sprung(node.springs), h, q, v, ahead[:, :6], ahead[:, 6:]
-            )
-            begin, v_begin = q, v
-            v, contact = step.solve()
-            q = q + h * v
-            arm = node.after(ahead, np.hstack([q, v]))
-            if until_rest and max(np.abs(v).max(), np.abs(v - v_begin).max()) < _REST:
+            sprung = conditions.sprung(arms[h].springs)
+            step, v = plant_step(state, steps.qd_rate, arms[h], sprung), state.v
+            if not step.is_solved.all():
+                raise RuntimeError(NO_BALANCE)
+            state = step.state
+            moves = max(np.abs(state.v).max(), np.abs(state.v - v).max())
+            if until_rest and moves < _REST:
                 break
-        contact[:, :3] += conditions.around.f_Gn
-        return arm[:, :6], q, self._loads(begin, (v - v_begin) / h, contact)
+        return state.arm[:, :6], state.q, step.load(self._body)
 
     def _conditions(self, steps: Steps, q_bolt: np.ndarray) -> ImpactConditions:
         """Returns the contact's conditions, per step where an effect is local."""
@@ -165,26 +149,3 @@ class ImpactReplay:
         parameters = self._diagram.station.parameters
         arm = ArmStep.of(parameters.arm, parameters.grip, step)
         return float(step) if arm.is_stable else 0.0
-
-    def _loads(
-        self, q: np.ndarray, vdot: np.ndarray, contact: np.ndarray
-    ) -> np.ndarray:
-        """Returns the bolt's load on the sensor, (n, 6) [f; tau] at Bo in Gn.
-
-        Newton's and Euler's laws for the bolt, without products of velocities.
-
-        Args:
-            q, vdot: (n, 6) coordinates and their second derivatives.
-            contact: (n, 6) wrench on the bolt at Bo in Gn.
-        """
-        mass, p_BoBcm_B, I_Bo_B, g_Gn = self._bolt
-        E, R = turning(q[:, 3:])
-        alpha = np.einsum("nij,nj->ni", E, vdot[:, 3:])
-        p_BoTo = R @ self._diagram.station.parameters.p_BoTo_B
-        a_Bo = vdot[:, :3] - np.cross(alpha, p_BoTo)
-        p_BoBcm = np.einsum("nij,j->ni", R, p_BoBcm_B)
-        spin = np.einsum("nij,jk,nlk,nl->ni", R, I_Bo_B, R, alpha)
-        pull = mass * (g_Gn - a_Bo)
-        f = contact[:, :3] + pull - mass * np.cross(alpha, p_BoBcm)
-        t = contact[:, 3:] + np.cross(p_BoBcm, pull) - spin
-        return np.hstack([f, t])

@@ -1,0 +1,1 @@
+"""The twin in batches: many episodes in lockstep, by the same equations."""

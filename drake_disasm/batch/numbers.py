@@ -1,0 +1,158 @@
+"""What the batched twin is made of, as numbers of a scenario without its effects."""
+
+import dataclasses
+import functools
+
+import numpy as np
+from pydrake.multibody.tree import SpatialInertia
+
+from drake_disasm.batch.motion import Body
+from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.cell.grip import AXIS_ORDER, in_joint_order
+from drake_disasm.cell.lock import nominal_environment
+from drake_disasm.cell.lock_dimensions import bolt_inertia
+from drake_disasm.cell.placement import nominal_groove_pose
+from drake_disasm.cell.tool import summed
+from drake_disasm.cell.twin_parameters import TwinParameters, twin_of
+from drake_disasm.common.arrays import Array
+from drake_disasm.common.rotations import Pose
+from drake_disasm.devices.sensor_chain import Payload
+from drake_disasm.effects import Environment
+from drake_disasm.impact import ImpactConditions, ImpactLaw, LockShape, Surroundings
+from drake_disasm.mdp import TaskGeometry, action_bounds
+from drake_disasm.scenario import Scenario, TaskConfig
+from drake_disasm.stations.arm_node import ArmStep
+from drake_disasm.systems.imprecision import Imprecise
+from drake_disasm.systems.observation import Mounting
+
+_GRAVITY_W = np.array([0.0, 0.0, -9.81])
+_JOINTS = [3, 4, 5, *(axis - 3 for axis in AXIS_ORDER[3:])]  # of Drake's [w; v]
+
+
+@dataclasses.dataclass(frozen=True)
+class TwinNumbers:
+    """All that a twin is made of, except effects; of n of them, arrays (n, ...).
+
+    Attributes:
+        law, shape: of the contact, at the nominal environment.
+        M: (6, 6) mass matrix of the twin's joints at their zero.
+        arm: a step of it.
+        body: that the sensor carries.
+        nominal: the environment without effects.
+        mounting: of the sensor.
+        task, geometry: of the MDP.
+        bounds: (6,) largest action [m, rad].
+        imprecise: of the scenario's imprecision.
+        noise, quantum: (6,) of the sensor.
+    """
+
+    law: ImpactLaw
+    shape: LockShape
+    M: Array
+    arm: ArmStep
+    body: Body
+    nominal: Environment
+    mounting: Mounting
+    task: TaskConfig
+    geometry: TaskGeometry
+    bounds: Array
+    imprecise: Imprecise
+    noise: Array
+    quantum: Array
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> "TwinNumbers":
+        """Returns the numbers of a scenario; from memory while those are the same.
+
+        Raises:
+            DisasmError: the arm can't reach the lock.
+        """
+        bare = dataclasses.replace(scenario, name="", effects=[], randomisation=[])
+        return _numbers(_Case(repr(bare), bare))
+
+    @property
+    def payload(self) -> Payload:
+        """What the sensor is known to carry."""
+        mounting = self.mounting
+        return Payload(mounting.mass, mounting.p_SoScm_S, mounting.g_W)
+
+    @property
+    def coordinates(self) -> BoltCoordinates:
+        """The twin's."""
+        return BoltCoordinates(self.body.p_BoTo_B)
+
+    def conditions(
+        self, environment: Environment, around: Surroundings
+    ) -> ImpactConditions:
+        """Returns the contact's conditions in an environment with effects.
+
+        Args:
+            environment: of which law and clearance are taken.
+            around: the rest of it.
+        """
+        law = dataclasses.replace(
+            self.law,
+            stiffness=environment.impact_stiffness,
+            exponent=environment.impact_exponent,
+        )
+        shape = self.shape.with_clearance(environment.clearance)
+        K, D = in_joint_order(self.arm.springs)
+        return ImpactConditions(law, shape, around, self.M, K, D, self.body.p_BoTo_B)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Case:
+    """A scenario without effects; equal if its text is."""
+
+    text: str
+    scenario: Scenario = dataclasses.field(compare=False)
+
+
+@functools.lru_cache(maxsize=4096)
+def _numbers(case: _Case) -> TwinNumbers:
+    scenario = case.scenario
+    parameters, lock = twin_of(scenario), scenario.lock
+    time_step = scenario.simulation.twin_time_step
+    M_B = summed([bolt_inertia(lock), parameters.M_fingers_B])
+    bounds = action_bounds(scenario.task)
+    return TwinNumbers(
+        law=ImpactLaw.of(scenario.contact.impact),
+        shape=LockShape.of(lock),
+        M=_mass_matrix(M_B, parameters.p_BoTo_B),
+        arm=ArmStep.of(parameters.arm, parameters.grip, time_step),
+        body=_body(scenario, M_B, parameters.p_BoTo_B),
+        nominal=nominal_environment(lock, scenario.contact),
+        mounting=_mounting(scenario, M_B, parameters),
+        task=scenario.task,
+        geometry=TaskGeometry.of(scenario),
+        bounds=bounds,
+        imprecise=Imprecise.of(scenario.imprecision, bounds),
+        noise=np.array(scenario.ft_sensor.noise),
+        quantum=np.array(scenario.ft_sensor.quantum),
+    )
+
+
+def _mass_matrix(M_B: SpatialInertia, p_BoTo_B: np.ndarray) -> np.ndarray:
+    """Returns the mass matrix (6, 6) of joints x, y, z, yaw, pitch, roll at To."""
+    whole = M_B.Shift(p_BoTo_B).CopyToFullMatrix6()
+    return whole[np.ix_(_JOINTS, _JOINTS)]
+
+
+def _body(scenario: Scenario, M_B: SpatialInertia, p_BoTo_B: np.ndarray) -> Body:
+    R_WG = nominal_groove_pose(scenario.placement).rotation()
+    return Body(
+        M_B.get_mass(),
+        M_B.get_com(),
+        M_B.CalcRotationalInertia().CopyToFullMatrix3(),
+        R_WG.matrix().T @ _GRAVITY_W,
+        p_BoTo_B,
+    )
+
+
+def _mounting(
+    scenario: Scenario, M_B: SpatialInertia, parameters: TwinParameters
+) -> Mounting:
+    R_WG = nominal_groove_pose(scenario.placement).rotation().matrix()
+    X_SB = parameters.X_SB
+    p_SoScm_S = X_SB @ M_B.get_com()
+    return Mounting(Pose.of(X_SB), R_WG, M_B.get_mass(), p_SoScm_S, _GRAVITY_W)
