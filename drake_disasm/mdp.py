@@ -113,12 +113,19 @@ class TaskGeometry:
     compliance: Array
 
     @classmethod
-    def of(cls, scenario: Scenario) -> Self:
-        """Returns the geometry of a scenario, without its effects."""
+    def of(cls, scenario: Scenario, compliance: Array | None = None) -> Self:
+        """Returns the geometry of a scenario, without its effects.
+
+        Args:
+            scenario: of the task.
+            compliance: (3, 6) of the grip, if it is known: finding it takes time.
+        """
         lift = scenario.lock.lift_needed(scenario.task.lift_success)
         end, room = scenario.lock.end, np.array(scenario.task.room)
         high = np.array([end, lift, 0.0]) + room
-        return cls(lift, end, -room, high, bolt_compliance(scenario)[:3])
+        if compliance is None:
+            compliance = bolt_compliance(scenario)[:3]
+        return cls(lift, end, -room, high, compliance)
 
     def place(self, state: BoltState) -> Array:
         """Returns where Bo is since the start (..., 3) [m], grip included."""

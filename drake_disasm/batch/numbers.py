@@ -2,15 +2,16 @@
 
 import dataclasses
 import functools
+from typing import Any
 
 import numpy as np
 from pydrake.multibody.tree import SpatialInertia
 
 from drake_disasm.batch.motion import Body
 from drake_disasm.cell.coordinates import BoltCoordinates
-from drake_disasm.cell.grip import AXIS_ORDER, in_joint_order
+from drake_disasm.cell.grip import AXIS_ORDER, bolt_compliance, in_joint_order
 from drake_disasm.cell.lock import nominal_environment
-from drake_disasm.cell.lock_dimensions import bolt_inertia
+from drake_disasm.cell.lock_dimensions import GROOVE_FIELDS, bolt_inertia
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import summed
 from drake_disasm.cell.twin_parameters import TwinParameters, twin_of
@@ -62,13 +63,31 @@ class TwinNumbers:
 
     @classmethod
     def of(cls, scenario: Scenario) -> "TwinNumbers":
-        """Returns the numbers of a scenario; from memory while those are the same.
+        """Returns the numbers of a scenario, whatever its effects.
+
+        Arm, tool and bolt take milliseconds, where they are not those of an earlier
+        scenario: then they come from memory.
 
         Raises:
             DisasmError: the arm can't reach the lock.
         """
-        bare = dataclasses.replace(scenario, name="", effects=[], randomisation=[])
-        return _numbers(_Case(repr(bare), bare))
+        rigid = _rigid(_Case.of(scenario))
+        bounds = action_bounds(scenario.task)
+        return cls(
+            law=ImpactLaw.of(scenario.contact.impact),
+            shape=LockShape.of(scenario.lock),
+            M=rigid.M,
+            arm=rigid.arm,
+            body=rigid.body,
+            nominal=nominal_environment(scenario.lock, scenario.contact),
+            mounting=rigid.mounting,
+            task=scenario.task,
+            geometry=TaskGeometry.of(scenario, rigid.compliance),
+            bounds=bounds,
+            imprecise=Imprecise.of(scenario.imprecision, bounds),
+            noise=np.array(scenario.ft_sensor.noise),
+            quantum=np.array(scenario.ft_sensor.quantum),
+        )
 
     @property
     def payload(self) -> Payload:
@@ -102,33 +121,50 @@ class TwinNumbers:
 
 @dataclasses.dataclass(frozen=True)
 class _Case:
-    """A scenario without effects; equal if its text is."""
+    """What arm, tool and bolt depend on; equal if its text is."""
 
     text: str
     scenario: Scenario = dataclasses.field(compare=False)
 
+    @classmethod
+    def of(cls, scenario: Scenario) -> "_Case":
+        """Returns the case of a scenario."""
+        groove: dict[str, Any] = dict.fromkeys(GROOVE_FIELDS, 0.0)
+        parts = (
+            dataclasses.replace(scenario.lock, **groove),
+            scenario.simulation.twin_time_step,
+            scenario.placement,
+            scenario.arm,
+            scenario.gripper,
+            scenario.ft_sensor.model,
+            scenario.task.period,
+        )
+        return cls(repr(parts), scenario)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Rigid:
+    """The part of the numbers that takes time; see TwinNumbers, TaskGeometry."""
+
+    M: np.ndarray
+    arm: ArmStep
+    body: Body
+    mounting: Mounting
+    compliance: np.ndarray
+
 
 @functools.lru_cache(maxsize=4096)
-def _numbers(case: _Case) -> TwinNumbers:
+def _rigid(case: _Case) -> _Rigid:
     scenario = case.scenario
-    parameters, lock = twin_of(scenario), scenario.lock
+    parameters = twin_of(scenario)
     time_step = scenario.simulation.twin_time_step
-    M_B = summed([bolt_inertia(lock), parameters.M_fingers_B])
-    bounds = action_bounds(scenario.task)
-    return TwinNumbers(
-        law=ImpactLaw.of(scenario.contact.impact),
-        shape=LockShape.of(lock),
+    M_B = summed([bolt_inertia(scenario.lock), parameters.M_fingers_B])
+    return _Rigid(
         M=_mass_matrix(M_B, parameters.p_BoTo_B),
         arm=ArmStep.of(parameters.arm, parameters.grip, time_step),
         body=_body(scenario, M_B, parameters.p_BoTo_B),
-        nominal=nominal_environment(lock, scenario.contact),
         mounting=_mounting(scenario, M_B, parameters),
-        task=scenario.task,
-        geometry=TaskGeometry.of(scenario),
-        bounds=bounds,
-        imprecise=Imprecise.of(scenario.imprecision, bounds),
-        noise=np.array(scenario.ft_sensor.noise),
-        quantum=np.array(scenario.ft_sensor.quantum),
+        compliance=bolt_compliance(scenario)[:3],
     )
 
 

@@ -39,7 +39,7 @@ def array_like(values: Any, like: Array) -> Array:
         return np.asarray(values, dtype=like.dtype)
     xp = namespace(like)
     if isinstance(values, np.ndarray):
-        values = np.ascontiguousarray(values)
+        values = np.array(values)  # of its own: torch takes no view of Drake's memory
     device = array_api_compat.device(like)
     return xp.asarray(values, dtype=like.dtype, device=device)
 

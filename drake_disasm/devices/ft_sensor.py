@@ -15,6 +15,7 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
+from drake_disasm.common.arrays import Array, namespace
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.spatial import (
     shift_and_express,
@@ -228,9 +229,8 @@ def _refuse_too_many_memories(effects: Sequence[SensorEffect]) -> None:
         )
 
 
-def quantise(values: np.ndarray, quantum: np.ndarray) -> np.ndarray:
+def quantise(values: Array, quantum: Array) -> Array:
     """Returns values rounded to whole multiples; a zero quantum leaves them."""
-    if quantum.all():
-        return np.rint(values / quantum) * quantum
-    step = np.where(quantum > 0.0, quantum, 1.0)
-    return np.where(quantum > 0.0, np.rint(values / step) * step, values)
+    xp = namespace(values)
+    step = xp.where(quantum > 0.0, quantum, 1.0)
+    return xp.where(quantum > 0.0, xp.round(values / step) * step, values)

@@ -1,0 +1,221 @@
+"""Many episodes of the twin in lockstep, on one set of array operations."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from drake_disasm.batch.episodes import Episodes, TwinBatch
+from drake_disasm.batch.refusals import make_like, refuse_count, refuse_scenarios
+from drake_disasm.batch.stacking import put_rows, rows_of
+from drake_disasm.common.arrays import Array, array_like, namespace, to_numpy
+from drake_disasm.devices.ft_sensor import quantise
+from drake_disasm.mdp import BoltState, outcomes, reward_terms
+from drake_disasm.scenario import Scenario, draw, with_values
+from drake_disasm.systems.imprecision import clamped
+from drake_disasm.systems.pose_target import executed_pose, moved_poses
+
+_NOISE_STREAM = 0x4E4F4953  # apart from that of the ranges
+
+
+@dataclasses.dataclass(frozen=True)
+class BatchResult:
+    """What one step of the MDP returned, of n environments.
+
+    Attributes:
+        observation: (n, 12) the states after it.
+        reward_terms: the weighted terms by name, (n,) each.
+        outcome: (n,) numbers of `mdp.Outcome`.
+        has_failed: (n,) whether the simulation has: an action that is not finite, or a
+            step that no contact force balances. Its observation is the one before,
+            its reward zero.
+    """
+
+    observation: Array
+    reward_terms: dict[str, Array]
+    outcome: Array
+    has_failed: Array
+
+    @property
+    def reward(self) -> Array:
+        """Sum of the terms (n,)."""
+        return sum(self.reward_terms.values())
+
+
+class BatchedTwin:
+    """The twin with IMPACT contact, N episodes in lockstep.
+
+    What `TaskSimulation(scenario, "twin")` simulates, by the same equations for
+    effects, contact, observation, reward and end of an episode; the diagram is the
+    reference (tests/drake_disasm/batch). Noise has the same distribution but other
+    numbers. States are float64.
+
+    Attributes:
+        count: how many environments.
+        scenarios: one for each of them, as given.
+        episodes: that run.
+        drawn: values drawn from the ranges for each running episode, by parameter.
+
+    Args:
+        scenarios: one for all, or one for each environment: effects, parameters and
+            ranges may differ.
+        count: how many environments; of a list, its length.
+        device: "cpu", or "cuda", where torch computes; or "numpy".
+
+    Raises:
+        DisasmError: the batch can't carry an effect or a scenario, the device is not
+            there, or there is no environment.
+    """
+
+    def __init__(
+        self,
+        scenarios: Scenario | Sequence[Scenario],
+        count: int | None = None,
+        device: str = "cpu",
+    ) -> None:
+        given = [scenarios] if isinstance(scenarios, Scenario) else list(scenarios)
+        count = len(given) if count is None else count
+        refuse_count(min(count, len(given)))
+        self.scenarios = given * count if len(given) == 1 else given
+        self.count = len(self.scenarios)
+        refuse_scenarios(self.scenarios)
+        self.like = make_like(device)
+        self._batch = TwinBatch(self.scenarios, self.like)
+        self.drawn: list[dict[str, float]] = [{} for _ in self.scenarios]
+        self._steps = max(s.task.steps for s in self.scenarios)
+        self._noise = np.zeros((self.count, 0, 12))
+        if any(s.imprecision or any(s.ft_sensor.noise) for s in self.scenarios):
+            shape = (self.count, self._steps + 1, 12)
+            self._noise = array_like(np.zeros(shape, np.float32), self.like)
+        self._common = self._common_start()
+        self.episodes: Episodes
+        self.observation: Array
+
+    def reset(self, seeds: Sequence[int]) -> Array:
+        """Starts all episodes anew; returns the first observations (n, 12).
+
+        Args:
+            seeds: one for each environment: of noise, and of what is drawn from the
+                scenario's ranges, the same as the diagram draws.
+        """
+        every = np.arange(self.count)
+        self.episodes = self.begin(every, seeds)
+        self.observation = array_like(np.zeros((self.count, 12)), self.like)
+        return self.start(every, seeds, self.episodes)
+
+    def begin(self, rows: np.ndarray, seeds: Sequence[int]) -> Episodes:
+        """Returns episodes that may be started, of some environments (m,).
+
+        It takes as long as some steps of the task; for many at once little more than
+        for one. Where nothing is drawn from ranges it takes no time.
+        """
+        if self._common is not None:
+            return rows_of(self._common, np.zeros(len(rows), np.int64))
+        drawn = [draw(self.scenarios[i], s) for i, s in zip(rows, seeds, strict=True)]
+        scenarios = [
+            with_values(self.scenarios[i], values)
+            for i, values in zip(rows, drawn, strict=True)
+        ]
+        return self._batch.begin([int(i) for i in rows], scenarios)
+
+    def start(
+        self, rows: np.ndarray, seeds: Sequence[int], beginning: Episodes
+    ) -> Array:
+        """Starts episodes in some environments; returns all observations (n, 12).
+
+        Args:
+            rows: (m,) which environments.
+            seeds: of them.
+            beginning: from `begin`, m of them.
+        """
+        if beginning is not self.episodes:
+            put_rows(self.episodes, rows, beginning)
+        for row, seed in zip(rows, seeds, strict=True):
+            self.drawn[row] = draw(self.scenarios[row], seed)
+            if self._noise.shape[1]:
+                random = np.random.default_rng([seed, _NOISE_STREAM])
+                numbers = random.standard_normal(self._noise.shape[1:], np.float32)
+                self._noise[row] = array_like(numbers, self._noise)
+        found = self._observed()
+        self.observation[rows] = found[rows]
+        return self.observation
+
+    def step(self, actions: Array) -> BatchResult:
+        """Advances one period of the MDP.
+
+        Args:
+            actions: (n, 6) [m, rad], clipped to the bounds.
+        """
+        xp, episodes, before = namespace(self.like), self.episodes, self.observation
+        numbers = self._batch.numbers(episodes)
+        action = array_like(actions, self.like)
+        is_finite = xp.all(xp.isfinite(action), axis=1)
+        action = xp.where(is_finite[:, None], action, 0.0)
+        action = clamped(action, numbers.bounds)
+        if self._noise.shape[1]:
+            noise = self._noise_now()[:, :6]
+            action = numbers.imprecise.action(action, noise)
+        goal = self._goal(action)
+        is_solved = self._batch.advance(episodes, goal, action[:, :3] / self._period)
+        episodes.steps = episodes.steps + 1.0
+        found = self._observed()
+        has_failed = ~(is_finite & is_solved & xp.all(xp.isfinite(found), axis=1))
+        after = self.observation = xp.where(has_failed[:, None], before, found)
+        states = BoltState.from_vector(before), BoltState.from_vector(after)
+        terms = reward_terms(*states, numbers.task, numbers.geometry)
+        terms = {name: xp.where(has_failed, 0.0, term) for name, term in terms.items()}
+        ends = outcomes(states[1], episodes.steps, numbers.task, numbers.geometry)
+        return BatchResult(after, terms, ends, has_failed)
+
+    def bolt_is_out(self) -> np.ndarray:
+        """Returns whether each bolt truly is out (n,): only a simulation knows."""
+        numbers = self._batch.numbers(self.episodes)
+        effects = self._batch.effects(self.episodes)
+        around = self._batch.conditions(self.episodes, effects, None).around
+        X_GnB = numbers.coordinates.poses(self.episodes.state.q)
+        p_GBo = namespace(self.like).matmul(
+            (X_GnB.p - around.p_GnG)[:, None], around.R_GnG
+        )
+        return to_numpy(p_GBo[:, 0, 1] >= numbers.geometry.lift_needed)
+
+    @property
+    def _period(self) -> float:
+        return self._batch.period
+
+    def _goal(self, action: Array) -> Array:
+        """Returns the coordinates (n, 6) to which the command goes."""
+        episodes = self.episodes
+        episodes.commanded = executed = moved_poses(episodes.commanded, action)
+        effects = self._batch.effects(episodes).motion
+        if effects:
+            wrench, memory = self.observation[:, 6:], episodes.motion_memory
+            executed, episodes.motion_memory = executed_pose(
+                effects, executed, wrench, memory, self._period
+            )
+        return self._batch.numbers(episodes).coordinates.of_poses(executed)
+
+    def _observed(self) -> Array:
+        """Returns what the newest readings show (n, 12), with noise."""
+        episodes, numbers = self.episodes, self._batch.numbers(self.episodes)
+        reading = episodes.reading
+        if self._noise.shape[1]:
+            reading = reading + numbers.noise * self._noise_now()[:, 6:]
+        reading = quantise(reading, numbers.quantum)
+        X_GB = numbers.coordinates.poses(episodes.state.arm[:, :6])
+        processing = self._batch.processing(episodes)
+        return processing.state(X_GB, reading, episodes.offset)
+
+    def _noise_now(self) -> Array:
+        """Returns unit noise (n, 12) for this step, of action and reading."""
+        xp = namespace(self.like)
+        every = xp.arange(self.count)
+        step = xp.astype(self.episodes.steps, xp.int64)
+        last = self._noise.shape[1] - 1
+        return xp.astype(self._noise[every, xp.clip(step, 0, last)], self.like.dtype)
+
+    def _common_start(self) -> Episodes | None:
+        """Returns the start (1, ...) of all episodes, if nothing makes them differ."""
+        first = self.scenarios[0]
+        if first.randomisation or any(s is not first for s in self.scenarios):
+            return None
+        return self._batch.begin([0], [first])
