@@ -190,17 +190,17 @@ class ImpactStep:
         is_finite = xp.isfinite(xp.sum(balance.r, axis=1))
         touching = is_finite & xp.any(balance.W != 0.0, axis=1)
         # A bolt that leans on a wall mostly goes on doing so.
-        guessed = every[touching]
-        guessed = guessed[
-            self._take_better(guessed, self._before[guessed], twist, balance)
-        ]
-        failed = xp.concat(self._newton(guessed, twist, balance))
-        twist[failed] = alone[failed]
-        balance.put(failed, self._balance(failed, alone[failed]))
-        is_other = touching
-        is_other[guessed] = False
-        is_other[failed] = True
-        _, unfinished = self._newton(every[is_other], twist, balance)
+        rows = every[touching]
+        guessed = xp.zeros_like(touching)
+        guessed[rows] = self._take_better(rows, self._before[rows], twist, balance)
+        stuck, unfinished = self._newton(rows, twist, balance)
+        again = xp.concat([stuck, unfinished])
+        again = again[guessed[again]]
+        if len(again):
+            twist[again] = alone[again]
+            balance.put(again, self._balance(again, alone[again]))
+            is_finite[unfinished] = guessed[unfinished]
+            _, unfinished = self._newton(again, twist, balance)
         is_finite[unfinished] = False
         f, t_To = (self._in_Gn(part) for part in (balance.W[:, :3], balance.W[:, 3:]))
         wrench = xp.concat([f, t_To - cross(self._p_ToBo, f)], axis=1)
@@ -263,17 +263,34 @@ class ImpactStep:
             those of `todo` that have moved, and those that have not.
         """
         xp = self._xp
-        moved = xp.zeros_like(todo, dtype=xp.bool)
-        left = xp.arange(len(todo), device=array_device(todo))
-        for scale in 0.5 ** np.arange(_HALVINGS):
-            if not len(left):
-                break
-            rows = todo[left]
-            there = twist[rows] + float(scale) * step[left]
-            lower = self._take_better(rows, there, twist, balance)
-            moved[left[lower]] = True
-            left = left[~lower]
+        moved = self._take_better(todo, twist[todo] + step, twist, balance)
+        left = xp.nonzero(~moved)[0]
+        if len(left):
+            moved[left] = self._halve(todo[left], twist, step[left], balance)
         return todo[moved], todo[~moved]
+
+    def _halve(self, rows: Array, twist: Array, step: Array, balance: _Balance) -> Array:
+        """Goes to the first of ever smaller parts of a step whose error is lower.
+
+        All parts are tried at once. See `_descend`.
+
+        Returns:
+            for which of the rows (m,) there is one.
+        """
+        xp, count = self._xp, len(rows)
+        scales = array_like(0.5 ** np.arange(1, _HALVINGS), step)
+        there = twist[rows][:, None] + scales[:, None] * step[:, None]
+        every = xp.repeat(rows, len(scales))
+        found = self._balance(every, xp.reshape(there, (-1, 6)))
+        error = xp.reshape(_squares(found.r), (count, -1))
+        lower = error < _squares(balance.r[rows])[:, None]
+        first = xp.argmax(xp.astype(lower, xp.int8), axis=1)
+        has_one = xp.any(lower, axis=1)
+        which = xp.arange(count, device=array_device(step))[has_one]
+        chosen = first[has_one]
+        twist[rows[has_one]] = there[which, chosen]
+        balance.put(rows[has_one], found.select(which * len(scales) + chosen))
+        return has_one
 
     def _twist_by_rates(self, E: Array, angles: Array) -> tuple[Array, Array]:
         """Returns T (n, 6, 6), the twist in G by the coordinates' rates, and T^-1."""
