@@ -142,6 +142,10 @@ class ForceTorqueSensor(LeafSystem):
         """
         self._load_at_rest = np.array(load)
 
+    def forget(self, context: Context) -> None:
+        """Lets effects with a memory begin anew, at the load of the first sample."""
+        context.get_mutable_discrete_state(self._remembered).SetAtIndex(0, np.nan)
+
     def load(self, context: Context) -> np.ndarray:
         """Returns the load on the sensor (6,), [f; tau] at So in S."""
         load = -wrench_from_spatial_force(self._reaction.Eval(context)[self._joint])

@@ -151,10 +151,14 @@ class SimulatedStation(Station):
         settled = self.settled(self._default_effects)
         q = plant.GetPositions(self.part_context(plant, settled))
         plant.SetDefaultPositions(q)
+        self._take_as_default(settled)
         self.sensor.set_load_at_rest(
             self.sensor.load(self.part_context(self.sensor, settled))
         )
         self._initial = self._state_at_start(settled)
+
+    def _take_as_default(self, settled: Context) -> None:
+        """Makes what has settled besides the plant a part of the default Context."""
 
     @property
     def initial_state(self) -> InitialState:
@@ -243,6 +247,7 @@ class SimulatedStation(Station):
         self.set_effects(context, effects)
         plant_context = self.part_context(self.plant, context)
         self.plant.SetPositions(plant_context, self._unsettled)
+        self._unsettle(context)
         self._fix_commands(context)
         return simulator
 
@@ -273,6 +278,7 @@ class SimulatedStation(Station):
         settled = self.settled(wanted)
         self.set_effects(context, wanted)
         _copy_state(settled, context)
+        self.sensor.forget(self.part_context(self.sensor, context))
         plant_context = self.part_context(self.plant, context)
         self.plant.SetVelocities(plant_context, np.zeros(self.plant.num_velocities()))
         return self._state_at_start(settled)
@@ -309,6 +315,9 @@ class SimulatedStation(Station):
 
     def _place_at_start(self, plant_context: Context) -> None:
         """Sets the positions from which settling starts, if not the default ones."""
+
+    def _unsettle(self, context: Context) -> None:
+        """Takes back what `_take_as_default` did, before settling anew."""
 
     def _prepare(self, context: Context) -> None:
         """Applies to a default Context what `reconfigure` has changed."""

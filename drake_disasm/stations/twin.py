@@ -155,6 +155,16 @@ class TwinStation(SimulatedStation):
         system = self.contact.system
         return system.conditions(self.part_context(system, context))
 
+    def _take_as_default(self, settled: Context) -> None:
+        """Lets the arm begin where it has given way to a load on the bolt."""
+        arm = self.arm_node.system
+        state = self.part_context(arm, settled).get_discrete_state_vector()
+        arm.configure_default_state(state.CopyToVector())
+
+    def _unsettle(self, context: Context) -> None:
+        arm = self.part_context(self.arm_node.system, context)
+        arm.SetDiscreteState(np.zeros(12))
+
     def _prepare(self, context: Context) -> None:
         if not self._is_reconfigured:
             return
