@@ -7,7 +7,7 @@ from drake_disasm.cell.lock import nominal_environment
 from drake_disasm.common.arrays import Array
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import ArmEffect, SensorMemoryEffect, sensor_chain
-from drake_disasm.scenario import Scenario, validate
+from drake_disasm.scenario import Scenario, corner, validate
 from drake_disasm.stations.capabilities import refuse_arm_effects, refuse_unknown_kinds
 from drake_disasm.stations.contact import refuse_without_quantity
 
@@ -69,12 +69,18 @@ def refuse_scenarios(scenarios: Sequence[Scenario]) -> None:
         nominal = nominal_environment(scenario.lock, scenario.contact)
         refuse_without_quantity("impact", nominal, scenario.effects)
         _refuse_sampling(scenario)
-        for name, value in _SHARED.items():
-            if value(scenario) != value(scenarios[0]):
-                raise DisasmError(
-                    f"{name}: {value(scenario)} and {value(scenarios[0])} in one "
-                    "batch; make a batch for each"
-                )
+        for end in ("low", "high"):
+            _refuse_others(corner(scenario, end), corner(scenarios[0], "low"))
+
+
+def _refuse_others(scenario: Scenario, first: Scenario) -> None:
+    """Refuses what differs and is one for a batch."""
+    for name, value in _SHARED.items():
+        if value(scenario) != value(first):
+            raise DisasmError(
+                f"{name}: {value(scenario)} and {value(first)} in one batch; make a "
+                "batch for each"
+            )
 
 
 def _refuse_contact(scenario: Scenario) -> None:

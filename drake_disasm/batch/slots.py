@@ -18,7 +18,7 @@ from drake_disasm.effects import (
     SensorEffect,
     is_local,
 )
-from drake_disasm.scenario import Scenario, with_values
+from drake_disasm.scenario import Scenario, corner
 
 _PLACES: tuple[type[Effect], ...] = (EnvironmentEffect, MotionEffect, SensorEffect)
 
@@ -160,11 +160,7 @@ class EffectSlots:
 
 def _chain(scenario: Scenario) -> list[tuple[int, Slot]]:
     """Returns effects that may act, in their order, by their number in the list."""
-    ranges = scenario.randomisation
-    ends = [
-        with_values(scenario, {r.parameter: getattr(r, end) for r in ranges}).effects
-        for end in ("low", "high")
-    ]
+    ends = [corner(scenario, end).effects for end in ("low", "high")]
     numbered = [
         (_order(low), number, Slot.of(low))
         for number, (low, high) in enumerate(zip(*ends, strict=True))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from drake_disasm.batch.episodes import Episodes, TwinBatch
+from drake_disasm.batch.probe import refuse_scalar_effects
 from drake_disasm.batch.refusals import make_like, refuse_count, refuse_scenarios
 from drake_disasm.batch.stacking import put_rows, rows_of
 from drake_disasm.common.arrays import Array, array_like, namespace, to_numpy
@@ -26,15 +27,14 @@ class BatchResult:
         observation: (n, 12) the states after it.
         reward_terms: the weighted terms by name, (n,) each.
         outcome: (n,) numbers of `mdp.Outcome`.
-        has_failed: (n,) whether the simulation has: an action that is not finite, or a
-            step that no contact force balances. Its observation is the one before,
-            its reward zero.
+        failure: (n) why the simulation of an environment failed, or "" where it did
+            not. Its observation is the one before, its reward zero.
     """
 
     observation: Array
     reward_terms: dict[str, Array]
     outcome: Array
-    has_failed: Array
+    failure: list[str]
 
     @property
     def reward(self) -> Array:
@@ -81,6 +81,7 @@ class BatchedTwin:
         refuse_scenarios(self.scenarios)
         self.like = make_like(device)
         self._batch = TwinBatch(self.scenarios, self.like)
+        refuse_scalar_effects(self._batch.slots.slots, self.like)
         self.drawn: list[dict[str, float]] = [{} for _ in self.scenarios]
         self._steps = max(s.task.steps for s in self.scenarios)
         self._noise = np.zeros((self.count, 0, 12))
@@ -136,8 +137,9 @@ class BatchedTwin:
                 random = np.random.default_rng([seed, _NOISE_STREAM])
                 numbers = random.standard_normal(self._noise.shape[1:], np.float32)
                 self._noise[row] = array_like(numbers, self._noise)
-        found = self._observed()
-        self.observation[rows] = found[rows]
+        xp, found = namespace(self.like), self._observed()[rows]
+        # Where the start has failed, so will the first step, which says so.
+        self.observation[rows] = xp.where(xp.isfinite(found), found, 0.0)
         return self.observation
 
     def step(self, actions: Array) -> BatchResult:
@@ -165,7 +167,17 @@ class BatchedTwin:
         terms = reward_terms(*states, numbers.task, numbers.geometry)
         terms = {name: xp.where(has_failed, 0.0, term) for name, term in terms.items()}
         ends = outcomes(states[1], episodes.steps, numbers.task, numbers.geometry)
-        return BatchResult(after, terms, ends, has_failed)
+        return BatchResult(after, terms, ends, self._reasons(has_failed, is_finite))
+
+    def _reasons(self, has_failed: Array, is_finite: Array) -> list[str]:
+        """Returns why environments failed (n)."""
+        reasons, fine = [""] * self.count, to_numpy(is_finite)
+        for row in np.flatnonzero(to_numpy(has_failed)):
+            reason = "no contact force balances its step"
+            if not fine[row]:
+                reason = "its action is not finite"
+            reasons[row] = f"environment {row}: {reason}; its episode ends"
+        return reasons
 
     def bolt_is_out(self) -> np.ndarray:
         """Returns whether each bolt truly is out (n,): only a simulation knows."""

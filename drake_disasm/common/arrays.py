@@ -44,10 +44,10 @@ def array_like(values: Any, like: Array) -> Array:
     return xp.asarray(values, dtype=like.dtype, device=device)
 
 
-def to_numpy(array: Array) -> np.ndarray:
-    """Returns an array as one of NumPy; it may share memory."""
-    if isinstance(array, np.ndarray):
-        return array
+def to_numpy(array: float | Array) -> np.ndarray:
+    """Returns an array, or a number, as an array of NumPy; it may share memory."""
+    if isinstance(array, np.ndarray | np.generic | float | int):
+        return np.asarray(array)
     return np.asarray(array_api_compat.to_device(array, "cpu"))
 
 

@@ -269,7 +269,9 @@ class ImpactStep:
             moved[left] = self._halve(todo[left], twist, step[left], balance)
         return todo[moved], todo[~moved]
 
-    def _halve(self, rows: Array, twist: Array, step: Array, balance: _Balance) -> Array:
+    def _halve(
+        self, rows: Array, twist: Array, step: Array, balance: _Balance
+    ) -> Array:
         """Goes to the first of ever smaller parts of a step whose error is lower.
 
         All parts are tried at once. See `_descend`.

@@ -70,7 +70,7 @@ class DisassemblyEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             DisasmError: an option is unknown.
         """
         super().reset(seed=seed)
-        effects = _effects_in(options or {})
+        effects = effects_in(options or {})
         if seed is None:
             seed = int(self.np_random.integers(2**31))
         observation = self.simulation.reset(seed, effects)
@@ -110,7 +110,12 @@ class DisassemblyEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         }
 
 
-def _effects_in(options: dict[str, Any]) -> list[Effect] | None:
+def effects_in(options: dict[str, Any]) -> list[Effect] | None:
+    """Returns the effects in a reset's options; None if there are none.
+
+    Raises:
+        DisasmError: an option is unknown.
+    """
     for name in options:
         if name != "effects":
             raise DisasmError(f"option '{name}' is not known; use effects=[...]")
@@ -138,5 +143,8 @@ for _name, _scenario in IDS.items():
     gymnasium.register(
         _name,
         entry_point="drake_disasm.learning.environment:DisassemblyEnv",
+        vector_entry_point=(
+            "drake_disasm.learning.vector_environment:DisassemblyVectorEnv"
+        ),
         kwargs={"scenario": _scenario},
     )

@@ -13,7 +13,7 @@ from drake_disasm.scenario.files import (
     scenario_to_mapping,
     shipped_scenarios,
 )
-from drake_disasm.scenario.randomisation import draw, with_values
+from drake_disasm.scenario.randomisation import corner, draw, with_values
 from drake_disasm.scenario.schema import (
     CONTROLS,
     ArmConfig,
@@ -51,6 +51,7 @@ __all__ = [
     "SensorConfig",
     "SimulationConfig",
     "TaskConfig",
+    "corner",
     "draw",
     "dump_scenario",
     "load_scenario",

@@ -44,6 +44,12 @@ def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
     return drawn
 
 
+def corner(scenario: Scenario, end: str) -> Scenario:
+    """Returns a scenario with all ranges at an end, "low" or "high"."""
+    ranges = scenario.randomisation
+    return with_values(scenario, {r.parameter: getattr(r, end) for r in ranges})
+
+
 def refuse_broken_ranges(scenario: Scenario) -> None:
     """Checks that every range is of a number that is there, and given once.
 

@@ -6,7 +6,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import check
 from drake_disasm.common.text import clipped
 from drake_disasm.effects import files_of, find_effect
-from drake_disasm.scenario.randomisation import refuse_broken_ranges, with_values
+from drake_disasm.scenario.randomisation import corner, refuse_broken_ranges
 from drake_disasm.scenario.schema import (
     CartesianImpedanceConfig,
     LockConfig,
@@ -27,11 +27,8 @@ def validate(scenario: Scenario) -> None:
     _validate_one(scenario)
     refuse_broken_ranges(scenario)
     for name in ("low", "high") if scenario.randomisation else ():
-        corner = with_values(
-            scenario, {r.parameter: getattr(r, name) for r in scenario.randomisation}
-        )
         try:
-            _validate_one(corner)
+            _validate_one(corner(scenario, name))
         except DisasmError as error:
             raise DisasmError(
                 f"randomisation: with every {name} end, {error}"

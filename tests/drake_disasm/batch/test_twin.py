@@ -1,0 +1,220 @@
+"""Many twins in lockstep: seeds, ranges, noise, company, and what a batch refuses."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from drake_disasm.batch.starts import NextEpisodes
+from drake_disasm.batch.twin import BatchedTwin
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import (
+    Environment,
+    EnvironmentEffect,
+    GrooveFriction,
+    GroovePose,
+    JointCoulombFriction,
+    SensorLag,
+    amplitude,
+    register_effect,
+    registry,
+)
+from drake_disasm.scenario import Range, Scenario, draw, load_scenario
+from tests.drake_disasm.batch.sizes import actions
+
+IMPACT = ["contact.model=impact"]
+QUIET = [*IMPACT, "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"]
+RANDOM = load_scenario("removal_randomised", IMPACT)
+
+
+def _run(twin: BatchedTwin, seeds: list[int], steps: int = 4) -> np.ndarray:
+    states = [twin.reset(seeds).copy()]
+    for action in actions(steps):
+        moves = np.repeat(action[None], twin.count, axis=0)
+        states.append(twin.step(moves).observation.copy())
+    return np.array(states)
+
+
+def test_an_environment_does_not_depend_on_its_company():
+    seeds = [5, 8, 5, 11]
+    whole = _run(BatchedTwin(RANDOM, 4, "numpy"), seeds)
+    alone = _run(BatchedTwin(RANDOM, 1, "numpy"), [8])
+    np.testing.assert_allclose(whole[:, 1], alone[:, 0], atol=1e-9)
+    assert np.array_equal(whole[:, 0], whole[:, 2])
+    assert not np.allclose(whole[:, 0], whole[:, 3], atol=1e-4)
+
+
+def test_the_same_seed_draws_from_the_ranges_what_the_diagram_draws():
+    twin = BatchedTwin(RANDOM, 3, "numpy")
+    twin.reset([4, 9, 4])
+    assert twin.drawn == [draw(RANDOM, seed) for seed in (4, 9, 4)]
+
+
+def test_noise_is_the_scenarios_and_of_the_seed():
+    scenario = load_scenario("removal", IMPACT)
+    twin = BatchedTwin(scenario, 400, "numpy")
+    first = twin.reset(range(400)).copy()
+    sigma = np.std(first[:, 6:9], axis=0)  # at A, sensor and groove are parallel
+    np.testing.assert_allclose(np.sort(sigma), [0.035, 0.035, 0.15], rtol=0.15)
+    again = twin.reset(range(400))
+    assert np.array_equal(first, again)
+
+
+def test_imprecision_is_that_of_algorithm_3_2():
+    psi = 3e-4
+    scenario = load_scenario("removal", [*QUIET, f"imprecision={psi}"])
+    twin = BatchedTwin(scenario, 300, "numpy")
+    twin.reset(range(300))
+    moved = twin.step(np.tile([5e-4, 0, 0, 0, 0, 0], (300, 1))).observation
+    commanded = twin.episodes.commanded
+    assert np.std(commanded.p[:, 1]) == pytest.approx(psi, rel=0.2)
+    assert np.mean(commanded.p[:, 0]) == pytest.approx(5e-4, abs=1e-4)
+    assert np.array_equal(commanded.R[:, 0, 0], np.ones(300))
+    assert np.isfinite(moved).all()
+
+
+def test_what_is_not_finite_ends_its_own_environment_alone():
+    scenario = load_scenario("removal", QUIET)
+    twin, alone = BatchedTwin(scenario, 3, "numpy"), BatchedTwin(scenario, 1, "numpy")
+    twin.reset([0, 1, 2])
+    alone.reset([2])
+    for number, action in enumerate(actions(3)):
+        moves = np.repeat(action[None], 3, axis=0)
+        if number == 1:
+            moves[1, 4] = np.nan
+        result, expected = twin.step(moves), alone.step(action[None])
+        if number == 1:
+            assert result.failure[1].startswith("environment 1: its action is not")
+            assert result.reward[1] == 0.0
+        assert not result.failure[0] and not result.failure[2]
+        assert np.isfinite(result.observation).all()
+    np.testing.assert_allclose(
+        result.observation[2], expected.observation[0], atol=1e-9
+    )
+
+
+def test_a_state_that_is_not_finite_ends_its_own_environment_alone():
+    twin = BatchedTwin(load_scenario("removal", QUIET), 2, "numpy")
+    twin.reset([0, 1])
+    twin.episodes.state.q[0, 3] = np.nan
+    result = twin.step(np.repeat(actions(1), 2, axis=0))
+    assert "environment 0: no contact force" in result.failure[0]
+    assert not result.failure[1] and np.isfinite(result.observation).all()
+
+
+def test_next_episodes_are_those_of_the_environments_generators():
+    twin = BatchedTwin(RANDOM, 3, "numpy")
+    twin.reset([0, 1, 2])
+    following = NextEpisodes(twin, [np.random.default_rng(i) for i in range(3)])
+    mine = [np.random.default_rng(i) for i in range(3)]
+    for rows in ([1], [1, 2], [0, 1, 2]):
+        seeds, episodes = following.take(np.array(rows))
+        assert seeds == [int(mine[row].integers(2**31)) for row in rows]
+        expected = twin.begin(np.array(rows), seeds)
+        np.testing.assert_allclose(episodes.state.q, expected.state.q, atol=1e-9)
+
+
+def test_effects_in_other_orders_share_a_batch():
+    one, two = GroovePose(ry=0.02), GrooveFriction(coefficient=0.1)
+    base = load_scenario("removal", QUIET)
+    orders = [[one, two], [two, one], [one], []]
+    scenarios = [dataclasses.replace(base, effects=effects) for effects in orders]
+    states = _run(BatchedTwin(scenarios, device="numpy"), [0] * 4)
+    np.testing.assert_allclose(states[:, 0], states[:, 1], atol=1e-9)
+    alone = _run(BatchedTwin(scenarios[2], device="numpy"), [0])
+    np.testing.assert_allclose(states[:, 2], alone[:, 0], atol=1e-9)
+
+
+@dataclasses.dataclass
+class OneAtATime(EnvironmentEffect):
+    """Friction by a table, which takes no arrays.
+
+    Equation: mu = 0.1 where a > 0, else 0.3.
+    Where it acts: the contact.
+    """
+
+    a: float = amplitude("1", -1.0, 1.0, "what decides")
+    experiment = "any"
+
+    def apply(self, environment: Environment, bolt: object) -> Environment:
+        """Sets the friction."""
+        return dataclasses.replace(environment, friction=0.1 if self.a > 0 else 0.3)
+
+
+@dataclasses.dataclass
+class Rubs(EnvironmentEffect):
+    """Friction, by arithmetic alone.
+
+    Equation: mu += a.
+    Where it acts: the contact.
+    """
+
+    a: float = amplitude("1", -1.0, 1.0, "added")
+    experiment = "any"
+
+    def apply(self, environment: Environment, bolt: object) -> Environment:
+        """Adds friction."""
+        return dataclasses.replace(environment, friction=environment.friction + self.a)
+
+
+@pytest.fixture
+def own_effects(monkeypatch):
+    """Effects of a user, for one test."""
+    monkeypatch.setattr(registry, "_effects", dict(registry._effects))
+    monkeypatch.setattr(registry, "import_in_workers", lambda module: None)
+    register_effect(OneAtATime)
+    register_effect(Rubs)
+
+
+def test_effects_of_users_take_part_if_their_equations_take_arrays(own_effects):
+    base = load_scenario("removal_turned", QUIET)
+    scenarios = [
+        dataclasses.replace(base, effects=[*base.effects, effect])
+        for effect in (Rubs(a=0.1), GrooveFriction(coefficient=0.1))
+    ]
+    states = _run(BatchedTwin(scenarios, device="numpy"), [0, 0])
+    np.testing.assert_allclose(states[:, 0], states[:, 1], atol=1e-9)
+    refused = dataclasses.replace(base, effects=[OneAtATime(a=0.5)])
+    with pytest.raises(DisasmError, match="OneAtATime: its equation takes no arrays"):
+        BatchedTwin([refused, base])
+
+
+def _with(*settings: str, **changes: object) -> Scenario:
+    scenario = load_scenario("removal", [*QUIET, *settings])
+    return dataclasses.replace(scenario, **changes)
+
+
+@pytest.mark.parametrize(
+    ("scenarios", "options", "words"),
+    [
+        (_with(), {"count": 0}, "num_envs: 0"),
+        ([], {}, "num_envs: 0"),
+        (_with(), {"device": "cuda"}, "device: 'cuda' is not there"),
+        (_with(), {"device": "tpu9"}, "device: 'tpu9' is not there"),
+        (_with("contact.model=hydroelastic"), {}, "contact.model: 'hydroelastic'"),
+        (
+            _with(effects=[JointCoulombFriction(joint="iiwa_joint_1", size=1.0)]),
+            {},
+            "JointCoulombFriction",
+        ),
+        ([_with(), _with("task.period=0.2")], {}, "task.period: 0.2 and 0.1"),
+        (
+            _with("ft_sensor.period=0.008", effects=[SensorLag(share=1.0)]),
+            {},
+            "ft_sensor.period: 0.008",
+        ),
+        (
+            _with(randomisation=[Range("task.period", 0.1, 0.2)]),
+            {},
+            "task.period",
+        ),
+    ],
+)
+def test_what_it_cannot_carry_is_one_clear_error(scenarios, options, words):
+    if options.get("device") == "cuda":
+        torch = pytest.importorskip("torch")
+        if torch.cuda.is_available():
+            pytest.skip("there is a GPU")
+    with pytest.raises(DisasmError, match=words) as error:
+        BatchedTwin(scenarios, **options)
+    assert "\n" not in str(error.value)
