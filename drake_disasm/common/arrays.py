@@ -131,19 +131,19 @@ def matrix_of(rows: Sequence[Sequence[Array]]) -> Array:
 
 
 def segment_sums(parts: Array, segment: Array, count: int) -> Array:
-    """Returns for each of `count` segments the sum (count, ...) of its parts (c, ...).
+    """Returns for each of `count` segments the sum (count, k) of its parts (k, c).
 
     Args:
-        parts: (c, ...).
+        parts: (k, c).
         segment: (c,) of each part; ascends.
         count: of segments.
     """
     if isinstance(parts, np.ndarray):
-        total = np.zeros((count, *parts.shape[1:]))
+        total = np.zeros((count, len(parts)))
         if len(segment):
             is_first = np.empty(len(segment), bool)
             is_first[0], is_first[1:] = True, segment[1:] != segment[:-1]
             first = np.flatnonzero(is_first)
-            total[segment[first]] = np.add.reduceat(parts, first, axis=0)
+            total[segment[first]] = np.add.reduceat(parts, first, axis=1).T
         return total
-    return parts.new_zeros((count, *parts.shape[1:])).index_add_(0, segment, parts)
+    return parts.new_zeros((count, len(parts))).index_add_(0, segment, parts.T)

@@ -312,31 +312,33 @@ class ImpactStep:
         R_GGn = transposed(around.R_GnG)
         p_GBo = apply_matrix(R_GGn, p_GnBo - around.p_GnG)
         found = self._c.shape.contacts(xp.matmul(R_GGn, R_GnB), p_GBo)
-        self._normals = array_like(NORMALS, p_GBo)
         self._p = found.penetration
         p_ToBo_G = apply_matrix(R_GGn, self._p_ToBo)
-        self._arm = found.arm + p_ToBo_G[:, None]  # from To, which the joints move
-        lever = cross(self._arm, self._normals[None])
-        normals = xp.broadcast_to(self._normals[None], lever.shape)
-        self._Jn = xp.concat([normals, lever], axis=2)
+        arm = found.arm + p_ToBo_G[:, None]  # from To, which the joints move
+        self._arm = xp.asarray(xp.permute_dims(arm, (2, 0, 1)), copy=True)
+        self._normals = array_like(NORMALS.T, p_GBo)
+        self._lever = _cross(self._arm, self._normals[:, None])
 
     def _balance(self, rows: Array, twist: Array) -> _Balance:
         """Returns the balance of some states, at twists (m, 6) after the step."""
-        xp, h, places = self._xp, self._h, len(self._normals)
-        rate = -apply_matrix(self._Jn[rows], twist)
+        xp, h, places = self._xp, self._h, self._normals.shape[1]
+        rate = -xp.matmul(twist[:, :3], self._normals)
+        for axis in range(3):
+            rate -= self._lever[axis][rows] * twist[:, 3 + axis, None]
         depth = self._p[rows] + h * rate
         pair = xp.nonzero(xp.reshape(depth > 0.0, (-1,)))[0]  # a touching place
         state, place = pair // places, pair % places
         F, kp, kd = self._c.law.select(rows[state]).force_and_slopes(
             xp.reshape(depth, (-1,))[pair], xp.reshape(rate, (-1,))[pair]
         )
-        arm = xp.reshape(self._arm, (-1, 3))[rows[state] * places + place]
-        n = self._normals[place]
+        arm = xp.reshape(self._arm, (3, -1))[:, rows[state] * places + place]
+        n = self._normals[:, place]
         mu = self._around.friction[rows[state]]
-        velocity = twist[state, :3] + cross(twist[state, 3:], arm)
+        moves = xp.matrix_transpose(twist)[:, state]
+        velocity = moves[:3] + _cross(moves[3:], arm)
         force, slope = _force_and_slope(n, velocity, F, h * kp + kd, mu)
         W, dW = _wrench_and_slope(arm, force, slope)
-        parts = xp.concat([W, xp.reshape(dW, (-1, 36))], axis=1)
+        parts = xp.concat([W, xp.reshape(dW, (36, -1))])
         sums = segment_sums(parts, state, len(rows))
         W, dW = sums[:, :6], xp.reshape(sums[:, 6:], (-1, 6, 6))
         A = self._A[rows]
@@ -344,16 +346,19 @@ class ImpactStep:
         return _Balance(W, r, A - h * dW)
 
 
+# For touching places, components come first: an operation then runs along the places.
+
+
 def _force_and_slope(
     n: Array, velocity: Array, F: Array, dF: Array, mu: Array
 ) -> tuple[Array, Array]:
-    """Returns forces (c, 3) at touching places, and their slopes (c, 3, 3).
+    """Returns forces (3, c) at touching places, and their slopes (3, 3, c).
 
     Coulomb friction, regularised: mu F s / sqrt(s^2 + stiction^2) against the slip s.
 
     Args:
-        n: (c, 3) normals, along the axes.
-        velocity: (c, 3) of the bolt there.
+        n: (3, c) normals, along the axes.
+        velocity: (3, c) of the bolt there.
         F: (c,) normal force [N].
         dF: (c,) by which it falls with the velocity along the normal [N s/m].
         mu: (c,) coefficient of friction.
@@ -361,32 +366,36 @@ def _force_and_slope(
     xp = namespace(velocity)
     across = 1.0 - n * n  # the two axes along which it slips
     slip = velocity * across
-    speed = xp.sqrt(_squares(slip) + _STICTION**2)
-    along, drag = slip / speed[:, None], mu * F / speed
-    force = F[:, None] * n - drag[:, None] * slip
-    by_normal = dF[:, None] * (mu[:, None] * along - n)
-    by_slip = drag[:, None] * along
-    slope = by_normal[:, :, None] * n[:, None, :]
-    slope += by_slip[:, :, None] * along[:, None, :]
+    speed = xp.sqrt(xp.sum(slip * slip, axis=0) + _STICTION**2)
+    along, drag = slip / speed, mu * F / speed
+    force = F * n - drag * slip
+    by_normal = dF * (mu * along - n)
+    slope = by_normal[:, None] * n[None] + (drag * along)[:, None] * along[None]
     for axis in range(3):
-        slope[:, axis, axis] -= drag * across[:, axis]
+        slope[axis, axis] -= drag * across[axis]
     return force, slope
 
 
 def _wrench_and_slope(arm: Array, force: Array, slope: Array) -> tuple[Array, Array]:
-    """Returns wrenches (c, 6) about a point, and their slopes (c, 6, 6) by the twist.
+    """Returns wrenches (6, c) about a point, and their slopes (6, 6, c) by the twist.
 
     Args:
-        arm: (c, 3) from the point to the place.
-        force, slope: (c, 3), (c, 3, 3) there, by the place's velocity.
+        arm: (3, c) from the point to the place.
+        force, slope: (3, c), (3, 3, c) there, by the place's velocity.
     """
     xp = namespace(arm)
-    wrench = xp.concat([force, cross(arm, force)], axis=1)
-    top = xp.concat([slope, cross(arm[:, None], slope)], axis=2)
-    x, y, z = (arm[:, i, None] for i in range(3))
-    fx, fy, fz = (top[:, i] for i in range(3))
-    turns = xp.stack([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx], axis=1)
-    return wrench, xp.concat([top, turns], axis=1)
+    wrench = xp.concat([force, _cross(arm, force)])
+    turned = xp.permute_dims(slope, (1, 0, 2))
+    by_turn = xp.permute_dims(_cross(arm[:, None], turned), (1, 0, 2))
+    top = xp.concat([slope, by_turn], axis=1)
+    return wrench, xp.concat([top, _cross(arm[:, None], top)])
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Returns the cross product of vectors (3, ...)."""
+    (a1, a2, a3), (b1, b2, b3) = a, b
+    parts = [a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1]
+    return namespace(a).stack(parts)
 
 
 def turning(angles: Array) -> tuple[Array, Array]:
