@@ -20,6 +20,7 @@ from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import batch_speed
 import endurance
 import numpy as np
 import psutil
@@ -189,6 +190,12 @@ def measure_latency() -> Iterator[Figure]:
     yield Figure("hardware_echo_ms", 1e3 * echo, "ms", "a stale arm", echo / stale)
 
 
+def measure_batches() -> Iterator[Figure]:
+    """Yields steps per second of twins in batches, compared with the diagram's."""
+    for key, value, ratio in batch_speed.speeds():
+        yield Figure(key, value, "1/s", "the diagram with IMPACT", ratio)
+
+
 def tool(name: str) -> list[str]:
     """Returns the command that runs a program of tools/."""
     return [sys.executable, str(Path(__file__).parents[1] / "tools" / f"{name}.py")]
@@ -331,6 +338,14 @@ MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
     ("cell_reset_ms",): lambda: measure_reset("cell"),
     ("twin_reset_ms",): lambda: measure_reset("twin"),
     ("policy_inference_us",): measure_inference,
+    (
+        *(f"diagram_{contact}_steps_per_s" for contact in batch_speed.CONTACTS),
+        *(
+            f"batch_{kind}_{count}_steps_per_s"
+            for kind in batch_speed.KINDS
+            for count in batch_speed.SIZES
+        ),
+    ): measure_batches,
     **{
         (f"updates_per_s_{name}", f"updates_ratio_sb3_{name}"): functools.partial(
             measure_update_speed, name
@@ -408,10 +423,13 @@ def main(arguments: Sequence[str]) -> int:
 
 def table(figures: list[Figure]) -> str:
     """Returns the figures as a table for a terminal."""
-    lines = [f"{'figure':26} {'value':>10} {'unit':5} {'ratio':>8}  compared with"]
+    width = max([26, *(len(figure.key) for figure in figures)])
+    lines = [f"{'figure':{width}} {'value':>10} {'unit':5} {'ratio':>8}  compared with"]
     for f in figures:
         ratio = "" if f.ratio is None else f"{f.ratio:8.3g}"
-        lines.append(f"{f.key:26} {f.value:10.4g} {f.unit:5} {ratio:>8}  {f.reference}")
+        lines.append(
+            f"{f.key:{width}} {f.value:10.4g} {f.unit:5} {ratio:>8}  {f.reference}"
+        )
     return "\n".join(lines)
 
 
