@@ -28,6 +28,7 @@ from drake_disasm.learning.hyperparameters import (
     preset,
 )
 from drake_disasm.learning.jobs import seed_jobs, train_seeds
+from drake_disasm.learning.lockstep import refuse_envs
 from drake_disasm.learning.warm_start import check_start
 from drake_disasm.scenario import load_scenario
 
@@ -51,6 +52,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = program.argument_parser("train", __doc__, _EXAMPLES)
     cli.add_scenario_arguments(parser)
     _add_task_arguments(parser.add_argument)
+    _add_batch_argument(parser.add_argument)
     _add_agent_arguments(parser.add_argument)
     _add_data_arguments(parser.add_argument)
     _add_run_arguments(parser.add_argument)
@@ -67,6 +69,17 @@ def _add_task_arguments(add: Callable[..., object]) -> None:
         type=options.nonnegative,
         metavar="M",
         help="imprecision of the robot [m], e.g. 0.0003 (default: the scenario's)",
+    )
+
+
+def _add_batch_argument(add: Callable[..., object]) -> None:
+    add(
+        "--envs",
+        type=options.positive,
+        default=1,
+        metavar="N",
+        help="episodes at a time, on a batch of twins with IMPACT contact; validation "
+        "stays on the diagram of the scenario (default: 1, on the diagram)",
     )
 
 
@@ -184,6 +197,7 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
     overrides = list(args.overrides)
     if args.psi is not None:
         overrides.append(f"imprecision={args.psi}")
+    refuse_envs(args.envs, args.station, acts=not args.from_logs)
     changes = list(args.hyper)
     if args.episodes is not None:
         changes.append(f"episodes={args.episodes}")
@@ -199,6 +213,7 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
         updates=args.updates or 0,
         demonstrations=_hashes(args.demonstrations),
         start=str(args.start_from or ""),
+        envs=args.envs,
         provenance=program.provenance("train", arguments, args.first_seed),
     )
 

@@ -10,6 +10,7 @@ from drake_disasm.batch.probe import refuse_scalar_effects
 from drake_disasm.batch.refusals import make_like, refuse_count, refuse_scenarios
 from drake_disasm.batch.stacking import put_rows, rows_of
 from drake_disasm.common.arrays import Array, array_like, namespace, to_numpy
+from drake_disasm.common.rotations import Pose
 from drake_disasm.devices.ft_sensor import quantise
 from drake_disasm.mdp import BoltState, outcomes, reward_terms
 from drake_disasm.scenario import Scenario, draw, with_values
@@ -17,6 +18,12 @@ from drake_disasm.systems.imprecision import clamped
 from drake_disasm.systems.pose_target import executed_pose, moved_poses
 
 _NOISE_STREAM = 0x4E4F4953  # apart from that of the ranges
+
+
+def with_impact(scenario: Scenario) -> Scenario:
+    """Returns a scenario with the contact that a batch has a form of."""
+    contact = dataclasses.replace(scenario.contact, model="impact")
+    return dataclasses.replace(scenario, contact=contact)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,6 +62,9 @@ class BatchedTwin:
         scenarios: one for each of them, as given.
         episodes: that run.
         drawn: values drawn from the ranges for each running episode, by parameter.
+        observation, reading: (n, 12), (n, 6) the newest states and sensor readings.
+        action, action_executed: (n, 6) of the newest step, without and with the
+            scenario's imprecision.
 
     Args:
         scenarios: one for all, or one for each environment: effects, parameters and
@@ -91,6 +101,10 @@ class BatchedTwin:
         self._common = self._common_start()
         self.episodes: Episodes
         self.observation: Array
+        self.reading: Array
+        self.action = self.action_executed = array_like(
+            np.zeros((self.count, 6)), self.like
+        )
 
     def reset(self, seeds: Sequence[int]) -> Array:
         """Starts all episodes anew; returns the first observations (n, 12).
@@ -153,12 +167,13 @@ class BatchedTwin:
         action = array_like(actions, self.like)
         is_finite = xp.all(xp.isfinite(action), axis=1)
         action = xp.where(is_finite[:, None], action, 0.0)
-        action = clamped(action, numbers.bounds)
+        action = self.action = clamped(action, numbers.bounds)
         if self._noise.shape[1]:
             noise = self._noise_now()[:, :6]
             action = numbers.imprecise.action(action, noise)
+        self.action_executed = action
         goal = self._goal(action)
-        is_solved = self._batch.advance(episodes, goal, action[:, :3] / self._period)
+        is_solved = self._batch.advance(episodes, goal, action[:, :3] / self.period)
         episodes.steps = episodes.steps + 1.0
         found = self._observed()
         has_failed = ~(is_finite & is_solved & xp.all(xp.isfinite(found), axis=1))
@@ -191,7 +206,8 @@ class BatchedTwin:
         return to_numpy(p_GBo[:, 0, 1] >= numbers.geometry.lift_needed)
 
     @property
-    def _period(self) -> float:
+    def period(self) -> float:
+        """Of the MDP [s]."""
         return self._batch.period
 
     def _goal(self, action: Array) -> Array:
@@ -202,7 +218,7 @@ class BatchedTwin:
         if effects:
             wrench, memory = self.observation[:, 6:], episodes.motion_memory
             executed, episodes.motion_memory = executed_pose(
-                effects, executed, wrench, memory, self._period
+                effects, executed, wrench, memory, self.period
             )
         return self._batch.numbers(episodes).coordinates.of_poses(executed)
 
@@ -212,10 +228,14 @@ class BatchedTwin:
         reading = episodes.reading
         if self._noise.shape[1]:
             reading = reading + numbers.noise * self._noise_now()[:, 6:]
-        reading = quantise(reading, numbers.quantum)
-        X_GB = numbers.coordinates.poses(episodes.state.arm[:, :6])
+        self.reading = quantise(reading, numbers.quantum)
         processing = self._batch.processing(episodes)
-        return processing.state(X_GB, reading, episodes.offset)
+        return processing.state(self.pose_measured(), self.reading, episodes.offset)
+
+    def pose_measured(self) -> Pose:
+        """Returns where the encoders have the bolts, X_GB (n, ...)."""
+        coordinates = self._batch.numbers(self.episodes).coordinates
+        return coordinates.poses(self.episodes.state.arm[:, :6])
 
     def _noise_now(self) -> Array:
         """Returns unit noise (n, 12) for this step, of action and reading."""

@@ -34,7 +34,7 @@ class Experiment:
     """What all seeds of a training have in common.
 
     Attributes:
-        scenario, station, config, compiled, threads: as in TrainingSpec.
+        scenario, station, config, compiled, threads, envs: as in TrainingSpec.
         preset: name of the hyper-parameters that `config` started from.
         validation: greedy episodes after each training, for its result.
         logs: folders to learn from without acting, with the hash of what is in
@@ -58,11 +58,18 @@ class Experiment:
     demonstrations: dict[str, str] = dataclasses.field(default_factory=dict)
     start: str = ""
     provenance: dict[str, Any] = dataclasses.field(default_factory=dict)
+    envs: int = 1
 
     def spec(self, seed: int) -> TrainingSpec:
         """Returns one seed's training."""
         return TrainingSpec(
-            self.scenario, self.station, self.config, seed, self.compiled, self.threads
+            self.scenario,
+            self.station,
+            self.config,
+            seed,
+            self.compiled,
+            self.threads,
+            self.envs,
         )
 
     def to_mapping(self) -> dict[str, Any]:
@@ -94,10 +101,13 @@ def open_experiment(experiment: Experiment, folder: Path, resume: bool) -> Exper
 
 
 def _with_station(found: dict[str, Any]) -> dict[str, Any]:
-    """Returns a training's plain data; once the station was called "model" in it."""
+    """Returns a training's plain data; an older one called the station "model".
+
+    And it had one environment.
+    """
     if "model" in found:
         found["station"] = found.pop("model")
-    return found
+    return {"envs": 1} | found
 
 
 def read_training(folder: Path, example: dict[str, Any]) -> dict[str, Any]:

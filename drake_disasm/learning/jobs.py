@@ -5,18 +5,20 @@ from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from drake_disasm.batch.twin import with_impact
 from drake_disasm.common.executors import WorkerPool
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.learning.checkpoint import load_memory
 from drake_disasm.learning.dataset import remember
 from drake_disasm.learning.experiment import Experiment
+from drake_disasm.learning.lockstep import LockstepTraining
 from drake_disasm.learning.replay import Replay
 from drake_disasm.learning.run import learn_offline, run_training
-from drake_disasm.learning.training import Training, action_map
+from drake_disasm.learning.training import Recorded, Training, action_map
 from drake_disasm.learning.warm_start import start_checkpoint, start_hash
 from drake_disasm.logs import LogWriter, flat_columns, read_logs
 from drake_disasm.logs.transitions import observations
-from drake_disasm.task.recording import EpisodeRecorder, transitions_header
+from drake_disasm.task.recording import transitions_header
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,17 +63,20 @@ class _Log:
 
     def __init__(self, job: SeedJob) -> None:
         experiment = job.experiment
+        scenario = experiment.scenario
+        if experiment.envs > 1:
+            scenario = with_impact(scenario)
         header = transitions_header(
-            experiment.scenario,
+            scenario,
             experiment.station,
             experiment.provenance | {"seed": job.seed},
         )
         self._writer = LogWriter(job.folder / "log", header, resume=True)
 
-    def write(self, number: int, recorder: EpisodeRecorder) -> None:
+    def write(self, number: int, recorded: Recorded) -> None:
         """Writes the episode, unless a run that was killed had written it."""
         if number >= self._writer.next_number:
-            self._writer.write_episode(flat_columns("transitions", recorder.columns()))
+            self._writer.write_episode(flat_columns("transitions", recorded.columns()))
 
 
 def train_seed(job: SeedJob, progress: Progress) -> dict[str, Any]:
@@ -89,7 +94,8 @@ def train_seed(job: SeedJob, progress: Progress) -> dict[str, Any]:
     }
     demonstrations = _demonstrations(job)
     dataset = _memory(experiment, experiment.logs)
-    training = Training(experiment.spec(job.seed), demonstrations, dataset)
+    kind = LockstepTraining if experiment.envs > 1 else Training
+    training = kind(experiment.spec(job.seed), demonstrations, dataset)
     if experiment.start:
         training.start_from(start_checkpoint(experiment.start, job.seed))
         provenance["start"] = {

@@ -1,7 +1,8 @@
 """One seed's training in a folder: checkpoint, log, policy, result.
 
 folder/
-  checkpoint.npz   written after every episode; a resumed run continues from it
+  checkpoint.npz   written after every episode, or every round of them that run at a
+                   time; a resumed run continues from it
   log/             every episode (the caller's writer)
   episodes.csv     one row per episode
   policy.npz       the trained policy
@@ -25,11 +26,15 @@ from drake_disasm.common.progress import Progress, ProgressUpdate
 from drake_disasm.common.text import clipped
 from drake_disasm.learning.evaluation import summed_up, validate_policy
 from drake_disasm.learning.policy import trained_policy
-from drake_disasm.learning.training import Purpose, Training, seed_for
+from drake_disasm.learning.training import (
+    Purpose,
+    Recorded,
+    Training,
+    seed_for,
+)
 from drake_disasm.mdp import REWARD_TERMS, Outcome
 from drake_disasm.policies import save_policy
 from drake_disasm.task.episode import EpisodeSummary
-from drake_disasm.task.recording import EpisodeRecorder
 
 _AGAIN = "delete it, and resume the training"
 _MOST_BYTES = 2**28
@@ -40,7 +45,7 @@ _PATIENCE = 10.0  # s until the workers of a killed run have noticed
 class EpisodeLog(Protocol):
     """Writes the rows of each episode."""
 
-    def write(self, number: int, recorder: EpisodeRecorder) -> None:
+    def write(self, number: int, recorded: Recorded) -> None:
         """Writes episode `number`, if it is not there yet."""
 
 
@@ -60,7 +65,7 @@ def run_training(
         log: gets each episode before its checkpoint is written.
         provenance: where the policy is from.
         validation: greedy episodes at the end.
-        progress: called after each episode.
+        progress: called after each episode, or each round of them.
 
     Returns:
         The content of `result.json`.
@@ -74,8 +79,9 @@ def run_training(
         if checkpoint.exists():
             training.restore(checkpoint)
         while len(training.summaries) < training.spec.config.episodes:
-            _, recorder = training.run_episode()
-            log.write(len(training.summaries) - 1, recorder)
+            first = len(training.summaries)
+            for number, (_, recorded) in enumerate(training.run_episodes(), first):
+                log.write(number, recorded)
             training.save(checkpoint)
             progress(_update(training))
         return finish(training, folder, provenance, validation)

@@ -8,10 +8,11 @@ for bit.
 import contextlib
 import dataclasses
 import enum
+import functools
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import torch
@@ -41,6 +42,13 @@ _NOTES = {
 }
 
 
+class Recorded(Protocol):
+    """The rows of an episode."""
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Returns the quantities of a log, each (T + 1,) or (T + 1, n)."""
+
+
 class Purpose(enum.IntEnum):
     """What random numbers are used for."""
 
@@ -68,6 +76,7 @@ class TrainingSpec:
         seed: of everything.
         compiled: whether updates run compiled.
         threads: of torch; with more than one, the order of sums varies.
+        envs: how many episodes run at a time, on a batch of twins; 1: on the diagram.
     """
 
     scenario: Scenario
@@ -76,6 +85,7 @@ class TrainingSpec:
     seed: int
     compiled: bool = True
     threads: int = 1
+    envs: int = 1
 
 
 class Training:
@@ -107,7 +117,6 @@ class Training:
                 f"demonstrations: {config.demonstrations:g} of each batch are to come "
                 "from logs; give some by --demonstrations DIR"
             )
-        self.env = DisassemblyEnv(spec.scenario, spec.station)
         self.agent = Agent(
             config, seed_for(spec.seed, Purpose.PARAMETERS), spec.compiled
         )
@@ -158,6 +167,15 @@ class Training:
         """Returns the memory that a checkpoint holds; a dataset is on disk already."""
         return self.replay if self._acts else Replay(1)
 
+    @functools.cached_property
+    def env(self) -> DisassemblyEnv:
+        """The environment."""
+        return DisassemblyEnv(self.spec.scenario, self.spec.station)
+
+    def run_episodes(self) -> "Sequence[tuple[EpisodeSummary, Recorded]]":
+        """Runs the next episodes, one here; see `run_episode`."""
+        return [self.run_episode()]
+
     def run_episode(self) -> tuple[EpisodeSummary, EpisodeRecorder]:
         """Runs one episode, with updates by the schedule."""
         config, number = self.spec.config, len(self.summaries)
@@ -186,7 +204,7 @@ class Training:
         return EpisodeSummary(seed), recorder
 
     def _step(
-        self, explorer: "_Explorer", summary: EpisodeSummary, recorder: EpisodeRecorder
+        self, explorer: "Explorer", summary: EpisodeSummary, recorder: EpisodeRecorder
     ) -> None:
         """Takes one exploring step and stores its transition."""
         with self._clock("simulation"):
@@ -220,7 +238,7 @@ class Training:
             return rows
         return np.concatenate([rows, self._demonstrations.sample(shown, generator)])
 
-    def _explorer(self, number: int) -> "_Explorer":
+    def _explorer(self, number: int) -> "Explorer":
         """Returns how episode `number` explores.
 
         The hyper-parameter is in metres, for an agent with the task's whole range of
@@ -229,7 +247,7 @@ class Training:
         config, task = self.spec.config, self.spec.scenario.task
         sigma = config.exploration * config.exploration_decay**number
         generator = self._generator(Purpose.EXPLORATION, number)
-        return _Explorer(self.agent.network(), sigma / task.max_translation, generator)
+        return Explorer(self.agent.network(), sigma / task.max_translation, generator)
 
     @contextlib.contextmanager
     def _clock(self, name: str) -> Iterator[None]:
@@ -248,7 +266,7 @@ _CORRECTION = np.array([0.003] * 3 + [np.deg2rad(1.0)] * 3)
 
 
 @dataclasses.dataclass
-class _Explorer:
+class Explorer:
     """How an episode is explored: the actor, and the noise on its output."""
 
     network: Network

@@ -20,7 +20,7 @@ from gymnasium.vector.utils import batch_space
 
 from drake_disasm.batch.refusals import refuse_count
 from drake_disasm.batch.starts import NextEpisodes
-from drake_disasm.batch.twin import BatchedTwin, BatchResult
+from drake_disasm.batch.twin import BatchedTwin, BatchResult, with_impact
 from drake_disasm.common.arrays import to_numpy
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.environment import effects_in
@@ -310,19 +310,18 @@ def _device_of(name: str) -> str:
 def _scenarios_of(given: _Scenarios, count: int) -> list[Scenario]:
     """Returns a scenario for each environment, with IMPACT contact."""
     if isinstance(given, Scenario | str | Path):
-        return [_with_impact(given)] * count
+        return [_loaded(given)] * count
     if len(given) != count:
         raise DisasmError(
             f"scenario: {len(given)} scenarios for {count} environments; give one for "
             "each, or one for all"
         )
-    return [_with_impact(scenario) for scenario in given]
+    return [_loaded(scenario) for scenario in given]
 
 
-def _with_impact(given: Scenario | str | Path) -> Scenario:
+def _loaded(given: Scenario | str | Path) -> Scenario:
     scenario = given if isinstance(given, Scenario) else load_scenario(str(given))
-    contact = dataclasses.replace(scenario.contact, model="impact")
-    return dataclasses.replace(scenario, contact=contact)
+    return with_impact(scenario)
 
 
 def _observation_space(scenarios: Sequence[Scenario]) -> gymnasium.spaces.Box:

@@ -37,6 +37,12 @@ class Network:
             np.maximum(after, zeros, out=after)
         return memory.output.dot(memory.last)
 
+    def rows(self, x: np.ndarray) -> np.ndarray:
+        """Returns the outputs (k, m) for inputs (k, n) float32."""
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            x = np.maximum(x @ weight.T + bias, 0.0)
+        return x @ self.weights[-1].T + self.biases[-1]
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Leaves the working memory out of copies: its views would come apart."""
         return type(self), (self.weights, self.biases)

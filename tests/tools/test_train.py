@@ -87,6 +87,18 @@ def test_a_log_holds_what_was_chosen_not_what_was_executed(tmp_path: Path) -> No
     assert moved[:-1, :3].max() > 1e-5 and moved[:, 3:].max() == 0.0
 
 
+def test_a_batch_of_twins_can_be_trained_on(tmp_path: Path) -> None:
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    many = ["--envs=3", "--episodes=6"]
+    _finished(whole, *many)
+    folder = whole / "seed_000"
+    log = read_log(folder / "log")
+    assert [episode.rows for episode in log.episodes] == [9] * 6
+    assert log.header.scenario["contact"]["model"] == "impact"
+    refused = _train(parts, *many, "--station=cell")
+    assert refused.returncode == 2 and "envs: station 'cell'" in refused.stderr
+
+
 def test_the_cell_can_be_trained_on(tmp_path: Path) -> None:
     _finished(tmp_path / "out", "--episodes=1", "--station=cell", "--validation=1")
     log = read_log(tmp_path / "out/seed_000/log")
