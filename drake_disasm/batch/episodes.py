@@ -120,7 +120,9 @@ class TwinBatch:
         numbers = self.numbers(episodes)
         still = 0.0 * episodes.goal
         for _ in range(round(SETTLING_TIME / self.h)):
-            step = plant_step(episodes.state, still, numbers.arm, conditions)
+            step = plant_step(
+                episodes.state, still, numbers.arm, numbers.body, conditions
+            )
             episodes.state = step.state
         load = self._load_S(numbers, step.state.arm, step)
         sensing = self._sensing(numbers, step.state.arm, episodes.steps)
@@ -221,7 +223,7 @@ class TwinBatch:
         begin = episodes.steps * self.period
         for number in range(1, steps + 1):
             encoders, time = state.arm, begin + (0.0 if is_first else number * self.h)
-            step = plant_step(state, rate, numbers.arm, conditions)
+            step = plant_step(state, rate, numbers.arm, numbers.body, conditions)
             state, is_solved = step.state, is_solved & step.is_solved
             is_sample = is_first or number % self._per_sample == 0
             if memory.shape[1] and is_sample:

@@ -108,7 +108,10 @@ class ImpactReplay:
         state = TwinState(before, q_bolt, steps.v + steps.give_rate, steps.qd)
         for h in time_steps:
             sprung = conditions.sprung(arms[h].springs)
-            step, v = plant_step(state, steps.qd_rate, arms[h], sprung), state.v
+            step, v = (
+                plant_step(state, steps.qd_rate, arms[h], self._body, sprung),
+                state.v,
+            )
             if not step.is_solved.all():
                 raise RuntimeError(NO_BALANCE)
             state = step.state

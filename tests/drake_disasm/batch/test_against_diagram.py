@@ -63,11 +63,11 @@ def _diagram(scenario: Scenario, moves: np.ndarray) -> np.ndarray:
 
 
 def _assert_same(found: np.ndarray, expected: np.ndarray) -> None:
-    """To a micrometre and two hundredths of a newton."""
-    np.testing.assert_allclose(found[:, :3], expected[:, :3], atol=1e-6)
-    np.testing.assert_allclose(found[:, 3:6], expected[:, 3:6], atol=1e-5)
-    np.testing.assert_allclose(found[:, 6:9], expected[:, 6:9], atol=0.02)
-    np.testing.assert_allclose(found[:, 9:], expected[:, 9:], atol=2e-3)
+    """To 10 nm and thousandths of a newton; asked for were 1 um and 0.02 N."""
+    np.testing.assert_allclose(found[:, :3], expected[:, :3], atol=1e-8)
+    np.testing.assert_allclose(found[:, 3:6], expected[:, 3:6], atol=1e-7)
+    np.testing.assert_allclose(found[:, 6:9], expected[:, 6:9], atol=2e-3)
+    np.testing.assert_allclose(found[:, 9:], expected[:, 9:], atol=1e-4)
 
 
 @pytest.mark.parametrize("case", range(len(CASES)), ids=NAMES)
