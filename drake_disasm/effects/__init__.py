@@ -91,6 +91,7 @@ from drake_disasm.effects.arm.joint_coupling import JointCoupling
 from drake_disasm.effects.arm.time_shift import ArmDelay, JointDelay
 from drake_disasm.effects.arm.base_tilt import ArmTilt
 from drake_disasm.effects.arm.flange_payload import FlangePayload
+from drake_disasm.effects.arm.joint_elasticity import JointElasticity
 from drake_disasm.effects.arm.residual_model import ArmResidualModel
 # isort: on
 
@@ -128,6 +129,7 @@ __all__ = [
     "JointCoupling",
     "JointDelay",
     "JointEffect",
+    "JointElasticity",
     "JointLoadFriction",
     "JointQuadraticFriction",
     "JointSamples",
