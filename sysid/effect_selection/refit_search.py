@@ -9,11 +9,13 @@ import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence
-from sysid.effect_selection.fit import Fit, measured_evidence
+from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.measured_evidence import amplitude_p, measured_evidence
 from sysid.effect_selection.prescreen import prescreening_fits
 from sysid.effect_selection.search import ForwardSearch, ties, trials
 from sysid.effect_selection.settings import SelectionSettings
@@ -73,7 +75,7 @@ class RefitSearch(ForwardSearch):
         again = self.fitter.fit(fit.effects, found)
         if again.loss <= (1.0 + limits.min_gain) * found.loss:
             return self._same_effects(fit, again)
-        rivals = ties(best, survey, self._worth_a_fit(survey, starts))
+        rivals = ties(best, self._worth_a_fit(survey, starts))
         rivals = _ties_by_fit(rivals, confirmed, fit, found)
         found = at_own_minimum(self.fitter, found)
         self._record(best, rivals, survey, found)
@@ -187,24 +189,44 @@ def at_own_minimum(fitter: Fitter, fit: Fit) -> Fit:
 
 
 def simplified(fitter: Fitter, fit: Fit) -> Fit:
-    """Returns the fit without amplitudes that gain next to nothing.
+    """Returns the fit without amplitudes that gain next to nothing, or noise explains.
 
     Even if they are significant: they have taken up what the model does a little
     differently from the device.
     """
-    effects = tuple(_with_useful_amplitudes(fit, effect) for effect in fit.effects)
-    if effects == fit.effects:
-        return fit
-    simple = fitter.fit(effects, fit)
+    if fit.noise_is_stated:
+        fit = _only(fitter, fit, [_beyond_noise(fit, e) for e in fit.effects])
+    simple = _only(fitter, fit, [_of_use(fit, effect) for effect in fit.effects])
     return simple if simple.loss <= (1.0 + fit.settings.min_gain) * fit.loss else fit
 
 
-def _with_useful_amplitudes(fit: Fit, effect: Candidate) -> Candidate:
+def _only(fitter: Fitter, fit: Fit, effects: Sequence[Candidate]) -> Fit:
+    """Returns the fit with effects that have fewer amplitudes."""
+    return fit if tuple(effects) == fit.effects else fitter.fit(tuple(effects), fit)
+
+
+def _of_use(fit: Fit, effect: Candidate) -> Candidate:
     """Returns an effect with its best amplitude and others that gain enough."""
-    gains = fit.gains_of([np.array([c]) for c in fit.columns_of(effect)])
-    enough = min(fit.settings.min_amplitude_gain, max(gains))
-    pairs = zip(effect.fields, gains, strict=True)
-    return effect.only([field for field, gain in pairs if gain >= enough])
+    gains = _gains(fit, effect)
+    return _with(effect, gains >= min(fit.settings.min_amplitude_gain, max(gains)))
+
+
+def _beyond_noise(fit: Fit, effect: Candidate) -> Candidate:
+    """Returns an effect with its best amplitude and others that noise can't explain."""
+    p = np.array([amplitude_p(fit, int(c)) for c in fit.columns_of(effect)])
+    gains = _gains(fit, effect)
+    return _with(effect, (p < fit.settings.alpha) | (gains == max(gains)))
+
+
+def _gains(fit: Fit, effect: Candidate) -> NDArray[np.float64]:
+    """Returns what each amplitude of an effect gains (k,)."""
+    return np.array(fit.gains_of([np.array([c]) for c in fit.columns_of(effect)]))
+
+
+def _with(effect: Candidate, kept: NDArray[np.bool_]) -> Candidate:
+    """Returns an effect with some of its amplitudes (k,)."""
+    pairs = zip(effect.fields, kept, strict=True)
+    return effect.only([field for field, keep in pairs if keep])
 
 
 def _significant_only(fitter: Fitter, fit: Fit, known: int) -> Fit:

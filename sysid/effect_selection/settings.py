@@ -407,6 +407,13 @@ class SelectionSettings:
         "directions that a fold's other rows do not fix stay where they are",
     )
 
+    model_error_reach: float = _setting(
+        2.0,
+        "standard deviations",
+        "by which the model itself may be off in all rows at once, in the direction of "
+        "an effect: what is less is none of a log that states such an error",
+    )
+
     # Whether the arm scatters about its commands.
     max_objective_at_noise: float = _setting(
         1.2,
