@@ -6,6 +6,7 @@ anywhere else: `register_effect`.
 
 from drake_disasm.effects.base import (
     AT_REST,
+    LONGEST_POSE_MEMORY,
     ArmEffect,
     ArmSamples,
     ArmTorqueEffect,
@@ -17,6 +18,7 @@ from drake_disasm.effects.base import (
     JointEffect,
     JointSamples,
     MotionEffect,
+    PoseEffect,
     Sensing,
     SensorEffect,
     SensorMemoryEffect,
@@ -25,6 +27,8 @@ from drake_disasm.effects.chains import (
     environment_at,
     is_local,
     motion_chain,
+    pose_weights,
+    reported_poses,
     sensor_chain,
 )
 from drake_disasm.effects.fields import (
@@ -61,6 +65,7 @@ from drake_disasm.effects.motion.backlash import Backlash
 from drake_disasm.effects.motion.compliance import Compliance
 from drake_disasm.effects.motion.slip import BoltSlip
 from drake_disasm.effects.motion.imprecision import Imprecision
+from drake_disasm.effects.pose.delay import PoseDelay
 from drake_disasm.effects.sensor.bias import SensorBias
 from drake_disasm.effects.sensor.drift import SensorDrift
 from drake_disasm.effects.sensor.warm_up import SensorWarmUp
@@ -97,6 +102,7 @@ from drake_disasm.effects.arm.residual_model import ArmResidualModel
 
 __all__ = [
     "AT_REST",
+    "LONGEST_POSE_MEMORY",
     "ArmDelay",
     "ArmEffect",
     "ArmResidualModel",
@@ -138,6 +144,8 @@ __all__ = [
     "MotionEffect",
     "MotionLag",
     "PayloadError",
+    "PoseDelay",
+    "PoseEffect",
     "RotorInertia",
     "RustyPatch",
     "Sensing",
@@ -170,8 +178,10 @@ __all__ = [
     "is_local",
     "joint_name",
     "motion_chain",
+    "pose_weights",
     "register_effect",
     "registered_effects",
+    "reported_poses",
     "sensor_chain",
     "shape_parameter",
     "shape_parameters",
