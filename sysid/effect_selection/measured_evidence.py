@@ -14,6 +14,7 @@ from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.prewhitening import Prewhitening
 from sysid.effect_selection.significance import gained_p
+from sysid.effect_selection.survey import LinearSurvey
 from sysid.objective import pseudo_residual
 
 Array = NDArray[np.float64]
@@ -59,6 +60,23 @@ def amplitude_p(fit: Fit, column: int) -> float:
     linear = fit.linearisation
     change = -linear.jacobian[..., column] * (linear.u - fit.null)[column]
     return _of_noise(fit, np.sqrt(linear.weights) * change, _bounded(fit), 1)
+
+
+def linear_p(fit: Fit, survey: LinearSurvey, evidence: Evidence) -> float:
+    """Returns the p-value that noise alone makes something so good, without a fit.
+
+    Args:
+        fit: without it.
+        survey: at that fit.
+        evidence: for effects of the survey.
+    """
+    columns = np.concatenate([survey.groups[c.text] for c in evidence.candidates])
+    linear = survey.linearisation
+    root = np.sqrt(linear.weights)
+    J = (root[..., None] * linear.jacobian[..., columns]).reshape(root.size, -1)
+    r = root * linear.residual
+    change = -(J @ np.linalg.lstsq(J, -r.reshape(-1), rcond=None)[0]).reshape(r.shape)
+    return _of_noise(fit, change, r - change, len(columns))
 
 
 def _of_noise(fit: Fit, change: Array, left: Array, parameters: int) -> float:

@@ -15,7 +15,11 @@ from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.measured_evidence import amplitude_p, measured_evidence
+from sysid.effect_selection.measured_evidence import (
+    amplitude_p,
+    linear_p,
+    measured_evidence,
+)
 from sysid.effect_selection.prescreen import prescreening_fits
 from sysid.effect_selection.search import ForwardSearch, ties, trials
 from sysid.effect_selection.settings import SelectionSettings
@@ -50,17 +54,24 @@ class RefitSearch(ForwardSearch):
         self, fit: Fit, survey: Survey, starts: _Starts
     ) -> tuple[list[_Trial], list[_Trial]]:
         """Returns what fits confirm of the most promising, and all that was tried."""
-        chosen = trials(self._worth_a_fit(survey, starts), self._settings.max_trials)
+        chosen = trials(
+            self._worth_a_fit(fit, survey, starts), self._settings.max_trials
+        )
         return self._try(fit, survey, chosen, starts)
 
-    def _worth_a_fit(self, survey: Survey, starts: _Starts) -> list[Evidence]:
-        """Returns what gains enough; after prescreening, of what has a start alone."""
-        least = self._settings.refit_min_linear_gain
-        return [
-            e
-            for e in survey.effects
-            if e.gain >= least and (not starts or e.effects in starts)
-        ]
+    def _worth_a_fit(self, fit: Fit, survey: Survey, starts: _Starts) -> list[Evidence]:
+        """Returns what gains enough; after prescreening, of what has a start alone.
+
+        And what may exceed the model's own error, where that is stated.
+        """
+        limits = self._settings
+        likely = [e for e in survey.effects if e.gain >= limits.refit_min_linear_gain]
+        if starts:
+            return [e for e in likely if e.effects in starts]
+        if not fit.states_model_error:
+            return likely
+        most = limits.refit_max_linear_p
+        return [e for e in likely if linear_p(fit, survey.linearised, e) < most]
 
     def _chosen(
         self,
@@ -75,7 +86,7 @@ class RefitSearch(ForwardSearch):
         again = self.fitter.fit(fit.effects, found)
         if again.loss <= (1.0 + limits.min_gain) * found.loss:
             return self._same_effects(fit, again)
-        rivals = ties(best, self._worth_a_fit(survey, starts))
+        rivals = ties(best, self._worth_a_fit(fit, survey, starts))
         rivals = _ties_by_fit(rivals, confirmed, fit, found)
         found = at_own_minimum(self.fitter, found)
         self._record(best, rivals, survey, found)

@@ -355,6 +355,12 @@ class SelectionSettings:
         "a candidate with less, by the linear account, is not worth a fit",
         _BLIND_LOGS,
     )
+    refit_max_linear_p: float = _setting(
+        0.5,
+        "p-value",
+        "where the model states its own error: what does not come near to exceeding it "
+        "in the linear account is not worth minutes of fits",
+    )
     refit_max_pairs: int = _setting(
         3,
         "pairs per round",

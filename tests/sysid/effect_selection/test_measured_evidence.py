@@ -12,9 +12,11 @@ from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.measured_evidence import (
     amplitude_p,
     exceeds_noise_p,
+    linear_p,
     measured_evidence,
 )
 from sysid.effect_selection.settings import SelectionSettings
+from sysid.effect_selection.survey import survey_candidates
 from sysid.effect_selection.verdict import parameter_values
 from sysid.models import Channel, LogModel, Measurements
 from sysid.workers import Workers
@@ -49,14 +51,19 @@ class Stuck(LogModel):
         return self.replace(v=self.v[mask])
 
 
-def _fits(friction, model_error=0.0, seed=0):
-    """Fits without and with friction to a log that has so much of it."""
+def _fitter(friction, model_error=0.0, seed=0):
+    """A fitter of a log that has so much friction, and the candidate."""
     noise = _NOISE * np.random.default_rng(seed).standard_normal(_ROWS)
     noise[_MOVING] += friction
     model = Stuck(noise, model_error)
-    fitter = Fitter(model, Workers(), np.inf, _SETTINGS)
-    (effect,) = candidates(model, [JointCoulombFriction])[:1]
-    return fitter.fit(()), fitter.fit((effect.only(["size"]),))
+    effect = candidates(model, [JointCoulombFriction])[0].only(["size"])
+    return Fitter(model, Workers(), np.inf, _SETTINGS), effect
+
+
+def _fits(friction, model_error=0.0, seed=0):
+    """Fits without and with friction to a log that has so much of it."""
+    fitter, effect = _fitter(friction, model_error, seed)
+    return fitter.fit(()), fitter.fit((effect,))
 
 
 def _evidence(before, after):
@@ -89,6 +96,17 @@ def test_an_effect_has_to_exceed_what_the_model_itself_is_off_by():
     assert value.interval[0] <= 0.0 <= 0.1 <= value.interval[1]
     before, after = _fits(0.2, model_error=0.03)
     assert _evidence(before, after).accepted and amplitude_p(after, 0) < 1e-3
+
+
+@pytest.mark.parametrize("friction", [0.05, 0.2])
+def test_the_linear_account_says_what_a_fit_would(friction):
+    fitter, effect = _fitter(friction, model_error=0.03)
+    before, after = fitter.fit(()), fitter.fit((effect,))
+    survey = survey_candidates(fitter, before, [effect])
+    (evidence,) = survey.effects
+    p = linear_p(before, survey.linearised, evidence)
+    assert p == pytest.approx(exceeds_noise_p(before, after, 1), rel=1e-2)
+    assert (p < 0.5) == (friction > 0.1)
 
 
 def test_what_is_left_in_the_rows_that_change_counts_as_noise():
