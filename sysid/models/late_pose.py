@@ -17,22 +17,26 @@ from numpy.typing import NDArray
 from drake_disasm.effects import reported_poses
 from sysid.models.base import Array
 
+_STEADY = 0.03  # weight of a change from step to step, against what is measured
 _NEARLY = 0.1  # of a step, by which a pose may come in after an episode's end
 
 
 def on_time(measured: Array, path: Array, weights: Array) -> Array:
     """Returns where the arm was (n, 6), of what was measured of it (n, 6).
 
+    The filter is undone by least squares; what it hides is taken for steady.
+
     Args:
         measured: an episode's poses, as reported.
         path: (n, 6) where it goes by its model.
         weights: (m,) of poses in the one that is reported, see `pose_weights`.
     """
-    elsewhere = measured - reported_poses(path, weights)
-    k = np.arange(len(path), dtype=np.float64)
-    later = k + np.arange(len(weights)) @ weights
-    seen = [np.interp(later, k, column) for column in elsewhere.T]
-    return np.asarray(path + np.column_stack(seen))
+    seen = measured - reported_poses(path, weights)
+    steady = _STEADY * np.diff(np.eye(len(path)), axis=0)
+    filtered = reported_poses(np.eye(len(path)), weights)
+    wanted = np.vstack([seen, np.zeros((len(steady), seen.shape[1]))])
+    elsewhere = np.linalg.lstsq(np.vstack([filtered, steady]), wanted, rcond=None)[0]
+    return np.asarray(path + elsewhere)
 
 
 @dataclasses.dataclass(frozen=True)

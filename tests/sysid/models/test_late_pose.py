@@ -17,14 +17,15 @@ def _paths():
     return path, path + 0.01 * np.cumsum(random.normal(size=path.shape), axis=0)
 
 
-@pytest.mark.parametrize("steps", [1, 2])
-def test_what_is_measured_later_tells_where_it_was(steps):
+@pytest.mark.parametrize("delay", [0.004, 0.1, 0.13, 0.2])
+def test_what_is_measured_later_tells_where_it_was(delay):
     path, true = _paths()
-    weights = PoseDelay(steps * _PERIOD).weights(_PERIOD)
+    weights = PoseDelay(delay).weights(_PERIOD)
     measured = reported_poses(true, weights)
     found = on_time(measured, path, weights)
-    inner = slice(steps, -steps)
-    np.testing.assert_allclose(found[inner], true[inner], atol=1e-12)
+    inner = slice(1, -len(weights) + 1)
+    left, there = (found - true)[inner], (path - true)[inner]
+    assert np.abs(left).max() < 0.02 * np.abs(there).max()
 
 
 @pytest.mark.parametrize("delay", [0.1, 0.13, 0.2, 0.3])

@@ -79,7 +79,7 @@ def _error(log, scenario):
         Compliance(x=2e-5, z=2e-5),
         BoltSlip(x=3e-4),
         PoseDelay(0.1),
-        PoseDelay(0.2),
+        PoseDelay(0.13),
         SensorMounting(ry=0.1),
         SensorDelay(0.1),
         SensorDeadBand(force=1.0, torque=1.0, width=1.0),
