@@ -65,6 +65,10 @@ def amplitude_p(fit: Fit, column: int) -> float:
 def linear_p(fit: Fit, survey: LinearSurvey, evidence: Evidence) -> float:
     """Returns the p-value that noise alone makes something so good, without a fit.
 
+    Of all its amplitudes together, or of the best one for as many tests as there are:
+    one that makes up for the model's error must not hide another that does not. With
+    the weights of the fit, and without: what fits far rows has them count again.
+
     Args:
         fit: without it.
         survey: at that fit.
@@ -72,11 +76,18 @@ def linear_p(fit: Fit, survey: LinearSurvey, evidence: Evidence) -> float:
     """
     columns = np.concatenate([survey.groups[c.text] for c in evidence.candidates])
     linear = survey.linearisation
-    root = np.sqrt(linear.weights)
-    J = (root[..., None] * linear.jacobian[..., columns]).reshape(root.size, -1)
-    r = root * linear.residual
-    change = -(J @ np.linalg.lstsq(J, -r.reshape(-1), rcond=None)[0]).reshape(r.shape)
-    return _of_noise(fit, change, r - change, len(columns))
+    sets = [columns, *(columns[i : i + 1] for i in range(len(columns)))]
+    found = []
+    for weights in (linear.weights, np.ones_like(linear.weights)):
+        root = np.sqrt(weights)
+        r = root * linear.residual
+        for chosen in sets:
+            J = (root[..., None] * linear.jacobian[..., chosen]).reshape(r.size, -1)
+            step = np.linalg.lstsq(J, -r.reshape(-1), rcond=None)[0]
+            change = -(J @ step).reshape(r.shape)
+            p = _of_noise(fit, change, r - change, len(chosen))
+            found.append(p * len(columns) / len(chosen))
+    return min(1.0, *found)
 
 
 def _of_noise(fit: Fit, change: Array, left: Array, parameters: int) -> float:

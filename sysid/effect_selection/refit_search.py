@@ -147,6 +147,8 @@ class RefitSearch(ForwardSearch):
         else:
             found = self._fit_chosen(fit, survey, trial)
             found = self._with_hidden_amplitudes(fit, found, trial)
+        if fit.states_model_error:
+            found = without_noise(self.fitter, found)
         return self._without_replaced(self._without_needless(found))
 
     def _with_hidden_amplitudes(self, fit: Fit, found: Fit, trial: Evidence) -> Fit:
@@ -205,10 +207,16 @@ def simplified(fitter: Fitter, fit: Fit) -> Fit:
     Even if they are significant: they have taken up what the model does a little
     differently from the device.
     """
-    if fit.noise_is_stated:
-        fit = _only(fitter, fit, [_beyond_noise(fit, e) for e in fit.effects])
+    fit = without_noise(fitter, fit)
     simple = _only(fitter, fit, [_of_use(fit, effect) for effect in fit.effects])
     return simple if simple.loss <= (1.0 + fit.settings.min_gain) * fit.loss else fit
+
+
+def without_noise(fitter: Fitter, fit: Fit) -> Fit:
+    """Returns the fit without amplitudes that stated noise or error can explain."""
+    if not fit.noise_is_stated:
+        return fit
+    return _only(fitter, fit, [_beyond_noise(fit, e) for e in fit.effects])
 
 
 def _only(fitter: Fitter, fit: Fit, effects: Sequence[Candidate]) -> Fit:
