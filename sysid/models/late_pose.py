@@ -17,26 +17,29 @@ from numpy.typing import NDArray
 from drake_disasm.effects import reported_poses
 from sysid.models.base import Array
 
-_STEADY = 0.03  # weight of a change from step to step, against what is measured
+_PASSES = 3  # the first alone is an interpolation
 _NEARLY = 0.1  # of a step, by which a pose may come in after an episode's end
 
 
 def on_time(measured: Array, path: Array, weights: Array) -> Array:
     """Returns where the arm was (n, 6), of what was measured of it (n, 6).
 
-    The filter is undone by least squares; what it hides is taken for steady.
+    What is missed is sought later, and what that misses once more (van Cittert 1931):
+    the filter is undone without its noise growing where it hides the motion.
 
     Args:
         measured: an episode's poses, as reported.
         path: (n, 6) where it goes by its model.
         weights: (m,) of poses in the one that is reported, see `pose_weights`.
     """
-    seen = measured - reported_poses(path, weights)
-    steady = _STEADY * np.diff(np.eye(len(path)), axis=0)
-    filtered = reported_poses(np.eye(len(path)), weights)
-    wanted = np.vstack([seen, np.zeros((len(steady), seen.shape[1]))])
-    elsewhere = np.linalg.lstsq(np.vstack([filtered, steady]), wanted, rcond=None)[0]
-    return np.asarray(path + elsewhere)
+    k = np.arange(len(path), dtype=np.float64)
+    later = k + np.arange(len(weights)) @ weights
+    there = path
+    for _ in range(_PASSES):
+        missed = measured - reported_poses(there, weights)
+        seen = [np.interp(later, k, column) for column in missed.T]
+        there = there + np.column_stack(seen)
+    return np.asarray(there)
 
 
 @dataclasses.dataclass(frozen=True)
