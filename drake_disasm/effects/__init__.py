@@ -6,6 +6,7 @@ anywhere else: `register_effect`.
 
 from drake_disasm.effects.base import (
     AT_REST,
+    LONGEST_POSE_MEMORY,
     ArmEffect,
     ArmSamples,
     ArmTorqueEffect,
@@ -17,6 +18,7 @@ from drake_disasm.effects.base import (
     JointEffect,
     JointSamples,
     MotionEffect,
+    PoseEffect,
     Sensing,
     SensorEffect,
     SensorMemoryEffect,
@@ -25,6 +27,8 @@ from drake_disasm.effects.chains import (
     environment_at,
     is_local,
     motion_chain,
+    pose_weights,
+    reported_poses,
     sensor_chain,
 )
 from drake_disasm.effects.fields import (
@@ -61,6 +65,7 @@ from drake_disasm.effects.motion.backlash import Backlash
 from drake_disasm.effects.motion.compliance import Compliance
 from drake_disasm.effects.motion.slip import BoltSlip
 from drake_disasm.effects.motion.imprecision import Imprecision
+from drake_disasm.effects.pose.delay import PoseDelay
 from drake_disasm.effects.sensor.bias import SensorBias
 from drake_disasm.effects.sensor.drift import SensorDrift
 from drake_disasm.effects.sensor.warm_up import SensorWarmUp
@@ -91,11 +96,13 @@ from drake_disasm.effects.arm.joint_coupling import JointCoupling
 from drake_disasm.effects.arm.time_shift import ArmDelay, JointDelay
 from drake_disasm.effects.arm.base_tilt import ArmTilt
 from drake_disasm.effects.arm.flange_payload import FlangePayload
+from drake_disasm.effects.arm.joint_elasticity import JointElasticity
 from drake_disasm.effects.arm.residual_model import ArmResidualModel
 # isort: on
 
 __all__ = [
     "AT_REST",
+    "LONGEST_POSE_MEMORY",
     "ArmDelay",
     "ArmEffect",
     "ArmResidualModel",
@@ -128,6 +135,7 @@ __all__ = [
     "JointCoupling",
     "JointDelay",
     "JointEffect",
+    "JointElasticity",
     "JointLoadFriction",
     "JointQuadraticFriction",
     "JointSamples",
@@ -136,6 +144,8 @@ __all__ = [
     "MotionEffect",
     "MotionLag",
     "PayloadError",
+    "PoseDelay",
+    "PoseEffect",
     "RotorInertia",
     "RustyPatch",
     "Sensing",
@@ -168,8 +178,10 @@ __all__ = [
     "is_local",
     "joint_name",
     "motion_chain",
+    "pose_weights",
     "register_effect",
     "registered_effects",
+    "reported_poses",
     "sensor_chain",
     "shape_parameter",
     "shape_parameters",

@@ -12,8 +12,8 @@ arrays (n,) of n environments: `BatchedTwin` refuses an effect whose equation do
 `Effect.vector` and `Effect.column` give fields in such shapes.
 
 To write one: derive a dataclass from the place where it acts (EnvironmentEffect,
-MotionEffect, SensorEffect or JointEffect), give it a docstring and fields, define the
-place's method, and put `@register_effect` above it.
+MotionEffect, PoseEffect, SensorEffect or JointEffect), give it a docstring and
+fields, define the place's method, and put `@register_effect` above it.
 """
 
 import abc
@@ -37,6 +37,9 @@ from drake_disasm.common.arrays import (
 from drake_disasm.common.rotations import Pose
 from drake_disasm.common.spatial import weight_wrench
 from drake_disasm.effects.fields import acts_at_joint, amplitudes, shape_parameters
+
+#: How far back effects on the measured pose may look, all together [s].
+LONGEST_POSE_MEMORY = 0.3
 
 #: What an effect on the motion keeps from one step to the next: six numbers.
 Memory = Array
@@ -249,6 +252,25 @@ class MotionEffect(Effect, abc.ABC):
             wrench: (..., 6) [f; tau] on the bolt at Bo in G, measured as the step
                 begins.
             memory: (..., 6) of the step before; zeros at the start.
+            period: of the MDP [s].
+        """
+
+
+class PoseEffect(Effect, abc.ABC):
+    """Acts on the bolt's pose as it is measured, not on the motion itself.
+
+    What is reported is a weighted sum of poses now and before, position and rotation
+    vector of B in G, at the boundaries of the MDP's steps, where alone the task reads
+    them: a filter with a finite impulse response.
+    """
+
+    @abc.abstractmethod
+    def weights(self, period: float) -> np.ndarray:
+        """Returns the weights (m,) of the pose now, a step ago, and so on.
+
+        Their sum is one.
+
+        Args:
             period: of the MDP [s].
         """
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from drake_disasm.effects.base import (
     AT_REST,
     BoltMotion,
@@ -9,6 +11,7 @@ from drake_disasm.effects.base import (
     Environment,
     EnvironmentEffect,
     MotionEffect,
+    PoseEffect,
     SensorEffect,
 )
 
@@ -21,6 +24,31 @@ def motion_chain(effects: Sequence[Effect]) -> tuple[MotionEffect, ...]:
         if isinstance(effect, MotionEffect) and not effect.is_null
     ]
     return tuple(sorted(chosen, key=lambda effect: effect.stage))
+
+
+def pose_weights(effects: Sequence[Effect], period: float) -> np.ndarray:
+    """Returns the weights (m,) of poses in the one that is reported, the newest first.
+
+    Args:
+        effects: of a scenario; those on the measured pose count.
+        period: of the MDP [s].
+    """
+    weights = np.ones(1)
+    for effect in effects:
+        if isinstance(effect, PoseEffect) and not effect.is_null:
+            weights = np.convolve(weights, effect.weights(period))
+    return weights
+
+
+def reported_poses(path: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Returns what is reported (n, 6) of an episode's poses (n, 6), from its start on.
+
+    Before the first of them the bolt was there, too.
+    """
+    before = np.tile(path[0], (len(weights) - 1, 1))
+    whole = np.vstack([before, path])
+    ago = (whole[len(before) - i : len(whole) - i] for i in range(len(weights)))
+    return np.sum([w * part for w, part in zip(weights, ago, strict=True)], axis=0)
 
 
 def is_local(effects: Sequence[Effect]) -> bool:

@@ -14,6 +14,7 @@ from drake_disasm.effects.base import (
     EnvironmentEffect,
     JointEffect,
     MotionEffect,
+    PoseEffect,
     SensorEffect,
 )
 from drake_disasm.effects.fields import amplitudes
@@ -22,10 +23,11 @@ from drake_disasm.effects.fields import amplitudes
 PLACES: tuple[type[Effect], ...] = (
     EnvironmentEffect,
     MotionEffect,
+    PoseEffect,
     SensorEffect,
     ArmEffect,
 )
-_BASES = "EnvironmentEffect, MotionEffect, SensorEffect or JointEffect"
+_BASES = "EnvironmentEffect, MotionEffect, PoseEffect, SensorEffect or JointEffect"
 
 
 def refuse_faulty(effect: type[Effect]) -> None:

@@ -8,6 +8,7 @@ from drake_disasm.effects.base import (
     Effect,
     EnvironmentEffect,
     MotionEffect,
+    PoseEffect,
     SensorEffect,
 )
 from drake_disasm.effects.fields import shape_parameters
@@ -15,6 +16,7 @@ from drake_disasm.effects.fields import shape_parameters
 _SECTIONS: dict[type[Effect], str] = {
     EnvironmentEffect: "Environment: around the bolt",
     MotionEffect: "Motion: from command to arm",
+    PoseEffect: "Pose: from encoders to what is reported",
     SensorEffect: "Sensor: from load to reading",
     ArmEffect: "Arm: from joint to torque reading",
 }

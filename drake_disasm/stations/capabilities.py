@@ -8,10 +8,11 @@ from drake_disasm.effects import (
     Effect,
     EnvironmentEffect,
     MotionEffect,
+    PoseEffect,
     SensorEffect,
 )
 
-_KINDS = (EnvironmentEffect, MotionEffect, SensorEffect, ArmEffect)
+_KINDS = (EnvironmentEffect, MotionEffect, PoseEffect, SensorEffect, ArmEffect)
 
 
 def refuse_unknown_kinds(effects: Sequence[Effect]) -> None:

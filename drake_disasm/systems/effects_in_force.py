@@ -8,7 +8,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import Effect, is_local, motion_chain
+from drake_disasm.effects import Effect, PoseEffect, is_local, motion_chain
 
 
 class EffectsInForce(LeafSystem):
@@ -71,10 +71,12 @@ class EffectsInForce(LeafSystem):
                 f"{name}: depends on the bolt's motion and would not act here; add the "
                 "line station.attach(simulator) before the simulation begins"
             )
-        if motion_chain([effect]) and not self.motion_is_applied:
+        on_pose = isinstance(effect, PoseEffect) and not effect.is_null
+        if (on_pose or motion_chain([effect])) and not self.motion_is_applied:
             raise DisasmError(
-                f"{name}: acts on the commanded motion, before the station, and would "
-                "not act here; build the diagram with add_task(builder, station)"
+                f"{name}: acts outside the station, on the pose that is commanded or "
+                "measured, and would not act here; build the diagram with "
+                "add_task(builder, station)"
             )
 
     def _is_of(

@@ -2,20 +2,36 @@
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiscreteValues,
+    EventStatus,
+    LeafSystem,
+)
 
 from drake_disasm.cell.coordinates import Coordinates
 from drake_disasm.common.arrays import Array, apply_matrix, namespace
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.rotations import (
     Pose,
     as_matrices,
     rotation_vectors,
     rpy_of_matrices,
 )
-from drake_disasm.common.spatial import pose_to_vector, shifted_wrench, weight_wrench
+from drake_disasm.common.spatial import (
+    pose_to_vector,
+    rotation_from_vector,
+    rotation_vector,
+    shifted_wrench,
+    weight_wrench,
+)
+from drake_disasm.common.timing import MOTION_DELAY
+from drake_disasm.effects import LONGEST_POSE_MEMORY, Effect, pose_weights
 
 
 @dataclasses.dataclass(frozen=True)
@@ -150,7 +166,9 @@ class ObservationProcessor(LeafSystem):
 
     Pose of the bolt relative to the start, from the measured coordinates, and
     the environment's wrench on it, both in the groove's nominal frame. The
-    zeroing of the sensor is a parameter of the Context, set by `zero`.
+    zeroing of the sensor is a parameter of the Context, set by `zero`. Effects on
+    the measured pose act on both outputs; poses that they look back at are those at
+    the boundaries of the MDP's steps.
 
     @system
     name: ObservationProcessor
@@ -167,6 +185,11 @@ class ObservationProcessor(LeafSystem):
         mounting: geometry and payload of the sensor.
         variant: "exact", or "small_angle" for the thesis's equations.
         reading: (6,) at which the default Context is zeroed; None: it is not.
+        period: of the MDP [s]; None: no effect can act on the measured pose.
+        effects: of the default Context.
+
+    Raises:
+        DisasmError: effects look farther back than it remembers.
     """
 
     def __init__(
@@ -175,8 +198,11 @@ class ObservationProcessor(LeafSystem):
         mounting: Mounting,
         variant: str = "exact",
         reading: np.ndarray | None = None,
+        period: float | None = None,
+        effects: Sequence[Effect] = (),
     ) -> None:
         super().__init__()
+        self._remember_poses(period, effects)
         self._coordinates = coordinates
         self._processing = Processing(mounting, variant == "exact")
         offset = np.zeros(6) if reading is None else self._processing.offset(reading)
@@ -193,12 +219,79 @@ class ObservationProcessor(LeafSystem):
             prerequisites_of_calc={
                 position,
                 self._wrench.ticket(),
+                self.xd_ticket(),
                 self.all_parameters_ticket(),
             },
         )
         self.DeclareVectorOutputPort(
-            "X_GB", 7, self._calc_pose, prerequisites_of_calc={position}
+            "X_GB",
+            7,
+            self._calc_pose,
+            prerequisites_of_calc={
+                position,
+                self.xd_ticket(),
+                self.all_parameters_ticket(),
+            },
         )
+
+    def _remember_poses(self, period: float | None, effects: Sequence[Effect]) -> None:
+        """Declares what effects on the measured pose need."""
+        self._period = period
+        # An episode begins at A, where position and rotation vector are zero.
+        kept = int(np.ceil(LONGEST_POSE_MEMORY / period - 1e-9)) if period else 0
+        self._before = self.DeclareDiscreteState(6 * kept)  # the newest first
+        self._most = kept + 1
+        self._weights = self.DeclareNumericParameter(
+            BasicVector(self._weights_of(effects))
+        )
+        if period:
+            self.DeclarePeriodicDiscreteUpdateEvent(
+                period, MOTION_DELAY, self._remember
+            )
+
+    def set_effects(self, context: Context, effects: Sequence[Effect]) -> None:
+        """Puts effects into this system's Context: those on the measured pose act.
+
+        Raises:
+            DisasmError: they look farther back than it remembers.
+        """
+        parameter = context.get_mutable_numeric_parameter(self._weights)
+        parameter.SetFromVector(self._weights_of(effects))
+
+    def _weights_of(self, effects: Sequence[Effect]) -> np.ndarray:
+        found = pose_weights(effects, self._period) if self._period else np.ones(1)
+        if len(found) > self._most:
+            raise DisasmError(
+                "effects: those on the measured pose look back by more than "
+                f"{LONGEST_POSE_MEMORY:g} s together; make their delays shorter"
+            )
+        return np.pad(found, (0, self._most - len(found)))
+
+    def _remember(self, context: Context, state: DiscreteValues) -> EventStatus:
+        if not self._is_late(context):
+            return EventStatus.DidNothing()
+        before = context.get_discrete_state(self._before).value()
+        state.set_value(self._before, [*self._pose_vector(context), *before[:-6]])
+        return EventStatus.Succeeded()
+
+    def _is_late(self, context: Context) -> bool:
+        """Returns whether an earlier pose has a weight in the one that is reported."""
+        weights = context.get_numeric_parameter(self._weights).value()
+        return bool(weights[0] != 1.0)
+
+    def _X_GB(self, context: Context) -> RigidTransform:
+        """Returns the pose as it is reported."""
+        if not self._is_late(context):
+            return self._coordinates.pose(self._position.Eval(context))
+        weights = context.get_numeric_parameter(self._weights).value()
+        before = context.get_discrete_state(self._before).value().reshape(-1, 6)
+        pose = weights @ np.vstack([self._pose_vector(context), before])
+        return RigidTransform(rotation_from_vector(pose[3:]), pose[:3])
+
+    def _pose_vector(self, context: Context) -> np.ndarray:
+        """Returns position and rotation vector (6,) of where the bolt is now."""
+        X_GB = self._coordinates.pose(self._position.Eval(context))
+        return np.append(X_GB.translation(), rotation_vector(X_GB.rotation()))
 
     def zero(self, context: Context, reading: np.ndarray) -> None:
         """Zeroes the sensor: `reading` (6,) was taken at the start, X_GB = identity."""
@@ -213,10 +306,10 @@ class ObservationProcessor(LeafSystem):
         return np.asarray(self._processing.state(Pose.of(X_GB), reading, offset))
 
     def _calc_observation(self, context: Context, output: BasicVector) -> None:
-        X_GB = self._coordinates.pose(self._position.Eval(context))
+        X_GB = self._X_GB(context)
         reading = self._wrench.Eval(context)
         output.SetFromVector(self.observation(context, X_GB, reading))
 
     def _calc_pose(self, context: Context, output: BasicVector) -> None:
-        X_GB = self._coordinates.pose(self._position.Eval(context))
+        X_GB = self._X_GB(context)
         output.SetFromVector(pose_to_vector(X_GB))

@@ -88,9 +88,9 @@ class TaskSystems:
         self.pose_target.set_start(target, start.position)
         motion = self.motion.GetMyMutableContextFromRoot(context)
         motion.SetDiscreteState(start.position)
-        self.processor.zero(
-            self.processor.GetMyMutableContextFromRoot(context), start.reading
-        )
+        processor = self.processor.GetMyMutableContextFromRoot(context)
+        self.processor.zero(processor, start.reading)
+        self.processor.set_effects(processor, acting)
         warn_of_load(start)
         return start
 
@@ -160,7 +160,7 @@ def add_task(
     Raises:
         DisasmError: a system that is no policy.
     """
-    processor = add_observation(builder, station)
+    processor = add_observation(builder, station, station.scenario.task.period)
     monitor = _add_monitor(builder, station.scenario, processor)
     imprecision, noise = _add_imprecision(builder, station.scenario)
     pose_target = _add_pose_target(builder, station, imprecision, processor)
@@ -184,12 +184,15 @@ def add_task(
     )
 
 
-def add_observation(builder: DiagramBuilder, station: Station) -> ObservationProcessor:
+def add_observation(
+    builder: DiagramBuilder, station: Station, period: float | None = None
+) -> ObservationProcessor:
     """Adds the processing of a station's readings to the task's state s.
 
     Args:
         builder: of the diagram that holds the station.
         station: whose readings are processed; zeroed where its episode starts.
+        period: of the MDP [s]; None: effects on the measured pose don't act.
     """
     processor = builder.AddNamedSystem(
         "observation_processor",
@@ -198,6 +201,8 @@ def add_observation(builder: DiagramBuilder, station: Station) -> ObservationPro
             station.mounting,
             station.scenario.observation.variant,
             station.initial_state.reading if station.start_is_reusable else None,
+            period,
+            station.scenario.effects,
         ),
     )
     for port, name in (

@@ -4,14 +4,17 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import ncx2
+from scipy.stats import chi2, ncx2, norm
 
 from sysid.effect_selection.block_regression import Columns
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.effect_selection.significance import highest_by_chance, squared_length
 from sysid.effect_selection.survey import LinearSurvey
 from sysid.parameters import Scaling, nominal_values
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -79,17 +82,48 @@ def _limits(
     ]
 
 
-def _in_unit_box(survey: LinearSurvey, group: Columns, critical: float) -> np.ndarray:
+def _in_unit_box(survey: LinearSurvey, group: Columns, critical: float) -> Array:
     """Returns what of parameters' ranges (k,) is found; infinite if none is."""
-    whitened, raw, settings = survey.whitened, survey.regression, survey.raw.settings
-    if whitened.least_p(group) >= settings.alpha:
-        return np.full(len(group), np.inf)
+    raw, settings = survey.regression, survey.raw.settings
     with np.errstate(divide="ignore"):
-        length = _needed(critical, len(group), settings)
-        by_chance = length / whitened.sensitivity(group) / whitened.scale[group]
         power = np.sum(raw.A[:, group] ** 2, axis=0)
         of_use = np.sqrt(settings.min_gain * raw.block_losses.sum() / power)
-        return np.asarray(np.maximum(by_chance, of_use / raw.scale[group]))
+    return np.maximum(_certain(survey, group, critical), of_use / raw.scale[group])
+
+
+def _certain(survey: LinearSurvey, group: Columns, critical: float) -> Array:
+    """Returns what of parameters' ranges (k,) is more than chance; see Evidence."""
+    if survey.model_error_share is not None:
+        return _beyond_noise(survey, group)
+    by_blocks = _by_blocks(survey, group, critical)
+    if not survey.noise_decides:
+        return by_blocks
+    return np.minimum(by_blocks, _beyond_noise(survey, group))
+
+
+def _by_blocks(survey: LinearSurvey, group: Columns, critical: float) -> Array:
+    """Returns what of parameters' ranges (k,) the blocks' signs tell from chance."""
+    whitened, settings = survey.whitened, survey.raw.settings
+    if whitened.least_p(group) >= settings.alpha:
+        return np.full(len(group), np.inf)
+    length = _needed(critical, len(group), settings)
+    with np.errstate(divide="ignore"):
+        return np.asarray(length / whitened.sensitivity(group) / whitened.scale[group])
+
+
+def _beyond_noise(survey: LinearSurvey, group: Columns) -> Array:
+    """Returns what of parameters' ranges (k,) exceeds noise and error as stated."""
+    settings, linear = survey.raw.settings, survey.linearisation
+    J = np.sqrt(linear.weights)[..., None] * linear.jacobian[..., group]
+    size = np.sqrt(np.einsum("nck,nck->k", J, J))
+    alpha = settings.alpha / len(survey.groups)
+    needed = np.sqrt(chi2.isf(alpha, len(group))) + norm.ppf(settings.detection_power)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = 0.0
+        if survey.model_error_share is not None:
+            of_error = np.einsum("nck,nc->k", np.abs(J), survey.model_error_share)
+            off = settings.model_error_reach * of_error / size
+        return np.where(size > 0.0, (needed + off) / size, np.inf)
 
 
 @functools.lru_cache(maxsize=256)

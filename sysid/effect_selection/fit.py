@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from sysid.confidence import Z
 from sysid.effect_selection.block_regression import BlockRegression, blocks_of
 from sysid.effect_selection.candidates import Candidate, is_joint_group
-from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.prewhitening import Prewhitening
 from sysid.effect_selection.settings import SelectionSettings
-from sysid.effect_selection.significance import gained_p, greater_p
+from sysid.effect_selection.significance import greater_p
 from sysid.identification.linearisation import Linearisation
 from sysid.models.base import LogModel
 from sysid.objective import pseudo_residual
@@ -50,6 +49,11 @@ class Fit:
         """Sum of the squared residuals, Huber's beyond `huber_delta`."""
         linear = self.linearisation
         return float(np.sum(pseudo_residual(linear.residual, linear.huber_delta) ** 2))
+
+    @property
+    def states_model_error(self) -> bool:
+        """Whether it is known by how much the model itself is off."""
+        return self.model.measurements.model_error is not None
 
     @property
     def blocks(self) -> NDArray[np.int64]:
@@ -101,7 +105,7 @@ class Fit:
 
         By a sandwich estimate over blocks: right for any correlation within a block.
         """
-        away = np.abs(self.linearisation.u - self._null)
+        away = np.abs(self.linearisation.u - self.null)
         return np.asarray(away > Z * self.regression().standard_errors())
 
     def all_significant(self, names: Sequence[str]) -> bool:
@@ -193,7 +197,7 @@ class Fit:
 
         Of blocks that are not fitted; all other parameters are fitted again.
         """
-        regression, null = self.regression(), self._null
+        regression, null = self.regression(), self.null
         unbounded = np.zeros(len(null))  # seen from null, a bound is no limit
         found = []
         for columns in groups:
@@ -217,14 +221,31 @@ class Fit:
         if finer is None or not len(linear.u):
             return np.zeros_like(linear.u)
         fine = self.model.measurements.weighted(finer.predictions(self.theta))
-        root = np.sqrt(linear.weights)
-        J = (root[..., None] * linear.jacobian).reshape(root.size, -1)
-        change = (root * (fine - linear.residual)).reshape(-1)
-        rcond = self.settings.held_out_rcond
-        return np.asarray(-np.linalg.lstsq(J, change, rcond=rcond)[0])
+        change = (np.sqrt(linear.weights) * (fine - linear.residual)).reshape(-1)
+        return np.asarray(-self._step @ change)
 
     @property
-    def _null(self) -> Array:
+    def error_of_model(self) -> Array:
+        """By how much the estimate (p,) may be off, in the unit box, for its model.
+
+        Were that off in each row by `model_error_reach` standard deviations to the side
+        that matters: the same in all episodes, so that no bootstrap sees it either.
+        """
+        share = self.model.measurements.model_error_share
+        off = np.sqrt(self.linearisation.weights) * share
+        reach = self.settings.model_error_reach
+        return np.asarray(reach * np.abs(self._step) @ off.reshape(-1))
+
+    @property
+    def _step(self) -> Array:
+        """What weighted residuals (rows channels,) move the estimate by (p, ...)."""
+        linear = self.linearisation
+        root = np.sqrt(linear.weights)
+        J = (root[..., None] * linear.jacobian).reshape(root.size, -1)
+        return np.asarray(np.linalg.pinv(J, rcond=self.settings.held_out_rcond))
+
+    @property
+    def null(self) -> Array:
         """The point (p,) of the unit box at which no parameter has an effect."""
         parameters = self.model.parameters
         return Scaling(parameters).to_unit(nominal_values(parameters))
@@ -237,32 +258,3 @@ def _channel_losses(
     linear = fit.linearisation
     squares = pseudo_residual(linear.residual[:, channel], linear.huber_delta) ** 2
     return np.asarray(np.bincount(blocks, squares, minlength=count), dtype=float)
-
-
-def measured_evidence(before: Fit, after: Fit, trial: Evidence, tests: int) -> Evidence:
-    """Returns the evidence for what was added, by fits before and after.
-
-    Each block is judged by what the fit after would cost it, were it fitted to all
-    others; the p-value is of the prewhitened residuals, by short blocks, and for as
-    many tests as there are effects (Bonferroni).
-    """
-    gains, total = _block_gains(before, after, before.blocks)
-    filtered, settings = after.prewhitening, after.settings
-    white = filtered(after.linearisation.residual)
-    short = blocks_of(white, filtered.episode, settings, settings.max_test_blocks)
-    of_white, _ = _block_gains(before, after, short, filtered)
-    p = min(1.0, tests * gained_p(of_white, settings))
-    return trial.measured(gains, total, p)
-
-
-def _block_gains(
-    before: Fit,
-    after: Fit,
-    blocks: NDArray[np.int64],
-    filtered: Prewhitening | None = None,
-) -> tuple[Array, float]:
-    """Returns what each block gains (B,), and the loss of all before."""
-    losses = before.regression(blocks, filtered).block_losses
-    own = np.arange(len(after.theta))
-    left = after.regression(blocks, filtered).held_out_losses(own)
-    return losses - left, float(losses.sum())

@@ -75,8 +75,12 @@ class HeldOut:
 
     def in_noise(self, predicted: Array) -> float:
         """Returns the rms error in units of the noise and of the model's own error."""
+        return float(np.sqrt(np.mean(self.in_sigma(predicted) ** 2)))
+
+    def in_sigma(self, predicted: Array) -> Array:
+        """Returns the rms error (channels,) in units of `sigma`."""
         error = (predicted - self.measured) / self.sigma
-        return float(np.sqrt(np.mean(error**2)))
+        return np.asarray(np.sqrt(np.mean(error**2, axis=0)))
 
     @property
     def sigma(self) -> Array:

@@ -9,11 +9,17 @@ import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence
-from sysid.effect_selection.fit import Fit, measured_evidence
+from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.measured_evidence import (
+    amplitude_p,
+    linear_p,
+    measured_evidence,
+)
 from sysid.effect_selection.prescreen import prescreening_fits
 from sysid.effect_selection.search import ForwardSearch, ties, trials
 from sysid.effect_selection.settings import SelectionSettings
@@ -48,17 +54,24 @@ class RefitSearch(ForwardSearch):
         self, fit: Fit, survey: Survey, starts: _Starts
     ) -> tuple[list[_Trial], list[_Trial]]:
         """Returns what fits confirm of the most promising, and all that was tried."""
-        chosen = trials(self._worth_a_fit(survey, starts), self._settings.max_trials)
+        chosen = trials(
+            self._worth_a_fit(fit, survey, starts), self._settings.max_trials
+        )
         return self._try(fit, survey, chosen, starts)
 
-    def _worth_a_fit(self, survey: Survey, starts: _Starts) -> list[Evidence]:
-        """Returns what gains enough; after prescreening, of what has a start alone."""
-        least = self._settings.refit_min_linear_gain
-        return [
-            e
-            for e in survey.effects
-            if e.gain >= least and (not starts or e.effects in starts)
-        ]
+    def _worth_a_fit(self, fit: Fit, survey: Survey, starts: _Starts) -> list[Evidence]:
+        """Returns what gains enough; after prescreening, of what has a start alone.
+
+        And what may exceed the model's own error, where that is stated.
+        """
+        limits = self._settings
+        likely = [e for e in survey.effects if e.gain >= limits.refit_min_linear_gain]
+        if starts:
+            return [e for e in likely if e.effects in starts]
+        if not fit.states_model_error:
+            return likely
+        most = limits.refit_max_linear_p
+        return [e for e in likely if linear_p(fit, survey.linearised, e) < most]
 
     def _chosen(
         self,
@@ -73,7 +86,7 @@ class RefitSearch(ForwardSearch):
         again = self.fitter.fit(fit.effects, found)
         if again.loss <= (1.0 + limits.min_gain) * found.loss:
             return self._same_effects(fit, again)
-        rivals = ties(best, survey, self._worth_a_fit(survey, starts))
+        rivals = ties(best, self._worth_a_fit(fit, survey, starts))
         rivals = _ties_by_fit(rivals, confirmed, fit, found)
         found = at_own_minimum(self.fitter, found)
         self._record(best, rivals, survey, found)
@@ -134,6 +147,8 @@ class RefitSearch(ForwardSearch):
         else:
             found = self._fit_chosen(fit, survey, trial)
             found = self._with_hidden_amplitudes(fit, found, trial)
+        if fit.states_model_error:
+            found = without_noise(self.fitter, found)
         return self._without_replaced(self._without_needless(found))
 
     def _with_hidden_amplitudes(self, fit: Fit, found: Fit, trial: Evidence) -> Fit:
@@ -187,24 +202,50 @@ def at_own_minimum(fitter: Fitter, fit: Fit) -> Fit:
 
 
 def simplified(fitter: Fitter, fit: Fit) -> Fit:
-    """Returns the fit without amplitudes that gain next to nothing.
+    """Returns the fit without amplitudes that gain next to nothing, or noise explains.
 
     Even if they are significant: they have taken up what the model does a little
     differently from the device.
     """
-    effects = tuple(_with_useful_amplitudes(fit, effect) for effect in fit.effects)
-    if effects == fit.effects:
-        return fit
-    simple = fitter.fit(effects, fit)
+    fit = without_noise(fitter, fit)
+    simple = _only(fitter, fit, [_of_use(fit, effect) for effect in fit.effects])
     return simple if simple.loss <= (1.0 + fit.settings.min_gain) * fit.loss else fit
 
 
-def _with_useful_amplitudes(fit: Fit, effect: Candidate) -> Candidate:
+def without_noise(fitter: Fitter, fit: Fit) -> Fit:
+    """Returns the fit without amplitudes that stated noise or error can explain."""
+    if not fit.noise_is_stated:
+        return fit
+    return _only(fitter, fit, [_beyond_noise(fit, e) for e in fit.effects])
+
+
+def _only(fitter: Fitter, fit: Fit, effects: Sequence[Candidate]) -> Fit:
+    """Returns the fit with effects that have fewer amplitudes."""
+    return fit if tuple(effects) == fit.effects else fitter.fit(tuple(effects), fit)
+
+
+def _of_use(fit: Fit, effect: Candidate) -> Candidate:
     """Returns an effect with its best amplitude and others that gain enough."""
-    gains = fit.gains_of([np.array([c]) for c in fit.columns_of(effect)])
-    enough = min(fit.settings.min_amplitude_gain, max(gains))
-    pairs = zip(effect.fields, gains, strict=True)
-    return effect.only([field for field, gain in pairs if gain >= enough])
+    gains = _gains(fit, effect)
+    return _with(effect, gains >= min(fit.settings.min_amplitude_gain, max(gains)))
+
+
+def _beyond_noise(fit: Fit, effect: Candidate) -> Candidate:
+    """Returns an effect with its best amplitude and others that noise can't explain."""
+    p = np.array([amplitude_p(fit, int(c)) for c in fit.columns_of(effect)])
+    gains = _gains(fit, effect)
+    return _with(effect, (p < fit.settings.alpha) | (gains == max(gains)))
+
+
+def _gains(fit: Fit, effect: Candidate) -> NDArray[np.float64]:
+    """Returns what each amplitude of an effect gains (k,)."""
+    return np.array(fit.gains_of([np.array([c]) for c in fit.columns_of(effect)]))
+
+
+def _with(effect: Candidate, kept: NDArray[np.bool_]) -> Candidate:
+    """Returns an effect with some of its amplitudes (k,)."""
+    pairs = zip(effect.fields, kept, strict=True)
+    return effect.only([field for field, keep in pairs if keep])
 
 
 def _significant_only(fitter: Fitter, fit: Fit, known: int) -> Fit:

@@ -182,7 +182,8 @@ class LinearSearch(ForwardSearch):
         for trial in trials(accepted, self._settings.max_trials):
             found = self._without_needless(self._fit_chosen(fit, survey, trial))
             if self._is_better(fit, found, trial) and held_out_loss(found) <= enough:
-                self._record(trial, ties(trial, survey, accepted), survey, found)
+                rivals = linear_rivals(trial, survey, accepted)
+                self._record(trial, ties(trial, rivals), survey, found)
                 return found
             self._report_rejected(trial)
             if self._is_over:
@@ -206,10 +207,15 @@ def trials(accepted: Sequence[Evidence], count: int) -> list[Evidence]:
     return list(found.values())[:count]
 
 
-def ties(
+def ties(best: Evidence, rivals: Sequence[Evidence]) -> tuple[Evidence, ...]:
+    """Returns the rivals that the blocks can't distinguish from what was chosen."""
+    return tuple(e for e in rivals if e.ties_with(best))
+
+
+def linear_rivals(
     best: Evidence, survey: Survey, accepted: Sequence[Evidence]
-) -> tuple[Evidence, ...]:
-    """Returns what is accepted, or gains no less, and the blocks can't distinguish.
+) -> list[Evidence]:
+    """Returns what is accepted, or gains no less than what was chosen.
 
     Args:
         best: what was chosen.
@@ -218,5 +224,4 @@ def ties(
     """
     is_surveyed = any(best is e for e in survey.effects)
     rivals = survey.effects if is_surveyed else accepted
-    likely = [e for e in rivals if e.accepted or e.gain >= best.gain]
-    return tuple(e for e in likely if e.ties_with(best))
+    return [e for e in rivals if e.accepted or e.gain >= best.gain]

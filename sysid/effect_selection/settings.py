@@ -355,6 +355,12 @@ class SelectionSettings:
         "a candidate with less, by the linear account, is not worth a fit",
         _BLIND_LOGS,
     )
+    refit_max_linear_p: float = _setting(
+        0.5,
+        "p-value",
+        "where the model states its own error: what does not come near to exceeding it "
+        "in the linear account is not worth minutes of fits",
+    )
     refit_max_pairs: int = _setting(
         3,
         "pairs per round",
@@ -405,6 +411,15 @@ class SelectionSettings:
         1e-6,
         "of the largest singular value",
         "directions that a fold's other rows do not fix stay where they are",
+    )
+
+    model_error_reach: float = _setting(
+        1.0,
+        "standard deviations",
+        "by which the model itself may be off in all rows at once, in the direction of "
+        "an effect: what is less is none of a log that states such an error",
+        "in four logs of the cell with nothing hidden, no effect gained more than 0.07 "
+        "of them would explain (seeds 3000 to 3060)",
     )
 
     # Whether the arm scatters about its commands.

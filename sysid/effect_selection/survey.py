@@ -45,6 +45,9 @@ class LinearSurvey:
         dependences: curves, and the columns of each.
         episodes: (B,) number of the episode that each block is of.
         is_further: whether the fit has effects: the model surely lacked something.
+        noise_decides: whether what exceeds the stated noise is found: where fits
+            decide, and not this linear account.
+        model_error_share: (rows, channels) see Measurements; None: none is stated.
     """
 
     linearisation: Linearisation
@@ -56,6 +59,8 @@ class LinearSurvey:
     dependences: Sequence[tuple[Dependence, Columns]]
     episodes: NDArray[np.int64]
     is_further: bool
+    noise_decides: bool
+    model_error_share: Array | None
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -218,6 +223,8 @@ def _linear_survey(
         of_curves,
         episode[np.unique(blocks, return_index=True)[1]],
         bool(fit.effects),
+        fit.noise_is_stated and not model.affine,
+        model.measurements.model_error_share if fit.states_model_error else None,
     )
 
 

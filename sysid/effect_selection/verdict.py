@@ -212,9 +212,9 @@ def _explained(first: Fit, last: Fit, left: float) -> float:
 def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
     """Returns the effects' parameters with their intervals.
 
-    An interval is that of a bootstrap, and as much wider as the model's time steps are
-    known to be off. Without shape parameters on which no row of the log depends: they
-    are as assumed.
+    An interval is that of a bootstrap, and as much wider as the model's time steps, and
+    the model itself, are known to be off. Without shape parameters on which no row of
+    the log depends: they are as assumed.
 
     Args:
         fit: with the effects.
@@ -222,8 +222,10 @@ def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
     """
     spread = uncertainty(fit.linearisation, fit.model.measurements.episode)
     scaling = Scaling(fit.model.parameters)
-    off = fit.error_of_steps[:, None]
-    ends = spread.bootstrap + np.hstack([np.minimum(off, 0.0), np.maximum(off, 0.0)])
+    off, around = fit.error_of_steps[:, None], fit.error_of_model[:, None]
+    ends = spread.bootstrap + np.hstack(
+        [np.minimum(off, 0.0) - around, np.maximum(off, 0.0) + around]
+    )
     ends = np.clip(fit.linearisation.u[:, None] + ends, 0.0, 1.0)
     low, high = (scaling.from_unit(side) for side in ends.T)
     inside = fit.inside(np.arange(len(fit.theta)))

@@ -106,7 +106,8 @@ def improvement_in_words(errors: HeldOut) -> str:
         before, after = ({unit: 100.0 * errors.relative(p)} for p in ends)
         shown = [unit]
     else:
-        shown = [unit for unit in before if unit in _above_noise(errors)]
+        telling = _telling(errors)
+        shown = [unit for unit in before if unit in telling]
     changed = [u for u in shown if _two_digits(before[u]) != _two_digits(after[u])]
     texts = {u: _change(before[u], after[u], u) for u in changed}
     verbs = {
@@ -125,12 +126,13 @@ def _change(before: float, after: float, unit: str) -> str:
     return f"from {before / factor:.3g} to {after / factor:.3g} {small}"
 
 
-def _above_noise(errors: HeldOut) -> set[str]:
-    """Returns the units of channels that are above their noise; all if none is."""
-    ends = [errors.rms(predicted) for predicted in (errors.before, errors.after)]
-    below = np.max(ends, axis=0) < [channel.noise for channel in errors.channels]
+def _telling(errors: HeldOut) -> set[str]:
+    """Returns the units of channels above their noise, and the one that gains most."""
+    before, after = (errors.in_sigma(p) ** 2 for p in (errors.before, errors.after))
     units = np.array([channel.unit for channel in errors.channels])
-    return set(units[~below] if not below.all() else units)
+    gain = {unit: float((before - after)[units == unit].sum()) for unit in units}
+    is_below = np.maximum(before, after) < 1.0
+    return {*units[~is_below], max(gain, key=lambda unit: gain[unit])}
 
 
 def left_in_words(verdict: Verdict) -> str:

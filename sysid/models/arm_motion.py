@@ -15,12 +15,25 @@ from drake_disasm.effects import (
     ArmTorqueEffect,
     DelayEffect,
     FlangePayload,
+    JointElasticity,
 )
 from drake_disasm.logs import Episode
 from sysid.models.base import Array
+from sysid.models.elastic_torques import ElasticTorques
 from sysid.models.regressor import ArmDynamics, BaseSet
 
-_BY_SAMPLE = ("time", "episode", "q", "v", "vd", "Y", "Y_payload", "Y_tilt", "tilt")
+_BY_SAMPLE = (
+    "row",
+    "time",
+    "episode",
+    "q",
+    "v",
+    "vd",
+    "Y",
+    "Y_payload",
+    "Y_tilt",
+    "tilt",
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,6 +42,7 @@ class ArmMotion:
 
     Attributes:
         joints: their names.
+        row: (n,) number of each sample among all those of the log.
         time: (n,) [s].
         episode: (n,) number of each sample's episode.
         q, v, vd: (n, joints).
@@ -37,9 +51,11 @@ class ArmMotion:
         Y_tilt: (n, joints, b, 2) derivative of Y by a tilt [rx, ry] of the base.
         tilt: (n, joints, 2) the same of the torques by the nominal parameters.
         nominal: (b,) base parameters by the URDF.
+        elastic: of all samples of the log.
     """
 
     joints: tuple[str, ...]
+    row: NDArray[np.int64]
     time: Array
     episode: NDArray[np.int64]
     q: Array
@@ -50,6 +66,7 @@ class ArmMotion:
     Y_tilt: Array
     tilt: Array
     nominal: Array
+    elastic: ElasticTorques
 
     @classmethod
     def of(
@@ -65,10 +82,13 @@ class ArmMotion:
             for name in ("q", "v", "vd", "time")
         )
         Y, Y_tilt = arm.regressor(q, v, vd), arm.tilt_regressor(q)
+        counts = [len(e["time"]) for e in episodes]
+        episode = np.repeat(np.arange(len(episodes)), counts)
         return cls(
             tuple(joints),
+            np.arange(len(time)),
             time,
-            np.repeat(np.arange(len(episodes)), [len(e["time"]) for e in episodes]),
+            episode,
             q,
             v,
             vd,
@@ -77,6 +97,7 @@ class ArmMotion:
             Y_tilt[:, :, base.independent],
             np.einsum("njkt,k->njt", Y_tilt, arm.inertia),
             base.beta(arm.inertia),
+            ElasticTorques(arm.urdf, joints, time, episode, np.stack([q, v, vd])),
         )
 
     def rows(self, chosen: slice | NDArray[np.bool_]) -> Self:
@@ -104,7 +125,8 @@ class ArmMotion:
 
         Args:
             beta: (b,) base parameters.
-            effects: on the arm; bodies that it carries and a tilt are in the load.
+            effects: on the arm; bodies that it carries, a tilt and gears that yield
+                are in the load.
         """
         load: Array = self.Y @ beta
         for effect in effects:
@@ -113,6 +135,9 @@ class ArmMotion:
             elif isinstance(effect, ArmTilt) and not effect.is_null:
                 by_base = np.einsum("njbt,b->njt", self.Y_tilt, beta - self.nominal)
                 load = load + (self.tilt + by_base) @ [effect.rx, effect.ry]
+            elif isinstance(effect, JointElasticity) and not effect.is_null:
+                by_compliance = self.elastic.by_compliance(effect.joint)[self.row]
+                load = load + effect.compliance * by_compliance
         return ArmSamples(self.joints, self.q, self.v, self.vd, load)
 
     def shifted(self, torque: Array, effects: Sequence[DelayEffect]) -> Array:

@@ -1,4 +1,4 @@
-"""How fast the arm moves when a step begins, which no encoder measures."""
+"""How fast the arm moves, which no encoder measures, and where it goes."""
 
 import dataclasses
 from typing import Self
@@ -49,13 +49,31 @@ class ArmRates:
             q, qd: (n, 2, 6) measured and commanded coordinates at begin and end.
             wrench: (n, 2, 6) measured on the bolt then, [f; tau] at Bo in Gn.
         """
-        h = self.step.h
-        mean: Array = (q[:, 1] - q[:, 0]) / h
+        mean: Array = (q[:, 1] - q[:, 0]) / self.step.h
         if not self.lags:
             return mean
+        ahead = self._ahead(np.hstack([q[:, 0], v]), qd, wrench)
+        return mean + ahead[:, 6:] - (ahead[:, :6] - q[:, 0]) / self.step.h
+
+    def path(self, qd: Array, wrench: Array) -> Array:
+        """Returns where the arm goes in an episode (n + 1, 6), from rest on.
+
+        Args:
+            qd: (n + 1, 6) commanded coordinates.
+            wrench: (n + 1, 6) measured on the bolt, [f; tau] at Bo in Gn.
+        """
+        found = np.zeros((len(qd), 12))
+        found[0, :6] = qd[0]
+        for k in range(1, len(qd)):
+            last = np.s_[None, k - 1 : k + 1]
+            found[k] = self._ahead(found[None, k - 1], qd[last], wrench[last])
+        return found[:, :6]
+
+    def _ahead(self, x: Array, qd: Array, wrench: Array) -> Array:
+        """Returns coordinates and rates (n, 12) a step after others; see `after`."""
+        h = self.step.h
         commanded = np.hstack([qd[:, 1], (qd[:, 1] - qd[:, 0]) / h])
         force = (wrench @ self.to_grip.T)[..., list(AXIS_ORDER)]
         grows = (force[:, 1] - force[:, 0]) / h
-        ahead = self.step.ahead(np.hstack([q[:, 0], v]), commanded)
-        ahead += force[:, 0] @ self.step.G.T + grows @ self.step.H.T
-        return mean + ahead[:, 6:] - (ahead[:, :6] - q[:, 0]) / h
+        ahead = self.step.ahead(x, commanded)
+        return np.asarray(ahead + force[:, 0] @ self.step.G.T + grows @ self.step.H.T)

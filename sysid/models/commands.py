@@ -45,6 +45,18 @@ class Commands:
         return np.array(path)
 
 
+def bolt_path(coordinates: Array, p_BoTo_B: Array) -> Array:
+    """Returns positions and rotation vectors (n, 6) of B in G: see `twin_coordinates`.
+
+    Args:
+        coordinates: (n, 6) of the twin.
+        p_BoTo_B: (3,) see `BoltCoordinates`.
+    """
+    turn = Rotation.from_euler("ZYX", coordinates[:, 3:])
+    p = np.array(p_BoTo_B)
+    return np.hstack([coordinates[:, :3] - turn.apply(p) + p, turn.as_rotvec()])
+
+
 def twin_coordinates(path: Array, p_BoTo_B: Array) -> Array:
     """Returns the twin's coordinates (n, 6) of positions and rotation vectors (n, 6).
 

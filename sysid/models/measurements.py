@@ -133,6 +133,13 @@ class Measurements:
             return self.noise
         return np.hypot(self.noise, self.model_error)
 
+    @property
+    def model_error_share(self) -> Array:
+        """Share of `sigma` (rows, channels) that is the model's own error, or zeros."""
+        if self.model_error is None:
+            return np.zeros_like(self.values)
+        return np.asarray(self.model_error / self.sigma)
+
     def weighted(self, predicted: Array) -> Array:
         """Returns residuals (rows, channels) of a prediction, in units of `sigma`."""
         return np.asarray((predicted - self.values) / self.sigma)

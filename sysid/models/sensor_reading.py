@@ -108,6 +108,18 @@ class SensorReading:
         change = (load - raw) - (seen - zero)
         return np.hstack([states[:, :6], states[:, 6:] + change])
 
+    def reported(self, states: Array, poses: Array) -> Array:
+        """Returns states (n, 12) as they are processed with other poses (n, 6).
+
+        Processing takes off the payload's weight at the pose that is reported.
+        """
+        reported = np.hstack([poses, states[:, 6:]])
+        there, seen = (
+            self.payload.weight(self.orientations(s)) for s in (states, reported)
+        )
+        reported[:, 6:] += there - seen
+        return reported
+
     def orientations(self, states: Array) -> Array:
         """Returns the orientations (n, 3, 3) of the sensor in W, of states (n, 12)."""
         R_GB = Rotation.from_rotvec(states[:, 3:6]).as_matrix()

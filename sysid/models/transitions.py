@@ -23,6 +23,7 @@ from sysid.models.base import Array
 from sysid.models.cell_arm import CellArm, Sway
 from sysid.models.commands import Commands, twin_coordinates
 from sysid.models.grip_lag import GripLag
+from sysid.models.late_pose import LatePoses, on_time
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.sensor_reading import SensorReading, at_sensor
 
@@ -51,6 +52,7 @@ class Transitions:
         steps: measured state and command of each transition (rows,).
         before: (rows, 12) state at its beginning, the wrench at So in S.
         rows: (rows,) its number among all transitions of the episodes.
+        episodes: whole ones, in the twin's coordinates, for poses that come late.
         commands: of whole episodes, since effects on the motion have a memory.
         lead: (rows,) by which the command is ahead on average [s].
         shift: (rows, 6) by which it is elsewhere.
@@ -62,6 +64,7 @@ class Transitions:
     steps: Steps
     before: Array
     rows: NDArray[np.int64]
+    episodes: "tuple[_Recorded, ...]"
     commands: tuple[Commands, ...]
     lead: Array
     shift: Array
@@ -85,7 +88,8 @@ class Transitions:
         p_BoTo_B = Tool.from_models(scenario).p_BoTo_B
         twin = BoltCoordinates(p_BoTo_B)
         rates, grip = ArmRates.of(scenario), GripLag.of(scenario)
-        steps = _concatenated([_steps(e, rates, grip, twin) for e in episodes])
+        recorded = tuple(_Recorded.of(e, rates, grip, twin) for e in episodes)
+        steps = _concatenated([each.steps() for each in recorded])
         arms = [CellArm.of(scenario, _station(log)) for log in logs]
         counts = [sum(e.rows - 1 for e in log.episodes) for log in logs]
         lead = np.repeat([arm.lead for arm in arms], counts)
@@ -99,7 +103,9 @@ class Transitions:
         before = np.concatenate(states)
         commands = tuple(Commands.of(e, period) for e in episodes)
         rows = np.arange(len(steps))
-        found = cls(steps, before, rows, commands, lead, shift, sway, period, p_BoTo_B)
+        found = cls(
+            steps, before, rows, recorded, commands, lead, shift, sway, period, p_BoTo_B
+        )
         return dataclasses.replace(found, steps=found._moved(steps.qd, steps.qd_rate))
 
     def select(self, mask: NDArray[np.bool_]) -> Self:
@@ -114,16 +120,33 @@ class Transitions:
             sway=self.sway[mask],
         )
 
-    def executed(self, effects: Sequence[MotionEffect]) -> Steps:
-        """Returns the steps as effects, in the chain's order, have them executed."""
-        if not effects:
-            return self.steps
+    def executed(
+        self, effects: Sequence[MotionEffect], weights: Array
+    ) -> tuple[Steps, LatePoses | None]:
+        """Returns the steps as effects have them executed, and late poses, if any.
+
+        Args:
+            effects: on the motion, in the chain's order.
+            weights: of poses in the one that is measured, see `pose_weights`.
+        """
+        is_late = len(weights) > 1
+        if not effects and not is_late:
+            return self.steps, None
         paths = [
             twin_coordinates(c.executed(effects), self.p_BoTo_B) for c in self.commands
         ]
         qd = np.concatenate([path[:-1] for path in paths])
         moved = np.concatenate([np.diff(path, axis=0) for path in paths])
-        return self._moved(qd[self.rows], moved[self.rows] / self.period)
+        steps = self._moved(qd[self.rows], moved[self.rows] / self.period)
+        if not is_late:
+            return steps, None
+        pairs = list(zip(self.episodes, paths, strict=True))
+        went = [each.rates.path(path, each.wrench) for each, path in pairs]
+        late = LatePoses.of(went, weights)
+        pairs = list(zip(self.episodes, went, strict=True))
+        begun = _concatenated([e.on_time(path, weights).steps() for e, path in pairs])
+        begun = begun.select(self.rows)
+        return dataclasses.replace(steps, q=begun.q, v=begun.v), late
 
     def _moved(self, qd: Array, qd_rate: Array) -> Steps:
         """Returns the steps with commands (rows, 6) as the arm has them."""
@@ -247,28 +270,57 @@ def _begins(episodes: Sequence[Episode]) -> Array:
     return np.concatenate([observations(e)[:-1, 6:] for e in episodes])
 
 
-def _steps(
-    episode: Episode, rates: ArmRates, grip: GripLag, twin: BoltCoordinates
-) -> Steps:
-    measured = _coordinates(episode["X_GB_measured"], twin)
-    commanded = _coordinates(episode["X_GB_commanded"], twin)
-    wrench = observations(episode)[:, 6:]
-    v, elastic = np.zeros((episode.rows - 1, 6)), np.array(wrench[:-1])
-    for k in range(1, len(v)):
-        last = np.s_[None, k - 1 : k + 1]
-        v[k] = rates.after(
-            v[None, k - 1], measured[last], commanded[last], wrench[last]
+@dataclasses.dataclass(frozen=True)
+class _Recorded:
+    """An episode of n steps as it was recorded, in the twin's coordinates.
+
+    Attributes:
+        measured, commanded: (n + 1, 6) coordinates.
+        wrench: (n + 1, 6) measured on the bolt at Bo in G.
+        rates, grip: that tell what no encoder measures.
+    """
+
+    measured: Array
+    commanded: Array
+    wrench: Array
+    rates: ArmRates
+    grip: GripLag
+
+    @classmethod
+    def of(
+        cls, episode: Episode, rates: ArmRates, grip: GripLag, twin: BoltCoordinates
+    ) -> Self:
+        """Returns a log's episode."""
+        return cls(
+            _coordinates(episode["X_GB_measured"], twin),
+            _coordinates(episode["X_GB_commanded"], twin),
+            observations(episode)[:, 6:],
+            rates,
+            grip,
         )
-        elastic[k] = grip.after(elastic[None, k - 1], wrench[last])
-    return Steps(
-        np.arange(episode.rows - 1),
-        measured[:-1],
-        v,
-        commanded[:-1],
-        np.diff(commanded, axis=0) / rates.step.h,
-        elastic,
-        grip.rates(elastic, wrench[:-1]),
-    )
+
+    def on_time(self, path: Array, weights: Array) -> Self:
+        """Returns the episode with poses that do not come late: see `on_time`."""
+        there = on_time(self.measured, path, weights)
+        return dataclasses.replace(self, measured=there)
+
+    def steps(self) -> Steps:
+        """Returns its steps."""
+        q, qd, wrench = self.measured, self.commanded, self.wrench
+        v, elastic = np.zeros((len(q) - 1, 6)), np.array(wrench[:-1])
+        for k in range(1, len(v)):
+            last = np.s_[None, k - 1 : k + 1]
+            v[k] = self.rates.after(v[None, k - 1], q[last], qd[last], wrench[last])
+            elastic[k] = self.grip.after(elastic[None, k - 1], wrench[last])
+        return Steps(
+            np.arange(len(v)),
+            q[:-1],
+            v,
+            qd[:-1],
+            np.diff(qd, axis=0) / self.rates.step.h,
+            elastic,
+            self.grip.rates(elastic, wrench[:-1]),
+        )
 
 
 def _coordinates(poses: Array, twin: BoltCoordinates) -> Array:

@@ -13,9 +13,12 @@ from drake_disasm.effects import (
     Effect,
     EnvironmentEffect,
     MotionEffect,
+    PoseEffect,
     SensorEffect,
     SensorResidualModel,
     motion_chain,
+    pose_weights,
+    reported_poses,
     sensor_chain,
 )
 from drake_disasm.logs import Log
@@ -24,6 +27,8 @@ from drake_disasm.scenario import Scenario
 from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.replay import Steps, TwinReplay
 from sysid.models.base import Array, PredictionError, even_chunks
+from sysid.models.commands import bolt_path, twin_coordinates
+from sysid.models.late_pose import LatePoses
 from sysid.models.replays import impact_replay, twin_replay
 from sysid.models.scenario_model import ScenarioModel
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
@@ -49,7 +54,7 @@ class TwinModel(ScenarioModel):
     small for one step show.
     """
 
-    effect_types = (EnvironmentEffect, MotionEffect, SensorEffect)
+    effect_types = (EnvironmentEffect, MotionEffect, PoseEffect, SensorEffect)
     residual_effect = SensorResidualModel
     held_out_share = 0.25
     has_commands = True
@@ -81,7 +86,7 @@ class TwinModel(ScenarioModel):
         self._transitions = Transitions.of(logs, scenario, self.reading)
         self.measurements = measured_states(logs, scenario, self.reading)
         self._displacement: Array | None = None  # (rows, 2, 3) of begin and end
-        self._executed: tuple[str, Steps] | None = None
+        self._executed: tuple[str, tuple[Steps, LatePoses | None]] | None = None
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
@@ -95,11 +100,15 @@ class TwinModel(ScenarioModel):
         scenario = self.scenario_at(theta)
         try:
             replay = self._replay_at(scenario)
-            steps = self._steps_of(_mean_chain(scenario)).select(rows)
+            steps, late = self._executed_at(scenario)
+            steps = steps.select(rows)
             if self._displacement is not None:
                 period = self._transitions.period
                 steps = _displaced(steps, self._displacement[rows], period)
-            states = self.at_sensor(self._states(replay, steps))
+            states = self._states(replay, steps)
+            if late is not None and not self.rollout:
+                states = self._carried_on(replay, steps, states, late, rows)
+            states = self.at_sensor(states)
             states[:, 6:] += self._transitions.sway[rows]
         except (RuntimeError, DisasmError, ValueError) as error:
             text = " ".join(str(error).split())
@@ -108,12 +117,17 @@ class TwinModel(ScenarioModel):
         return np.hstack([states, zero])
 
     def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
-        """Returns the states (len(rows), 12) with the wrench read through effects."""
-        effects = sensor_chain(self.scenario_at(theta).effects)
+        """Returns the states (len(rows), 12), wrench and pose read through effects."""
+        scenario = self.scenario_at(theta)
+        effects = sensor_chain(scenario.effects)
         states, zero = simulated[:, :12], simulated[0, 12:]
-        if not effects:
+        if effects:
+            states = self.reading.read(effects, states, zero, self._times[rows])
+        steps, late = self._executed_at(scenario)
+        if late is None:
             return states
-        return self.reading.read(effects, states, zero, self._times[rows])
+        poses = self._reported(states, steps, late, rows)
+        return self.reading.reported(states, poses)
 
     def residual_inputs(self, theta: Array) -> dict[str, Array]:
         """See LogModel: of readings before zeroing is taken off."""
@@ -196,10 +210,29 @@ class TwinModel(ScenarioModel):
         """Returns channels (n, 12), of states (n, 12) with the wrench at Bo in G."""
         return at_sensor(states, self.reading.X_SB)
 
-    def _steps_of(self, effects: Sequence[MotionEffect]) -> Steps:
-        """Returns the steps as effects on the motion have them executed."""
-        if self._executed is None or self._executed[0] != repr(effects):
-            self._executed = repr(effects), self._transitions.executed(effects)
+    def _reported(
+        self, states: Array, steps: Steps, late: LatePoses, rows: slice
+    ) -> Array:
+        """Returns the poses (n, 6) that are reported where steps led, of states."""
+        poses, before = states[:, :6], self._transitions.before[rows, :6]
+        if not self.rollout:
+            p, own = self._transitions.p_BoTo_B, self._transitions.rows[rows]
+            q, q_before = (twin_coordinates(x, p) for x in (poses, before))
+            return bolt_path(late.at_ends(own, q_before, steps.q[rows], q), p)
+        episode, found = self.measurements.episode[rows], np.empty_like(poses)
+        for number in np.unique(episode):
+            own = episode == number
+            path = np.vstack([before[own][:1], poses[own]])
+            found[own] = reported_poses(path, late.weights)[1:]
+        return found
+
+    def _executed_at(self, scenario: Scenario) -> tuple[Steps, LatePoses | None]:
+        """Returns the steps as effects have them executed, and late poses, if any."""
+        effects = _mean_chain(scenario)
+        weights = pose_weights(scenario.effects, self._transitions.period)
+        key = repr((effects, weights.tolist()))
+        if self._executed is None or self._executed[0] != key:
+            self._executed = key, self._transitions.executed(effects, weights)
         return self._executed[1]
 
     def chunks(self) -> list[slice]:
@@ -245,6 +278,31 @@ class TwinModel(ScenarioModel):
         if isinstance(replay, ImpactReplay) or not self.rollout:
             return replay.transitions(steps)
         return replay.episode(steps)
+
+    def _carried_on(
+        self,
+        replay: TwinReplay | ImpactReplay,
+        steps: Steps,
+        states: Array,
+        late: LatePoses,
+        rows: slice,
+    ) -> Array:
+        """Returns states (n, 12) after steps, of which the last ones begin unmeasured.
+
+        An episode's last poses never come in: there a step begins where the one before
+        led, by its prediction.
+        """
+        transitions, states = self._transitions, states.copy()
+        own = transitions.rows[rows]
+        unseen = late.unseen[own] * (np.diff(own, prepend=-2) == 1)
+        steps = dataclasses.replace(steps, q=steps.q.copy(), v=steps.v.copy())
+        for count in range(1, int(unseen.max(initial=0)) + 1):
+            on = np.flatnonzero(unseen == count)
+            q = twin_coordinates(states[on - 1, :6], transitions.p_BoTo_B)
+            steps.v[on] = (q - steps.q[on - 1]) / transitions.period
+            steps.q[on] = q
+            states[on] = replay.transitions(steps.select(unseen == count))
+        return states
 
     def __getstate__(self) -> dict[str, Any]:
         """Leaves out what is quickly found again."""

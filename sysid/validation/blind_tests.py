@@ -16,6 +16,7 @@ from drake_disasm.effects import (
     Effect,
     EnvironmentEffect,
     MotionEffect,
+    PoseEffect,
     SensorEffect,
     registered_effects,
 )
@@ -103,7 +104,7 @@ def nominal() -> Scenario:
 
 def observable_effects() -> tuple[type[Effect], ...]:
     """Returns the effects that show in transitions of the twin."""
-    acts = (EnvironmentEffect, MotionEffect, SensorEffect)
+    acts = (EnvironmentEffect, MotionEffect, PoseEffect, SensorEffect)
     return tuple(
         effect
         for effect in registered_effects()

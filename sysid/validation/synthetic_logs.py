@@ -18,6 +18,8 @@ from drake_disasm.effects import (
     Effect,
     EnvironmentEffect,
     motion_chain,
+    pose_weights,
+    reported_poses,
     sensor_chain,
 )
 from drake_disasm.logs import LogWriter, flat_columns
@@ -137,6 +139,7 @@ def rollout(
     real = copy.deepcopy(scenario)
     real.effects = [*real.effects, *effects]
     motion, sensor = motion_chain(real.effects), sensor_chain(real.effects)
+    weights = pose_weights(real.effects, scenario.task.period)
     real.effects = [e for e in real.effects if isinstance(e, EnvironmentEffect)]
     replay = ImpactReplay(real, coarse=True)  # as the model of the log has it
     reading = SensorReading(scenario, Tool.from_models(scenario))
@@ -162,6 +165,10 @@ def rollout(
             states[e, k + 1] = read[-1]
         states[:, k + 1, 6:] += noise[:, k + 1]
     readings = np.array([reading.raw(s, zero) for s in states])
+    if len(weights) > 1:
+        seen = [reported_poses(path, weights) for path in states[:, :, :6]]
+        pairs = zip(states, seen, strict=True)
+        states = np.array([reading.reported(s, poses) for s, poses in pairs])
     return Rollout(commanded, states, readings)
 
 

@@ -37,6 +37,7 @@ _SEEDS = {"null": 3000, "effect": 7000}
 _EXPLORATION = 1.5e-4  # m
 _TIMES = (4.0, 10.0)  # the limit of detection
 _MOST = 0.5  # of the way to an amplitude's bound; beyond it the cell may not start
+_FAR = _MOST / _TIMES[1]
 
 
 def record(folder: Path, scenario: Scenario, seed: int) -> Log:
@@ -52,14 +53,14 @@ def record(folder: Path, scenario: Scenario, seed: int) -> Log:
 def draw(number: int, limits: list[list[object]]) -> Effect:
     """Returns the effect of a case: another kind for each, as far as there are."""
     random = np.random.default_rng(_SEEDS["effect"])
-    known = {str(name) for name, _, size, share in limits if size and share < _MOST / 4}
+    known = {str(name) for name, _, size, share in limits if size and share < _FAR}
     kinds = [kind for kind in observable_effects() if kind.__name__ in known]
     order = np.concatenate(
         [random.permutation(len(kinds)) for _ in range(1 + number // len(kinds))]
     )
     kind, random = kinds[order[number]], np.random.default_rng([7000, number])
     own = [row for row in limits if row[0] == kind.__name__ and row[2]]
-    own = [row for row in own if row[3] < _MOST / 4]
+    own = [row for row in own if row[3] < _FAR]
     _, field, size, _ = own[int(random.integers(len(own)))]
     return kind(**{str(field): float(size) * random.uniform(*_TIMES)})
 

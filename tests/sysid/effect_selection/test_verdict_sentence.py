@@ -175,6 +175,20 @@ def test_errors_of_several_units_are_no_shares_and_those_that_rise_are_said():
     )
 
 
+def test_the_unit_that_gains_most_is_said_though_it_is_below_its_noise():
+    channels = (Channel("fx", "N", 0.1), Channel("w", "rad", 6e-5))
+    errors = dataclasses.replace(
+        ERRORS,
+        measured=np.zeros((2, 2)),
+        before=np.tile([0.109, 5.6e-5], (2, 1)),
+        after=np.tile([0.109, 9e-6], (2, 1)),
+        channels=channels,
+    )
+    assert improvement_in_words(errors) == (
+        "the held-out error falls from 56 to 9 \N{GREEK SMALL LETTER MU}rad"
+    )
+
+
 def test_a_share_of_readings_near_zero_is_not_given():
     errors = dataclasses.replace(ERRORS, measured=0.01 * ERRORS.measured)
     assert "%" not in improvement_in_words(errors)

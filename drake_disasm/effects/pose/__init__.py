@@ -1,0 +1,1 @@
+"""Effects between where the arm is and what is reported of it."""

@@ -1,0 +1,49 @@
+"""A pose that comes late, and what could be taken for it, in logs of transitions."""
+
+import pytest
+
+from drake_disasm.effects import (
+    Backlash,
+    Effect,
+    MotionLag,
+    PoseDelay,
+    SensorDelay,
+)
+from drake_disasm.logs import read_log
+from sysid.effect_selection.close_loop import close_loop
+from sysid.effect_selection.verdict import Verdict
+from sysid.models.twin import TwinModel
+from sysid.validation.blind_tests import nominal
+from sysid.validation.synthetic_logs import transitions_log
+
+_RIVALS = [PoseDelay, MotionLag, SensorDelay]
+
+
+def _verdict(folder, effects: list[Effect], library=None, episodes=12) -> Verdict:
+    log = folder / "log"
+    transitions_log(log, nominal(), effects, seed=0, episodes=episodes)
+    model = TwinModel([read_log(log)], nominal(), ())
+    return close_loop(model, library=library).verdict
+
+
+@pytest.mark.parametrize("effect", [PoseDelay(0.2), MotionLag(0.03)], ids=repr)
+def test_each_is_named_beside_its_rivals(effect, tmp_path):
+    verdict = _verdict(tmp_path, [effect], _RIVALS, episodes=8)
+    assert (verdict.ending, verdict.names) == ("explained", (type(effect).__name__,))
+    (value,) = verdict.values
+    assert value.value == pytest.approx(effect.delay, rel=0.02)
+
+
+def test_a_pose_on_time_is_given_no_delay(tmp_path):
+    assert _verdict(tmp_path, [], _RIVALS, episodes=8).ending == "none"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "effect",
+    [PoseDelay(0.1), PoseDelay(0.2), MotionLag(0.03), Backlash(x=4e-4, z=4e-4)],
+    ids=repr,
+)
+def test_each_is_named_first_of_the_whole_library(effect, tmp_path):
+    verdict = _verdict(tmp_path, [effect])
+    assert (verdict.ending, verdict.names) == ("explained", (type(effect).__name__,))

@@ -1,0 +1,181 @@
+"""A gear that yields: motor-side positions, and the torque at the joint."""
+
+import pickle
+
+import numpy as np
+import pytest
+from scipy.interpolate import make_interp_spline
+
+from drake_disasm.effects import Effect, JointElasticity, find_effect
+from drake_disasm.logs import Log, LogHeader, LogWriter, flat_columns, read_log
+from drake_disasm.scenario import Scenario
+from sysid.effect_selection.close_loop import close_loop
+from sysid.models.elastic_torques import ElasticTorques, time_derivatives
+from sysid.models.joint_motion import JointMotionModel
+from sysid.models.regressor import ArmDynamics
+from tests.sysid.models.arm import JOINTS, smooth_motion, write_two_link_arm
+
+_PERIOD, _ROWS = 0.005, 1200
+_NOISE = 0.02  # N m
+
+_PENDULUM = """<robot name="pendulum"><link name="base"/><link name="rod">
+<inertial><origin xyz="0 0 -0.4"/><mass value="5"/>
+<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.01"/></inertial></link>
+<joint name="pivot" type="{kind}"><parent link="base"/><child link="rod"/>
+<axis xyz="0 1 0"/><limit lower="-9" upper="9" velocity="9" effort="99"/></joint>
+</robot>
+"""
+
+
+@pytest.fixture
+def urdf(tmp_path):
+    return write_two_link_arm(tmp_path / "two.urdf")
+
+
+def _written(folder, urdf, joints, columns) -> Log:
+    header = LogHeader("joint_motion", "excite", {}, joints=joints, urdf=str(urdf))
+    with LogWriter(folder, header) as writer:
+        writer.write_episode(flat_columns("joint_motion", columns))
+    return read_log(folder)
+
+
+def _behind_springs(folder, urdf, compliances, seed=0) -> Log:
+    """A log of the arm whose links move smoothly: the motors lead by c tau.
+
+    Link positions are a flat output of elastic joints (De Luca and Book, Springer
+    Handbook of Robotics, 2nd ed., ch. 11): torque and motors follow without a
+    simulation.
+    """
+    time = _PERIOD * np.arange(_ROWS)
+    linked = smooth_motion(time)
+    tau = ArmDynamics(str(urdf), JOINTS).torques(*linked)
+    ahead = make_interp_spline(time, tau * compliances, k=5)
+    q, v, vd = (part + ahead.derivative(k)(time) for k, part in enumerate(linked))
+    noise = _NOISE * np.random.default_rng(seed).normal(size=tau.shape)
+    columns = {"time": time, "q": q, "v": v, "vd": vd, "tau": tau + noise}
+    return _written(folder, urdf, JOINTS, columns)
+
+
+def _torque(log: Log, effects: list[Effect]) -> np.ndarray:
+    model = JointMotionModel([log], scenario=Scenario(effects=effects))
+    return model.predictions(np.array([p.nominal for p in model.parameters]))
+
+
+def test_a_pendulum_on_a_spring_swings_as_in_the_textbook(tmp_path):
+    """J q'' + m g l sin(q) = tau = k (q_motor - q), in closed form.
+
+    With q = a sin(w t), its torque's derivatives by hand.
+    """
+    path = tmp_path / "pendulum.urdf"
+    path.write_text(_PENDULUM.format(kind="revolute"))
+    time = _PERIOD * np.arange(_ROWS)
+    a, w, J, weight, k = 0.5, 7.0, 0.1 + 5 * 0.4**2, 5 * 9.81 * 0.4, 2000.0
+    q, v = a * np.sin(w * time), a * w * np.cos(w * time)
+    vd = -(w**2) * q
+    tau = J * vd + weight * np.sin(q)
+    rate = -J * w**2 * v + weight * np.cos(q) * v
+    second = -J * w**2 * vd + weight * (np.cos(q) * vd - np.sin(q) * v**2)
+    motor = [x + y / k for x, y in zip((q, v, vd), (tau, rate, second), strict=True)]
+    columns = dict(zip(("q", "v", "vd"), (m[:, None] for m in motor), strict=True))
+    columns |= {"time": time, "tau": tau[:, None]}
+    log = _written(tmp_path / "log", path, ("pivot",), columns)
+    rigid = _torque(log, [])
+    change = _torque(log, [JointElasticity("pivot", 1.0 / k)]) - rigid
+    inner = slice(20, -20)
+    found = float(np.vdot(change[inner], (tau[:, None] - rigid)[inner]))
+    found /= float(np.vdot(change[inner], change[inner]))
+    assert found == pytest.approx(1.0, abs=0.03)  # times the true compliance
+
+
+def test_a_sliding_joint_yields_by_a_length(tmp_path):
+    """m q'' = f alone: the force changes by -c m^2 q''''."""
+    path = tmp_path / "slide.urdf"
+    path.write_text(_PENDULUM.format(kind="prismatic"))
+    time, w, c = _PERIOD * np.arange(_ROWS), 5.0, 1e-4
+    q = np.sin(w * time)[:, None]
+    columns = {"time": time, "q": q, "v": w * np.cos(w * time)[:, None]}
+    columns |= {"vd": -(w**2) * q, "tau": -5 * w**2 * q}
+    log = _written(tmp_path / "log", path, ("pivot",), columns)
+    change = _torque(log, [JointElasticity("pivot", c)]) - _torque(log, [])
+    np.testing.assert_allclose(change[20:-20], -c * 25 * w**4 * q[20:-20], atol=2e-3)
+
+
+def test_it_is_affine_in_the_compliance_and_in_the_rows_alike(urdf, tmp_path):
+    log = _behind_springs(tmp_path / "log", urdf, [0.0, 0.0])
+    rigid = _torque(log, [])
+    change = _torque(log, [JointElasticity("shoulder", 1e-3)]) - rigid
+    twice = _torque(log, [JointElasticity("shoulder", 2e-3)]) - rigid
+    assert np.abs(change).max(axis=0).min() > 1e-3  # both joints feel it
+    np.testing.assert_allclose(twice, 2.0 * change, rtol=1e-9, atol=1e-12)
+    scenario = Scenario(effects=[JointElasticity("shoulder", 1e-3)])
+    model = JointMotionModel([log], scenario=scenario)
+    theta = np.array([p.nominal for p in model.parameters])
+    mask = np.random.default_rng(0).random(_ROWS) < 0.3
+    few = model.of_rows(mask)
+    np.testing.assert_allclose(few.predictions(theta), (rigid + change)[mask])
+    fewer = few.of_rows(np.arange(mask.sum()) % 2 == 0)
+    np.testing.assert_allclose(fewer.predictions(theta), (rigid + change)[mask][::2])
+
+
+def test_derivatives_are_found_once_and_only_if_asked_for(urdf, tmp_path, monkeypatch):
+    log = _behind_springs(tmp_path / "log", urdf, [0.0, 0.0])
+    asked = []
+    torques = ArmDynamics.torques
+
+    def counted(self, *state):
+        asked.append(state)
+        return torques(self, *state)
+
+    monkeypatch.setattr(ArmDynamics, "torques", counted)
+    model = JointMotionModel([log])
+    theta = np.array([p.nominal for p in model.parameters])
+    model.with_effects([JointElasticity("shoulder")]).predictions(theta)
+    assert not asked
+    for size in (1e-3, 2e-3):
+        model.with_effects([JointElasticity("shoulder", size)]).predictions(theta)
+        again = pickle.loads(pickle.dumps(model))
+        again.with_effects([JointElasticity("shoulder", size)]).predictions(theta)
+    assert len(asked) == 2  # the load, and with one gear that yields
+
+
+def test_an_arm_without_mass_has_nothing_to_yield_to(tmp_path):
+    path = tmp_path / "light.urdf"
+    text = _PENDULUM.format(kind="revolute")
+    begin, end = text.index("<inertial>"), text.index("</inertial>")
+    path.write_text(text[:begin] + text[end + len("</inertial>") :])
+    motion = np.ones((3, 30, 1))
+    found = ElasticTorques(
+        str(path), ("pivot",), np.arange(30.0), np.zeros(30, int), motion
+    )
+    assert not found.by_compliance("pivot").any()
+
+
+def test_time_derivatives_of_noise_stay_small():
+    time = 1e-3 * np.arange(2000)
+    noise = 1e-3 * np.random.default_rng(0).normal(size=2000)
+    wave = np.sin(20.0 * time)
+    found = time_derivatives(time, wave + noise)
+    inner = slice(60, -60)
+    np.testing.assert_allclose(found[0, inner], 20 * np.cos(20 * time)[inner], atol=0.1)
+    np.testing.assert_allclose(found[1, inner], -400 * wave[inner], atol=12.0)
+    assert not time_derivatives(time[:5], wave[:5]).any()
+
+
+def test_it_is_registered_with_what_separates_it():
+    assert find_effect("JointElasticity") is JointElasticity
+    assert {"RotorInertia", "ArmDelay"} <= set(JointElasticity.experiments_against)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_closing_the_loop_names_the_joint(seed, urdf, tmp_path):
+    """Its size to a tenth: the motion is at a fifth of the joint's resonance."""
+    log = _behind_springs(tmp_path / "log", urdf, [1e-3, 0.0], seed)
+    verdict = close_loop(JointMotionModel([log])).verdict
+    assert verdict.names == ("JointElasticity.shoulder",)
+    (value,) = verdict.values
+    assert value.value == pytest.approx(1e-3, rel=0.15)
+
+
+def test_a_stiff_arm_is_given_none(urdf, tmp_path):
+    log = _behind_springs(tmp_path / "log", urdf, [0.0, 0.0])
+    assert close_loop(JointMotionModel([log])).verdict.names == ()
