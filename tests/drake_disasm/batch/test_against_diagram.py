@@ -81,14 +81,14 @@ def test_an_episode_begins_as_the_diagrams(batch, case):
 @pytest.mark.slow
 @pytest.mark.parametrize("case", range(len(CASES)), ids=NAMES)
 def test_a_whole_episode_is_the_diagrams(batch, case):
-    """And the effect shows in it, far above what the two differ by."""
+    """And the effect shows in it, five times what the two may differ by."""
     moves = _actions(CASES[case])
     expected = _diagram(_scenario(CASES[case]), moves)
-    assert np.abs(expected[:, 6:9]).max() > 2.0
+    assert np.abs(expected[:, 6:9]).max() > 1.0
     _assert_same(batch[:, case], expected)
     if CASES[case] and not isinstance(CASES[case][0], Imprecision):
         away = np.abs(batch[:, case] - batch[:, 0])
-        assert max(away[:, :3].max() / 1e-5, away[:, 6:9].max() / 0.1) > 1.0
+        assert max(away[:, :3].max() / 1e-5, away[:, 6:9].max() / 0.01) > 1.0
 
 
 def test_all_effects_on_the_twin_are_here():
