@@ -6,7 +6,12 @@ from typing import Any
 from drake_disasm.cell.lock import nominal_environment
 from drake_disasm.common.arrays import Array
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import ArmEffect, SensorMemoryEffect, sensor_chain
+from drake_disasm.effects import (
+    ArmEffect,
+    PoseEffect,
+    SensorMemoryEffect,
+    sensor_chain,
+)
 from drake_disasm.scenario import Scenario, corner, validate
 from drake_disasm.stations.capabilities import refuse_arm_effects, refuse_unknown_kinds
 from drake_disasm.stations.contact import refuse_without_quantity
@@ -66,6 +71,7 @@ def refuse_scenarios(scenarios: Sequence[Scenario]) -> None:
         _refuse_contact(scenario)
         refuse_unknown_kinds(scenario.effects)
         refuse_arm_effects([e for e in scenario.effects if isinstance(e, ArmEffect)])
+        _refuse_late_poses(scenario)
         nominal = nominal_environment(scenario.lock, scenario.contact)
         refuse_without_quantity("impact", nominal, scenario.effects)
         _refuse_sampling(scenario)
@@ -89,6 +95,15 @@ def _refuse_contact(scenario: Scenario) -> None:
             f"contact.model: '{scenario.contact.model}' has no form for a batch; set "
             "it to impact, or use the diagram's twin"
         )
+
+
+def _refuse_late_poses(scenario: Scenario) -> None:
+    for effect in scenario.effects:
+        if isinstance(effect, PoseEffect):
+            raise DisasmError(
+                f"{type(effect).__name__}: a batch reports poses as they are; take it "
+                "out, or use the diagram's twin"
+            )
 
 
 def _refuse_sampling(scenario: Scenario) -> None:

@@ -14,6 +14,7 @@ from drake_disasm.effects import (
     GrooveFriction,
     GroovePose,
     JointCoulombFriction,
+    PoseDelay,
     SensorLag,
     amplitude,
     register_effect,
@@ -197,6 +198,7 @@ def _with(*settings: str, **changes: object) -> Scenario:
             {},
             "JointCoulombFriction",
         ),
+        (_with(effects=[PoseDelay(0.1)]), {}, "PoseDelay: a batch reports poses"),
         ([_with(), _with("task.period=0.2")], {}, "task.period: 0.2 and 0.1"),
         (
             _with("ft_sensor.period=0.008", effects=[SensorLag(share=1.0)]),
