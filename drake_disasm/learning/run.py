@@ -1,12 +1,14 @@
 """One seed's training in a folder: checkpoint, log, policy, result.
 
-folder/
-  checkpoint.npz   written after every episode, or every round of them that run at a
-                   time; a resumed run continues from it
-  log/             every episode (the caller's writer)
-  episodes.csv     one row per episode
-  policy.npz       the trained policy
-  result.json      its figures and its validation; written last
+::
+
+    folder/
+      checkpoint.npz   written after every episode, or every round of them that run at
+                       a time; a resumed run continues from it
+      log/             every episode (the caller's writer)
+      episodes.csv     one row per episode
+      policy.npz       the trained policy
+      result.json      its figures and its validation; written last
 """
 
 import contextlib

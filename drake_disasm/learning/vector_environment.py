@@ -1,10 +1,13 @@
 """The task as a Gymnasium vector environment, on a batch of twins.
 
-import gymnasium
-import drake_disasm.learning.environment
-envs = gymnasium.make_vec(
-    "drake_disasm/Removal-v0", num_envs=256, vectorization_mode="vector_entry_point"
-)
+::
+
+    import gymnasium
+    import drake_disasm.learning.environment
+
+    envs = gymnasium.make_vec(
+        "drake_disasm/Removal-v0", num_envs=256, vectorization_mode="vector_entry_point"
+    )
 """
 
 import dataclasses
