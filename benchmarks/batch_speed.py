@@ -33,7 +33,7 @@ def diagram_speed(contact: str) -> tuple[float, np.ndarray]:
     """Returns steps per second of the diagram's twin, and its moves (steps, 6)."""
     simulation = TaskSimulation(scenario_with(contact), "twin", make_policy(_POLICY))
     simulation.reset(0)
-    moves = []
+    moves: list[np.ndarray] = []
     start = time.perf_counter()
     while len(moves) < _MOVES:
         outcome = simulation.step().outcome
