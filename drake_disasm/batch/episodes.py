@@ -26,10 +26,8 @@ from drake_disasm.effects import (
 )
 from drake_disasm.impact import ImpactConditions, Surroundings
 from drake_disasm.scenario import Scenario, with_values
+from drake_disasm.stations.twin import TwinStation
 from drake_disasm.systems.observation import Processing
-
-#: Time to settle at the start, as the twin's station has [s].
-SETTLING_TIME = 0.5
 
 
 @dataclasses.dataclass
@@ -119,7 +117,7 @@ class TwinBatch:
         conditions = self.conditions(episodes, effects, None)
         numbers = self.numbers(episodes)
         still = 0.0 * episodes.goal
-        for _ in range(round(SETTLING_TIME / self.h)):
+        for _ in range(round(TwinStation.settling_time / self.h)):
             step = plant_step(
                 episodes.state, still, numbers.arm, numbers.body, conditions
             )

@@ -47,8 +47,13 @@ class Fit:
     @property
     def loss(self) -> float:
         """Sum of the squared residuals, Huber's beyond `huber_delta`."""
+        return float(np.sum(self.bounded_residual**2))
+
+    @property
+    def bounded_residual(self) -> Array:
+        """Residuals (rows, channels) whose squares add up to the loss."""
         linear = self.linearisation
-        return float(np.sum(pseudo_residual(linear.residual, linear.huber_delta) ** 2))
+        return pseudo_residual(linear.residual, linear.huber_delta)
 
     @property
     def states_model_error(self) -> bool:
@@ -231,6 +236,8 @@ class Fit:
         Were that off in each row by `model_error_reach` standard deviations to the side
         that matters: the same in all episodes, so that no bootstrap sees it either.
         """
+        if not self.states_model_error:
+            return np.zeros_like(self.theta)
         share = self.model.measurements.model_error_share
         off = np.sqrt(self.linearisation.weights) * share
         reach = self.settings.model_error_reach
@@ -240,8 +247,7 @@ class Fit:
     def _step(self) -> Array:
         """What weighted residuals (rows channels,) move the estimate by (p, ...)."""
         linear = self.linearisation
-        root = np.sqrt(linear.weights)
-        J = (root[..., None] * linear.jacobian).reshape(root.size, -1)
+        J = np.sqrt(linear.weights).reshape(-1, 1) * linear.flat_jacobian
         return np.asarray(np.linalg.pinv(J, rcond=self.settings.held_out_rcond))
 
     @property
@@ -255,6 +261,5 @@ def _channel_losses(
     fit: Fit, channel: int, blocks: NDArray[np.int64], count: int
 ) -> Array:
     """Returns what a channel adds to the loss of each block (B,)."""
-    linear = fit.linearisation
-    squares = pseudo_residual(linear.residual[:, channel], linear.huber_delta) ** 2
+    squares = fit.bounded_residual[:, channel] ** 2
     return np.asarray(np.bincount(blocks, squares, minlength=count), dtype=float)

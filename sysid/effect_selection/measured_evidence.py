@@ -15,7 +15,6 @@ from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.prewhitening import Prewhitening
 from sysid.effect_selection.significance import gained_p
 from sysid.effect_selection.survey import LinearSurvey
-from sysid.objective import pseudo_residual
 
 Array = NDArray[np.float64]
 
@@ -48,8 +47,8 @@ def exceeds_noise_p(before: Fit, after: Fit, parameters: int) -> float:
         before, after: fits to the same rows without and with the parameters.
         parameters: how many the second has more.
     """
-    left = _bounded(after)
-    return _of_noise(after, _bounded(before) - left, left, parameters)
+    left = after.bounded_residual
+    return _of_noise(after, before.bounded_residual - left, left, parameters)
 
 
 def amplitude_p(fit: Fit, column: int) -> float:
@@ -59,7 +58,7 @@ def amplitude_p(fit: Fit, column: int) -> float:
     """
     linear = fit.linearisation
     change = -linear.jacobian[..., column] * (linear.u - fit.null)[column]
-    return _of_noise(fit, np.sqrt(linear.weights) * change, _bounded(fit), 1)
+    return _of_noise(fit, np.sqrt(linear.weights) * change, fit.bounded_residual, 1)
 
 
 def linear_p(fit: Fit, survey: LinearSurvey, evidence: Evidence) -> float:
@@ -82,7 +81,7 @@ def linear_p(fit: Fit, survey: LinearSurvey, evidence: Evidence) -> float:
         root = np.sqrt(weights)
         r = root * linear.residual
         for chosen in sets:
-            J = (root[..., None] * linear.jacobian[..., chosen]).reshape(r.size, -1)
+            J = root.reshape(-1, 1) * linear.flat_jacobian[:, chosen]
             step = np.linalg.lstsq(J, -r.reshape(-1), rcond=None)[0]
             change = -(J @ step).reshape(r.shape)
             p = _of_noise(fit, change, r - change, len(chosen))
@@ -115,12 +114,6 @@ def _of_noise(fit: Fit, change: Array, left: Array, parameters: int) -> float:
     of_blocks = np.bincount(fit.blocks, np.sum(along * left, axis=1))
     left_over = max(float(np.sum((along * left) ** 2)), float(np.sum(of_blocks**2)))
     return float(chi2.sf(score**2 / max(1.0, left_over), parameters))
-
-
-def _bounded(fit: Fit) -> Array:
-    """Returns residuals (rows, channels) whose squares add up to the loss."""
-    linear = fit.linearisation
-    return pseudo_residual(linear.residual, linear.huber_delta)
 
 
 def _block_gains(

@@ -37,26 +37,26 @@ class RefitSearch(ForwardSearch):
         limits, starts = self._settings, dict[tuple[str, ...], Fit]()
         confirmed, tried = list[_Trial](), list[_Trial]()
         is_far = fit.objective > limits.max_linear_objective
+        likely = self._worth_a_fit(fit, survey, starts)
         if not is_far:
-            confirmed, tried = self._try_best(fit, survey, starts)
+            confirmed, tried = self._try_best(fit, survey, likely, starts)
         # What is not linear at null, as a stop that takes up a force, hides from it;
         # of a costly model more than noise is always left, and minutes would be lost.
         is_left = fit.objective > limits.max_objective_at_noise and not fit.model.costly
         is_open = survey.effects and not confirmed and not self._is_over
         if is_open and (is_far or is_left):
             survey, starts = self._prescreened(fit, survey)
-            confirmed, tried = self._try_best(fit, survey, starts)
+            likely = self._worth_a_fit(fit, survey, starts)
+            confirmed, tried = self._try_best(fit, survey, likely, starts)
         if not confirmed:
             confirmed, _ = self._try(fit, survey, _pairs(tried, limits), {})
-        return self._chosen(fit, survey, confirmed, starts) if confirmed else None
+        return self._chosen(fit, survey, confirmed, likely) if confirmed else None
 
     def _try_best(
-        self, fit: Fit, survey: Survey, starts: _Starts
+        self, fit: Fit, survey: Survey, likely: Sequence[Evidence], starts: _Starts
     ) -> tuple[list[_Trial], list[_Trial]]:
         """Returns what fits confirm of the most promising, and all that was tried."""
-        chosen = trials(
-            self._worth_a_fit(fit, survey, starts), self._settings.max_trials
-        )
+        chosen = trials(likely, self._settings.max_trials)
         return self._try(fit, survey, chosen, starts)
 
     def _worth_a_fit(self, fit: Fit, survey: Survey, starts: _Starts) -> list[Evidence]:
@@ -78,7 +78,7 @@ class RefitSearch(ForwardSearch):
         fit: Fit,
         survey: Survey,
         confirmed: Sequence[_Trial],
-        starts: _Starts,
+        likely: Sequence[Evidence],
     ) -> Fit | None:
         """Returns the best of the confirmed fits, on record, if an effect is needed."""
         limits = self._settings
@@ -86,7 +86,7 @@ class RefitSearch(ForwardSearch):
         again = self.fitter.fit(fit.effects, found)
         if again.loss <= (1.0 + limits.min_gain) * found.loss:
             return self._same_effects(fit, again)
-        rivals = ties(best, self._worth_a_fit(fit, survey, starts))
+        rivals = ties(best, likely)
         rivals = _ties_by_fit(rivals, confirmed, fit, found)
         found = at_own_minimum(self.fitter, found)
         self._record(best, rivals, survey, found)

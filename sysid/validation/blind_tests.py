@@ -155,9 +155,8 @@ def residual(effect: Effect, folder: str) -> float:
     log = Path(folder) / f"probe_{len(list(Path(folder).iterdir()))}"
     transitions_log(log, noiseless, [effect], 0, episodes, steps)
     model = TwinModel([read_log(log)], nominal(), ())
-    measured = model.measurements
-    error = model.predictions(np.zeros(0)) - measured.values
-    return rms(pseudo_residual(error / measured.sigma, model.default_huber_delta))
+    error = model.measurements.weighted(model.predictions(np.zeros(0)))
+    return rms(pseudo_residual(error, model.default_huber_delta))
 
 
 def run_cases(
