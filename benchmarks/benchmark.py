@@ -30,6 +30,7 @@ from objective_speed import (
     THESIS_S,
     cores,
     evaluation_time,
+    jacobian_times,
     recorded_log,
 )
 from pydrake.systems.analysis import Simulator
@@ -245,6 +246,15 @@ def measure_objective(contact: str, prefix: str) -> Iterator[Figure]:
     yield Figure(f"{prefix}_883_one_core_s", alone, "s", reference, ratio)
 
 
+def measure_jacobian() -> Iterator[Figure]:
+    """Yields the time of all candidates' derivatives, compared with evaluations."""
+    with recorded_log(SIZES[0]) as log:
+        for workers, name in ((cores(), "s"), (1, "one_core_s")):
+            one, value, count = jacobian_times(log, SIZES[0], workers)
+            key, reference = f"jacobian_impact_883_{name}", f"{count} evaluations"
+            yield Figure(key, value, "s", reference, value / (count * one))
+
+
 def measure_closing(contact: str, key: str) -> Iterator[Figure]:
     """Yields the time from a log to the verdict."""
     value = closing_time(SIZES[0], cores(), contact)
@@ -361,6 +371,7 @@ MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
             ("impact", "objective_impact"),
         )
     },
+    ("jacobian_impact_883_s", "jacobian_impact_883_one_core_s"): measure_jacobian,
     ("close_loop_883_s",): lambda: measure_closing("hydroelastic", "close_loop_883_s"),
     ("close_loop_impact_883_s",): lambda: measure_closing(
         "impact", "close_loop_impact_883_s"

@@ -14,6 +14,8 @@ from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
+from sysid.effect_selection.candidates import candidates, extended
+from sysid.identification.linearisation import linearise
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.parameters import nominal_values
@@ -70,6 +72,33 @@ def evaluation_time(
             objective(theta * (1.0 + 1e-3 * i))  # as in a search: no two are the same
             times.append(time.perf_counter() - start)
     return float(np.median(times))
+
+
+def jacobian_times(
+    log: Path, transitions: int, workers: int
+) -> tuple[float, float, int]:
+    """Returns the times [s] of an evaluation and of all candidates' derivatives.
+
+    And for how many amplitudes of candidates the twin with IMPACT has to be simulated.
+
+    Args:
+        log: of transitions.
+        transitions: how many of them.
+        workers: processes.
+    """
+    scenario = load_scenario(_SCENARIO, ["contact.model=impact"])
+    model = TwinModel([read_log(log)], scenario, ()).first(transitions)
+    whole, _ = extended(model, candidates(model))
+    with Workers(workers) as pool:
+        objective = Objective(whole, pool)
+        u = objective.start
+        linearise(Objective(model.first(20), pool), np.zeros(0))  # starts the workers
+        start = time.perf_counter()
+        residual = objective.residuals(objective.scaling.from_unit(u))[0]
+        one = time.perf_counter() - start
+        linearise(objective, u, central=False, residual=residual)
+        both = time.perf_counter() - start
+    return one, both - one, int(whole.simulated.sum())
 
 
 def cores() -> int:

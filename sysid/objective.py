@@ -87,18 +87,16 @@ class Objective:
             DisasmError: predictions do not have the shape of the measurements.
         """
         thetas = np.atleast_2d(thetas)
-        chunks = self.model.chunks()
         _, first, which = np.unique(
             thetas[:, self.model.simulated],
             axis=0,
             return_index=True,
             return_inverse=True,
         )
-        work = [(thetas[i], rows) for i in first for rows in chunks]
-        parts = self._workers.simulate(self.model, work)
+        parts = self._workers.simulate(self.model, thetas[first], self.model.chunks())
         self.evaluations += len(thetas)
         return [
-            self._weighted(theta, parts[i * len(chunks) : (i + 1) * len(chunks)])
+            self._weighted(theta, parts[i])
             for theta, i in zip(thetas, which.reshape(-1), strict=True)
         ]
 

@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
-import numpy as np
-
 from drake_disasm.common.executors import WorkerPool
 from drake_disasm.common.progress import Progress, ignore_progress
-from sysid.models.base import Array, LogModel, PredictionError
+from sysid.models.base import Array, LogModel, even_chunks
 
 #: What a worker has built, by thread: a diagram serves one thread.
 _mine = threading.local()
@@ -44,19 +42,36 @@ class Workers(WorkerPool):
         )
 
     def simulate(
-        self, model: LogModel, work: Sequence[tuple[Array, slice]]
-    ) -> list[Array | str]:
-        """Returns simulations, or why there is none, in the order of the work.
+        self, model: LogModel, thetas: Array, chunks: Sequence[slice]
+    ) -> list[list[Array | str]]:
+        """Returns simulations of parameter sets, or why there is none.
+
+        For each of the sets (k, p) a list, of its parts in the order of the chunks.
 
         Args:
             model: simulates.
-            work: parameters (p,) and rows of each piece.
+            thetas: (k, p).
+            chunks: rows of each part.
 
         Raises:
             DisasmError: workers died again and again.
         """
+        # Not by the number of workers: no bit depends on who shared the work.
+        groups = [thetas[part] for part in even_chunks(len(thetas), model.together)]
+        work = [(group, rows) for group in groups for rows in chunks]
+        done = iter(self._simulated(model, work))
+        found: list[list[Array | str]] = []
+        for _ in groups:
+            parts = [next(done) for _ in chunks]
+            found += [list(own) for own in zip(*parts, strict=True)]
+        return found
+
+    def _simulated(
+        self, model: LogModel, work: Sequence[tuple[Array, slice]]
+    ) -> list[list[Array | str]]:
+        """Returns what `simulate_all` gives of each piece of work."""
         if self.in_this_process or model.affine:  # a product of matrices: not worth it
-            return [self.counted(_outcome(model, theta, rows)) for theta, rows in work]
+            return [self.counted(model.simulate_all(*piece)) for piece in work]
         payload = pickle.dumps(model)
         key = hashlib.sha256(payload).hexdigest()
         return self.map(_simulate, [_Piece(key, payload, *piece) for piece in work])
@@ -64,35 +79,25 @@ class Workers(WorkerPool):
 
 @dataclass(frozen=True)
 class _Piece:
-    """A model's simulation of some rows, as it is sent to a worker.
+    """Simulations of some rows, as they are sent to a worker.
 
     Attributes:
         key: the payload's hash.
         payload: the model, pickled.
-        theta: parameters (p,).
+        thetas: parameters (k, p).
         rows: of its log.
     """
 
     key: str
     payload: bytes
-    theta: Array
+    thetas: Array
     rows: slice
 
 
-def _simulate(piece: _Piece) -> Array | str:
+def _simulate(piece: _Piece) -> list[Array | str]:
     """Returns what this worker's copy of a model simulates."""
-    return _outcome(_model(piece.key, piece.payload), piece.theta, piece.rows)
-
-
-def _outcome(model: LogModel, theta: Array, rows: slice) -> Array | str:
-    """Returns what the model simulates for the rows, or why it can't."""
-    try:
-        simulated = model.simulate(theta, rows)
-    except PredictionError as error:
-        return str(error)
-    if not np.isfinite(simulated).all():
-        return "the prediction is not finite"
-    return simulated
+    model = _model(piece.key, piece.payload)
+    return model.simulate_all(piece.thetas, piece.rows)
 
 
 def _model(key: str, payload: bytes) -> LogModel:

@@ -5,29 +5,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drake_disasm.batch.motion import PlantStep, TwinState, plant_step
+from drake_disasm.batch.motion import TwinState, plant_step
 from drake_disasm.batch.numbers import TwinNumbers
-from drake_disasm.batch.slots import BatchEffects, EffectSlots
+from drake_disasm.batch.slots import EffectSlots
 from drake_disasm.batch.stacking import leaves_of, shared, with_leaves
-from drake_disasm.common.arrays import Array, array_like, namespace
+from drake_disasm.batch.twins import Twins, at_A
+from drake_disasm.common.arrays import Array, array_like
 from drake_disasm.common.rotations import Pose
-from drake_disasm.common.spatial import shifted_wrench
 from drake_disasm.devices.sensor_chain import (
     memory_size,
     sensed_at_zeroing,
     sensed_sample,
 )
-from drake_disasm.effects import (
-    BoltMotion,
-    Environment,
-    MotionEffect,
-    Sensing,
-    environment_at,
-)
-from drake_disasm.impact import ImpactConditions, Surroundings
+from drake_disasm.effects import BoltMotion, MotionEffect
+from drake_disasm.impact import ImpactConditions
 from drake_disasm.scenario import Scenario, with_values
 from drake_disasm.stations.twin import TwinStation
-from drake_disasm.systems.observation import Processing
 
 
 @dataclasses.dataclass
@@ -92,18 +85,11 @@ class TwinBatch:
         self._template = shared(TwinNumbers.of(first), like)
         self._varying = _varying_leaves(scenarios)
 
-    def numbers(self, episodes: Episodes) -> TwinNumbers:
-        """Returns the numbers of the environments' twins."""
+    def twins(self, episodes: Episodes) -> Twins:
+        """Returns the environments' twins."""
         leaves = dict(zip(self._varying, episodes.numbers, strict=True))
-        return _in_columns(with_leaves(self._template, leaves))
-
-    def effects(self, episodes: Episodes) -> BatchEffects:
-        """Returns the effects of the environments."""
-        return self.slots.effects(episodes.effects)
-
-    def processing(self, episodes: Episodes) -> Processing:
-        """Returns the processing of the environments' readings."""
-        return Processing(self.numbers(episodes).mounting, self._is_exact)
+        numbers = _in_columns(with_leaves(self._template, leaves))
+        return Twins(numbers, self.slots.effects(episodes.effects), self._is_exact)
 
     def begin(self, which: Sequence[int], scenarios: Sequence[Scenario]) -> Episodes:
         """Returns episodes that have settled at A, zeroed and made their first step.
@@ -112,22 +98,19 @@ class TwinBatch:
             which: the environments' numbers.
             scenarios: theirs, with ranges drawn.
         """
-        episodes = self._at_rest(which, scenarios)
-        effects = self.effects(episodes)
-        conditions = self.conditions(episodes, effects, None)
-        numbers = self.numbers(episodes)
-        still = 0.0 * episodes.goal
+        episodes = self.at_rest(which, scenarios)
+        twins, still = self.twins(episodes), 0.0 * episodes.goal
+        conditions = twins.conditions(at_A(still))
+        arm, body = twins.numbers.arm, twins.numbers.body
         for _ in range(round(TwinStation.settling_time / self.h)):
-            step = plant_step(
-                episodes.state, still, numbers.arm, numbers.body, conditions
-            )
+            step = plant_step(episodes.state, still, arm, body, conditions)
             episodes.state = step.state
-        load = self._load_S(numbers, step.state.arm, step)
-        sensing = self._sensing(numbers, step.state.arm, episodes.steps)
-        reading = sensed_at_zeroing(load, effects.sensor, sensing)
-        episodes.offset = self.processing(episodes).offset(reading)
+        load = twins.load_S(step.state.arm, step)
+        sensing = twins.sensing(step.state.arm, episodes.steps)
+        reading = sensed_at_zeroing(load, twins.effects.sensor, sensing)
+        episodes.offset = twins.processing.offset(reading)
         episodes.state = dataclasses.replace(step.state, v=still)
-        samples = self._period(episodes, still, effects, conditions, steps=1)
+        samples = self._period(episodes, still, twins, conditions, steps=1)
         episodes.state, episodes.reading = samples.state, samples.reading
         episodes.sensor_memory = samples.memory
         return episodes
@@ -143,38 +126,20 @@ class TwinBatch:
         Returns:
             Whether the contact of each always found a balance (n,).
         """
-        effects = self.effects(episodes)
-        motion = None
-        if effects.is_local:
-            X_GB = self.numbers(episodes).coordinates.poses(episodes.state.q)
+        twins, motion = self.twins(episodes), at_A(goal)
+        if twins.effects.is_local:
+            X_GB = twins.numbers.coordinates.poses(episodes.state.q)
             motion = BoltMotion(X_GB.p, v)
-        conditions = self.conditions(episodes, effects, motion)
+        conditions = twins.conditions(motion)
         rate = (goal - episodes.goal) / self.period
         steps = round(self.period / self.h)
-        samples = self._period(episodes, rate, effects, conditions, steps)
+        samples = self._period(episodes, rate, twins, conditions, steps)
         episodes.state, episodes.goal = samples.state, goal
         episodes.reading, episodes.sensor_memory = samples.reading, samples.memory
         return samples.is_solved
 
-    def conditions(
-        self, episodes: Episodes, effects: BatchEffects, bolt: BoltMotion | None
-    ) -> ImpactConditions:
-        """Returns the contact's conditions in the environments.
-
-        Args:
-            episodes: that run.
-            effects: theirs.
-            bolt: its motions, on which effects may depend; None is at rest at A.
-        """
-        numbers = self.numbers(episodes)
-        nothing = 0.0 * episodes.goal[:, :3]
-        motion = BoltMotion(nothing, nothing) if bolt is None else bolt
-        environment = environment_at(numbers.nominal, effects.environment, motion)
-        around = self._around(environment, len(nothing))
-        return numbers.conditions(environment, around)
-
-    def _at_rest(self, which: Sequence[int], scenarios: Sequence[Scenario]) -> Episodes:
-        """Returns episodes at A, before the bolt has settled."""
+    def at_rest(self, which: Sequence[int], scenarios: Sequence[Scenario]) -> Episodes:
+        """Returns episodes at A, before the bolt has settled; see `begin`."""
         like, count = self.like, len(scenarios)
         leaves = [leaves_of(TwinNumbers.of(s)) for s in scenarios if self._varying]
         own = tuple(
@@ -201,7 +166,7 @@ class TwinBatch:
             sensor_memory=zeros(0),
             steps=zeros(),
         )
-        size = memory_size(self.effects(episodes).sensor)
+        size = memory_size(self.slots.effects(episodes.effects).sensor)
         episodes.sensor_memory = array_like(np.full((count, size), np.nan), like)
         return episodes
 
@@ -209,63 +174,29 @@ class TwinBatch:
         self,
         episodes: Episodes,
         rate: Array,
-        effects: BatchEffects,
+        twins: Twins,
         conditions: ImpactConditions,
         steps: int,
     ) -> _Samples:
         """Returns what becomes of the episodes in some steps of the plant."""
-        numbers = self.numbers(episodes)
+        arm, body, sensor = twins.numbers.arm, twins.numbers.body, twins.effects.sensor
         state, memory, is_solved = episodes.state, episodes.sensor_memory, True
         is_first = steps == 1  # of an episode, before which nothing has moved
         interval = 0.0 if is_first else self.h * self._per_sample
         begin = episodes.steps * self.period
         for number in range(1, steps + 1):
             encoders, time = state.arm, begin + (0.0 if is_first else number * self.h)
-            step = plant_step(state, rate, numbers.arm, numbers.body, conditions)
+            step = plant_step(state, rate, arm, body, conditions)
             state, is_solved = step.state, is_solved & step.is_solved
             is_sample = is_first or number % self._per_sample == 0
             if memory.shape[1] and is_sample:
-                sensing = self._sensing(numbers, encoders, time)
-                load = self._load_S(numbers, encoders, step)
-                _, memory = sensed_sample(
-                    load, effects.sensor, sensing, memory, interval
-                )
-        sensing = self._sensing(numbers, state.arm, time)
-        load = self._load_S(numbers, state.arm, step)
-        reading, _ = sensed_sample(load, effects.sensor, sensing, memory, 0.0)
+                sensing = twins.sensing(encoders, time)
+                load = twins.load_S(encoders, step)
+                _, memory = sensed_sample(load, sensor, sensing, memory, interval)
+        sensing = twins.sensing(state.arm, time)
+        load = twins.load_S(state.arm, step)
+        reading, _ = sensed_sample(load, sensor, sensing, memory, 0.0)
         return _Samples(state, reading, memory, is_solved)
-
-    def _load_S(self, numbers: TwinNumbers, arm: Array, step: PlantStep) -> Array:
-        """Returns the load on the sensor (n, 6), [f; tau] at So in S.
-
-        Args:
-            numbers: of the twins.
-            arm: (n, 12) where encoders have the sensor.
-            step: of the plant.
-        """
-        coordinates = numbers.coordinates
-        X_GB, bolt = coordinates.poses(arm[:, :6]), coordinates.poses(step.state.q)
-        X_SGn = numbers.mounting.X_SB @ X_GB.inverse()
-        return shifted_wrench(step.load(numbers.body), X_SGn.R, X_SGn @ bolt.p)
-
-    def _sensing(self, numbers: TwinNumbers, arm: Array, time: Array) -> Sensing:
-        """Returns the circumstances of readings; see `_load_S`."""
-        R_GB = numbers.coordinates.poses(arm[:, :6]).R
-        R_GS = namespace(R_GB).matmul(R_GB, numbers.mounting.X_BS.R)
-        return numbers.payload.sensing(time, numbers.mounting.R_WS(R_GS))
-
-    def _around(self, environment: Environment, count: int) -> Surroundings:
-        """Returns what may differ from environment to environment, (count, ...)."""
-        xp, like, X_GnG = namespace(self.like), self.like, environment.X_GnG
-        f_Gn = [
-            xp.broadcast_to(array_like(f, like), (count,)) for f in environment.force_Gn
-        ]
-        return Surroundings(
-            xp.broadcast_to(array_like(environment.friction, like), (count,)),
-            xp.broadcast_to(X_GnG.rotation(), (count, 3, 3)),
-            xp.broadcast_to(X_GnG.translation(), (count, 3)),
-            xp.stack(f_Gn, axis=1),
-        )
 
 
 def _varying_leaves(scenarios: Sequence[Scenario]) -> list[int]:

@@ -9,7 +9,13 @@ from pydrake.multibody.tree import SpatialInertia
 
 from drake_disasm.batch.motion import Body
 from drake_disasm.cell.coordinates import BoltCoordinates
-from drake_disasm.cell.grip import AXIS_ORDER, bolt_compliance, in_joint_order
+from drake_disasm.cell.grip import (
+    AXIS_ORDER,
+    Springs,
+    bolt_compliance,
+    deflection,
+    in_joint_order,
+)
 from drake_disasm.cell.lock import nominal_environment
 from drake_disasm.cell.lock_dimensions import GROOVE_FIELDS, bolt_inertia
 from drake_disasm.cell.placement import nominal_groove_pose
@@ -38,6 +44,7 @@ class TwinNumbers:
         law, shape: of the contact, at the nominal environment.
         M: (6, 6) mass matrix of the twin's joints at their zero.
         arm: a step of it.
+        grip: springs between arm and bolt.
         body: that the sensor carries.
         nominal: the environment without effects.
         mounting: of the sensor.
@@ -51,6 +58,7 @@ class TwinNumbers:
     shape: LockShape
     M: Array
     arm: ArmStep
+    grip: Springs
     body: Body
     nominal: Environment
     mounting: Mounting
@@ -78,6 +86,7 @@ class TwinNumbers:
             shape=LockShape.of(scenario.lock),
             M=rigid.M,
             arm=rigid.arm,
+            grip=rigid.grip,
             body=rigid.body,
             nominal=nominal_environment(scenario.lock, scenario.contact),
             mounting=rigid.mounting,
@@ -99,6 +108,14 @@ class TwinNumbers:
     def coordinates(self) -> BoltCoordinates:
         """The twin's."""
         return BoltCoordinates(self.body.p_BoTo_B)
+
+    def deflection(self, wrench: Array) -> Array:
+        """Returns by how much the grip gives (n, 6) under wrenches (n, 6) on the bolt.
+
+        In the twin's coordinates; see `cell.grip.deflection`.
+        """
+        body = self.body
+        return deflection(self.grip, body.p_BoTo_B, body.mass * body.g_Gn, wrench)
 
     def conditions(
         self, environment: Environment, around: Surroundings
@@ -148,6 +165,7 @@ class _Rigid:
 
     M: np.ndarray
     arm: ArmStep
+    grip: Springs
     body: Body
     mounting: Mounting
     compliance: np.ndarray
@@ -162,6 +180,7 @@ def _rigid(case: _Case) -> _Rigid:
     return _Rigid(
         M=_mass_matrix(M_B, parameters.p_BoTo_B),
         arm=ArmStep.of(parameters.arm, parameters.grip, time_step),
+        grip=parameters.grip,
         body=_body(scenario, M_B, parameters.p_BoTo_B),
         mounting=_mounting(scenario, M_B, parameters),
         compliance=bolt_compliance(scenario)[:3],

@@ -34,18 +34,24 @@ def refuse_scalar_effects(slots: list[Slot], like: Array) -> None:
         DisasmError: names the first, and what it would need.
     """
     for slot in slots:
-        if not slot.kind.__module__.startswith(_OWN):
-            reason = _reason(slot, like)
-            if reason:
-                raise DisasmError(
-                    f"{slot.kind.__name__}: its equation takes no arrays, which a "
-                    f"batch needs ({reason}); write it with drake_disasm.common.arrays "
-                    "as those of the library, or simulate the diagram's twin"
-                )
+        reason = _reason(slot, like)
+        if reason:
+            raise DisasmError(
+                f"{slot.kind.__name__}: its equation takes no arrays, which a batch "
+                f"needs ({reason}); write it with drake_disasm.common.arrays as those "
+                "of the library, or simulate the diagram's twin"
+            )
+
+
+def takes_arrays(slot: Slot, like: Array) -> bool:
+    """Returns whether an effect's equation is that of arrays."""
+    return not _reason(slot, like)
 
 
 def _reason(slot: Slot, like: Array) -> str:
     """Returns what goes wrong with arrays; empty if nothing does."""
+    if slot.kind.__module__.startswith(_OWN):
+        return ""
     values = np.array([slot.null, _noticeable(slot)])
     try:
         together = _results(slot.effect(array_like(values, like)), like, None)

@@ -9,6 +9,7 @@ from drake_disasm.batch.episodes import Episodes, TwinBatch
 from drake_disasm.batch.probe import refuse_scalar_effects
 from drake_disasm.batch.refusals import make_like, refuse_count, refuse_scenarios
 from drake_disasm.batch.stacking import put_rows, rows_of
+from drake_disasm.batch.twins import at_A
 from drake_disasm.common.arrays import Array, array_like, namespace, to_numpy
 from drake_disasm.common.rotations import Pose
 from drake_disasm.devices.ft_sensor import quantise
@@ -163,7 +164,7 @@ class BatchedTwin:
             actions: (n, 6) [m, rad], clipped to the bounds.
         """
         xp, episodes, before = namespace(self.like), self.episodes, self.observation
-        numbers = self._batch.numbers(episodes)
+        numbers = self._batch.twins(episodes).numbers
         action = array_like(actions, self.like)
         is_finite = xp.all(xp.isfinite(action), axis=1)
         action = xp.where(is_finite[:, None], action, 0.0)
@@ -196,9 +197,8 @@ class BatchedTwin:
 
     def bolt_is_out(self) -> np.ndarray:
         """Returns whether each bolt truly is out (n,): only a simulation knows."""
-        numbers = self._batch.numbers(self.episodes)
-        effects = self._batch.effects(self.episodes)
-        around = self._batch.conditions(self.episodes, effects, None).around
+        twins = self._batch.twins(self.episodes)
+        numbers, around = twins.numbers, twins.conditions(at_A(self.action)).around
         X_GnB = numbers.coordinates.poses(self.episodes.state.q)
         p_GBo = namespace(self.like).matmul(
             (X_GnB.p - around.p_GnG)[:, None], around.R_GnG
@@ -214,27 +214,29 @@ class BatchedTwin:
         """Returns the coordinates (n, 6) to which the command goes."""
         episodes = self.episodes
         episodes.commanded = executed = moved_poses(episodes.commanded, action)
-        effects = self._batch.effects(episodes).motion
+        twins = self._batch.twins(episodes)
+        effects = twins.effects.motion
         if effects:
             wrench, memory = self.observation[:, 6:], episodes.motion_memory
             executed, episodes.motion_memory = executed_pose(
                 effects, executed, wrench, memory, self.period
             )
-        return self._batch.numbers(episodes).coordinates.of_poses(executed)
+        return twins.numbers.coordinates.of_poses(executed)
 
     def _observed(self) -> Array:
         """Returns what the newest readings show (n, 12), with noise."""
-        episodes, numbers = self.episodes, self._batch.numbers(self.episodes)
+        episodes, twins = self.episodes, self._batch.twins(self.episodes)
+        numbers = twins.numbers
         reading = episodes.reading
         if self._noise.shape[1]:
             reading = reading + numbers.noise * self._noise_now()[:, 6:]
         self.reading = quantise(reading, numbers.quantum)
-        processing = self._batch.processing(episodes)
-        return processing.state(self.pose_measured(), self.reading, episodes.offset)
+        pose = self.pose_measured()
+        return twins.processing.state(pose, self.reading, episodes.offset)
 
     def pose_measured(self) -> Pose:
         """Returns where the encoders have the bolts, X_GB (n, ...)."""
-        coordinates = self._batch.numbers(self.episodes).coordinates
+        coordinates = self._batch.twins(self.episodes).numbers.coordinates
         return coordinates.poses(self.episodes.state.arm[:, :6])
 
     def _noise_now(self) -> Array:

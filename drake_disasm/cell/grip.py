@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 
 from drake_disasm.cell.tool import Tool
-from drake_disasm.common.arrays import Array
+from drake_disasm.common.arrays import Array, cross, namespace
 from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import GripperConfig, Scenario
 
@@ -51,6 +51,27 @@ def in_joint_order(springs: Springs) -> tuple[Array, Array]:
     """Returns stiffness and damping (..., 6) in the order of the twin's joints."""
     order = list(AXIS_ORDER)
     return springs.stiffness[..., order], springs.damping[..., order]
+
+
+def deflection(
+    grip: Springs, p_BoTo_B: Array, weight_Gn: Array, wrench: Array
+) -> Array:
+    """Returns by how much the grip gives (..., 6), in joint order, under wrenches.
+
+    At rest, bolt against arm; no encoder sees it.
+
+    Args:
+        grip: the springs.
+        p_BoTo_B: (..., 3) their middle [m].
+        weight_Gn: (..., 3) of what the sensor carries [N].
+        wrench: (..., 6) on the bolt at Bo in Gn, [f; tau], processed as the task's.
+    """
+    f, k = wrench[..., :3], grip.stiffness
+    moved = f / k[..., :3]
+    # About the pads where they are now; the sensor's place does not move along.
+    t_To = wrench[..., 3:] - cross(p_BoTo_B, f) - cross(moved, f + weight_Gn)
+    given = namespace(wrench).concat([moved, t_To / k[..., 3:]], axis=-1)
+    return given[..., list(AXIS_ORDER)]
 
 
 def gripped_inertia(tool: Tool) -> np.ndarray:

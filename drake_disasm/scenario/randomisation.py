@@ -1,7 +1,9 @@
 """Domain randomisation: ranges in a scenario, and one draw of them per episode."""
 
 import copy
+import dataclasses
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -36,12 +38,29 @@ def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
     Raises:
         DisasmError: a name leads nowhere.
     """
-    drawn = copy.deepcopy(scenario)
+    drawn = _copied(scenario)
     drawn.randomisation = []
     for name, value in values.items():
         drawn, path = resolve(drawn, name)
         find_field(drawn, path, name).set(value)
     return drawn
+
+
+def _copied(tree: Any) -> Any:
+    """Returns a deep copy of dataclasses and lists of them, ten times as fast.
+
+    An identification makes 10⁵.
+    """
+    if isinstance(tree, float | int | str):
+        return tree
+    if isinstance(tree, list):
+        return [_copied(item) for item in tree]
+    if dataclasses.is_dataclass(tree) and not isinstance(tree, type):
+        new = object.__new__(type(tree))
+        values = tree.__dict__.items()
+        new.__dict__.update({name: _copied(value) for name, value in values})
+        return new
+    return copy.deepcopy(tree)
 
 
 def corner(scenario: Scenario, end: str) -> Scenario:

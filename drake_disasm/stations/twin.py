@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, PassThrough
 
 from drake_disasm.cell.coordinates import BoltCoordinates
-from drake_disasm.cell.grip import AXIS_ORDER
+from drake_disasm.cell.grip import deflection
 from drake_disasm.cell.lock import add_lock, nominal_environment
 from drake_disasm.cell.lock_dimensions import GROOVE_FIELDS
 from drake_disasm.cell.tool import summed
@@ -136,13 +136,10 @@ class TwinStation(SimulatedStation):
         Args:
             wrench: (6,) on the bolt at Bo in Gn, [f; tau], processed as the task's.
         """
-        p, k = self.parameters.p_BoTo_B, self.parameters.grip.stiffness
-        f = wrench[:3]
-        moved = f / k[:3]
+        parameters = self.parameters
         weight = self.X_WG.rotation().inverse() @ (self.payload_mass * self.g_W)
-        # About the pads where they are now; the sensor's place does not move along.
-        t_To = wrench[3:] - np.cross(p, f) - np.cross(moved, f + weight)
-        return np.concatenate([moved, t_To / k[3:]])[list(AXIS_ORDER)]
+        found = deflection(parameters.grip, parameters.p_BoTo_B, weight, wrench)
+        return np.asarray(found)
 
     def impact_conditions(self, context: Context) -> ImpactConditions:
         """Returns the present inputs of the IMPACT law.

@@ -1,154 +1,238 @@
-"""The twin with IMPACT, many steps of the task at once.
+"""The twin with IMPACT, many steps of the task of many twins at once.
 
 Without the hydroelastic query a step of this twin is a small system of equations
-(`ImpactStep`); for all measured steps together it is a few array operations, and one
-evaluation of the objective takes a fraction of the diagram's time
-(docs/identification.md has the figures).
+(`ImpactStep`); for all measured steps together, and for all parameter sets of which a
+search asks at once, it is a few array operations, and one evaluation of the objective
+takes a fraction of the diagram's time (docs/identification.md has the figures).
 """
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 
-from drake_disasm.batch.motion import TwinState, plant_step
+from drake_disasm.batch.episodes import Episodes, TwinBatch
+from drake_disasm.batch.motion import PlantStep, TwinState, plant_step
 from drake_disasm.batch.numbers import TwinNumbers
-from drake_disasm.effects import environment_at, is_local
-from drake_disasm.impact import NO_BALANCE, ImpactConditions, Surroundings
-from drake_disasm.scenario import Scenario
-from drake_disasm.stations.arm_node import ArmStep
-from drake_disasm.task.replay import ReplayDiagram, Steps
+from drake_disasm.batch.stacking import mapped, rows_of
+from drake_disasm.batch.twins import Twins, at_A
+from drake_disasm.common.arrays import apply_matrix, cross
+from drake_disasm.common.rotations import rotation_vectors
+from drake_disasm.devices.sensor_chain import sensed, sensed_at_zeroing
+from drake_disasm.effects import BoltMotion
+from drake_disasm.scenario import Scenario, validate
+from drake_disasm.stations.twin import TwinStation
+from drake_disasm.task.replay import Steps, noise_free
 
 _COARSE = 0.01  # s: with 20 ms, steps under friction ended twice as far off
 _REST = 1e-6  # m/s, rad/s: in half a second less than the sensor can tell
 
 
 class ImpactReplay:
-    """Computes `TwinReplay.transitions` for a scenario with IMPACT contact, faster.
+    """Computes `TwinReplay.transitions` of scenarios with IMPACT contact, faster.
 
-    The diagram stays the reference: it holds the parameters, zeroes the sensor and
-    processes observations; only the steps themselves are computed here, by those of
-    the batched twin (`plant_step`).
+    The diagram is the reference; the equations are those of the batched twin. What one
+    scenario gives does not depend on the others.
+
+    Attributes:
+        reading_at_zeroing: (k, 6) what each sensor read when it was zeroed, [f; tau]
+            in S; NaN where contact finds no balance at A.
 
     Args:
-        scenario: what the twin is, `contact.model` being impact.
+        scenarios: what the k twins are, `contact.model` being impact.
         coarse: whether all but the end of a step may be simulated in coarse steps.
+
+    Raises:
+        DisasmError: a scenario is out of bounds.
     """
 
-    def __init__(self, scenario: Scenario, coarse: bool = False) -> None:
-        self._coarse = coarse
-        self._build(scenario)
+    def __init__(self, scenarios: Sequence[Scenario], coarse: bool = False) -> None:
+        for scenario in scenarios:
+            validate(scenario)
+        self.reading_at_zeroing = np.zeros((len(scenarios), 6))
+        self._parts: list[tuple[np.ndarray, _EvenReplay]] = []
+        steps = np.array([_coarse_step(scenario) for scenario in scenarios])
+        for h in np.unique(steps):
+            which = np.flatnonzero(steps == h)
+            group = [noise_free(scenarios[int(i)]) for i in which]
+            replay = _EvenReplay(group, float(h), coarse)
+            self._parts.append((which, replay))
+            self.reading_at_zeroing[which] = replay.reading_at_zeroing
 
-    def _build(self, scenario: Scenario) -> None:
-        self._diagram, self._scenario = ReplayDiagram(scenario), scenario
-        self._body = TwinNumbers.of(scenario).body
-        self._zero()
+    def transitions(self, steps: Sequence[Steps]) -> list[np.ndarray]:
+        """Returns the states (n, 12) after independent steps, each from its own start.
 
-    def reconfigure(self, scenario: Scenario) -> None:
-        """See TwinReplay."""
-        if not self._diagram.can_reconfigure(scenario):
-            self._build(scenario)
-            return
-        self._diagram.reconfigure(scenario)
-        self._scenario = scenario
-        self._zero()
-
-    @property
-    def reading_at_zeroing(self) -> np.ndarray:
-        """See TwinReplay."""
-        return self._diagram.reading_at_zeroing
-
-    def transitions(self, steps: Steps) -> np.ndarray:
-        """See TwinReplay.
-
-        Raises:
-            RuntimeError: the contact equations of a step have no solution.
-        """
-        deflection = self._diagram.station.deflection
-        given = np.array([deflection(wrench) for wrench in steps.wrench])
-        q, q_bolt, loads = self._after(steps, steps.q + given, self._time_steps())
-        times = (steps.index + 1) * self._scenario.task.period
-        rows = zip(times, q, q_bolt, loads, strict=True)
-        return np.array([self._diagram.observed(*row) for row in rows])
-
-    def _zero(self) -> None:
-        """Lets the bolt settle at A, in coarse steps, and zeroes the sensor.
-
-        Where it comes to rest does not depend on the steps' length.
-        """
-        rest, station = np.zeros((1, 6)), self._diagram.station
-        stay = Steps(np.zeros(1), rest, rest, station.start[None], rest, rest, rest)
-        h = self._coarse_step() or self._diagram.time_step
-        time_steps = [h] * round(station.settling_time / h)
-        settled = self._after(stay, rest, time_steps, until_rest=True)
-        [state] = zip(*settled, strict=True)
-        self._diagram.zero_at(*state)
-
-    def _after(
-        self,
-        steps: Steps,
-        q_bolt: np.ndarray,
-        time_steps: Sequence[float],
-        until_rest: bool = False,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns coordinates of arm and bolt, and loads on the sensor (n, 6) each.
+        NaN where contact finds no balance.
 
         Args:
-            steps: where arm and command begin, and how the command moves.
-            q_bolt: (n, 6) where the bolt begins.
-            time_steps: of the plant [s].
-            until_rest: whether to stop before, as soon as nothing moves.
+            steps: n of each of the k twins; n may differ from one to the next.
         """
-        parameters = self._diagram.station.parameters
-        conditions = self._conditions(steps, q_bolt)
-        arms = {
-            h: ArmStep.of(parameters.arm, parameters.grip, h) for h in set(time_steps)
+        found = [np.zeros((len(each), 12)) for each in steps]
+        for which, replay in self._parts:
+            states = replay.transitions([steps[i] for i in which])
+            for i, own in zip(which, states, strict=True):
+                found[i] = own
+        return found
+
+
+class _EvenReplay:
+    """The replay of scenarios that allow for the same coarse time step.
+
+    Args:
+        scenarios: of the k twins.
+        coarse_step: [s]; 0 if there is none.
+        coarse: see `ImpactReplay`.
+    """
+
+    def __init__(
+        self, scenarios: Sequence[Scenario], coarse_step: float, coarse: bool
+    ) -> None:
+        simulation, self._period = scenarios[0].simulation, scenarios[0].task.period
+        fine = simulation.twin_time_step
+        self._batches = {
+            h: _SteppedBatch.of(scenarios, h) for h in {coarse_step or fine, fine}
         }
-        before = np.hstack([steps.q, steps.v])
-        state = TwinState(before, q_bolt, steps.v + steps.give_rate, steps.qd)
-        for h in time_steps:
-            sprung = conditions.sprung(arms[h].springs)
-            step, v = (
-                plant_step(state, steps.qd_rate, arms[h], self._body, sprung),
-                state.v,
-            )
-            if not step.is_solved.all():
-                raise RuntimeError(NO_BALANCE)
-            state = step.state
-            moves = max(np.abs(state.v).max(), np.abs(state.v - v).max())
-            if until_rest and moves < _REST:
+        begun = round(self._period / coarse_step) - 1 if coarse and coarse_step else 0
+        rest = round((self._period - begun * coarse_step) / fine)
+        self._time_steps = [coarse_step] * begun + [fine] * rest
+        self._zero(coarse_step or fine)
+
+    def transitions(self, steps: Sequence[Steps]) -> list[np.ndarray]:
+        """See ImpactReplay."""
+        counts = [len(each) for each in steps]
+        which = np.repeat(np.arange(len(steps)), counts)
+        states = self._after(which, Steps.concatenated(steps))
+        return np.split(states, np.cumsum(counts)[:-1])
+
+    def _zero(self, h: float) -> None:
+        """Lets the bolts settle at A and zeroes the sensors.
+
+        Where they come to rest does not depend on the steps' length.
+        """
+        batch = self._batches[h]
+        twins, still = batch.twins(slice(None)), np.zeros((batch.count, 6))
+        arm, body = twins.numbers.arm, twins.numbers.body
+        conditions = twins.conditions(at_A(still))
+        step = plant_step(batch.at_rest.state, still, arm, body, conditions)
+        moves = np.ones(batch.count, bool)
+        for _ in range(round(TwinStation.settling_time / h) - 1):
+            following = plant_step(step.state, still, arm, body, conditions)
+            v, change = following.state.v, following.state.v - step.state.v
+            step = _chosen(moves, following, step)
+            moves &= np.abs(np.hstack([v, change])).max(axis=1) >= _REST
+            if not moves.any():
                 break
-        return state.arm[:, :6], state.q, step.load(self._body)
-
-    def _conditions(self, steps: Steps, q_bolt: np.ndarray) -> ImpactConditions:
-        """Returns the contact's conditions, per step where an effect is local."""
-        conditions, effects = self._diagram.impact_conditions(), self._scenario.effects
-        if not is_local(effects):
-            return conditions
-        nominal = self._diagram.station.lock.nominal
-        rows = zip(q_bolt, steps.qd_rate, strict=True)
-        motions = [self._diagram.motion(*row) for row in rows]
-        around = Surroundings.of(
-            [environment_at(nominal, effects, motion) for motion in motions]
+        reading = sensed_at_zeroing(
+            twins.load_S(step.state.arm, step),
+            twins.effects.sensor,
+            twins.sensing(step.state.arm, np.zeros(batch.count)),
         )
-        return dataclasses.replace(conditions, around=around)
+        self.reading_at_zeroing = np.where(step.is_solved[:, None], reading, np.nan)
+        self._offset = twins.processing.offset(self.reading_at_zeroing)
 
-    def _time_steps(self) -> list[float]:
-        """Returns the plant's steps within a period [s]."""
-        period = self._scenario.task.period
-        fine = self._scenario.simulation.twin_time_step
-        coarse = self._coarse_step() if self._coarse else 0.0
-        first = round(period / coarse) - 1 if coarse else 0
-        rest = round((period - first * coarse) / fine)
-        return [coarse] * first + [fine] * rest
+    def _after(self, which: np.ndarray, steps: Steps) -> np.ndarray:
+        """Returns the states (n, 12) after steps of some of the twins (n,)."""
+        twins = {h: batch.twins(which) for h, batch in self._batches.items()}
+        numbers = twins[self._time_steps[-1]].numbers
+        q_bolt = steps.q + numbers.deflection(steps.wrench)
+        motion = _motion(numbers, q_bolt, steps.qd_rate)
+        conditions = {h: twins[h].conditions(motion) for h in self._time_steps}
+        arm = np.hstack([steps.q, steps.v])
+        state = TwinState(arm, q_bolt, steps.v + steps.give_rate, steps.qd)
+        is_solved = np.ones(len(which), bool)
+        for h in self._time_steps:
+            arm_step, body = twins[h].numbers.arm, numbers.body
+            step = plant_step(state, steps.qd_rate, arm_step, body, conditions[h])
+            state, is_solved = step.state, is_solved & step.is_solved
+        time = (steps.index + 1) * self._period
+        found = _observed(twins[h], step, time, self._offset[which])
+        return np.where(is_solved[:, None], found, np.nan)
 
-    def _coarse_step(self) -> float:
-        """Returns about 10 ms that divide the period [s]; 0 if no such step will do."""
-        period = self._scenario.task.period
-        step = period / np.ceil(period / _COARSE - 1e-9)
-        whole = step / self._scenario.simulation.twin_time_step
-        if whole < 1.5 or abs(whole - round(whole)) > 1e-6:
-            return 0.0
-        parameters = self._diagram.station.parameters
-        arm = ArmStep.of(parameters.arm, parameters.grip, step)
-        return float(step) if arm.is_stable else 0.0
+
+@dataclasses.dataclass(frozen=True)
+class _SteppedBatch:
+    """Twins whose plants have one time step.
+
+    Attributes:
+        batch: of k twins.
+        at_rest: them, at A.
+    """
+
+    batch: TwinBatch
+    at_rest: Episodes
+
+    @classmethod
+    def of(cls, scenarios: Sequence[Scenario], h: float) -> Self:
+        """Returns the twins of scenarios with steps of a length [s]."""
+        stepped = [_with_time_step(scenario, h) for scenario in scenarios]
+        batch = TwinBatch(stepped, np.zeros(0))
+        return cls(batch, batch.at_rest(range(len(stepped)), stepped))
+
+    @property
+    def count(self) -> int:
+        """How many twins."""
+        return len(self.at_rest.steps)
+
+    def twins(self, which: np.ndarray | slice) -> Twins:
+        """Returns some of the twins, by their numbers (n,)."""
+        return self.batch.twins(rows_of(self.at_rest, which))
+
+
+def _observed(
+    twins: Twins, step: PlantStep, time: np.ndarray, offset: np.ndarray
+) -> np.ndarray:
+    """Returns the states (n, 12) that are seen, their rotations as vectors.
+
+    Args:
+        twins: n of them.
+        step: of their plants.
+        time: (n,) since their episodes began [s].
+        offset: (n, 6) of their sensors.
+    """
+    arm = step.state.arm
+    X_GB = twins.numbers.coordinates.poses(arm[:, :6])
+    load, sensing = twins.load_S(arm, step), twins.sensing(arm, time)
+    reading = sensed(load, twins.effects.sensor, sensing)
+    wrench = twins.processing.wrench(X_GB.R, reading, offset)
+    return np.hstack([X_GB.p, rotation_vectors(X_GB.R), wrench])
+
+
+def _motion(numbers: TwinNumbers, q_bolt: np.ndarray, rate: np.ndarray) -> BoltMotion:
+    """Returns the bolts' motion in a step, on which effects may depend.
+
+    Args:
+        numbers: of n twins.
+        q_bolt: (n, 6) coordinates of the bolts.
+        rate: (n, 6) of the commanded coordinates.
+    """
+    X_GB = numbers.coordinates.poses(q_bolt)
+    p_BoTo = apply_matrix(X_GB.R, numbers.body.p_BoTo_B)
+    rate_of_turn = rate[:, :2:-1]  # roll, pitch, yaw: about x, y, z while small
+    return BoltMotion(X_GB.p, rate[:, :3] - cross(rate_of_turn, p_BoTo))
+
+
+def _chosen(which: np.ndarray, step: PlantStep, other: PlantStep) -> PlantStep:
+    """Returns rows of one step where a mask (n,) is true, of another elsewhere."""
+
+    def chosen(new: np.ndarray, old: np.ndarray) -> np.ndarray:
+        """Returns rows of one array or another."""
+        return np.where(which.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+
+    return mapped(chosen, step, other)
+
+
+def _with_time_step(scenario: Scenario, h: float) -> Scenario:
+    simulation = dataclasses.replace(scenario.simulation, twin_time_step=h)
+    return dataclasses.replace(scenario, simulation=simulation)
+
+
+def _coarse_step(scenario: Scenario) -> float:
+    """Returns about 10 ms that divide the period [s]; 0 if no such step will do."""
+    period = scenario.task.period
+    step = float(period / np.ceil(period / _COARSE - 1e-9))
+    whole = step / scenario.simulation.twin_time_step
+    if whole < 1.5 or abs(whole - round(whole)) > 1e-6:
+        return 0.0
+    arm = TwinNumbers.of(_with_time_step(scenario, step)).arm
+    return step if arm.is_stable else 0.0

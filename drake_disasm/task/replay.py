@@ -69,6 +69,12 @@ class Steps:
     def __len__(self) -> int:
         return len(self.index)
 
+    @classmethod
+    def concatenated(cls, parts: "Sequence[Steps]") -> Self:
+        """Returns all steps of some parts, in their order."""
+        names = [field.name for field in dataclasses.fields(cls)]
+        return cls(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
+
     def select(self, which: np.ndarray | slice) -> Self:
         """Returns some of the steps, by a mask (n,) or a slice."""
         return dataclasses.replace(
@@ -129,7 +135,7 @@ class TwinReplay:
         for i in range(len(steps)):
             self._start(steps, i)
             states.append(self.advance(steps.qd_rate[i]))
-        return np.array(states)
+        return np.array(states).reshape(-1, 12)
 
     def episode(self, steps: Steps) -> np.ndarray:
         """Returns the states (n, 12) after consecutive steps from the first state.

@@ -239,6 +239,11 @@ class LogModel(abc.ABC):
         return [slice(0, self.measurements.rows)]
 
     @property
+    def together(self) -> int:
+        """How many parameter sets `simulate_all` takes with profit."""
+        return 1
+
+    @property
     def simulated(self) -> NDArray[np.bool_]:
         """Which parameters (p,) `simulate` depends on."""
         return np.ones(len(self.parameters), dtype=bool)
@@ -258,6 +263,23 @@ class LogModel(abc.ABC):
         """
         predicted = np.asarray(self.predict(self.with_frozen(theta), rows))
         return predicted[:, None] if predicted.ndim == 1 else predicted
+
+    def simulate_all(self, thetas: Array, rows: slice) -> list[Array | str]:
+        """Returns what `simulate` gives of parameter sets (k, p), or why it can't.
+
+        Here one after the other; a model that simulates many at once overrides it.
+        """
+        return [self._outcome(theta, rows) for theta in thetas]
+
+    def _outcome(self, theta: Array, rows: slice) -> Array | str:
+        """Returns a simulation of finite numbers, or why there is none."""
+        try:
+            simulated = self.simulate(theta, rows)
+        except PredictionError as error:
+            return str(error)
+        if not np.isfinite(simulated).all():
+            return "the prediction is not finite"
+        return simulated
 
     def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
         """Returns the prediction (len(rows), channels) from what `simulate` gave."""

@@ -89,7 +89,7 @@ class Transitions:
         twin = BoltCoordinates(p_BoTo_B)
         rates, grip = ArmRates.of(scenario), GripLag.of(scenario)
         recorded = tuple(_Recorded.of(e, rates, grip, twin) for e in episodes)
-        steps = _concatenated([each.steps() for each in recorded])
+        steps = Steps.concatenated([each.steps() for each in recorded])
         arms = [CellArm.of(scenario, _station(log)) for log in logs]
         counts = [sum(e.rows - 1 for e in log.episodes) for log in logs]
         lead = np.repeat([arm.lead for arm in arms], counts)
@@ -144,7 +144,9 @@ class Transitions:
         went = [each.rates.path(path, each.wrench) for each, path in pairs]
         late = LatePoses.of(went, weights)
         pairs = list(zip(self.episodes, went, strict=True))
-        begun = _concatenated([e.on_time(path, weights).steps() for e, path in pairs])
+        begun = Steps.concatenated(
+            [e.on_time(path, weights).steps() for e, path in pairs]
+        )
         begun = begun.select(self.rows)
         return dataclasses.replace(steps, q=begun.q, v=begun.v), late
 
@@ -326,12 +328,3 @@ class _Recorded:
 def _coordinates(poses: Array, twin: BoltCoordinates) -> Array:
     """Returns the twin's coordinates (n, 6) of poses (n, 7)."""
     return np.array([twin.solve(pose_from_vector(p), np.zeros(6)) for p in poses])
-
-
-def _concatenated(parts: Sequence[Steps]) -> Steps:
-    return Steps(
-        *(
-            np.concatenate([getattr(part, f.name) for part in parts])
-            for f in dataclasses.fields(Steps)
-        )
-    )

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -21,15 +22,16 @@ from drake_disasm.effects import (
     reported_poses,
     sensor_chain,
 )
+from drake_disasm.impact import NO_BALANCE
 from drake_disasm.logs import Log
 from drake_disasm.logs.schema import WRENCH
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.impact_replay import ImpactReplay
-from drake_disasm.task.replay import Steps, TwinReplay
+from drake_disasm.task.replay import Steps
 from sysid.models.base import Array, PredictionError, even_chunks
 from sysid.models.commands import bolt_path, twin_coordinates
 from sysid.models.late_pose import LatePoses
-from sysid.models.replays import impact_replay, twin_replay
+from sysid.models.replays import DiagramReplays, impact_replay
 from sysid.models.scenario_model import ScenarioModel
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 from sysid.models.transitions import Transitions, measured_states
@@ -38,6 +40,8 @@ from sysid.parameters import Parameter
 _FRICTION = "contact.friction"  # which both kinds of contact have
 _CHUNK = 32  # transitions: a tenth of a second of work
 _IMPACT_CHUNK = 512  # large enough for arrays, small enough to share
+_IMPACT_BATCH = 4096  # with more an array operation hardly gets faster
+_KEPT = 64  # executed commands of that many parameter sets
 
 
 class TwinModel(ScenarioModel):
@@ -86,7 +90,7 @@ class TwinModel(ScenarioModel):
         self._transitions = Transitions.of(logs, scenario, self.reading)
         self.measurements = measured_states(logs, scenario, self.reading)
         self._displacement: Array | None = None  # (rows, 2, 3) of begin and end
-        self._executed: tuple[str, tuple[Steps, LatePoses | None]] | None = None
+        self._executed: dict[str, tuple[Steps, LatePoses | None]] = {}
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
@@ -97,24 +101,42 @@ class TwinModel(ScenarioModel):
 
         (len(rows), 18), as the sensor would read them without effects.
         """
-        scenario = self.scenario_at(theta)
+        [found] = self.simulate_all(theta[None], rows)
+        if isinstance(found, str):
+            raise PredictionError(found)
+        return found
+
+    def simulate_all(self, thetas: Array, rows: slice) -> list[Array | str]:
+        """See LogModel."""
         try:
-            replay = self._replay_at(scenario)
-            steps, late = self._executed_at(scenario)
-            steps = steps.select(rows)
-            if self._displacement is not None:
-                period = self._transitions.period
-                steps = _displaced(steps, self._displacement[rows], period)
-            states = self._states(replay, steps)
-            if late is not None and not self.rollout:
-                states = self._carried_on(replay, steps, states, late, rows)
-            states = self.at_sensor(states)
-            states[:, 6:] += self._transitions.sway[rows]
+            found = self._simulated(thetas, rows)
         except (RuntimeError, DisasmError, ValueError) as error:
-            text = " ".join(str(error).split())
-            raise PredictionError(text) from None
-        zero = np.broadcast_to(replay.reading_at_zeroing, (len(states), 6))
-        return np.hstack([states, zero])
+            if len(thetas) > 1:  # it is not said of which
+                return super().simulate_all(thetas, rows)
+            return [" ".join(str(error).split())]
+        return [each if np.isfinite(each).all() else NO_BALANCE for each in found]
+
+    def _simulated(self, thetas: Array, rows: slice) -> list[Array]:
+        """Returns what `simulate` gives of parameter sets (k, p).
+
+        NaN where contact finds no balance.
+        """
+        scenarios = [self.scenario_at(theta) for theta in thetas]
+        executed = [self._executed_at(scenario) for scenario in scenarios]
+        steps = [self._displaced(own.select(rows), rows) for own, _ in executed]
+        replays = self._replays_at(scenarios)
+        found = replays.transitions(steps)
+        if not self.rollout:
+            late = [poses for _, poses in executed]
+            self._carry_on(replays, steps, found, late, rows)
+        found = [self.at_sensor(states) for states in found]
+        for states in found:
+            states[:, 6:] += self._transitions.sway[rows]
+        zeros = replays.reading_at_zeroing
+        return [
+            np.hstack([states, np.broadcast_to(zero, (len(states), 6))])
+            for states, zero in zip(found, zeros, strict=True)
+        ]
 
     def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
         """Returns the states (len(rows), 12), wrench and pose read through effects."""
@@ -231,9 +253,25 @@ class TwinModel(ScenarioModel):
         effects = _mean_chain(scenario)
         weights = pose_weights(scenario.effects, self._transitions.period)
         key = repr((effects, weights.tolist()))
-        if self._executed is None or self._executed[0] != key:
-            self._executed = key, self._transitions.executed(effects, weights)
-        return self._executed[1]
+        if key not in self._executed:
+            while len(self._executed) >= _KEPT:
+                del self._executed[next(iter(self._executed))]
+            self._executed[key] = self._transitions.executed(effects, weights)
+        return self._executed[key]
+
+    def _displaced(self, steps: Steps, rows: slice) -> Steps:
+        """Returns steps as the arm scatters about its commands, if it does."""
+        if self._displacement is None:
+            return steps
+        return _displaced(steps, self._displacement[rows], self._transitions.period)
+
+    @property
+    def together(self) -> int:
+        """See LogModel: as many as arrays are fast with."""
+        if self.rollout or not self._has_impact:
+            return 1
+        rows = min(self.measurements.rows, _IMPACT_CHUNK)
+        return max(1, round(_IMPACT_BATCH / rows))
 
     def chunks(self) -> list[slice]:
         """See LogModel; a rollout can't be cut within an episode."""
@@ -262,51 +300,57 @@ class TwinModel(ScenarioModel):
             _displacement=None if displacement is None else displacement[mask],
         )
 
-    def _replay_at(self, scenario: Scenario) -> TwinReplay | ImpactReplay:
-        """Returns the replay of a scenario."""
-        simulated = _environment_alone(scenario)
+    def _replays_at(
+        self, scenarios: Sequence[Scenario]
+    ) -> ImpactReplay | DiagramReplays:
+        """Returns the replays of scenarios."""
+        simulated = [_environment_alone(scenario) for scenario in scenarios]
         if self.rollout or not self._has_impact:
-            return twin_replay(simulated)
+            return DiagramReplays(simulated, self.rollout)
         return impact_replay(simulated, self.coarse)
 
     @property
     def _has_impact(self) -> bool:
         return self.scenario.contact.model == "impact"
 
-    def _states(self, replay: TwinReplay | ImpactReplay, steps: Steps) -> Array:
-        """Returns the states (len(steps), 12) after each step."""
-        if isinstance(replay, ImpactReplay) or not self.rollout:
-            return replay.transitions(steps)
-        return replay.episode(steps)
-
-    def _carried_on(
+    def _carry_on(
         self,
-        replay: TwinReplay | ImpactReplay,
-        steps: Steps,
-        states: Array,
-        late: LatePoses,
+        replays: ImpactReplay | DiagramReplays,
+        steps: Sequence[Steps],
+        found: Sequence[Array],
+        late: Sequence[LatePoses | None],
         rows: slice,
-    ) -> Array:
-        """Returns states (n, 12) after steps, of which the last ones begin unmeasured.
+    ) -> None:
+        """Finds the states (n, 12) after steps again whose begin was not measured.
 
-        An episode's last poses never come in: there a step begins where the one before
-        led, by its prediction.
+        An episode's last late poses never come in: there a step begins where the one
+        before led, by its prediction.
+
+        Args:
+            replays: of the k twins.
+            steps, found: n of each, and the states after them; changed in place.
+            late: poses of each twin, if they come late.
+            rows: that the steps are.
         """
-        transitions, states = self._transitions, states.copy()
+        transitions = self._transitions
         own = transitions.rows[rows]
-        unseen = late.unseen[own] * (np.diff(own, prepend=-2) == 1)
-        steps = dataclasses.replace(steps, q=steps.q.copy(), v=steps.v.copy())
-        for count in range(1, int(unseen.max(initial=0)) + 1):
-            on = np.flatnonzero(unseen == count)
-            q = twin_coordinates(states[on - 1, :6], transitions.p_BoTo_B)
-            steps.v[on] = (q - steps.q[on - 1]) / transitions.period
-            steps.q[on] = q
-            states[on] = replay.transitions(steps.select(unseen == count))
-        return states
+        follows = np.diff(own, prepend=-2) == 1
+        unseen = [0 * own if x is None else x.unseen[own] * follows for x in late]
+        copied = [replace(each, q=each.q.copy(), v=each.v.copy()) for each in steps]
+        for count in range(1, 1 + max(int(u.max(initial=0)) for u in unseen)):
+            which = [np.flatnonzero(u == count) for u in unseen]
+            for each, states, on in zip(copied, found, which, strict=True):
+                q = twin_coordinates(states[on - 1, :6], transitions.p_BoTo_B)
+                each.v[on] = (q - each.q[on - 1]) / transitions.period
+                each.q[on] = q
+            parts = [each.select(on) for each, on in zip(copied, which, strict=True)]
+            again = replays.transitions(parts)
+            for states, on, new in zip(found, which, again, strict=True):
+                states[on] = new
 
     def __getstate__(self) -> dict[str, Any]:
         """Leaves out what is quickly found again."""
-        return self.__dict__ | {"_executed": None}
+        return self.__dict__ | {"_executed": {}}
 
 
 def _mean_chain(scenario: Scenario) -> tuple[MotionEffect, ...]:

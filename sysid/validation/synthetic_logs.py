@@ -141,7 +141,7 @@ def rollout(
     motion, sensor = motion_chain(real.effects), sensor_chain(real.effects)
     weights = pose_weights(real.effects, scenario.task.period)
     real.effects = [e for e in real.effects if isinstance(e, EnvironmentEffect)]
-    replay = ImpactReplay(real, coarse=True)  # as the model of the log has it
+    replay = ImpactReplay([real], coarse=True)  # as the model of the log has it
     reading = SensorReading(scenario, Tool.from_models(scenario))
     measured = _Measured(scenario, commanded)
     count, size, _ = commanded.shape
@@ -150,7 +150,7 @@ def rollout(
     executed = np.array(commanded)
     memories = np.zeros((count, len(motion), 6))
     times = np.arange(1, size, dtype=np.float64) * scenario.task.period
-    zero = replay.reading_at_zeroing
+    [zero] = replay.reading_at_zeroing
     for k in range(size - 1):
         in_G = at_bolt(states[:, k], reading.X_SB)
         for e in range(count):
@@ -158,7 +158,8 @@ def rollout(
                 motion, commanded[e, k + 1], in_G[e, 6:], memories[e], times[0]
             )
         step = measured.steps(k, in_G, executed[:, k : k + 2])
-        clean[:, k + 1] = at_sensor(replay.transitions(step), reading.X_SB)
+        [after] = replay.transitions([step])
+        clean[:, k + 1] = at_sensor(after, reading.X_SB)
         for e in range(count):
             so_far = clean[e, 1 : k + 2]
             read = reading.read(sensor, so_far, zero, times[: k + 1])

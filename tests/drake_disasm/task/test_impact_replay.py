@@ -1,8 +1,14 @@
 """Many steps of the twin with IMPACT at once, against the diagram."""
 
+import dataclasses
+import math
+from typing import ClassVar
+
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
+from drake_disasm.effects import EnvironmentEffect, amplitude, register_effect, registry
 from drake_disasm.scenario import Scenario, load_scenario, with_values
 from drake_disasm.stations import TwinStation
 from drake_disasm.task.impact_replay import ImpactReplay
@@ -50,7 +56,7 @@ def steps(scenario: Scenario) -> Steps:
 def test_it_says_what_the_diagram_says(scenario, pushes):
     """To some 10 nm, thousandths of a newton and hundredths of a N mm."""
     expected = TwinReplay(scenario).transitions(steps(scenario))
-    found = ImpactReplay(scenario).transitions(steps(scenario))
+    [found] = ImpactReplay([scenario]).transitions([steps(scenario)])
     assert np.abs(expected[:, 8]).max() > pushes
     np.testing.assert_allclose(found[:, :3], expected[:, :3], atol=6e-8)
     np.testing.assert_allclose(found[:, 3:6], expected[:, 3:6], atol=1e-6)
@@ -63,29 +69,76 @@ def test_the_sensor_is_zeroed_under_the_force_at_the_start(effect):
     """To hundredths of a newton: in contact the bolt still creeps when it is zeroed."""
     scenario = load_scenario("removal", [*QUIET, f"effects=[!{effect}]"])
     expected = TwinReplay(scenario).reading_at_zeroing
-    found = ImpactReplay(scenario).reading_at_zeroing
-    away = ImpactReplay(TURNED).reading_at_zeroing
+    [found] = ImpactReplay([scenario]).reading_at_zeroing
+    [away] = ImpactReplay([TURNED]).reading_at_zeroing
     assert np.abs(expected - away)[:3].max() > 0.1
     np.testing.assert_allclose(found[:3], expected[:3], atol=1e-2)
     np.testing.assert_allclose(found[3:], expected[3:], atol=5e-4)
 
 
-def test_becoming_another_scenario_is_building_it_anew_bit_for_bit():
-    other = with_values(
-        TURNED,
-        {
-            "contact.impact.stiffness": 50.0,
-            "contact.impact.depth": 0.3,
-            "lock.clearance": 0.0005,
-            "gripper.stiffness.2": 900.0,
-            "effects.0.ry": 0.01,
-        },
-    )
-    replay, same = ImpactReplay(TURNED), steps(TURNED)
-    before = replay.transitions(same)
-    for scenario in (other, with_values(TURNED, {"lock.neck_diameter": 0.0051})):
-        replay.reconfigure(scenario)
-        expected = ImpactReplay(scenario).transitions(same)
-        assert replay.transitions(same).tobytes() == expected.tobytes()
-    replay.reconfigure(TURNED)
-    assert replay.transitions(same).tobytes() == before.tobytes()
+def test_what_a_scenario_gives_does_not_depend_on_the_others():
+    """Whatever they differ in, and from how many states each begins."""
+    values = [
+        {},
+        {"contact.impact.stiffness": 50.0, "contact.impact.depth": 0.3},
+        {"gripper.stiffness.2": 900.0, "lock.clearance": 0.0005},
+        {"effects.0.ry": 0.01, "lock.neck_diameter": 0.0051},
+    ]
+    scenarios = [with_values(TURNED, each) for each in values]
+    given = [steps(TURNED).select(np.arange(COUNT) < n) for n in (24, 7, 1, 12)]
+    together = ImpactReplay(scenarios, coarse=True)
+    found = together.transitions(given)
+    for i, scenario in enumerate(scenarios):
+        alone = ImpactReplay([scenario], coarse=True)
+        [expected] = alone.transitions([given[i]])
+        np.testing.assert_allclose(found[i], expected, rtol=1e-9, atol=1e-11)
+        zeros = together.reading_at_zeroing[i], alone.reading_at_zeroing[0]
+        np.testing.assert_allclose(*zeros, rtol=1e-9, atol=1e-11)
+
+
+def test_a_state_without_balance_is_nan_and_the_others_are_found():
+    broken = steps(TURNED)
+    broken.qd[3, 0] = np.nan
+    [found] = ImpactReplay([TURNED]).transitions([broken])
+    [expected] = ImpactReplay([TURNED]).transitions([steps(TURNED)])
+    assert np.isnan(found[3]).all()
+    others = np.arange(COUNT) != 3
+    np.testing.assert_allclose(found[others], expected[others], rtol=1e-9, atol=1e-11)
+
+
+@dataclasses.dataclass
+class Wear(EnvironmentEffect):
+    """A groove worn at its beginning, by an equation of numbers, as users write it.
+
+    Equation: z -= depth exp(-x / 20 mm), mu += 0.1 where more than half is worn.
+    Where it acts: the groove.
+    """
+
+    depth: float = amplitude("m", 0.0, 2e-3, "at A")
+    is_local: ClassVar[bool] = True
+    experiment: ClassVar[str] = "any"
+
+    def apply(self, environment, bolt):
+        """Returns the environment, lower where the bolt has not come far."""
+        worn = self.depth * math.exp(-max(bolt.p[0], 0.0) / 0.02)
+        X_GnG, friction = environment.X_GnG, environment.friction
+        if worn > 0.5 * self.depth:
+            friction += 0.1
+        p = X_GnG.translation() - np.array([0.0, 0.0, worn])
+        moved = RigidTransform(X_GnG.rotation(), p)
+        return dataclasses.replace(environment, X_GnG=moved, friction=friction)
+
+
+def test_an_effect_of_a_users_own_acts_though_its_equation_takes_no_arrays(
+    monkeypatch,
+):
+    monkeypatch.setattr(registry, "_effects", dict(registry._effects))
+    monkeypatch.setattr(registry, "import_in_workers", lambda module: None)
+    register_effect(Wear)
+    scenario = load_scenario("removal_turned", QUIET)
+    scenario.effects.append(Wear(depth=4e-4))
+    expected = TwinReplay(scenario).transitions(steps(scenario))
+    found, plain = ImpactReplay([scenario, TURNED]).transitions([steps(scenario)] * 2)
+    assert np.abs(found - plain)[:, 6:9].max() > 0.05
+    np.testing.assert_allclose(found[:, :3], expected[:, :3], atol=6e-8)
+    np.testing.assert_allclose(found[:, 6:9], expected[:, 6:9], atol=2e-3)

@@ -122,13 +122,13 @@ def test_sensor_effects_share_one_simulation(tmp_path, monkeypatch):
     model = TwinModel([log], scenario, parameters)
     np.testing.assert_array_equal(model.simulated, [False, False, True])
     asked = []
-    simulate = TwinModel.simulate
+    simulate_all = TwinModel.simulate_all
 
-    def counted(self, theta, rows):
-        asked.append(theta)
-        return simulate(self, theta, rows)
+    def counted(self, thetas, rows):
+        asked.extend(thetas)
+        return simulate_all(self, thetas, rows)
 
-    monkeypatch.setattr(TwinModel, "simulate", counted)
+    monkeypatch.setattr(TwinModel, "simulate_all", counted)
     thetas = np.array([[0.0, 0.0, 0.2], [0.5, 0.0, 0.2], [0.0, 0.1, 0.2], [0, 0, 0.3]])
     found = Objective(model, Workers()).residuals(thetas)
     assert len(asked) == 2
@@ -136,6 +136,20 @@ def test_sensor_effects_share_one_simulation(tmp_path, monkeypatch):
     np.testing.assert_allclose(change[:, 6], 0.5, atol=1e-9)
     alone = model.predict(thetas[2], slice(0, _STEPS)) - model.measurements.values
     np.testing.assert_allclose(found[2], alone / model.measurements.noise, atol=1e-9)
+
+
+def test_a_parameter_set_that_fails_leaves_the_others_of_its_batch(tmp_path):
+    scenario = _scenario("impact")
+    _, log = _log(tmp_path / "log", scenario, SensorMounting(ry=0.1))
+    scenario, parameters = scenario_parameters(scenario, [Request("lock.clearance")])
+    model = TwinModel([log], scenario, parameters)
+    thetas = np.array([[4e-4], [-1.0], [5e-4]])
+    assert model.together >= len(thetas)
+    found = model.simulate_all(thetas, slice(0, _STEPS))
+    assert "lock.clearance" in found[1]
+    for i in (0, 2):
+        alone = model.simulate(thetas[i], slice(0, _STEPS))
+        np.testing.assert_allclose(found[i], alone, rtol=1e-9, atol=1e-11)
 
 
 def test_a_learned_effect_knows_what_the_models_say_it_knows(tmp_path):
