@@ -64,10 +64,10 @@ class RefitSearch(ForwardSearch):
 
         And what may exceed the model's own error, where that is stated.
         """
+        if starts:
+            return [e for e in survey.effects if e.effects in starts]
         limits = self._settings
         likely = [e for e in survey.effects if e.gain >= limits.refit_min_linear_gain]
-        if starts:
-            return [e for e in likely if e.effects in starts]
         if not fit.states_model_error:
             return likely
         most = limits.refit_max_linear_p

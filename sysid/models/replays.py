@@ -1,17 +1,128 @@
-"""Replays of the twin: one of each kind in a process, which all models share.
+"""Replays of the twin, which all models of a process share.
 
 To build the diagram takes half a second, to turn it into another scenario's some 20 ms;
-the models of a search, one for each effect that is tried, differ in that alone.
+the models of a search, one for each effect that is tried, differ in that alone. And
+many of them ask for the same simulation: what acts on the sensor's readings alone does
+not change it.
 """
 
 import functools
+import hashlib
+import threading
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.replay import Steps, TwinReplay
+
+_MOST_BYTES = 2**26  # of simulations that are kept
+
+
+class Replayed(NamedTuple):
+    """What a twin's replay gives.
+
+    Attributes:
+        states: (n, 12) after the steps; NaN where contact finds no balance.
+        reading_at_zeroing: (6,) of the sensor, [f; tau] in S.
+    """
+
+    states: np.ndarray
+    reading_at_zeroing: np.ndarray
+
+
+class DiagramReplays:
+    """The replay of scenarios by Drake, one after the other.
+
+    Args:
+        scenarios: of the k twins.
+        whole: whether consecutive steps of whole episodes are simulated, each from
+            where the one before has led.
+    """
+
+    def __init__(self, scenarios: Sequence[Scenario], whole: bool = False) -> None:
+        self._scenarios, self._whole = scenarios, whole
+
+    def transitions(self, steps: Sequence[Steps]) -> list[Replayed]:
+        """Returns what the steps of each twin give.
+
+        Raises:
+            DisasmError: a scenario is out of bounds.
+            RuntimeError: Drake's contact solver did not converge.
+        """
+        pairs = zip(self._scenarios, steps, strict=True)
+        return [self._replayed(scenario, own) for scenario, own in pairs]
+
+    def _replayed(self, scenario: Scenario, steps: Steps) -> Replayed:
+        replay = twin_replay(scenario)
+        run = replay.episode if self._whole else replay.transitions
+        return Replayed(run(steps), replay.reading_at_zeroing)
+
+
+class ImpactReplays:
+    """The replay of scenarios with IMPACT contact, all at once, but what is known.
+
+    Args:
+        scenarios: of the k twins.
+        coarse: see `ImpactReplay`.
+    """
+
+    def __init__(self, scenarios: Sequence[Scenario], coarse: bool) -> None:
+        self._scenarios, self._coarse = scenarios, coarse
+        self._texts = [f"{coarse=} {scenario!r}" for scenario in scenarios]
+
+    def transitions(self, steps: Sequence[Steps]) -> list[Replayed]:
+        """Returns what the steps of each twin give.
+
+        Raises:
+            DisasmError: a scenario is out of bounds.
+        """
+        pairs = zip(self._texts, steps, strict=True)
+        keys = [text + _digest(own) for text, own in pairs]
+        found = {key: known for key in keys if (known := _kept.get(key))}
+        new = {key: i for i, key in enumerate(keys) if key not in found}
+        if new:
+            replayed = self._replayed(list(new.values()), steps)
+            for key, own in zip(new, replayed, strict=True):
+                found[key] = own
+                _kept.put(key, own)
+        return [Replayed(*(part.copy() for part in found[key])) for key in keys]
+
+    def _replayed(self, which: Sequence[int], steps: Sequence[Steps]) -> list[Replayed]:
+        """Returns the replays of some of the twins."""
+        asked = tuple(self._scenarios[i] for i in which)
+        text = "".join(self._texts[i] for i in which)
+        replay = _impact_replay(_Asked(text, asked), self._coarse)
+        states = replay.transitions([steps[i] for i in which])
+        pairs = zip(states, replay.reading_at_zeroing, strict=True)
+        return [Replayed(*pair) for pair in pairs]
+
+
+class _Kept:
+    """The last simulations, up to a size."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, Replayed] = {}
+        self._bytes, self._lock = 0, threading.Lock()
+
+    def get(self, key: str) -> Replayed | None:
+        """Returns a simulation, if it is there."""
+        with self._lock:
+            return self._found.get(key)
+
+    def put(self, key: str, found: Replayed) -> None:
+        """Keeps a simulation."""
+        with self._lock:
+            self._found[key] = found
+            self._bytes += found.states.nbytes
+            while self._bytes > _MOST_BYTES:
+                oldest = self._found.pop(next(iter(self._found)))
+                self._bytes -= oldest.states.nbytes
+
+
+_kept = _Kept()
 
 #: By kind of contact: a replay and its scenario's text, since who has a scenario may
 #: change it.
@@ -35,46 +146,12 @@ def twin_replay(scenario: Scenario) -> TwinReplay:
     return replay
 
 
-class DiagramReplays:
-    """The replay by Drake for some scenarios, one after the other; see ImpactReplay.
-
-    Args:
-        scenarios: of the twins.
-        whole: whether consecutive steps of whole episodes are simulated, each from
-            where the one before has led.
-    """
-
-    def __init__(self, scenarios: Sequence[Scenario], whole: bool = False) -> None:
-        self._scenarios, self._whole = scenarios, whole
-
-    @property
-    def reading_at_zeroing(self) -> np.ndarray:
-        """What each sensor read (k, 6) when it was zeroed, [f; tau] in S."""
-        return np.array([twin_replay(s).reading_at_zeroing for s in self._scenarios])
-
-    def transitions(self, steps: Sequence[Steps]) -> list[np.ndarray]:
-        """Returns the states (n, 12) after the steps of each.
-
-        Raises:
-            DisasmError: a scenario is out of bounds.
-            RuntimeError: Drake's contact solver did not converge.
-        """
-        return [
-            self._after(twin_replay(scenario), own)
-            for scenario, own in zip(self._scenarios, steps, strict=True)
-        ]
-
-    def _after(self, replay: TwinReplay, steps: Steps) -> np.ndarray:
-        return replay.episode(steps) if self._whole else replay.transitions(steps)
-
-
-def impact_replay(scenarios: Sequence[Scenario], coarse: bool) -> ImpactReplay:
-    """Returns the replay of many steps of scenarios with IMPACT contact at once.
-
-    Raises:
-        DisasmError: a scenario is out of bounds.
-    """
-    return _impact_replay(_Asked(repr(scenarios), tuple(scenarios)), coarse)
+def _digest(steps: Steps) -> str:
+    """Returns a text that only the same steps have."""
+    found = hashlib.blake2b()
+    for part in vars(steps).values():
+        found.update(np.ascontiguousarray(part).data)
+    return found.hexdigest()
 
 
 class _Asked:

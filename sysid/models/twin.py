@@ -26,12 +26,11 @@ from drake_disasm.impact import NO_BALANCE
 from drake_disasm.logs import Log
 from drake_disasm.logs.schema import WRENCH
 from drake_disasm.scenario import Scenario
-from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.replay import Steps
 from sysid.models.base import Array, PredictionError, even_chunks
 from sysid.models.commands import bolt_path, twin_coordinates
 from sysid.models.late_pose import LatePoses
-from sysid.models.replays import DiagramReplays, impact_replay
+from sysid.models.replays import DiagramReplays, ImpactReplays, Replayed
 from sysid.models.scenario_model import ScenarioModel
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 from sysid.models.transitions import Transitions, measured_states
@@ -128,15 +127,15 @@ class TwinModel(ScenarioModel):
         found = replays.transitions(steps)
         if not self.rollout:
             late = [poses for _, poses in executed]
-            self._carry_on(replays, steps, found, late, rows)
-        found = [self.at_sensor(states) for states in found]
-        for states in found:
-            states[:, 6:] += self._transitions.sway[rows]
-        zeros = replays.reading_at_zeroing
-        return [
-            np.hstack([states, np.broadcast_to(zero, (len(states), 6))])
-            for states, zero in zip(found, zeros, strict=True)
-        ]
+            self._carry_on(replays, steps, [each.states for each in found], late, rows)
+        return [self._at_sensor_and_zero(each, rows) for each in found]
+
+    def _at_sensor_and_zero(self, found: Replayed, rows: slice) -> Array:
+        """Returns the states and the reading at zeroing (len(rows), 18)."""
+        states = self.at_sensor(found.states)
+        states[:, 6:] += self._transitions.sway[rows]
+        zero = np.broadcast_to(found.reading_at_zeroing, (len(states), 6))
+        return np.hstack([states, zero])
 
     def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
         """Returns the states (len(rows), 12), wrench and pose read through effects."""
@@ -302,12 +301,12 @@ class TwinModel(ScenarioModel):
 
     def _replays_at(
         self, scenarios: Sequence[Scenario]
-    ) -> ImpactReplay | DiagramReplays:
+    ) -> ImpactReplays | DiagramReplays:
         """Returns the replays of scenarios."""
         simulated = [_environment_alone(scenario) for scenario in scenarios]
         if self.rollout or not self._has_impact:
             return DiagramReplays(simulated, self.rollout)
-        return impact_replay(simulated, self.coarse)
+        return ImpactReplays(simulated, self.coarse)
 
     @property
     def _has_impact(self) -> bool:
@@ -315,7 +314,7 @@ class TwinModel(ScenarioModel):
 
     def _carry_on(
         self,
-        replays: ImpactReplay | DiagramReplays,
+        replays: ImpactReplays | DiagramReplays,
         steps: Sequence[Steps],
         found: Sequence[Array],
         late: Sequence[LatePoses | None],
@@ -346,7 +345,7 @@ class TwinModel(ScenarioModel):
             parts = [each.select(on) for each, on in zip(copied, which, strict=True)]
             again = replays.transitions(parts)
             for states, on, new in zip(found, which, again, strict=True):
-                states[on] = new
+                states[on] = new.states
 
     def __getstate__(self) -> dict[str, Any]:
         """Leaves out what is quickly found again."""
