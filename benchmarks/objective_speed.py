@@ -67,7 +67,7 @@ def evaluation_time(
         objective = Objective(model, pool)
         objective(theta)
         times = []
-        for i in range(repeats):
+        for i in range(1, repeats + 1):
             start = time.perf_counter()
             objective(theta * (1.0 + 1e-3 * i))  # as in a search: no two are the same
             times.append(time.perf_counter() - start)

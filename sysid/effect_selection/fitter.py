@@ -16,6 +16,7 @@ from sysid.identification.gauss_newton import gauss_newton
 from sysid.identification.linearisation import Linearisation
 from sysid.models.base import LogModel
 from sysid.objective import Objective
+from sysid.parameters import Scaling
 from sysid.workers import Workers
 
 Array = NDArray[np.float64]
@@ -67,13 +68,30 @@ class Fitter:
         """
         model, _ = extended(self.base, effects, with_shapes=True)
         begin = (start.values if start else {}) | dict(values or {})
-        theta = [begin.get(p.name, p.nominal) for p in model.parameters]
-        objective = self.objective(model)
-        u = objective.scaling.to_unit(np.array(theta))
+        theta = np.array([begin.get(p.name, p.nominal) for p in model.parameters])
+        model = model.begun(theta)
         known = None
         if start and derivatives is not None:
+            u = Scaling(model.parameters).to_unit(theta)
             known = _extended_linearisation(start, model, u, derivatives)
-        found = self._minimised(objective, u, known)
+        found = self._fit_of(effects, model, theta, known)
+        for _ in range(self.settings.fits_begun_again):
+            model = found.model.begun(found.theta)
+            if model is found.model:
+                break
+            found = self._fit_of(effects, model, found.theta, None)
+        return found
+
+    def _fit_of(
+        self,
+        effects: tuple[Candidate, ...],
+        model: LogModel,
+        theta: Array,
+        known: Linearisation | None,
+    ) -> Fit:
+        """Returns a model's fit from parameters (p,) on."""
+        objective = self.objective(model)
+        found = self._minimised(objective, objective.scaling.to_unit(theta), known)
         return Fit(
             effects,
             model,

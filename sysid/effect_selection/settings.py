@@ -322,6 +322,12 @@ class SelectionSettings:
         "where one evaluation takes seconds, an iteration must gain twice `min_gain`",
         "reaches the bottom of the README example's valley (commit 3afb199)",
     )
+    fits_begun_again: int = _setting(
+        3,
+        "fits",
+        "after each, steps begin where the wrench says without the sensor's effects as "
+        "they are by then; mostly the first already changes nothing any more",
+    )
     bound_tolerance: float = _setting(
         1e-6,
         "of a parameter's range",

@@ -2,6 +2,7 @@
 
 import abc
 import copy
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
@@ -297,6 +298,14 @@ class LogModel(abc.ABC):
         parts = [self.simulate(theta, rows) for rows in self.chunks()]
         return self.read(theta, slice(0, self.measurements.rows), np.concatenate(parts))
 
+    def begun(self, theta: Array) -> Self:
+        """Returns the same model with its inputs as they are at parameters (p,).
+
+        Inputs that are measured through what the parameters describe: predictions then
+        take the rest of them as given. Itself, if that makes no noticeable difference.
+        """
+        return self
+
     def displaced(self, displacement: Array, push: Array) -> Self:
         """Returns the same model with each step displaced from its command.
 
@@ -360,5 +369,6 @@ class LogModel(abc.ABC):
 
 
 def even_chunks(rows: int, size: int) -> list[slice]:
-    """Returns slices of at most `size` rows that cover all of them."""
-    return [slice(i, min(i + size, rows)) for i in range(0, rows, size)]
+    """Returns slices of equal size, at most `size`, that cover all rows."""
+    ends = np.linspace(0, rows, -(-rows // size) + 1).round().astype(int)
+    return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]

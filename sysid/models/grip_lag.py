@@ -71,6 +71,14 @@ class GripLag:
         )
         return np.asarray(np.linalg.solve(self.to_grip, at_grip.T).T)
 
+    def deflections(self, wrench: Array) -> Array:
+        """Returns by how much the grip gives at rest (n, 6) [m, rad], along Gn.
+
+        Args:
+            wrench: (n, 6) on the bolt at Bo in Gn, [f; tau].
+        """
+        return np.asarray(wrench @ self.to_grip.T / self.springs.stiffness)
+
     def rates(self, elastic: Array, wrench: Array) -> Array:
         """Returns the bolt's rates (n, 6) against the arm, in the twin's coordinates.
 

@@ -70,6 +70,11 @@ class SensorReading:
         self._R_WG = nominal_groove_pose(scenario.placement).rotation().matrix()
         self._R_BS = X_SB.inverse().rotation().matrix()
 
+    @property
+    def at_rest(self) -> Array:
+        """The reading (6,) at A under the known weight alone, without effects."""
+        return self.payload.weight(self._R_WG @ self._R_BS)
+
     def raw(self, states: Array, zero: Array) -> Array:
         """Returns the raw readings (n, 6) in S of states (n, 12), wrench at So in S.
 
@@ -78,8 +83,7 @@ class SensorReading:
             zero: (6,) the reading at zeroing.
         """
         weight = self.payload.weight(self.orientations(states))
-        at_rest = self.payload.weight(self._R_WG[None] @ self._R_BS)[0]
-        return states[:, 6:] + zero - at_rest + weight
+        return states[:, 6:] + zero - self.at_rest + weight
 
     def sensing(self, states: Array, times: Array) -> Sensing:
         """Returns the circumstances of readings, of states (n, 12) at times (n,)."""

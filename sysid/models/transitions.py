@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from drake_disasm.cell.coordinates import BoltCoordinates
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.spatial import pose_from_vector
-from drake_disasm.effects import MotionEffect
-from drake_disasm.logs import Episode, Log
+from drake_disasm.effects import MotionEffect, SensorEffect, SensorMemoryEffect
+from drake_disasm.logs import Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.logs.transitions import observations
 from drake_disasm.mdp import STATE_NAMES
@@ -23,8 +22,9 @@ from sysid.models.base import Array
 from sysid.models.cell_arm import CellArm, Sway
 from sysid.models.commands import Commands, twin_coordinates
 from sysid.models.grip_lag import GripLag
-from sysid.models.late_pose import LatePoses, on_time
+from sysid.models.late_pose import LatePoses
 from sysid.models.measurements import Channel, Measurements
+from sysid.models.recorded_episode import RecordedEpisode
 from sysid.models.sensor_reading import SensorReading, at_sensor
 
 #: Repeatability of a robot's own encoders within an episode, m and rad: below that of
@@ -43,6 +43,10 @@ FORCE_ERROR = (0.02, 0.15)
 #: those logs by 10 um along y). It is no noise, so it counts twice.
 POSITION_ERROR = 2e-5
 
+#: By how much the grip gives, so that a step begins noticeably elsewhere [m, rad]: a
+#: tenth of what encoders repeat.
+_NOTICEABLE = (0.1 * POSE_NOISE[0], 0.1 * POSE_NOISE[1])
+
 
 @dataclasses.dataclass(frozen=True)
 class Transitions:
@@ -52,10 +56,10 @@ class Transitions:
         steps: measured state and command of each transition (rows,).
         before: (rows, 12) state at its beginning, the wrench at So in S.
         rows: (rows,) its number among all transitions of the episodes.
-        episodes: whole ones, in the twin's coordinates, for poses that come late.
+        recorded: whole episodes, in the twin's coordinates.
+        episodes: the same, with the wrench as it was before effects on the sensor.
         commands: of whole episodes, since effects on the motion have a memory.
         lead: (rows,) by which the command is ahead on average [s].
-        shift: (rows, 6) by which it is elsewhere.
         sway: (rows, 6) what moving loads the sensor with besides, at So in S.
         period: of the MDP [s].
         p_BoTo_B: (3,) of the twin's coordinates [m].
@@ -64,10 +68,10 @@ class Transitions:
     steps: Steps
     before: Array
     rows: NDArray[np.int64]
-    episodes: "tuple[_Recorded, ...]"
+    recorded: tuple[RecordedEpisode, ...]
+    episodes: tuple[RecordedEpisode, ...]
     commands: tuple[Commands, ...]
     lead: Array
-    shift: Array
     sway: Array
     period: float
     p_BoTo_B: Array
@@ -88,25 +92,48 @@ class Transitions:
         p_BoTo_B = Tool.from_models(scenario).p_BoTo_B
         twin = BoltCoordinates(p_BoTo_B)
         rates, grip = ArmRates.of(scenario), GripLag.of(scenario)
-        recorded = tuple(_Recorded.of(e, rates, grip, twin) for e in episodes)
-        steps = Steps.concatenated([each.steps() for each in recorded])
-        arms = [CellArm.of(scenario, _station(log)) for log in logs]
-        counts = [sum(e.rows - 1 for e in log.episodes) for log in logs]
-        lead = np.repeat([arm.lead for arm in arms], counts)
-        ends = np.cumsum(counts)[:-1]
-        parts = (np.split(each, ends) for each in (steps.q, _begins(episodes)))
-        shift = np.concatenate(
-            [arm.shifts(*row) for arm, *row in zip(arms, *parts, strict=True)]
+        recorded = tuple(
+            RecordedEpisode.of(episode, rates, grip, arm, twin)
+            for log, arm in zip(logs, _arms(logs, scenario), strict=True)
+            for episode in log.episodes
         )
-        states = [at_sensor(observations(e)[:-1], sensing.X_SB) for e in episodes]
-        sway = np.concatenate([_sway(log, scenario, sensing) for log in logs])
-        before = np.concatenate(states)
-        commands = tuple(Commands.of(e, period) for e in episodes)
-        rows = np.arange(len(steps))
+        steps = Steps.concatenated([each.steps() for each in recorded])
+        lead = [np.full(len(each.wrench) - 1, each.arm.lead) for each in recorded]
         found = cls(
-            steps, before, rows, recorded, commands, lead, shift, sway, period, p_BoTo_B
+            steps=steps,
+            before=np.concatenate(
+                [at_sensor(observations(e)[:-1], sensing.X_SB) for e in episodes]
+            ),
+            rows=np.arange(len(steps)),
+            recorded=recorded,
+            episodes=recorded,
+            commands=tuple(Commands.of(e, period) for e in episodes),
+            lead=np.concatenate(lead),
+            sway=np.concatenate([_sway(log, scenario, sensing) for log in logs]),
+            period=period,
+            p_BoTo_B=p_BoTo_B,
         )
         return dataclasses.replace(found, steps=found._moved(steps.qd, steps.qd_rate))
+
+    def begun(self, effects: Sequence[SensorEffect], sensing: SensorReading) -> Self:
+        """Returns the transitions as they begin where effects on the sensor are undone.
+
+        By how much the grip gives as a step begins is known from the measured wrench.
+        These transitions, if none begins noticeably elsewhere.
+
+        Args:
+            effects: in the chain's order; those with a memory are not undone, since
+                that would amplify noise.
+            sensing: of the scenario.
+        """
+        known = [e for e in effects if not isinstance(e, SensorMemoryEffect)]
+        episodes = tuple(e.unread(known, sensing, self.p_BoTo_B) for e in self.recorded)
+        pairs = zip(episodes, self.episodes, strict=True)
+        if not any(one.begins_elsewhere(other, _NOTICEABLE) for one, other in pairs):
+            return self
+        begun = Steps.concatenated([e.steps() for e in episodes]).select(self.rows)
+        found = dataclasses.replace(self, steps=begun, episodes=episodes)
+        return dataclasses.replace(found, steps=found._moved(begun.qd, begun.qd_rate))
 
     def select(self, mask: NDArray[np.bool_]) -> Self:
         """Returns the transitions where the mask (rows,) is true."""
@@ -116,7 +143,6 @@ class Transitions:
             before=self.before[mask],
             rows=self.rows[mask],
             lead=self.lead[mask],
-            shift=self.shift[mask],
             sway=self.sway[mask],
         )
 
@@ -152,7 +178,8 @@ class Transitions:
 
     def _moved(self, qd: Array, qd_rate: Array) -> Steps:
         """Returns the steps with commands (rows, 6) as the arm has them."""
-        led = qd + self.lead[:, None] * qd_rate + self.shift
+        shifts = np.concatenate([each.shifts() for each in self.episodes])
+        led = qd + self.lead[:, None] * qd_rate + shifts[self.rows]
         return dataclasses.replace(self.steps, qd=led, qd_rate=qd_rate)
 
     def ends_before(self, ends: Array) -> Array:
@@ -267,64 +294,6 @@ def _sway(log: Log, scenario: Scenario, sensing: SensorReading) -> Array:
     return np.concatenate([moves.wrenches(rate, R_SB) for rate in rates])
 
 
-def _begins(episodes: Sequence[Episode]) -> Array:
-    """Returns the measured wrench (rows, 6) at the begin of each step."""
-    return np.concatenate([observations(e)[:-1, 6:] for e in episodes])
-
-
-@dataclasses.dataclass(frozen=True)
-class _Recorded:
-    """An episode of n steps as it was recorded, in the twin's coordinates.
-
-    Attributes:
-        measured, commanded: (n + 1, 6) coordinates.
-        wrench: (n + 1, 6) measured on the bolt at Bo in G.
-        rates, grip: that tell what no encoder measures.
-    """
-
-    measured: Array
-    commanded: Array
-    wrench: Array
-    rates: ArmRates
-    grip: GripLag
-
-    @classmethod
-    def of(
-        cls, episode: Episode, rates: ArmRates, grip: GripLag, twin: BoltCoordinates
-    ) -> Self:
-        """Returns a log's episode."""
-        return cls(
-            _coordinates(episode["X_GB_measured"], twin),
-            _coordinates(episode["X_GB_commanded"], twin),
-            observations(episode)[:, 6:],
-            rates,
-            grip,
-        )
-
-    def on_time(self, path: Array, weights: Array) -> Self:
-        """Returns the episode with poses that do not come late: see `on_time`."""
-        there = on_time(self.measured, path, weights)
-        return dataclasses.replace(self, measured=there)
-
-    def steps(self) -> Steps:
-        """Returns its steps."""
-        q, qd, wrench = self.measured, self.commanded, self.wrench
-        v, elastic = np.zeros((len(q) - 1, 6)), np.array(wrench[:-1])
-        for k in range(1, len(v)):
-            last = np.s_[None, k - 1 : k + 1]
-            v[k] = self.rates.after(v[None, k - 1], q[last], qd[last], wrench[last])
-            elastic[k] = self.grip.after(elastic[None, k - 1], wrench[last])
-        return Steps(
-            np.arange(len(v)),
-            q[:-1],
-            v,
-            qd[:-1],
-            np.diff(qd, axis=0) / self.rates.step.h,
-            elastic,
-            self.grip.rates(elastic, wrench[:-1]),
-        )
-
-
-def _coordinates(poses: Array, twin: BoltCoordinates) -> Array:
-    """Returns the twin's coordinates (n, 6) of poses (n, 7)."""
-    return np.array([twin.solve(pose_from_vector(p), np.zeros(6)) for p in poses])
+def _arms(logs: Sequence[Log], scenario: Scenario) -> list[CellArm]:
+    """Returns how the arm of each log differs from the twin's."""
+    return [CellArm.of(scenario, _station(log)) for log in logs]

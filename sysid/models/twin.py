@@ -86,7 +86,9 @@ class TwinModel(ScenarioModel):
         self.parameters = tuple(parameters)
         self.scenario, self.rollout, self.coarse = scenario, rollout, coarse
         self.reading = SensorReading(scenario, Tool.from_models(scenario))
-        self._transitions = Transitions.of(logs, scenario, self.reading)
+        recorded = Transitions.of(logs, scenario, self.reading)
+        effects = sensor_chain(scenario.effects)
+        self._transitions = recorded.begun(effects, self.reading)
         self.measurements = measured_states(logs, scenario, self.reading)
         self._displacement: Array | None = None  # (rows, 2, 3) of begin and end
         self._executed: dict[str, tuple[Steps, LatePoses | None]] = {}
@@ -212,6 +214,14 @@ class TwinModel(ScenarioModel):
         """See LogModel: without coarse steps."""
         is_coarse = self.coarse and self._has_impact and not self.rollout
         return self.replace(coarse=False) if is_coarse else None
+
+    def begun(self, theta: Array) -> Self:
+        """See LogModel: steps begin where the wrench says, without sensor effects."""
+        effects = sensor_chain(self.scenario_at(theta).effects)
+        transitions = self._transitions.begun(effects, self.reading)
+        if transitions is self._transitions:
+            return self
+        return self.replace(_transitions=transitions)
 
     def displaced(self, displacement: Array, push: Array) -> Self:
         """See LogModel."""

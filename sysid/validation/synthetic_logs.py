@@ -17,6 +17,7 @@ from drake_disasm.cell.tool import Tool
 from drake_disasm.effects import (
     Effect,
     EnvironmentEffect,
+    SensorMemoryEffect,
     motion_chain,
     pose_weights,
     reported_poses,
@@ -147,6 +148,9 @@ def rollout(
     count, size, _ = commanded.shape
     clean, states = np.zeros((2, count, size, 12))
     states[:, 0, 6:] = noise[:, 0]
+    # A step begins under the load as the model knows it, see `Transitions.begun`.
+    is_undone = not any(isinstance(e, SensorMemoryEffect) for e in sensor)
+    noise_of_states = np.concatenate([np.zeros_like(noise), noise], axis=2)
     executed = np.array(commanded)
     memories = np.zeros((count, len(motion), 6))
     times = np.arange(1, size, dtype=np.float64) * scenario.task.period
@@ -157,6 +161,8 @@ def rollout(
             executed[e, k + 1], memories[e] = through_motion(
                 motion, commanded[e, k + 1], in_G[e, 6:], memories[e], times[0]
             )
+        if is_undone:
+            in_G = at_bolt(clean[:, k] + noise_of_states[:, k], reading.X_SB)
         step = measured.steps(k, in_G, executed[:, k : k + 2])
         [after] = replay.transitions([step])
         clean[:, k + 1] = at_sensor(after, reading.X_SB)

@@ -17,6 +17,7 @@ from drake_disasm.effects import (
     MotionLag,
     PoseDelay,
     RustyPatch,
+    SensorBias,
     SensorDeadBand,
     SensorDelay,
     SensorGainDrift,
@@ -32,6 +33,7 @@ from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
+from sysid.parameters import Parameter
 from sysid.scenario_parameters import Request, scenario_parameters
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
@@ -138,6 +140,25 @@ def test_sensor_effects_share_one_simulation(tmp_path, monkeypatch):
     np.testing.assert_allclose(found[2], alone / model.measurements.noise, atol=1e-9)
 
 
+def test_a_step_begins_where_the_load_has_the_grip_not_the_reading(tmp_path):
+    """In a simulation the grip that yields gives by the load: y errs by 30 um else."""
+    scenario = load_scenario("removal", ["contact.model=impact"])
+    real, log = _log(tmp_path / "log", scenario, SensorBias(fz=1.0))
+    bare, stated = (TwinModel([log], s, ()) for s in (scenario, real))
+    amplitude = Parameter("fz", 0.0, -5.0, 5.0, "N", path="effects.0.fz")
+    fitted = bare.with_effects([SensorBias()], [amplitude])
+    theta = np.array([1.0])
+    assert fitted.begun(np.zeros(1)) is fitted
+    begun = fitted.begun(theta)
+    assert begun.begun(theta) is begun
+    errors = [
+        np.sqrt(np.mean((m.predictions(t) - m.measurements.values)[:, :3] ** 2))
+        for m, t in ((fitted, theta), (begun, theta), (stated, _NOTHING))
+    ]
+    assert errors[1] < 0.3 * errors[0]
+    np.testing.assert_allclose(errors[1], errors[2], rtol=1e-9)
+
+
 def test_a_parameter_set_that_fails_leaves_the_others_of_its_batch(tmp_path):
     scenario = _scenario("impact")
     _, log = _log(tmp_path / "log", scenario, SensorMounting(ry=0.1))
@@ -156,10 +177,10 @@ def test_a_learned_effect_knows_what_the_models_say_it_knows(tmp_path):
     """What it adds to predictions is its function of `residual_inputs`."""
     transitions_log(tmp_path / "log", nominal(), [], 0, episodes=2, steps=8)
     logs, theta = [read_log(tmp_path / "log")], np.zeros(0)
-    bare = TwinModel(logs, nominal(), ())
     learned = SensorResidualModel(str(step_in_fy(tmp_path)), share=1.0)
-    scenario = dataclasses.replace(nominal(), effects=[learned])
-    more = TwinModel(logs, scenario, ()).predictions(theta) - bare.predictions(theta)
+    model = TwinModel(logs, dataclasses.replace(nominal(), effects=[learned]), ())
+    bare = model.with_effects(())
+    more = model.predictions(theta) - bare.predictions(theta)
     inputs = bare.residual_inputs(theta)["fy"]
     inside = np.all(np.abs(inputs) <= 20.0, axis=1)
     expected = np.where(inside & (inputs[:, 0] > 0.0), HEIGHT, 0.0)

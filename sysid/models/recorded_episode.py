@@ -1,0 +1,118 @@
+"""A recorded episode of the task, in the twin's coordinates."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+
+from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.common.spatial import pose_from_vector
+from drake_disasm.effects import SensorEffect
+from drake_disasm.logs import Episode
+from drake_disasm.logs.transitions import observations
+from drake_disasm.task.replay import Steps
+from sysid.models.arm_rates import ArmRates
+from sysid.models.base import Array
+from sysid.models.cell_arm import CellArm
+from sysid.models.commands import bolt_path
+from sysid.models.grip_lag import GripLag
+from sysid.models.late_pose import on_time
+from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
+
+_PASSES = 4  # to undo effects on the sensor: gains of a half are undone to 6 %
+
+
+@dataclasses.dataclass(frozen=True)
+class RecordedEpisode:
+    """An episode of n steps as it was recorded, in the twin's coordinates.
+
+    Attributes:
+        measured, commanded: (n + 1, 6) coordinates.
+        wrench: (n + 1, 6) measured on the bolt at Bo in G.
+        rates, grip: that tell what no encoder measures.
+        arm: how it differs from the twin's.
+    """
+
+    measured: Array
+    commanded: Array
+    wrench: Array
+    rates: ArmRates
+    grip: GripLag
+    arm: CellArm
+
+    @classmethod
+    def of(
+        cls,
+        episode: Episode,
+        rates: ArmRates,
+        grip: GripLag,
+        arm: CellArm,
+        twin: BoltCoordinates,
+    ) -> Self:
+        """Returns a log's episode."""
+        return cls(
+            _coordinates(episode["X_GB_measured"], twin),
+            _coordinates(episode["X_GB_commanded"], twin),
+            observations(episode)[:, 6:],
+            rates,
+            grip,
+            arm,
+        )
+
+    def unread(
+        self, effects: Sequence[SensorEffect], sensing: SensorReading, p_BoTo_B: Array
+    ) -> Self:
+        """Returns the episode with the wrench as it was before effects on the sensor.
+
+        What is read of a first guess is off by as much as the guess: by fixed points.
+        """
+        if not effects:
+            return self
+        poses = bolt_path(self.measured, p_BoTo_B)
+        read = at_sensor(np.hstack([poses, self.wrench]), sensing.X_SB)
+        times = self.grip.period * np.arange(len(read), dtype=np.float64)
+        found = read
+        for _ in range(_PASSES):
+            again = sensing.read(effects, found, sensing.at_rest, times)
+            found = found + read - again
+        wrench = at_bolt(found, sensing.X_SB)[:, 6:]
+        return dataclasses.replace(self, wrench=wrench)
+
+    def begins_elsewhere(self, other: Self, noticeable: tuple[float, float]) -> bool:
+        """Returns whether the grip gives by more than (m, rad) more than another's."""
+        change = np.abs(self.grip.deflections(self.wrench - other.wrench))
+        m, rad = noticeable
+        return bool(np.any(change[:, :3] > m) or np.any(change[:, 3:] > rad))
+
+    def shifts(self) -> Array:
+        """Returns by how much (n, 6) the arm's command is elsewhere."""
+        return self.arm.shifts(self.measured[:-1], self.wrench[:-1])
+
+    def on_time(self, path: Array, weights: Array) -> Self:
+        """Returns the episode with poses that do not come late: see `on_time`."""
+        there = on_time(self.measured, path, weights)
+        return dataclasses.replace(self, measured=there)
+
+    def steps(self) -> Steps:
+        """Returns its steps."""
+        q, qd, wrench = self.measured, self.commanded, self.wrench
+        v, elastic = np.zeros((len(q) - 1, 6)), np.array(wrench[:-1])
+        for k in range(1, len(v)):
+            last = np.s_[None, k - 1 : k + 1]
+            v[k] = self.rates.after(v[None, k - 1], q[last], qd[last], wrench[last])
+            elastic[k] = self.grip.after(elastic[None, k - 1], wrench[last])
+        return Steps(
+            np.arange(len(v)),
+            q[:-1],
+            v,
+            qd[:-1],
+            np.diff(qd, axis=0) / self.rates.step.h,
+            elastic,
+            self.grip.rates(elastic, wrench[:-1]),
+        )
+
+
+def _coordinates(poses: Array, twin: BoltCoordinates) -> Array:
+    """Returns the twin's coordinates (n, 6) of poses (n, 7)."""
+    return np.array([twin.solve(pose_from_vector(p), np.zeros(6)) for p in poses])
