@@ -173,6 +173,8 @@ def most_parsimonious(accepted: Sequence[Evidence]) -> Evidence:
     order = [effect.__name__ for effect in registered_effects()]
 
     def _is_as_good(other: Evidence) -> bool:
+        if other is best:  # whose gain may be negative, after prescreening
+            return True
         if other.gain >= (1.0 - limits.parsimony_tolerance) * best.gain:
             return True
         enough = other.gain >= (1.0 - limits.tie_parsimony_tolerance) * best.gain

@@ -56,6 +56,15 @@ def test_the_best_shape_of_an_effect_is_taken():
     assert most_parsimonious([high, low]) is high
 
 
+def test_what_would_cost_blocks_may_be_all_that_there_is():
+    """After prescreening the fits decide, whatever the linear account says."""
+    load, dry = (
+        _evidence(k, -0.1, 2) for k in (JointLoadFriction, JointCoulombFriction)
+    )
+    assert most_parsimonious([load]) is load
+    assert most_parsimonious([load, dry]) in (load, dry)
+
+
 def test_columns_that_act_in_few_blocks_have_a_least_p_value():
     """Spread evenly over n blocks no flips give less than 2^(1 - n)."""
     rows, size = 80, 4
