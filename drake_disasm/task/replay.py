@@ -5,7 +5,7 @@ measured wrench: a step begins where pose and wrench agree with what was measure
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
@@ -17,12 +17,9 @@ from pydrake.systems.primitives import ConstantVectorSource
 from drake_disasm.common.spatial import (
     pose_from_vector,
     rotation_vector,
-    shift_and_express,
 )
 from drake_disasm.common.timing import boundary
-from drake_disasm.devices.sensor_chain import sensed, sensed_at_zeroing
-from drake_disasm.effects import BoltMotion, Sensing, SensorEffect
-from drake_disasm.impact import ImpactConditions
+from drake_disasm.effects import BoltMotion
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations import TwinStation
 from drake_disasm.task.diagram import add_motion, add_observation
@@ -213,11 +210,6 @@ class ReplayDiagram:
     def __init__(self, scenario: Scenario) -> None:
         self._build(noise_free(scenario))
 
-    @property
-    def time_step(self) -> float:
-        """Of the plant [s]."""
-        return self.station.time_step
-
     def can_reconfigure(self, scenario: Scenario) -> bool:
         """Returns whether `reconfigure` can take a scenario's parameters."""
         return self.station.can_reconfigure(noise_free(scenario))
@@ -235,20 +227,7 @@ class ReplayDiagram:
         at_start = TwinState(rest, rest, self.station.start, rest, rest)
         self.start(boundary(0, 1.0), at_start)
         self.advance(rest, self.station.settling_time)
-        self._take_as_zero(self.station.reading_at_zeroing(self.station_context))
-
-    def zero_at(self, q: np.ndarray, q_bolt: np.ndarray, load: np.ndarray) -> None:
-        """Zeroes the sensor where the bolt has settled.
-
-        Args:
-            q, q_bolt: (6,) coordinates of arm and bolt.
-            load: (6,) of the bolt on the sensor, [f; tau] at Bo in Gn.
-        """
-        X_GB = self.station.coordinates.pose(q)
-        reading = self._reading(sensed_at_zeroing, 0.0, X_GB, q_bolt, load)
-        self._take_as_zero(reading)
-
-    def _take_as_zero(self, reading: np.ndarray) -> None:
+        reading = self.station.reading_at_zeroing(self.station_context)
         self.reading_at_zeroing = reading
         self.processor.zero(self.processor_context, reading)
 
@@ -296,45 +275,6 @@ class ReplayDiagram:
             q_bolt=plant.GetPositions(self._plant_context),
             v_bolt=plant.GetVelocities(self._plant_context),
         )
-
-    def impact_conditions(self) -> ImpactConditions:
-        """Returns the present conditions of IMPACT contact, which the scenario has."""
-        return self.station.impact_conditions(self.station_context)
-
-    def observed(
-        self, time: float, q: np.ndarray, q_bolt: np.ndarray, load: np.ndarray
-    ) -> np.ndarray:
-        """Returns the state (12,) of the task under a load.
-
-        Args:
-            time: of the sensor's sample, since the episode began [s].
-            q: (6,) coordinates of the arm.
-            q_bolt: (6,) of the bolt.
-            load: (6,) of the bolt on the sensor, [f; tau] at Bo in Gn.
-        """
-        X_GB = self.station.coordinates.pose(q)
-        reading = self._reading(sensed, time, X_GB, q_bolt, load)
-        observation = self.processor.observation(self.processor_context, X_GB, reading)
-        return _with_rotation_vector(observation, X_GB)
-
-    def _reading(
-        self,
-        through: Callable[[np.ndarray, Sequence[SensorEffect], Sensing], np.ndarray],
-        time: float,
-        X_GB: RigidTransform,
-        q_bolt: np.ndarray,
-        load: np.ndarray,
-    ) -> np.ndarray:
-        """Returns what the sensor reads (6,) of a load, through its effects."""
-        station, sensor = self.station, self.station.sensor
-        X_SGn = station.X_SB @ X_GB.inverse()
-        p_GnBo = station.coordinates.pose(q_bolt).translation()
-        load_S = shift_and_express(load, X_SGn @ RigidTransform(p_GnBo))
-        effects = sensor.effects(station.part_context(sensor, self.station_context))
-        if not effects:
-            return load_S
-        R_WS = (station.X_WG.rotation() @ X_SGn.rotation().inverse()).matrix()
-        return through(load_S, effects, station.payload.sensing(np.array(time), R_WS))
 
     def observation(self) -> np.ndarray:
         """Returns the state (12,) of the task now, its rotation as a vector."""
