@@ -6,7 +6,6 @@ from typing import Self
 
 import numpy as np
 
-from drake_disasm.cell.grip import Springs, in_joint_order
 from drake_disasm.common.arrays import (
     Array,
     apply_matrix,
@@ -92,11 +91,6 @@ class ImpactConditions:
     K: Array
     D: Array
     p_BoTo_B: Array
-
-    def sprung(self, springs: Springs) -> Self:
-        """Returns the same with other springs in the twin's joints."""
-        K, D = in_joint_order(springs)
-        return dataclasses.replace(self, K=K, D=D)
 
 
 @dataclasses.dataclass(frozen=True)

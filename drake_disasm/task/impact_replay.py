@@ -17,13 +17,11 @@ from drake_disasm.batch.motion import PlantStep, TwinState, plant_step
 from drake_disasm.batch.numbers import TwinNumbers
 from drake_disasm.batch.stacking import mapped, rows_of
 from drake_disasm.batch.twins import Twins, at_A
-from drake_disasm.common.arrays import apply_matrix, cross
 from drake_disasm.common.rotations import rotation_vectors
 from drake_disasm.devices.sensor_chain import sensed, sensed_at_zeroing
-from drake_disasm.effects import BoltMotion
 from drake_disasm.scenario import Scenario, validate
 from drake_disasm.stations.twin import TwinStation
-from drake_disasm.task.replay import Steps, noise_free
+from drake_disasm.task.replay import Steps, bolt_motion, noise_free
 
 _COARSE = 0.01  # s: with 20 ms, steps under friction ended twice as far off
 _REST = 1e-6  # m/s, rad/s: in half a second less than the sensor can tell
@@ -136,8 +134,9 @@ class _EvenReplay:
         twins = {h: batch.twins(which) for h, batch in self._batches.items()}
         numbers = twins[self._time_steps[-1]].numbers
         q_bolt = steps.q + numbers.deflection(steps.wrench)
-        motion = _motion(numbers, q_bolt, steps.qd_rate)
-        conditions = {h: twins[h].conditions(motion) for h in self._time_steps}
+        p_BoTo_B = numbers.body.p_BoTo_B
+        motion = bolt_motion(numbers.coordinates, p_BoTo_B, q_bolt, steps.qd_rate)
+        conditions = {h: twins[h].conditions(motion) for h in set(self._time_steps)}
         arm = np.hstack([steps.q, steps.v])
         state = TwinState(arm, q_bolt, steps.v + steps.give_rate, steps.qd)
         is_solved = np.ones(len(which), bool)
@@ -196,20 +195,6 @@ def _observed(
     reading = sensed(load, twins.effects.sensor, sensing)
     wrench = twins.processing.wrench(X_GB.R, reading, offset)
     return np.hstack([X_GB.p, rotation_vectors(X_GB.R), wrench])
-
-
-def _motion(numbers: TwinNumbers, q_bolt: np.ndarray, rate: np.ndarray) -> BoltMotion:
-    """Returns the bolts' motion in a step, on which effects may depend.
-
-    Args:
-        numbers: of n twins.
-        q_bolt: (n, 6) coordinates of the bolts.
-        rate: (n, 6) of the commanded coordinates.
-    """
-    X_GB = numbers.coordinates.poses(q_bolt)
-    p_BoTo = apply_matrix(X_GB.R, numbers.body.p_BoTo_B)
-    rate_of_turn = rate[:, :2:-1]  # roll, pitch, yaw: about x, y, z while small
-    return BoltMotion(X_GB.p, rate[:, :3] - cross(rate_of_turn, p_BoTo))
 
 
 def _chosen(which: np.ndarray, step: PlantStep, other: PlantStep) -> PlantStep:

@@ -14,6 +14,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
+from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.common.arrays import Array, apply_matrix, cross
 from drake_disasm.common.spatial import (
     pose_from_vector,
     rotation_vector,
@@ -238,12 +240,9 @@ class ReplayDiagram:
             q_bolt: (6,) coordinates of the bolt.
             qd_rate: (6,) rate of the commanded coordinates.
         """
-        X_GB = self.station.coordinates.pose(q_bolt)
-        p_BoTo = X_GB.rotation() @ self.station.parameters.p_BoTo_B
-        rate_of_turn = qd_rate[:2:-1]  # roll, pitch, yaw: about x, y, z while small
-        return BoltMotion(
-            X_GB.translation(), qd_rate[:3] - np.cross(rate_of_turn, p_BoTo)
-        )
+        station = self.station
+        p_BoTo_B = station.parameters.p_BoTo_B
+        return bolt_motion(station.coordinates, p_BoTo_B, q_bolt, qd_rate)
 
     def update_local_effects(self, motion: BoltMotion) -> None:
         """Brings effects that depend on the bolt's motion up to date."""
@@ -308,6 +307,23 @@ class ReplayDiagram:
         self.processor_context = self.processor.GetMyMutableContextFromRoot(root)
         source_context = self._source.GetMyMutableContextFromRoot(root)
         self._rate = self._source.get_mutable_source_value(source_context)
+
+
+def bolt_motion(
+    coordinates: BoltCoordinates, p_BoTo_B: Array, q_bolt: Array, qd_rate: Array
+) -> BoltMotion:
+    """Returns the bolt's motion in a step, on which local effects depend.
+
+    Args:
+        coordinates: the twin's.
+        p_BoTo_B: (3,) see `BoltCoordinates`.
+        q_bolt: (..., 6) coordinates of the bolt.
+        qd_rate: (..., 6) rate of the commanded coordinates.
+    """
+    X_GB = coordinates.poses(q_bolt)
+    p_BoTo = apply_matrix(X_GB.R, p_BoTo_B)
+    rate_of_turn = qd_rate[..., :2:-1]  # roll, pitch, yaw: about x, y, z while small
+    return BoltMotion(X_GB.p, qd_rate[..., :3] - cross(rate_of_turn, p_BoTo))
 
 
 def _with_rotation_vector(observation: np.ndarray, X_GB: RigidTransform) -> np.ndarray:

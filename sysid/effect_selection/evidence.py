@@ -173,11 +173,10 @@ def most_parsimonious(accepted: Sequence[Evidence]) -> Evidence:
     order = [effect.__name__ for effect in registered_effects()]
 
     def _is_as_good(other: Evidence) -> bool:
-        if other is best:  # whose gain may be negative, after prescreening
+        behind = best.gain - other.gain
+        if behind <= limits.parsimony_tolerance * abs(best.gain):
             return True
-        if other.gain >= (1.0 - limits.parsimony_tolerance) * best.gain:
-            return True
-        enough = other.gain >= (1.0 - limits.tie_parsimony_tolerance) * best.gain
+        enough = behind <= limits.tie_parsimony_tolerance * abs(best.gain)
         no_larger = other.parameter_count <= best.parameter_count
         return enough and no_larger and other.ties_with(best)
 

@@ -6,6 +6,7 @@ many of them ask for the same simulation: what acts on the sensor's readings alo
 not change it.
 """
 
+import dataclasses
 import functools
 import hashlib
 import threading
@@ -154,17 +155,12 @@ def _digest(steps: Steps) -> str:
     return found.hexdigest()
 
 
+@dataclasses.dataclass(frozen=True)
 class _Asked:
     """Scenarios, the same as others if their text is."""
 
-    def __init__(self, text: str, scenarios: Sequence[Scenario]) -> None:
-        self.text, self.scenarios = text, scenarios
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Asked) and self.text == other.text
-
-    def __hash__(self) -> int:
-        return hash(self.text)
+    text: str
+    scenarios: tuple[Scenario, ...] = dataclasses.field(compare=False)
 
 
 @functools.lru_cache(maxsize=4)

@@ -172,11 +172,16 @@ def rollout(
             states[e, k + 1] = read[-1]
         states[:, k + 1, 6:] += noise[:, k + 1]
     readings = np.array([reading.raw(s, zero) for s in states])
-    if len(weights) > 1:
-        seen = [reported_poses(path, weights) for path in states[:, :, :6]]
-        pairs = zip(states, seen, strict=True)
-        states = np.array([reading.reported(s, poses) for s, poses in pairs])
-    return Rollout(commanded, states, readings)
+    return Rollout(commanded, _reported(states, weights, reading), readings)
+
+
+def _reported(states: Array, weights: Array, reading: SensorReading) -> Array:
+    """Returns states (E, n + 1, 12) with the poses that come in, see `pose_weights`."""
+    if len(weights) <= 1:
+        return states
+    seen = [reported_poses(path, weights) for path in states[:, :, :6]]
+    pairs = zip(states, seen, strict=True)
+    return np.array([reading.reported(s, poses) for s, poses in pairs])
 
 
 class _Measured:
