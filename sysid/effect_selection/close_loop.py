@@ -202,12 +202,21 @@ def _applicable(
 def _search(
     fitter: Fitter, library: Sequence[Candidate], progress: Progress, deadline: float
 ) -> SearchResult:
-    """Returns what a search finds; costly models are searched on some rows only."""
-    thinned = fitter.with_base(_affordable(fitter.base, fitter.settings))
-    kind = LinearSearch if fitter.base.affine else RefitSearch
-    found = kind(thinned, library, progress, deadline).run()
-    if thinned.base is fitter.base:
-        return found
+    """Returns what a search finds; costly models are searched on some rows only.
+
+    So are, at first, others that are not linear and leave more than noise.
+    """
+    base = fitter.base
+    if base.affine:
+        return LinearSearch(fitter, library, progress, deadline).run()
+    thinned = fitter.with_base(_affordable(base, fitter.settings))
+    if thinned.base is base:
+        return RefitSearch(fitter, library, progress, deadline).run()
+    if not base.costly and not _leaves_more_than_noise(thinned):
+        return RefitSearch(fitter, library, progress, deadline).run()
+    found = RefitSearch(thinned, library, progress, deadline).run()
+    if not base.costly:
+        return RefitSearch(fitter, library, progress, deadline).run(found)
     progress(ProgressUpdate(ForwardSearch.stage, message="fitting all rows"))
     exact = fitter.with_exact_derivatives()
     first, last = exact.fit(()), exact.fit(found.last.effects, found.last)
@@ -246,8 +255,13 @@ def _judged(
 
 def _affordable(base: LogModel, settings: SelectionSettings) -> LogModel:
     """Returns the model of so many rows that hundreds of evaluations are affordable."""
-    every = round(base.measurements.rows / settings.costly_search_rows)
-    return base.thin(every) if base.costly and every >= 2 else base
+    every = round(base.measurements.rows / settings.search_rows)
+    return base.thin(every) if every >= 2 else base
+
+
+def _leaves_more_than_noise(fitter: Fitter) -> bool:
+    """Returns whether effects are surely missing, so that rounds of fits are ahead."""
+    return fitter.fit(()).objective > fitter.settings.max_objective_at_noise
 
 
 def _with_noise_of(base: LogModel, held_out: LogModel) -> LogModel:

@@ -72,17 +72,32 @@ class ForwardSearch(abc.ABC):
     deadline: float = math.inf
     _rounds: list[SelectionRound] = field(default_factory=list)
 
-    def run(self) -> SearchResult:
-        """Fits the model, and adds effects until none is confirmed any more."""
+    def run(self, known: SearchResult | None = None) -> SearchResult:
+        """Fits the model, and adds effects until none is confirmed any more.
+
+        Args:
+            known: of fewer rows, to go on from.
+        """
         self._report("fitting the model without effects")
-        fit = first = self.fitter.fit(())
+        fit = first = self.fitter.fit((), known.first if known else None)
         self._report_fit("without effects", first)
         self._report(f"testing {len(self.library)} candidates")
         survey = begin = self._survey(first)
+        if known and known.rounds:
+            fit = self._all_rows_of(known)
+            survey = self._survey(fit)
         while not self._is_over and (found := self._next(fit, survey)) is not None:
             fit, survey = found, self._survey(found)
         rounds, is_complete = tuple(self._rounds), not self._is_over
         return SearchResult(first, fit, begin, survey, rounds, is_complete)
+
+    def _all_rows_of(self, known: SearchResult) -> Fit:
+        """Returns what fewer rows have named, fitted to all; keeps its rounds."""
+        self._rounds += known.rounds
+        self._report("fitting all rows")
+        fit = self.fitter.fit(known.last.effects, known.last)
+        self._report_fit("with what fewer rows have named", fit)
+        return self._without_needless(fit)
 
     @property
     def _is_over(self) -> bool:

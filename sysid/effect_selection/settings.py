@@ -348,11 +348,11 @@ class SelectionSettings:
         "a groove turned by 3 degrees is found only by fits (tests/sysid/"
         "effect_selection/test_prescreen.py)",
     )
-    costly_search_rows: int = _setting(
+    search_rows: int = _setting(
         250,
         "rows",
         "a hundred evaluations of a model that takes seconds for all rows then take "
-        "minutes",
+        "minutes; so do hundreds of fits far from the data",
         "130 s from 883 transitions to the verdict (docs/closing-the-loop.md)",
     )
     refit_min_linear_gain: float = _setting(

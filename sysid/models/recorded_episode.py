@@ -1,6 +1,7 @@
 """A recorded episode of the task, in the twin's coordinates."""
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from typing import Self
 
@@ -16,6 +17,7 @@ from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
 from sysid.models.cell_arm import CellArm
 from sysid.models.commands import bolt_path
+from sysid.models.grip_creep import GripCreep
 from sysid.models.grip_lag import GripLag
 from sysid.models.late_pose import on_time
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
@@ -30,7 +32,7 @@ class RecordedEpisode:
     Attributes:
         measured, commanded: (n + 1, 6) coordinates.
         wrench: (n + 1, 6) measured on the bolt at Bo in G.
-        rates, grip: that tell what no encoder measures.
+        rates, grip, creep: that tell what no encoder measures.
         arm: how it differs from the twin's.
     """
 
@@ -39,6 +41,7 @@ class RecordedEpisode:
     wrench: Array
     rates: ArmRates
     grip: GripLag
+    creep: GripCreep
     arm: CellArm
 
     @classmethod
@@ -47,6 +50,7 @@ class RecordedEpisode:
         episode: Episode,
         rates: ArmRates,
         grip: GripLag,
+        creep: GripCreep,
         arm: CellArm,
         twin: BoltCoordinates,
     ) -> Self:
@@ -57,6 +61,7 @@ class RecordedEpisode:
             observations(episode)[:, 6:],
             rates,
             grip,
+            creep,
             arm,
         )
 
@@ -87,7 +92,13 @@ class RecordedEpisode:
 
     def shifts(self) -> Array:
         """Returns by how much (n, 6) the arm's command is elsewhere."""
-        return self.arm.shifts(self.measured[:-1], self.wrench[:-1])
+        own = self.arm.shifts(self.measured[:-1], self.wrench[:-1])
+        return own + self.crept[:-1]
+
+    @functools.cached_property
+    def crept(self) -> Array:
+        """How far the bolt has crept in the pads (n + 1, 6): see `GripCreep`."""
+        return self.creep.along(self.wrench)
 
     def on_time(self, path: Array, weights: Array) -> Self:
         """Returns the episode with poses that do not come late: see `on_time`."""
@@ -104,7 +115,7 @@ class RecordedEpisode:
             elastic[k] = self.grip.after(elastic[None, k - 1], wrench[last])
         return Steps(
             np.arange(len(v)),
-            q[:-1],
+            q[:-1] + self.crept[:-1],
             v,
             qd[:-1],
             np.diff(qd, axis=0) / self.rates.step.h,

@@ -21,6 +21,7 @@ from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
 from sysid.models.cell_arm import CellArm, Sway
 from sysid.models.commands import Commands, twin_coordinates
+from sysid.models.grip_creep import GripCreep, of_encoders
 from sysid.models.grip_lag import GripLag
 from sysid.models.late_pose import LatePoses
 from sysid.models.measurements import Channel, Measurements
@@ -61,6 +62,7 @@ class Transitions:
         commands: of whole episodes, since effects on the motion have a memory.
         lead: (rows,) by which the command is ahead on average [s].
         sway: (rows, 6) what moving loads the sensor with besides, at So in S.
+        crept: (rows, 6) how far the bolt has crept in the pads, in coordinates.
         period: of the MDP [s].
         p_BoTo_B: (3,) of the twin's coordinates [m].
     """
@@ -73,6 +75,7 @@ class Transitions:
     commands: tuple[Commands, ...]
     lead: Array
     sway: Array
+    crept: Array
     period: float
     p_BoTo_B: Array
 
@@ -93,8 +96,10 @@ class Transitions:
         twin = BoltCoordinates(p_BoTo_B)
         rates, grip = ArmRates.of(scenario), GripLag.of(scenario)
         recorded = tuple(
-            RecordedEpisode.of(episode, rates, grip, arm, twin)
-            for log, arm in zip(logs, _arms(logs, scenario), strict=True)
+            RecordedEpisode.of(episode, rates, grip, creep, arm, twin)
+            for log, creep, arm in zip(
+                logs, _creeps(logs, scenario), _arms(logs, scenario), strict=True
+            )
             for episode in log.episodes
         )
         steps = Steps.concatenated([each.steps() for each in recorded])
@@ -110,6 +115,7 @@ class Transitions:
             commands=tuple(Commands.of(e, period) for e in episodes),
             lead=np.concatenate(lead),
             sway=np.concatenate([_sway(log, scenario, sensing) for log in logs]),
+            crept=np.concatenate([each.crept[:-1] for each in recorded]),
             period=period,
             p_BoTo_B=p_BoTo_B,
         )
@@ -132,7 +138,10 @@ class Transitions:
         if not any(one.begins_elsewhere(other, _NOTICEABLE) for one, other in pairs):
             return self
         begun = Steps.concatenated([e.steps() for e in episodes]).select(self.rows)
-        found = dataclasses.replace(self, steps=begun, episodes=episodes)
+        crept = np.concatenate([each.crept[:-1] for each in episodes])
+        found = dataclasses.replace(
+            self, steps=begun, episodes=episodes, crept=crept[self.rows]
+        )
         return dataclasses.replace(found, steps=found._moved(begun.qd, begun.qd_rate))
 
     def select(self, mask: NDArray[np.bool_]) -> Self:
@@ -144,6 +153,7 @@ class Transitions:
             rows=self.rows[mask],
             lead=self.lead[mask],
             sway=self.sway[mask],
+            crept=self.crept[mask],
         )
 
     def executed(
@@ -181,6 +191,19 @@ class Transitions:
         shifts = np.concatenate([each.shifts() for each in self.episodes])
         led = qd + self.lead[:, None] * qd_rate + shifts[self.rows]
         return dataclasses.replace(self.steps, qd=led, qd_rate=qd_rate)
+
+    def of_encoders(self, states: Array, steps: Steps, rows: slice) -> Array:
+        """Returns the states (n, 12) after some steps as encoders have them.
+
+        Args:
+            states: of the twin, the wrench at Bo in G.
+            steps: the transitions' steps, as they are executed.
+            rows: which of them.
+        """
+        crept = self.crept[rows]
+        if not crept.any():
+            return states
+        return of_encoders(states, steps.q[rows] - crept, crept, self.p_BoTo_B)
 
     def ends_before(self, ends: Array) -> Array:
         """Returns what the step before ended with, of (rows, ...) that steps end with.
@@ -292,6 +315,11 @@ def _sway(log: Log, scenario: Scenario, sensing: SensorReading) -> Array:
     paths = [e["X_GB_commanded"][:, :3] for e in log.episodes]
     rates = [np.diff(path, axis=0) / scenario.task.period for path in paths]
     return np.concatenate([moves.wrenches(rate, R_SB) for rate in rates])
+
+
+def _creeps(logs: Sequence[Log], scenario: Scenario) -> list[GripCreep]:
+    """Returns how the bolt creeps in the grip in each log."""
+    return [GripCreep.of(scenario, _station(log)) for log in logs]
 
 
 def _arms(logs: Sequence[Log], scenario: Scenario) -> list[CellArm]:

@@ -130,11 +130,14 @@ class TwinModel(ScenarioModel):
         if not self.rollout:
             late = [poses for _, poses in executed]
             self._carry_on(replays, steps, [each.states for each in found], late, rows)
-        return [self._at_sensor_and_zero(each, rows) for each in found]
+        begun = [own for own, _ in executed]
+        pairs = zip(found, begun, strict=True)
+        return [self._at_sensor_and_zero(each, own, rows) for each, own in pairs]
 
-    def _at_sensor_and_zero(self, found: Replayed, rows: slice) -> Array:
+    def _at_sensor_and_zero(self, found: Replayed, steps: Steps, rows: slice) -> Array:
         """Returns the states and the reading at zeroing (len(rows), 18)."""
-        states = self.at_sensor(found.states)
+        states = self._transitions.of_encoders(found.states, steps, rows)
+        states = self.at_sensor(states)
         states[:, 6:] += self._transitions.sway[rows]
         zero = np.broadcast_to(found.reading_at_zeroing, (len(states), 6))
         return np.hstack([states, zero])
@@ -249,7 +252,8 @@ class TwinModel(ScenarioModel):
         if not self.rollout:
             p, own = self._transitions.p_BoTo_B, self._transitions.rows[rows]
             q, q_before = (twin_coordinates(x, p) for x in (poses, before))
-            return bolt_path(late.at_ends(own, q_before, steps.q[rows], q), p)
+            q_begin = steps.q[rows] - self._transitions.crept[rows]
+            return bolt_path(late.at_ends(own, q_before, q_begin, q), p)
         episode, found = self.measurements.episode[rows], np.empty_like(poses)
         for number in np.unique(episode):
             own = episode == number

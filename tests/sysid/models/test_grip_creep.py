@@ -1,0 +1,86 @@
+"""A bolt that creeps in the cell's pads, seen from a twin whose bolt does not."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from drake_disasm.cell.tool import Tool
+from drake_disasm.common.spatial import velocity_shift
+from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.stations import make_station
+from sysid.models.commands import bolt_path
+from sysid.models.grip_creep import GripCreep, of_encoders
+from tests.drake_disasm.conftest import QUIET
+from tests.physics.compliance import Push
+
+_SCENARIO = load_scenario("removal", [QUIET])
+_PATCH = np.array([0.0, 0.0205, 0.0])  # about which the bolt turns in the pads
+_RATE = 20.5e-3  # rad/(N m s), about z
+
+
+def _creep(station: str = "cell", scenario: Scenario = _SCENARIO) -> GripCreep:
+    return GripCreep.of(scenario, station)
+
+
+def _at_Bo(wrench_Po: np.ndarray) -> np.ndarray:
+    """Returns the same wrench (6,) at Bo."""
+    return np.linalg.solve(velocity_shift(_PATCH).T, wrench_Po)
+
+
+def test_a_torque_about_z_turns_the_bolt_about_the_middle_of_its_patch():
+    """At a steady rate; the other point of the bolt moves along."""
+    torque, steps = 0.1, 20
+    wrench = np.tile(_at_Bo([0.0, 0.0, 0.0, 0.0, 0.0, torque]), (steps + 1, 1))
+    crept = _creep().along(wrench)
+    turn = _RATE * torque * 0.1 * np.arange(steps + 1)
+    np.testing.assert_allclose(crept[:, 3], turn, rtol=1e-9)  # yaw comes first
+    lever = _creep().p_BoTo_B[1] - _PATCH[1]
+    np.testing.assert_allclose(crept[:, 0], -lever * turn, rtol=1e-9)
+    assert np.abs(crept[:, [2, 4, 5]]).max() < 1e-12
+
+
+def test_a_force_along_x_through_the_patch_turns_nothing():
+    wrench = np.tile(_at_Bo([5.0, 0.0, 0.0, 0.0, 0.0, 0.0]), (11, 1))
+    crept = _creep().along(wrench)
+    assert np.abs(crept[:, 3:]).max() < 1e-15
+    assert crept[-1, 0] == pytest.approx(2.1e-6 * 5.0 * 1.0)
+
+
+@pytest.mark.parametrize(
+    ("station", "changes"),
+    [("twin", []), ("hardware", []), ("cell", ["gripper.hold=weld"])],
+)
+def test_where_nothing_creeps_or_nobody_knows_there_is_none(station, changes):
+    creep = _creep(station, load_scenario("removal", changes))
+    assert not creep.mobility.any()
+
+
+def test_states_of_a_twin_that_stands_elsewhere_are_brought_back():
+    """The pose, and the torque by the lever; the force is in Gn as it was."""
+    rng = np.random.default_rng(0)
+    p = _creep().p_BoTo_B
+    q, crept = 0.01 * rng.standard_normal((2, 7, 6))
+    wrench = rng.standard_normal((7, 6))
+    found = of_encoders(np.hstack([bolt_path(q + crept, p), wrench]), q, crept, p)
+    np.testing.assert_allclose(found[:, :6], bolt_path(q, p), atol=1e-15)
+    np.testing.assert_array_equal(found[:, 6:9], wrench[:, :3])
+    moved = bolt_path(q + crept, p)[:, :3] - bolt_path(q, p)[:, :3]
+    lever = np.cross(moved, wrench[:, :3])
+    np.testing.assert_allclose(found[:, 9:], wrench[:, 3:] + lever)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("compliance", ["adaptive", "rigid"])
+@pytest.mark.parametrize("load", [[0, 0, 0, 0, 0, -0.175], [-5, 0, 0, 0, 0, 0]])
+def test_the_cells_bolt_creeps_as_stated(compliance, load):
+    """Free in the air; a force along x turns it, since it does not act in the patch."""
+    gripper = dataclasses.replace(_SCENARIO.gripper, compliance=compliance)
+    scenario = dataclasses.replace(_SCENARIO, gripper=gripper)
+    p = Tool.from_models(scenario).p_BoTo_B
+    push = Push(make_station("cell", scenario), p)
+    wrench = np.array(load, dtype=float)
+    early, late = (push.advance(wrench, t).grip for t in (1.0, 2.0))
+    stated = _creep(scenario=scenario).mobility @ wrench
+    assert (late - early)[5] == pytest.approx(stated[5], rel=0.1)
+    assert (late - early)[0] == pytest.approx(stated[0], rel=0.2)
