@@ -17,8 +17,8 @@ from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
 from sysid.models.cell_arm import CellArm
 from sysid.models.commands import bolt_path
-from sysid.models.grip_creep import GripCreep
 from sysid.models.grip_lag import GripLag
+from sysid.models.grip_offset import GripOffset
 from sysid.models.late_pose import on_time
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 
@@ -32,7 +32,7 @@ class RecordedEpisode:
     Attributes:
         measured, commanded: (n + 1, 6) coordinates.
         wrench: (n + 1, 6) measured on the bolt at Bo in G.
-        rates, grip, creep: that tell what no encoder measures.
+        rates, grip, offset: that tell what no encoder measures.
         arm: how it differs from the twin's.
     """
 
@@ -41,7 +41,7 @@ class RecordedEpisode:
     wrench: Array
     rates: ArmRates
     grip: GripLag
-    creep: GripCreep
+    offset: GripOffset
     arm: CellArm
 
     @classmethod
@@ -50,7 +50,7 @@ class RecordedEpisode:
         episode: Episode,
         rates: ArmRates,
         grip: GripLag,
-        creep: GripCreep,
+        offset: GripOffset,
         arm: CellArm,
         twin: BoltCoordinates,
     ) -> Self:
@@ -61,7 +61,7 @@ class RecordedEpisode:
             observations(episode)[:, 6:],
             rates,
             grip,
-            creep,
+            offset,
             arm,
         )
 
@@ -92,13 +92,23 @@ class RecordedEpisode:
 
     def shifts(self) -> Array:
         """Returns by how much (n, 6) the arm's command is elsewhere."""
-        own = self.arm.shifts(self.measured[:-1], self.wrench[:-1])
-        return own + self.crept[:-1]
+        own = self.arm.shifts(self.measured[:-1], self.carried[:-1])
+        return own + self.elsewhere[:-1]
 
     @functools.cached_property
-    def crept(self) -> Array:
-        """How far the bolt has crept in the pads (n + 1, 6): see `GripCreep`."""
-        return self.creep.along(self.wrench)
+    def elsewhere(self) -> Array:
+        """By how much the bolt is elsewhere in the grip (n + 1, 6): see GripOffset."""
+        return self.offset.along(self.measured, self.wrench)
+
+    @functools.cached_property
+    def carried(self) -> Array:
+        """The wrench (n + 1, 6) on the bolt at Bo in G, had the arm not turned.
+
+        The pads' lever to Bo turns with it; with this one the load on the grip is what
+        it is with the lever of the start.
+        """
+        at_grip = self.offset.at_grip(self.measured, self.wrench)
+        return np.asarray(np.linalg.solve(self.grip.to_grip, at_grip.T).T)
 
     def on_time(self, path: Array, weights: Array) -> Self:
         """Returns the episode with poses that do not come late: see `on_time`."""
@@ -107,7 +117,7 @@ class RecordedEpisode:
 
     def steps(self) -> Steps:
         """Returns its steps."""
-        q, qd, wrench = self.measured, self.commanded, self.wrench
+        q, qd, wrench = self.measured, self.commanded, self.carried
         v, elastic = np.zeros((len(q) - 1, 6)), np.array(wrench[:-1])
         for k in range(1, len(v)):
             last = np.s_[None, k - 1 : k + 1]
@@ -115,7 +125,7 @@ class RecordedEpisode:
             elastic[k] = self.grip.after(elastic[None, k - 1], wrench[last])
         return Steps(
             np.arange(len(v)),
-            q[:-1] + self.crept[:-1],
+            q[:-1] + self.elsewhere[:-1],
             v,
             qd[:-1],
             np.diff(qd, axis=0) / self.rates.step.h,

@@ -21,8 +21,8 @@ from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
 from sysid.models.cell_arm import CellArm, Sway
 from sysid.models.commands import Commands, twin_coordinates
-from sysid.models.grip_creep import GripCreep, of_encoders
 from sysid.models.grip_lag import GripLag
+from sysid.models.grip_offset import GripOffset, of_encoders
 from sysid.models.late_pose import LatePoses
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.recorded_episode import RecordedEpisode
@@ -62,7 +62,8 @@ class Transitions:
         commands: of whole episodes, since effects on the motion have a memory.
         lead: (rows,) by which the command is ahead on average [s].
         sway: (rows, 6) what moving loads the sensor with besides, at So in S.
-        crept: (rows, 6) how far the bolt has crept in the pads, in coordinates.
+        elsewhere: (rows, 6) by how much the bolt is elsewhere in the grip as a step
+            begins, in coordinates.
         period: of the MDP [s].
         p_BoTo_B: (3,) of the twin's coordinates [m].
     """
@@ -75,7 +76,7 @@ class Transitions:
     commands: tuple[Commands, ...]
     lead: Array
     sway: Array
-    crept: Array
+    elsewhere: Array
     period: float
     p_BoTo_B: Array
 
@@ -96,9 +97,9 @@ class Transitions:
         twin = BoltCoordinates(p_BoTo_B)
         rates, grip = ArmRates.of(scenario), GripLag.of(scenario)
         recorded = tuple(
-            RecordedEpisode.of(episode, rates, grip, creep, arm, twin)
-            for log, creep, arm in zip(
-                logs, _creeps(logs, scenario), _arms(logs, scenario), strict=True
+            RecordedEpisode.of(episode, rates, grip, offset, arm, twin)
+            for log, offset, arm in zip(
+                logs, _offsets(logs, scenario), _arms(logs, scenario), strict=True
             )
             for episode in log.episodes
         )
@@ -115,7 +116,7 @@ class Transitions:
             commands=tuple(Commands.of(e, period) for e in episodes),
             lead=np.concatenate(lead),
             sway=np.concatenate([_sway(log, scenario, sensing) for log in logs]),
-            crept=np.concatenate([each.crept[:-1] for each in recorded]),
+            elsewhere=np.concatenate([each.elsewhere[:-1] for each in recorded]),
             period=period,
             p_BoTo_B=p_BoTo_B,
         )
@@ -138,9 +139,9 @@ class Transitions:
         if not any(one.begins_elsewhere(other, _NOTICEABLE) for one, other in pairs):
             return self
         begun = Steps.concatenated([e.steps() for e in episodes]).select(self.rows)
-        crept = np.concatenate([each.crept[:-1] for each in episodes])
+        elsewhere = np.concatenate([each.elsewhere[:-1] for each in episodes])
         found = dataclasses.replace(
-            self, steps=begun, episodes=episodes, crept=crept[self.rows]
+            self, steps=begun, episodes=episodes, elsewhere=elsewhere[self.rows]
         )
         return dataclasses.replace(found, steps=found._moved(begun.qd, begun.qd_rate))
 
@@ -153,7 +154,7 @@ class Transitions:
             rows=self.rows[mask],
             lead=self.lead[mask],
             sway=self.sway[mask],
-            crept=self.crept[mask],
+            elsewhere=self.elsewhere[mask],
         )
 
     def executed(
@@ -177,7 +178,7 @@ class Transitions:
         if not is_late:
             return steps, None
         pairs = list(zip(self.episodes, paths, strict=True))
-        went = [each.rates.path(path, each.wrench) for each, path in pairs]
+        went = [each.rates.path(path, each.carried) for each, path in pairs]
         late = LatePoses.of(went, weights)
         pairs = list(zip(self.episodes, went, strict=True))
         begun = Steps.concatenated(
@@ -200,10 +201,10 @@ class Transitions:
             steps: the transitions' steps, as they are executed.
             rows: which of them.
         """
-        crept = self.crept[rows]
-        if not crept.any():
+        elsewhere = self.elsewhere[rows]
+        if not elsewhere.any():
             return states
-        return of_encoders(states, steps.q[rows] - crept, crept, self.p_BoTo_B)
+        return of_encoders(states, steps.q[rows] - elsewhere, elsewhere, self.p_BoTo_B)
 
     def ends_before(self, ends: Array) -> Array:
         """Returns what the step before ended with, of (rows, ...) that steps end with.
@@ -317,9 +318,9 @@ def _sway(log: Log, scenario: Scenario, sensing: SensorReading) -> Array:
     return np.concatenate([moves.wrenches(rate, R_SB) for rate in rates])
 
 
-def _creeps(logs: Sequence[Log], scenario: Scenario) -> list[GripCreep]:
-    """Returns how the bolt creeps in the grip in each log."""
-    return [GripCreep.of(scenario, _station(log)) for log in logs]
+def _offsets(logs: Sequence[Log], scenario: Scenario) -> list[GripOffset]:
+    """Returns where the bolt is in the grip, beyond its springs, in each log."""
+    return [GripOffset.of(scenario, _station(log)) for log in logs]
 
 
 def _arms(logs: Sequence[Log], scenario: Scenario) -> list[CellArm]:

@@ -252,7 +252,7 @@ class TwinModel(ScenarioModel):
         if not self.rollout:
             p, own = self._transitions.p_BoTo_B, self._transitions.rows[rows]
             q, q_before = (twin_coordinates(x, p) for x in (poses, before))
-            q_begin = steps.q[rows] - self._transitions.crept[rows]
+            q_begin = steps.q[rows] - self._transitions.elsewhere[rows]
             return bolt_path(late.at_ends(own, q_before, q_begin, q), p)
         episode, found = self.measurements.episode[rows], np.empty_like(poses)
         for number in np.unique(episode):

@@ -1,4 +1,4 @@
-"""A bolt that creeps in the cell's pads, seen from a twin whose bolt does not."""
+"""A bolt that creeps in the pads, and whose weight turns: not so in the twin."""
 
 import dataclasses
 
@@ -10,7 +10,7 @@ from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import make_station
 from sysid.models.commands import bolt_path
-from sysid.models.grip_creep import GripCreep, of_encoders
+from sysid.models.grip_offset import GripOffset, of_encoders
 from tests.drake_disasm.conftest import QUIET
 from tests.physics.compliance import Push
 
@@ -19,8 +19,8 @@ _PATCH = np.array([0.0, 0.0205, 0.0])  # about which the bolt turns in the pads
 _RATE = 20.5e-3  # rad/(N m s), about z
 
 
-def _creep(station: str = "cell", scenario: Scenario = _SCENARIO) -> GripCreep:
-    return GripCreep.of(scenario, station)
+def _offset(station: str = "cell", scenario: Scenario = _SCENARIO) -> GripOffset:
+    return GripOffset.of(scenario, station)
 
 
 def _at_Bo(wrench_Po: np.ndarray) -> np.ndarray:
@@ -32,17 +32,17 @@ def test_a_torque_about_z_turns_the_bolt_about_the_middle_of_its_patch():
     """At a steady rate; the other point of the bolt moves along."""
     torque, steps = 0.1, 20
     wrench = np.tile(_at_Bo([0.0, 0.0, 0.0, 0.0, 0.0, torque]), (steps + 1, 1))
-    crept = _creep().along(wrench)
+    crept = _offset().along(np.zeros_like(wrench), wrench)
     turn = _RATE * torque * 0.1 * np.arange(steps + 1)
     np.testing.assert_allclose(crept[:, 3], turn, rtol=1e-9)  # yaw comes first
-    lever = _creep().p_BoTo_B[1] - _PATCH[1]
+    lever = _offset().p_BoTo_B[1] - _PATCH[1]
     np.testing.assert_allclose(crept[:, 0], -lever * turn, rtol=1e-9)
     assert np.abs(crept[:, [2, 4, 5]]).max() < 1e-12
 
 
 def test_a_force_along_x_through_the_patch_turns_nothing():
     wrench = np.tile(_at_Bo([5.0, 0.0, 0.0, 0.0, 0.0, 0.0]), (11, 1))
-    crept = _creep().along(wrench)
+    crept = _offset().along(np.zeros_like(wrench), wrench)
     assert np.abs(crept[:, 3:]).max() < 1e-15
     assert crept[-1, 0] == pytest.approx(2.1e-6 * 5.0 * 1.0)
 
@@ -52,20 +52,45 @@ def test_a_force_along_x_through_the_patch_turns_nothing():
     [("twin", []), ("hardware", []), ("cell", ["gripper.hold=weld"])],
 )
 def test_where_nothing_creeps_or_nobody_knows_there_is_none(station, changes):
-    creep = _creep(station, load_scenario("removal", changes))
-    assert not creep.mobility.any()
+    offset = _offset(station, load_scenario("removal", changes))
+    assert not offset.mobility.any()
+    assert offset.sag.any() == (station != "twin")
+
+
+def test_the_springs_give_by_the_weight_that_turned_away():
+    """Rolled by a right angle, they carry it across instead of along y."""
+    offset = _offset(scenario=load_scenario("removal", ["gripper.hold=weld"]))
+    roll = np.zeros((2, 6))
+    roll[1, 5] = np.pi / 2.0
+    found = offset.along(roll, np.zeros((2, 6)))
+    np.testing.assert_allclose(found[0], 0.0, atol=1e-15)
+    f = offset.rest[:3]
+    turned_away = f - np.array([f[0], -f[2], f[1]])
+    k = 1.0 / np.diag(offset.sag)[:3]
+    np.testing.assert_allclose(found[1, :3], turned_away / k, atol=1e-12)
+    carried = Tool.from_models(_SCENARIO).M_gripped_B.get_mass()
+    assert np.linalg.norm(f) == pytest.approx(carried * 9.81, rel=1e-3)
+
+
+def test_the_lever_from_the_pads_turns_with_the_arm():
+    """Rolled by a right angle, it points along z: a force along x is a torque in y."""
+    roll = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, np.pi / 2.0]])
+    found = _offset().at_grip(roll, np.array([[5.0, 0.0, 0.0, 0.0, 0.0, 0.0]]))
+    lever = _offset().p_BoTo_B[1]
+    expected = [[5.0, 0.0, 0.0, 0.0, -5.0 * lever, 0.0]]
+    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_states_of_a_twin_that_stands_elsewhere_are_brought_back():
     """The pose, and the torque by the lever; the force is in Gn as it was."""
     rng = np.random.default_rng(0)
-    p = _creep().p_BoTo_B
-    q, crept = 0.01 * rng.standard_normal((2, 7, 6))
+    p = _offset().p_BoTo_B
+    q, offset = 0.01 * rng.standard_normal((2, 7, 6))
     wrench = rng.standard_normal((7, 6))
-    found = of_encoders(np.hstack([bolt_path(q + crept, p), wrench]), q, crept, p)
+    found = of_encoders(np.hstack([bolt_path(q + offset, p), wrench]), q, offset, p)
     np.testing.assert_allclose(found[:, :6], bolt_path(q, p), atol=1e-15)
     np.testing.assert_array_equal(found[:, 6:9], wrench[:, :3])
-    moved = bolt_path(q + crept, p)[:, :3] - bolt_path(q, p)[:, :3]
+    moved = bolt_path(q + offset, p)[:, :3] - bolt_path(q, p)[:, :3]
     lever = np.cross(moved, wrench[:, :3])
     np.testing.assert_allclose(found[:, 9:], wrench[:, 3:] + lever)
 
@@ -81,6 +106,6 @@ def test_the_cells_bolt_creeps_as_stated(compliance, load):
     push = Push(make_station("cell", scenario), p)
     wrench = np.array(load, dtype=float)
     early, late = (push.advance(wrench, t).grip for t in (1.0, 2.0))
-    stated = _creep(scenario=scenario).mobility @ wrench
+    stated = _offset(scenario=scenario).mobility @ wrench
     assert (late - early)[5] == pytest.approx(stated[5], rel=0.1)
     assert (late - early)[0] == pytest.approx(stated[0], rel=0.2)
