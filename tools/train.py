@@ -36,6 +36,8 @@ _EXAMPLES = """examples:
   python tools/train.py --out out/first --episodes 30          a first look
   python tools/train.py --agent ddpg --preset chapter3 --scenario chapter3 \\
       --psi 0.0003 --seeds 10 --out out/chapter3                the thesis's chapter 3
+  python tools/train.py --agent ddpg --preset chapter3 --scenario chapter3 \\
+      --seeds 10 --lockstep --out out/ten_seeds         all on one batch of twins
   python tools/train.py --scenario removal_randomised --out out/randomised
   python tools/train.py --agent sac --preset chapter4 --out out/sac \\
       --hyper layer_norm=true 'hidden=[64, 64]'
@@ -80,6 +82,13 @@ def _add_batch_argument(add: Callable[..., object]) -> None:
         metavar="N",
         help="episodes at a time, on a batch of twins with IMPACT contact; validation "
         "stays on the diagram of the scenario (default: 1, on the diagram)",
+    )
+
+    add(
+        "--lockstep",
+        action="store_true",
+        help="train all seeds side by side, on a batch of twins with IMPACT contact: "
+        "ten take little longer than one",
     )
 
 
@@ -197,7 +206,7 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
     overrides = list(args.overrides)
     if args.psi is not None:
         overrides.append(f"imprecision={args.psi}")
-    refuse_envs(args.envs, args.station, acts=not args.from_logs)
+    refuse_envs(args.envs, args.station, not args.from_logs, args.lockstep)
     changes = list(args.hyper)
     if args.episodes is not None:
         changes.append(f"episodes={args.episodes}")
@@ -214,6 +223,7 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
         demonstrations=_hashes(args.demonstrations),
         start=str(args.start_from or ""),
         envs=args.envs,
+        lockstep=args.lockstep,
         provenance=program.provenance("train", arguments, args.first_seed),
     )
 

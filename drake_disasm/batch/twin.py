@@ -99,7 +99,7 @@ class BatchedTwin:
         if any(s.imprecision or any(s.ft_sensor.noise) for s in self.scenarios):
             shape = (self.count, self._steps + 1, 12)
             self._noise = array_like(np.zeros(shape, np.float32), self.like)
-        self._common = self._common_start()
+        self._starts, self._start_of = self._common_starts()
         self.episodes: Episodes
         self.observation: Array
         self.reading: Array
@@ -125,8 +125,8 @@ class BatchedTwin:
         It takes as long as some steps of the task; for many at once little more than
         for one. Where nothing is drawn from ranges it takes no time.
         """
-        if self._common is not None:
-            return rows_of(self._common, np.zeros(len(rows), np.int64))
+        if self._starts is not None:
+            return rows_of(self._starts, self._start_of[rows])
         drawn = [draw(self.scenarios[i], s) for i, s in zip(rows, seeds, strict=True)]
         scenarios = [
             with_values(self.scenarios[i], values)
@@ -247,9 +247,15 @@ class BatchedTwin:
         last = self._noise.shape[1] - 1
         return xp.astype(self._noise[every, xp.clip(step, 0, last)], self.like.dtype)
 
-    def _common_start(self) -> Episodes | None:
-        """Returns the start (1, ...) of all episodes, if nothing makes them differ."""
-        first = self.scenarios[0]
-        if first.randomisation or any(s is not first for s in self.scenarios):
-            return None
-        return self._batch.begin([0], [first])
+    def _common_starts(self) -> tuple[Episodes | None, np.ndarray]:
+        """Returns the starts (k, ...) of k scenarios, and which one each row has (n,).
+
+        None where something is drawn for each episode, which makes starts differ.
+        """
+        number: dict[int, int] = {}
+        own = [number.setdefault(id(s), len(number)) for s in self.scenarios]
+        if any(s.randomisation for s in self.scenarios):
+            return None, np.array(own)
+        first = [own.index(k) for k in range(len(number))]
+        starts = self._batch.begin(first, [self.scenarios[i] for i in first])
+        return starts, np.array(own)

@@ -35,6 +35,7 @@ class Experiment:
 
     Attributes:
         scenario, station, config, compiled, threads, envs: as in TrainingSpec.
+        lockstep: whether seeds are trained side by side, on a batch of twins.
         preset: name of the hyper-parameters that `config` started from.
         validation: greedy episodes after each training, for its result.
         logs: folders to learn from without acting, with the hash of what is in
@@ -59,6 +60,12 @@ class Experiment:
     start: str = ""
     provenance: dict[str, Any] = dataclasses.field(default_factory=dict)
     envs: int = 1
+    lockstep: bool = False
+
+    @property
+    def is_batched(self) -> bool:
+        """Whether it learns on a batch of twins, whose contact is IMPACT."""
+        return self.envs > 1 or self.lockstep
 
     def spec(self, seed: int) -> TrainingSpec:
         """Returns one seed's training."""
@@ -103,11 +110,11 @@ def open_experiment(experiment: Experiment, folder: Path, resume: bool) -> Exper
 def _with_station(found: dict[str, Any]) -> dict[str, Any]:
     """Returns a training's plain data; an older one called the station "model".
 
-    And it had one environment.
+    And it had one environment, and a process for each seed.
     """
     if "model" in found:
         found["station"] = found.pop("model")
-    return {"envs": 1} | found
+    return {"envs": 1, "lockstep": False} | found
 
 
 def read_training(folder: Path, example: dict[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from drake_disasm.learning.dataset import remember
 from drake_disasm.learning.experiment import Experiment
 from drake_disasm.learning.lockstep import LockstepTraining
 from drake_disasm.learning.replay import Replay
-from drake_disasm.learning.run import learn_offline, run_training
+from drake_disasm.learning.run import learn_offline, run_in_lockstep, run_training
 from drake_disasm.learning.training import Recorded, Training, action_map
 from drake_disasm.learning.warm_start import start_checkpoint, start_hash
 from drake_disasm.logs import LogWriter, flat_columns, read_logs
@@ -35,6 +35,11 @@ class SeedJob:
     seed: int
     folder: Path
 
+    @property
+    def is_finished(self) -> bool:
+        """Whether its result is there."""
+        return (self.folder / "result.json").exists()
+
 
 def seed_jobs(
     experiment: Experiment, seeds: Iterable[int], folder: Path
@@ -48,14 +53,28 @@ def train_seeds(
 ) -> None:
     """Trains all seeds, each in a process of its own if there are several workers.
 
+    Seeds in lockstep share as many processes as there are workers; each is then
+    validated in one of its own.
+
     Args:
         jobs: one for each seed.
         workers: processes.
         progress: gets episodes done, mean reward, and success of the latest.
     """
+    together = [job for job in jobs if job.experiment.lockstep and not job.is_finished]
+    groups = [tuple(together[i::workers]) for i in range(min(workers, len(together)))]
     with WorkerPool(workers, process_per_job=True, progress=progress) as pool:
+        for _ in pool.run(_train_in_lockstep, groups):
+            pass
         for _ in pool.run(train_seed, jobs):
             pass
+
+
+def _train_in_lockstep(jobs: Sequence[SeedJob], progress: Progress) -> None:
+    """Trains some seeds side by side; `train_seed` finishes each."""
+    trainings = [_training(job) for job in jobs]
+    logs = [_Log(job) for job in jobs]
+    run_in_lockstep(trainings, [job.folder for job in jobs], logs, progress)
 
 
 class _Log:
@@ -64,7 +83,7 @@ class _Log:
     def __init__(self, job: SeedJob) -> None:
         experiment = job.experiment
         scenario = experiment.scenario
-        if experiment.envs > 1:
+        if experiment.is_batched:
             scenario = with_impact(scenario)
         header = transitions_header(
             scenario,
@@ -82,8 +101,7 @@ class _Log:
 def train_seed(job: SeedJob, progress: Progress) -> dict[str, Any]:
     """Trains one seed to its end and returns its result."""
     experiment = job.experiment
-    finished = job.folder / "result.json"
-    if finished.exists():
+    if job.is_finished:
         episodes = experiment.config.episodes
         progress(ProgressUpdate("training", episodes, episodes))
         return {}
@@ -92,20 +110,27 @@ def train_seed(job: SeedJob, progress: Progress) -> dict[str, Any]:
         "preset": experiment.preset,
         "data": experiment.logs | experiment.demonstrations,
     }
-    demonstrations = _demonstrations(job)
-    dataset = _memory(experiment, experiment.logs)
-    kind = LockstepTraining if experiment.envs > 1 else Training
-    training = kind(experiment.spec(job.seed), demonstrations, dataset)
     if experiment.start:
-        training.start_from(start_checkpoint(experiment.start, job.seed))
         provenance["start"] = {
             experiment.start: start_hash(experiment.start, job.seed),
         }
+    training = _training(job)
     end = (provenance, experiment.validation, progress)
-    if dataset:
-        updates = experiment.updates or dataset.size
+    if experiment.logs:
+        updates = experiment.updates or training.replay.size
         return learn_offline(training, job.folder, updates, *end)
     return run_training(training, job.folder, _Log(job), *end)
+
+
+def _training(job: SeedJob) -> Training:
+    """Returns the training of a seed, at its beginning."""
+    experiment = job.experiment
+    dataset = _memory(experiment, experiment.logs)
+    kind = LockstepTraining if experiment.envs > 1 else Training
+    training = kind(experiment.spec(job.seed), _demonstrations(job), dataset)
+    if experiment.start:
+        training.start_from(start_checkpoint(experiment.start, job.seed))
+    return training
 
 
 def _demonstrations(job: SeedJob) -> Replay | None:

@@ -1,7 +1,10 @@
-"""One agent that learns from many episodes at a time, on a batch of twins."""
+"""Learning from many episodes at a time, on a batch of twins: one agent, or several."""
 
+import contextlib
 import copy
 import dataclasses
+import time
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -18,22 +21,29 @@ from drake_disasm.learning.training import (
     seed_for,
 )
 from drake_disasm.mdp import Outcome
-from drake_disasm.policies import ActionMap, Network
+from drake_disasm.policies import ActionMap
+from drake_disasm.scenario import Scenario
 from drake_disasm.task.episode import EpisodeSummary
 from drake_disasm.task.simulation import StepResult
 
 
-def refuse_envs(envs: int, station: str, acts: bool) -> None:
+def refuse_envs(envs: int, station: str, acts: bool, lockstep: bool = False) -> None:
     """Refuses several episodes at a time where there is no batch.
 
     Args:
-        envs: how many.
+        envs: how many of one agent.
         station: on which the agent learns.
         acts: whether it acts at all.
+        lockstep: whether agents are trained side by side.
 
     Raises:
         DisasmError: says what to give instead.
     """
+    if lockstep and (envs > 1 or station != "twin" or not acts):
+        raise DisasmError(
+            "lockstep: agents side by side have one environment each, on a batch of "
+            "twins; leave out --envs, --station and --from-logs, or --lockstep"
+        )
     if envs > 1 and station != "twin":
         raise DisasmError(
             f"envs: station '{station}' has no batch; use --station twin, or --envs 1"
@@ -56,13 +66,158 @@ class _Running:
     is_running: bool = True
 
 
+class _Learner:
+    """A training's next episodes, in environments of a batch.
+
+    Args:
+        training: whose they are.
+        rows: of the batch, as many as there are episodes.
+    """
+
+    def __init__(self, training: Training, rows: Sequence[int]) -> None:
+        config, first = training.spec.config, len(training.summaries)
+        self.training = training
+        self._learns = first >= config.warmup_episodes
+        self._every_step = config.schedule == "every_step"
+        self._updates = training.generator(Purpose.UPDATES, first)
+        self.episodes = [
+            _Running(
+                row,
+                EpisodeSummary(seed_for(training.spec.seed, Purpose.EPISODE, number)),
+                training.explorer(number),
+                copy.deepcopy(training.action_map),
+            )
+            for number, row in enumerate(rows, first)
+        ]
+
+    @property
+    def running(self) -> list[_Running]:
+        """Episodes that have not ended."""
+        return [episode for episode in self.episodes if episode.is_running]
+
+    def act(self, before: np.ndarray, chosen: np.ndarray, actions: np.ndarray) -> None:
+        """Chooses the actions of the episodes that run, exploring.
+
+        Args:
+            before: (n, 12) the newest observations of the batch.
+            chosen, actions: (n, 6) in [-1, 1] and in m and rad; their rows are set.
+        """
+        training = self.training
+        for episode in self.running:
+            row, explorer = episode.row, episode.explorer
+            scaled = (before[row] / training.scale).astype(np.float32)
+            chosen[row] = training.agent.explore(
+                explorer.network(scaled), explorer.sigma, explorer.generator
+            )
+            actions[row] = episode.action_map.to_action(before[row], chosen[row])
+
+    def take(
+        self,
+        result: BatchResult,
+        before: np.ndarray,
+        chosen: np.ndarray,
+        is_out: np.ndarray,
+    ) -> None:
+        """Takes a step of the episodes that run, and learns if each step teaches.
+
+        Args:
+            result: of the batch.
+            before, chosen: as of `act`.
+            is_out: (n,) whether each bolt truly is out.
+        """
+        running, training = self.running, self.training
+        after = to_numpy(result.observation)
+        for episode in running:
+            row, step = episode.row, _result_of(result, episode.row)
+            episode.summary.add(step)
+            episode.summary.bolt_is_out = bool(is_out[row])
+            episode.is_running = step.outcome is Outcome.RUNNING
+            if result.failure[row]:
+                episode.is_running = False
+                continue
+            training.replay.add(
+                (before[row] / training.scale).astype(np.float32),
+                chosen[row],
+                step.reward,
+                after[row] / training.scale,
+                step.outcome.terminated,
+            )
+        if self._learns and self._every_step and running:
+            config = training.spec.config
+            training.learn(config.updates_per_step * len(running), self._updates)
+            network = training.agent.network()
+            for episode in running:
+                episode.explorer.network = network
+
+    def end(self) -> None:
+        """Learns from what the episodes showed, if each step did not teach."""
+        training, config = self.training, self.training.spec.config
+        if self._learns and not self._every_step:
+            steps = sum(episode.summary.steps for episode in self.episodes)
+            training.learn(config.updates_per_step * steps, self._updates)
+        training.summaries += [episode.summary for episode in self.episodes]
+
+
+def run_round(
+    twin: BatchedTwin, trainings: Sequence[tuple[Training, Sequence[int]]]
+) -> list[list[tuple[EpisodeSummary, RecordedEpisode]]]:
+    """Runs one round of episodes in lockstep, with updates by the schedules.
+
+    All of them begin together; one that ends waits for the others. The agent that
+    explores has learned from the rounds before, and with the schedule `every_step` from
+    the steps of this one.
+
+    Args:
+        twin: the batch.
+        trainings: each with the environments that run its next episodes.
+
+    Returns:
+        The episodes of each training.
+    """
+    learners = [_Learner(training, rows) for training, rows in trainings]
+    seeds = [0] * twin.count
+    for learner in learners:
+        for episode in learner.episodes:
+            seeds[episode.row] = episode.summary.seed
+    with _shared_clock(trainings):
+        twin.reset(seeds)
+        history = BatchHistory(twin)
+    while any(learner.running for learner in learners):
+        before = np.array(to_numpy(twin.observation))
+        chosen, actions = np.zeros((2, twin.count, 6))
+        with _shared_clock(trainings):
+            for learner in learners:
+                learner.act(before, chosen, actions)
+            result = twin.step(actions)
+            history.add(result)
+        is_out = twin.bolt_is_out()
+        for learner in learners:
+            learner.take(result, before, chosen, is_out)
+    for learner in learners:
+        learner.end()
+    return [
+        [(e.summary, history.episode(e.row, e.summary.steps)) for e in learner.episodes]
+        for learner in learners
+    ]
+
+
+@contextlib.contextmanager
+def _shared_clock(
+    trainings: Sequence[tuple[Training, Sequence[int]]],
+) -> Iterator[None]:
+    """Has each training bear its share of the time of a simulation."""
+    began = time.perf_counter()
+    yield
+    share = (time.perf_counter() - began) / len(trainings)
+    for training, _ in trainings:
+        training.seconds["simulation"] += share
+
+
 class LockstepTraining(Training):
     """A training whose episodes run in rounds, as many at a time as `spec.envs`.
 
-    All episodes of a round begin together; one that ends waits for the others. Seeds,
-    exploration and what is learned from are per episode as in `Training`; the agent
-    that explores has learned from the rounds before, and with the schedule
-    `every_step` from the steps of this one. Contact is IMPACT.
+    Seeds, exploration and what is learned from are per episode as in `Training`; see
+    `run_round`. Contact is IMPACT.
 
     Args:
         spec, demonstrations, dataset: as of Training.
@@ -79,78 +234,47 @@ class LockstepTraining(Training):
 
     def run_episodes(self) -> list[tuple[EpisodeSummary, RecordedEpisode]]:
         """Runs one round of episodes, with updates by the schedule."""
-        config, first = self.spec.config, len(self.summaries)
-        learning = first >= config.warmup_episodes
-        every_step = learning and config.schedule == "every_step"
-        updates = self._generator(Purpose.UPDATES, first)
-        with self._clock("simulation"):
-            episodes, history = self._begin_round(first)
-        network = self.agent.network()
-        while any(episode.is_running for episode in episodes):
-            with self._clock("simulation"):
-                taken = self._step_all(network, episodes, history)
-            if every_step:
-                self._learn(config.updates_per_step * taken, updates)
-                network = self.agent.network()
-        if learning and not every_step:
-            steps = sum(episode.summary.steps for episode in episodes)
-            self._learn(config.updates_per_step * steps, updates)
-        self.summaries += [episode.summary for episode in episodes]
-        return [(e.summary, history.episode(e.row, e.summary.steps)) for e in episodes]
+        spec = self.spec
+        count = min(spec.envs, spec.config.episodes - len(self.summaries))
+        [found] = run_round(self._twin, [(self, range(count))])
+        return found
 
-    def _begin_round(self, first: int) -> tuple[list[_Running], BatchHistory]:
-        count = min(self.spec.envs, self.spec.config.episodes - first)
-        seeds = [
-            seed_for(self.spec.seed, Purpose.EPISODE, first + i)
-            for i in range(self._twin.count)
-        ]
-        self._twin.reset(seeds)
-        episodes = [
-            _Running(
-                row,
-                EpisodeSummary(seeds[row]),
-                self._explorer(first + row),
-                copy.deepcopy(self.action_map),
-            )
-            for row in range(count)
-        ]
-        return episodes, BatchHistory(self._twin)
 
-    def _step_all(
-        self, network: Network, episodes: list[_Running], history: BatchHistory
-    ) -> int:
-        """Takes one exploring step in all episodes that run; returns how many."""
-        before = np.array(to_numpy(self._twin.observation))
-        scaled = (before / self._scale).astype(np.float32)
-        outputs = network.rows(scaled)
-        running = [episode for episode in episodes if episode.is_running]
-        chosen, actions = np.zeros((2, len(before), 6))
-        for episode in running:
-            row, explorer = episode.row, episode.explorer
-            chosen[row] = self.agent.explore(
-                outputs[row], explorer.sigma, explorer.generator
-            )
-            actions[row] = episode.action_map.to_action(before[row], chosen[row])
-        result = self._twin.step(actions)
-        history.add(result)
-        after = to_numpy(result.observation)
-        is_out = self._twin.bolt_is_out()
-        for episode in running:
-            row, step = episode.row, _result_of(result, episode.row)
-            episode.summary.add(step)
-            episode.summary.bolt_is_out = bool(is_out[row])
-            episode.is_running = step.outcome is Outcome.RUNNING
-            if result.failure[row]:
-                episode.is_running = False
-                continue
-            self.replay.add(
-                scaled[row],
-                chosen[row],
-                step.reward,
-                after[row] / self._scale,
-                step.outcome.terminated,
-            )
-        return len(running)
+class LockstepTrainings:
+    """Several trainings side by side, each on one environment of a batch of twins.
+
+    What each learns from is its own: an agent, episodes one after the other, updates
+    after each of them. Only the simulation is shared.
+
+    Args:
+        trainings: on the twin; their scenarios and hyper-parameters may differ. Their
+            `envs` is 1.
+    """
+
+    def __init__(self, trainings: Sequence[Training]) -> None:
+        self.trainings = list(trainings)
+        scenarios: dict[int, Scenario] = {}
+        for training in self.trainings:
+            own = training.spec.scenario
+            scenarios.setdefault(id(own), with_impact(own))
+        self._twin = BatchedTwin(
+            [scenarios[id(t.spec.scenario)] for t in self.trainings], device="numpy"
+        )
+
+    @property
+    def unfinished(self) -> list[int]:
+        """Numbers of the trainings that have episodes to run."""
+        return [
+            number
+            for number, training in enumerate(self.trainings)
+            if len(training.summaries) < training.spec.config.episodes
+        ]
+
+    def run_episodes(self) -> dict[int, RecordedEpisode]:
+        """Runs one episode of each unfinished training; returns them by number."""
+        which = self.unfinished
+        found = run_round(self._twin, [(self.trainings[i], [i]) for i in which])
+        return {i: recorded for i, [(_, recorded)] in zip(which, found, strict=True)}
 
 
 def _result_of(result: BatchResult, row: int) -> StepResult:

@@ -16,7 +16,7 @@ import csv
 import dataclasses
 import io
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -27,6 +27,7 @@ from drake_disasm.common.plain_data import check_like
 from drake_disasm.common.progress import Progress, ProgressUpdate
 from drake_disasm.common.text import clipped
 from drake_disasm.learning.evaluation import summed_up, validate_policy
+from drake_disasm.learning.lockstep import LockstepTrainings
 from drake_disasm.learning.policy import trained_policy
 from drake_disasm.learning.training import (
     Purpose,
@@ -39,6 +40,7 @@ from drake_disasm.policies import save_policy
 from drake_disasm.task.episode import EpisodeSummary
 
 _AGAIN = "delete it, and resume the training"
+_CHECKPOINT = "checkpoint.npz"
 _MOST_BYTES = 2**28
 _SHOWN = 20  # latest episodes over which progress is averaged
 _PATIENCE = 10.0  # s until the workers of a killed run have noticed
@@ -77,7 +79,7 @@ def run_training(
     """
     make_folder(folder)
     with _locked(folder):
-        checkpoint = folder / "checkpoint.npz"
+        checkpoint = folder / _CHECKPOINT
         if checkpoint.exists():
             training.restore(checkpoint)
         while len(training.summaries) < training.spec.config.episodes:
@@ -89,14 +91,47 @@ def run_training(
         return finish(training, folder, provenance, validation)
 
 
-def _update(training: Training) -> ProgressUpdate:
-    """Returns how far an online training is, and how its latest episodes went."""
-    latest = training.summaries[-_SHOWN:]
+def run_in_lockstep(
+    trainings: Sequence[Training],
+    folders: Sequence[Path],
+    logs: Sequence[EpisodeLog],
+    progress: Progress,
+) -> None:
+    """Trains side by side, on a batch of twins, up to the last checkpoint of each.
+
+    `run_training` then finishes each of them.
+
+    Args:
+        trainings: fresh.
+        folders, logs: of each.
+        progress: called after each round of episodes.
+
+    Raises:
+        DisasmError: see `run_training`.
+    """
+    with contextlib.ExitStack() as stack:
+        for training, folder in zip(trainings, folders, strict=True):
+            make_folder(folder)
+            stack.enter_context(_locked(folder))
+            if (folder / _CHECKPOINT).exists():
+                training.restore(folder / _CHECKPOINT)
+        batch = LockstepTrainings(trainings)
+        while batch.unfinished:
+            for number, recorded in batch.run_episodes().items():
+                training = trainings[number]
+                logs[number].write(len(training.summaries) - 1, recorded)
+                training.save(folders[number] / _CHECKPOINT)
+            progress(_update(*trainings))
+
+
+def _update(*trainings: Training) -> ProgressUpdate:
+    """Returns how far online trainings are, and how their latest episodes went."""
+    latest = [s for training in trainings for s in training.summaries[-_SHOWN:]]
     won = sum(s.outcome is Outcome.SUCCESS for s in latest)
     return ProgressUpdate(
         "training",
-        len(training.summaries),
-        training.spec.config.episodes,
+        sum(len(training.summaries) for training in trainings),
+        sum(training.spec.config.episodes for training in trainings),
         f"success {won}/{len(latest)}",
         sum(s.reward for s in latest) / len(latest),
     )
@@ -120,7 +155,7 @@ def learn_offline(
     make_folder(folder)
     parts = training.spec.config.episodes
     with _locked(folder):
-        checkpoint = folder / "checkpoint.npz"
+        checkpoint = folder / _CHECKPOINT
         if checkpoint.exists():
             training.restore(checkpoint)
         while training.rounds < parts:

@@ -96,6 +96,8 @@ class Training:
         replay: its replay memory.
         summaries: of the episodes done.
         rounds: done on a dataset.
+        scale: (12,) what the state is divided by before a network sees it.
+        action_map: from the network's output to an action.
         seconds: spent in "simulation", "updates" and "saving", resumed runs included.
 
     Args:
@@ -127,7 +129,7 @@ class Training:
         self.seconds = {"simulation": 0.0, "updates": 0.0, "saving": 0.0}
         self.action_map = action_map(spec.scenario, config)
         self._demonstrations = demonstrations
-        self._scale = np.array(config.observation_scale)
+        self.scale = np.array(config.observation_scale)
         self._observation = np.zeros(12)
 
     def start_from(self, path: Path) -> None:
@@ -160,7 +162,7 @@ class Training:
             "rounds": self.rounds,
             "seconds": self.seconds,
         }
-        with self._clock("saving"):
+        with self.clock("saving"):
             save_checkpoint(path, self.agent, self._own_memory(), notes)
 
     def _own_memory(self) -> Replay:
@@ -181,23 +183,23 @@ class Training:
         config, number = self.spec.config, len(self.summaries)
         learning = number >= config.warmup_episodes
         every_step = learning and config.schedule == "every_step"
-        updates = self._generator(Purpose.UPDATES, number)
-        explorer = self._explorer(number)
+        updates = self.generator(Purpose.UPDATES, number)
+        explorer = self.explorer(number)
         summary, recorder = self._begin_episode(number)
         while summary.outcome is Outcome.RUNNING:
             self._step(explorer, summary, recorder)
             if every_step:
-                self._learn(config.updates_per_step, updates)
+                self.learn(config.updates_per_step, updates)
                 explorer.network = self.agent.network()
         if learning and not every_step:
-            self._learn(config.updates_per_step * summary.steps, updates)
+            self.learn(config.updates_per_step * summary.steps, updates)
         summary.bolt_is_out = self.env.simulation.bolt_is_out()
         self.summaries.append(summary)
         return summary, recorder
 
     def _begin_episode(self, number: int) -> tuple[EpisodeSummary, EpisodeRecorder]:
         seed = seed_for(self.spec.seed, Purpose.EPISODE, number)
-        with self._clock("simulation"):
+        with self.clock("simulation"):
             self._observation, _ = self.env.reset(seed=seed)
             recorder = EpisodeRecorder(self.env.simulation)
             recorder.measure()
@@ -207,26 +209,27 @@ class Training:
         self, explorer: "Explorer", summary: EpisodeSummary, recorder: EpisodeRecorder
     ) -> None:
         """Takes one exploring step and stores its transition."""
-        with self._clock("simulation"):
+        with self.clock("simulation"):
             before = self._observation
-            scaled = (before / self._scale).astype(np.float32)
+            scaled = (before / self.scale).astype(np.float32)
             chosen = self.agent.explore(
                 explorer.network(scaled), explorer.sigma, explorer.generator
             )
             action = self.action_map.to_action(before, chosen)
             after, reward, terminated, _, _ = self.env.step(action)
-            self.replay.add(scaled, chosen, reward, after / self._scale, terminated)
+            self.replay.add(scaled, chosen, reward, after / self.scale, terminated)
             self._observation = after
             recorder.acted(self.env.result)
             summary.add(self.env.result)
 
     def run_round(self, updates: int) -> None:
         """Does updates on the replay memory, without acting (thesis 3.4.2)."""
-        self._learn(updates, self._generator(Purpose.UPDATES, self.rounds))
+        self.learn(updates, self.generator(Purpose.UPDATES, self.rounds))
         self.rounds += 1
 
-    def _learn(self, updates: int, generator: np.random.Generator) -> None:
-        with self._clock("updates"):
+    def learn(self, updates: int, generator: np.random.Generator) -> None:
+        """Does some gradient updates on batches of the replay memory."""
+        with self.clock("updates"):
             for _ in range(updates):
                 self.agent.learn(self._batch(generator), generator)
 
@@ -238,7 +241,7 @@ class Training:
             return rows
         return np.concatenate([rows, self._demonstrations.sample(shown, generator)])
 
-    def _explorer(self, number: int) -> "Explorer":
+    def explorer(self, number: int) -> "Explorer":
         """Returns how episode `number` explores.
 
         The hyper-parameter is in metres, for an agent with the task's whole range of
@@ -246,16 +249,18 @@ class Training:
         """
         config, task = self.spec.config, self.spec.scenario.task
         sigma = config.exploration * config.exploration_decay**number
-        generator = self._generator(Purpose.EXPLORATION, number)
+        generator = self.generator(Purpose.EXPLORATION, number)
         return Explorer(self.agent.network(), sigma / task.max_translation, generator)
 
     @contextlib.contextmanager
-    def _clock(self, name: str) -> Iterator[None]:
+    def clock(self, name: str) -> Iterator[None]:
+        """Adds the time that a block takes to `seconds` of a name."""
         began = time.perf_counter()
         yield
         self.seconds[name] += time.perf_counter() - began
 
-    def _generator(self, purpose: Purpose, number: int) -> np.random.Generator:
+    def generator(self, purpose: Purpose, number: int) -> np.random.Generator:
+        """Returns the random numbers for a purpose in episode `number`."""
         return np.random.default_rng(seed_for(self.spec.seed, purpose, number))
 
 
