@@ -15,6 +15,7 @@ from drake_disasm.scenario import Scenario
 _YIELD, _PUSH, _LIFT, _TURN = 0.4, 1.2, 3.2, 0.6
 _FASTEST, _FASTEST_LIFT = 0.001, 0.0015  # m per step
 _STEP_FORCE, _LIFT_STEP_FORCE = 12.8, 24.0  # N that a step against a stop adds
+_HELD = 0.5  # share of `lift` that holds the bolt down: it is under the lips
 _STOP, _STOP_SHARE = 3.0, 0.25  # N that tell a stop, and share of what a step adds
 
 
@@ -40,8 +41,9 @@ class Admittance:
     A Cartesian admittance per step (Hogan 1985): a = C (w_push + w), where w is
     the measured wrench on the bolt and C its compliance per step. Along x it pushes
     with a bounded force, so it slows down as resistance grows and stops at a stop;
-    then, and while the bolt is being lifted, it pushes upwards instead. It knows
-    neither the groove's direction nor where it ends. Its gains are for an arm and grip
+    then, and while the bolt is being lifted, it pushes upwards instead, and along x
+    again where something holds the bolt down. It knows neither the groove's direction
+    nor where it ends. Its gains are for an arm and grip
     of about 16 kN/m; `for_stiffness` gives those for another.
 
     Attributes:
@@ -102,7 +104,7 @@ class Admittance:
         y, f, t = observation[1], observation[6:9], observation[9:12]
         move, turn = self.yield_compliance * f, self.rotation_compliance * t
         lifting = y + self.grip_compliance * f[1] > self.lifted
-        if not lifting:
+        if not lifting or f[1] < -_HELD * self.lift:
             move[0] = min(self.speed, self.push_compliance * (self.push + f[0]))
         if lifting or f[0] < -self.stop:
             lift = self.lift_compliance * (self.lift + f[1])

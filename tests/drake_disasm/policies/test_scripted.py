@@ -120,6 +120,13 @@ def test_gains_of_a_stiff_bolt_are_the_ones_that_were_tuned_for_it() -> None:
         assert getattr(policy, field.name) == pytest.approx(tuned, rel=0.1)
 
 
+def test_a_bolt_that_is_held_down_is_pushed_on_along_x() -> None:
+    """Lifted by its own account, in a softer grip than it knows: still under a lip."""
+    policy = Admittance()
+    assert policy(_observation(0.004, fy=-policy.lift))[0] > 0.0
+    assert policy(_observation(0.004, fy=-0.2 * policy.lift))[0] == 0.0
+
+
 def test_lifting_begins_with_the_bolt_and_not_with_the_grip() -> None:
     """Up by 3 mm against 1.5 N at 0.6 kN/m, the bolt has risen by 0.5 mm only."""
     policy = Admittance.for_stiffness(STIFFNESS["yielding"], 1.0 / 600.0)
