@@ -4,8 +4,10 @@ All make the same moves: those of the policy `admittance` in the turned groove, 
 the bolt is in contact nearly all the time.
 """
 
+import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -62,6 +64,17 @@ def batch_speed(count: int, kind: str, moves: np.ndarray) -> float:
         return _steps_per_s(twin, moves)
     finally:
         torch.set_num_threads(before)
+
+
+def command(count: int) -> list[str]:
+    """Returns the command of a process that makes some steps of a batch in NumPy."""
+    work = (
+        f"import batch_speed; t = batch_speed.BatchedTwin(batch_speed.scenario_with("
+        f"'impact'), {count}, 'numpy'); t.reset(range({count})); "
+        f"[t.step(batch_speed.np.zeros(({count}, 6))) for _ in range(3)]"
+    )
+    path = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); "
+    return [sys.executable, "-c", path + work]
 
 
 def _steps_per_s(twin: BatchedTwin, moves: np.ndarray) -> float:

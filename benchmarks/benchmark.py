@@ -24,6 +24,7 @@ import batch_speed
 import endurance
 import numpy as np
 import psutil
+import training_speed
 from effect_matrix import closing_time, run_matrix
 from objective_speed import (
     SIZES,
@@ -195,6 +196,29 @@ def measure_batches() -> Iterator[Figure]:
     """Yields steps per second of twins in batches, compared with the diagram's."""
     for key, value, ratio in batch_speed.speeds():
         yield Figure(key, value, "1/s", "the diagram with IMPACT", ratio)
+
+
+def measure_training() -> Iterator[Figure]:
+    """Yields the time of a training, compared with stable-baselines3's."""
+    ours, theirs = training_speed.beside_sb3()
+    ratio = ours / theirs if theirs else None
+    reference = "stable-baselines3" if theirs else "(stable-baselines3 is not there)"
+    yield Figure("training_chapter4_s", ours, "s", reference, ratio)
+
+
+def measure_lockstep() -> Iterator[Figure]:
+    """Yields the time of trainings in lockstep, compared with one by one."""
+    together, alone = training_speed.side_by_side()
+    key, reference = f"training_lockstep_{training_speed.SEEDS}_s", "one by one"
+    yield Figure(key, together, "s", reference, together / alone)
+
+
+def measure_batch_memory() -> Iterator[Figure]:
+    """Yields peak memory of batches of twins in NumPy, compared with one twin's."""
+    one = _peak_mib(batch_speed.command(1))
+    for count in batch_speed.SIZES:
+        peak = _peak_mib(batch_speed.command(count)) if count > 1 else one
+        yield Figure(f"peak_mib_batch_{count}", peak, "MiB", "one twin", peak / one)
 
 
 def tool(name: str) -> list[str]:
@@ -376,8 +400,11 @@ MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
     ("close_loop_impact_883_s",): lambda: measure_closing(
         "impact", "close_loop_impact_883_s"
     ),
+    ("training_chapter4_s",): measure_training,
+    (f"training_lockstep_{training_speed.SEEDS}_s",): measure_lockstep,
     tuple(f"hardware_{of}_ms" for of in _LATENCIES): measure_latency,
     ("peak_mib_simulate", "peak_mib_train", "peak_mib_identify"): measure_memory,
+    tuple(f"peak_mib_batch_{n}" for n in batch_speed.SIZES): measure_batch_memory,
 }
 
 

@@ -87,7 +87,7 @@ class RefitSearch(ForwardSearch):
         if again.loss <= (1.0 + limits.min_gain) * found.loss:
             return self._same_effects(fit, again)
         rivals = ties(best, likely)
-        rivals = _ties_by_fit(rivals, confirmed, fit, found)
+        rivals = ties_by_fit(best, rivals, confirmed, fit, found)
         found = at_own_minimum(self.fitter, found)
         self._record(best, rivals, survey, found)
         return found
@@ -256,7 +256,8 @@ def _significant_only(fitter: Fitter, fit: Fit, known: int) -> Fit:
     return fitter.fit(effects, fit)
 
 
-def _ties_by_fit(
+def ties_by_fit(
+    best: Evidence,
     rivals: Sequence[Evidence],
     confirmed: Sequence[_Trial],
     before: Fit,
@@ -264,17 +265,22 @@ def _ties_by_fit(
 ) -> tuple[Evidence, ...]:
     """Returns rivals that could explain as much as the chosen effect's fit does.
 
-    Those that were fitted are judged by their fits, others by the linear account.
+    Those that were fitted are judged by their fits, others by the linear account: how
+    much less they explain by it than the best does by the same.
     """
     limit = (1.0 + found.settings.refit_tie_margin) * found.loss
     losses = {e.effects: fit.loss for e, fit in confirmed if fit is not found}
     known = {e.effects: e for e, fit in confirmed if fit is not found}
+
+    def less(rival: Evidence) -> float:
+        return (best.gain - rival.gain) * before.loss
+
     for rival in rivals:
         known.setdefault(rival.effects, rival)
     return tuple(
         rival
         for effects, rival in known.items()
-        if losses.get(effects, (1.0 - rival.gain) * before.loss) <= limit
+        if losses.get(effects, found.loss + less(rival)) <= limit
     )
 
 

@@ -1,5 +1,7 @@
 """Which of several effects that explain about as much is named."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from drake_disasm.effects import (
 from sysid.effect_selection.block_regression import BlockRegression
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence, most_parsimonious
+from sysid.effect_selection.refit_search import ties_by_fit
 from sysid.effect_selection.search import trials
 from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
 
@@ -76,3 +79,19 @@ def test_columns_that_act_in_few_blocks_have_a_least_p_value():
     )  # fmt: skip
     assert regression.least_p(np.array([0])) == pytest.approx(2.0**-19)
     assert regression.least_p(np.array([1])) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(
+    ("gain", "is_tie"), [(0.22, True), (0.16, True), (0.05, False)]
+)
+def test_a_rival_that_was_not_fitted_may_gain_by_a_fit_as_the_best_did(gain, is_tie):
+    """The linear account saw 0.22 of the loss, the fit took away 0.49 of it."""
+    best, rival = (
+        _evidence(kind, g, 1)
+        for kind, g in ((JointCoulombFriction, 0.22), (JointLoadFriction, gain))
+    )
+    before, found = (
+        SimpleNamespace(loss=loss, settings=DEFAULT_SETTINGS) for loss in (100.0, 51.0)
+    )
+    ties = ties_by_fit(best, [rival], [(best, found)], before, found)
+    assert ties == ((rival,) if is_tie else ())
