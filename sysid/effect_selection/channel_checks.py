@@ -45,8 +45,7 @@ def channel_findings(fit: Fit) -> list[ChannelFinding]:
     found = []
     for number, channel in enumerate(measured.channels):
         r = residual[:, number]
-        # What is far below a known noise is the solver's own, whatever it looks like.
-        least = fit.settings.noticeable if fit.noise_is_stated else 0.0
+        least = fit.noticeable(number)
         texts = [
             _outlying(r, measured, fit.settings, least),
             _line(r, measured, fit.settings, least),

@@ -55,6 +55,18 @@ class Fit:
         linear = self.linearisation
         return pseudo_residual(linear.residual, linear.huber_delta)
 
+    def noticeable(self, channel: int) -> float:
+        """Returns the rms, in units of sigma, below which a finding is none.
+
+        What is far below a known noise is the solver's own, whatever it looks like; and
+        a model that states by how much it is off itself is off in some pattern.
+        """
+        if not self.noise_is_stated:
+            return 0.0
+        share = self.model.measurements.model_error_share[:, channel]
+        own = self.settings.model_error_reach * float(np.sqrt(np.mean(share**2)))
+        return max(self.settings.noticeable, own)
+
     @property
     def states_model_error(self) -> bool:
         """Whether it is known by how much the model itself is off."""

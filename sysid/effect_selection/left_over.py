@@ -118,7 +118,7 @@ def left_over(fit: Fit) -> list[LeftOver]:
         p = len(measured.channels) * gained_p(gains, settings)
         if share < settings.min_left_over or p >= settings.channel_alpha:
             continue
-        if fit.noise_is_stated and gains.sum() < settings.noticeable**2 * len(target):
+        if gains.sum() < fit.noticeable(number) ** 2 * len(target):
             continue
         size = float(np.sqrt(np.mean((learned.predicted * sigma[kept, number]) ** 2)))
         needed = learned.depends_on(inputs, target, folds, settings.learner_importance)

@@ -17,6 +17,7 @@ from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.experiments import separating
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.left_over import LeftOver
+from sysid.effect_selection.residual_curves import Dependence
 from sysid.effect_selection.residual_model import ResidualModel
 from sysid.effect_selection.search import SelectionRound
 from sysid.effect_selection.strokes import joints_of_one_stroke
@@ -158,13 +159,12 @@ def judge(
 
 
 def _is_noticeable(dependence: Evidence, last: Fit) -> bool:
-    """Returns whether a dependence takes out more than what a solver leaves.
-
-    Against a noise that is known, of the rows of its one channel.
-    """
-    gained = dependence.gain * last.loss
-    least = last.settings.noticeable**2 * last.model.measurements.rows
-    return not last.noise_is_stated or gained >= least
+    """Returns whether a dependence takes more than `Fit.noticeable` out of a channel."""
+    measured, curve = last.model.measurements, dependence.explanation
+    if not isinstance(curve, Dependence):
+        return True
+    channel = [each.name for each in measured.channels].index(curve.channel)
+    return dependence.gain * last.loss >= last.noticeable(channel) ** 2 * measured.rows
 
 
 def _ending(found: Verdict, last: Fit) -> Ending:

@@ -1,5 +1,7 @@
 """What single channels show: against residuals that are made to show it."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -49,8 +51,11 @@ def _white(seed=0):
     return np.random.default_rng(seed).standard_normal(size)
 
 
-def _found(residual, noise_is_stated=True):
+def _found(residual, noise_is_stated=True, model_error=0.0):
     model = _Ramp(residual)
+    error = model_error * np.ones_like(residual) if model_error else None
+    measured = dataclasses.replace(model.measurements, model_error=error)
+    model = model.with_measurements(measured)
     fitter = Fitter(
         model, Workers(), np.inf, _SETTINGS, noise_is_stated=noise_is_stated
     )
@@ -73,6 +78,14 @@ def test_a_sine_is_found_where_the_noise_is_not_known():
     residual = _white()
     residual[:, 0] += 2.0 * np.sin(2 * np.pi * 2.5 * _time())
     assert _found(residual, noise_is_stated=False).startswith("fx: periodic at 2.5 Hz")
+
+
+def test_a_model_that_states_its_own_error_may_be_off_by_as_much_in_a_pattern():
+    """Of 2 N stated, a sine of 2 N is none of the log's; one of 9 N is."""
+    residual, sine = 0.1 * _white(), np.sin(2 * np.pi * 1.3 * _time())
+    for size, shows in ((2.0, False), (9.0, True)):
+        residual[:, 1] += size * sine
+        assert bool(_found(residual, model_error=2.0)) == shows
 
 
 def test_outlying_rows_are_counted_and_placed():
