@@ -159,7 +159,7 @@ def judge(
 
 
 def _is_noticeable(dependence: Evidence, last: Fit) -> bool:
-    """Returns whether a dependence takes more than `Fit.noticeable` out of a channel."""
+    """Returns whether a dependence takes more out than is `Fit.noticeable`."""
     measured, curve = last.model.measurements, dependence.explanation
     if not isinstance(curve, Dependence):
         return True
