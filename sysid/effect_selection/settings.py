@@ -341,12 +341,13 @@ class SelectionSettings:
         "a residual as large as the noise: nothing is left to fit",
     )
     max_linear_objective: float = _setting(
-        10.0,
+        5.0,
         "objective",
-        "beyond ten times the noise the linear account is not asked: the bolt is "
+        "beyond five times the noise the linear account is not asked: the bolt is "
         "inside the model's wall, and the derivative is the wall's stiffness",
         "a groove turned by 3 degrees is found only by fits (tests/sysid/"
-        "effect_selection/test_prescreen.py)",
+        "effect_selection/test_prescreen.py); one by 2 degrees, 7.5 times the noise, "
+        "was named a step of the sensor first",
     )
     search_rows: int = _setting(
         250,
