@@ -100,7 +100,9 @@ class _EvenReplay:
         """See ImpactReplay."""
         counts = [len(each) for each in steps]
         which = np.repeat(np.arange(len(steps)), counts)
-        states = self._after(which, Steps.concatenated(steps))
+        # Steps without a balance may overflow, they end as NaN; others don't care.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            states = self._after(which, Steps.concatenated(steps))
         return np.split(states, np.cumsum(counts)[:-1])
 
     def _zero(self, h: float) -> None:
