@@ -37,7 +37,7 @@ _EXAMPLES = """examples:
   python tools/train.py --agent ddpg --preset chapter3 --scenario chapter3 \\
       --psi 0.0003 --seeds 10 --out out/chapter3                the thesis's chapter 3
   python tools/train.py --agent ddpg --preset chapter3 --scenario chapter3 \\
-      --seeds 10 --lockstep --out out/ten_seeds         all on one batch of twins
+      --seeds 64 --lockstep --out out/many                 all on batches of twins
   python tools/train.py --scenario removal_randomised --out out/randomised
   python tools/train.py --agent sac --preset chapter4 --out out/sac \\
       --hyper layer_norm=true 'hidden=[64, 64]'
@@ -87,8 +87,8 @@ def _add_batch_argument(add: Callable[..., object]) -> None:
     add(
         "--lockstep",
         action="store_true",
-        help="train all seeds side by side, on a batch of twins with IMPACT contact: "
-        "ten take little longer than one",
+        help="train all seeds side by side, on a batch of twins with IMPACT contact, "
+        "as many batches as workers; pays for some thirty seeds and more",
     )
 
 

@@ -41,9 +41,25 @@ class BatchHistory:
     def __init__(self, twin: BatchedTwin) -> None:
         self._twin = twin
         self._drawn = [dict(values) for values in twin.drawn]
+        self._begun = np.zeros(twin.count, np.int64)
         self._steps: list[dict[str, np.ndarray]] = []
         self._measured: list[dict[str, np.ndarray]] = []
         self._measured.append(self._measure(np.zeros(twin.count, np.int64)))
+
+    def begin(self, rows: np.ndarray) -> None:
+        """Takes episodes of some environments (m,) that have just begun.
+
+        Those before are forgotten.
+        """
+        beginning = self._measure(np.zeros(self._twin.count, np.int64))
+        for name, values in self._measured[-1].items():
+            values[rows] = beginning[name][rows]
+        for row in rows:
+            self._drawn[row] = dict(self._twin.drawn[row])
+        self._begun[rows] = len(self._steps)
+        past = int(self._begun.min())
+        del self._steps[:past], self._measured[:past]
+        self._begun -= past
 
     def add(self, result: BatchResult) -> None:
         """Takes a step that was just done."""
@@ -62,13 +78,13 @@ class BatchHistory:
             row: its number.
             steps: of the episode.
         """
-        count = steps + 1
+        count, first = steps + 1, int(self._begun[row])
+        measured = self._measured[first : first + count]
         rows: dict[str, Any] = {
-            name: np.stack([m[name][row] for m in self._measured[:count]])
-            for name in self._measured[0]
+            name: np.stack([m[name][row] for m in measured]) for name in measured[0]
         }
         for name in _NO_STEP:
-            done = [step[name][row] for step in self._steps[:steps]]
+            done = [step[name][row] for step in self._steps[first : first + steps]]
             last = np.zeros_like(self._steps[0][name][row])
             rows[name] = np.stack([*done, last])
         rows["time"] = self._twin.period * np.arange(count)

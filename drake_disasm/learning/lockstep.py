@@ -179,20 +179,11 @@ def run_round(
     for learner in learners:
         for episode in learner.episodes:
             seeds[episode.row] = episode.summary.seed
-    with _shared_clock(trainings):
+    with _shared_clock([learner.training for learner in learners]):
         twin.reset(seeds)
         history = BatchHistory(twin)
     while any(learner.running for learner in learners):
-        before = np.array(to_numpy(twin.observation))
-        chosen, actions = np.zeros((2, twin.count, 6))
-        with _shared_clock(trainings):
-            for learner in learners:
-                learner.act(before, chosen, actions)
-            result = twin.step(actions)
-            history.add(result)
-        is_out = twin.bolt_is_out()
-        for learner in learners:
-            learner.take(result, before, chosen, is_out)
+        _step(twin, history, learners)
     for learner in learners:
         learner.end()
     return [
@@ -201,16 +192,30 @@ def run_round(
     ]
 
 
+def _step(
+    twin: BatchedTwin, history: BatchHistory, learners: Sequence[_Learner]
+) -> None:
+    """Takes one step in all episodes that run."""
+    before = np.array(to_numpy(twin.observation))
+    chosen, actions = np.zeros((2, twin.count, 6))
+    with _shared_clock([learner.training for learner in learners]):
+        for learner in learners:
+            learner.act(before, chosen, actions)
+        result = twin.step(actions)
+        history.add(result)
+    is_out = twin.bolt_is_out()
+    for learner in learners:
+        learner.take(result, before, chosen, is_out)
+
+
 @contextlib.contextmanager
-def _shared_clock(
-    trainings: Sequence[tuple[Training, Sequence[int]]],
-) -> Iterator[None]:
+def _shared_clock(trainings: Sequence[Training]) -> Iterator[None]:
     """Has each training bear its share of the time of a simulation."""
     began = time.perf_counter()
     yield
-    share = (time.perf_counter() - began) / len(trainings)
-    for training, _ in trainings:
-        training.seconds["simulation"] += share
+    spent = time.perf_counter() - began
+    for training in trainings:
+        training.seconds["simulation"] += spent / len(trainings)
 
 
 class LockstepTraining(Training):
@@ -244,7 +249,8 @@ class LockstepTrainings:
     """Several trainings side by side, each on one environment of a batch of twins.
 
     What each learns from is its own: an agent, episodes one after the other, updates
-    after each of them. Only the simulation is shared.
+    after each of them. Only the simulation is shared; none waits for another's
+    episode to end.
 
     Args:
         trainings: on the twin; their scenarios and hyper-parameters may differ. Their
@@ -260,6 +266,8 @@ class LockstepTrainings:
         self._twin = BatchedTwin(
             [scenarios[id(t.spec.scenario)] for t in self.trainings], device="numpy"
         )
+        self._learners: dict[int, _Learner] = {}
+        self._history: BatchHistory | None = None
 
     @property
     def unfinished(self) -> list[int]:
@@ -271,10 +279,40 @@ class LockstepTrainings:
         ]
 
     def run_episodes(self) -> dict[int, RecordedEpisode]:
-        """Runs one episode of each unfinished training; returns them by number."""
-        which = self.unfinished
-        found = run_round(self._twin, [(self.trainings[i], [i]) for i in which])
-        return {i: recorded for i, [(_, recorded)] in zip(which, found, strict=True)}
+        """Goes on until an episode ends; returns those that did, by training.
+
+        Their trainings have learned from them.
+        """
+        history = self._begin()
+        while all(learner.running for learner in self._learners.values()):
+            _step(self._twin, history, list(self._learners.values()))
+        ended = {}
+        for number, learner in list(self._learners.items()):
+            if not learner.running:
+                learner.end()
+                [episode] = learner.episodes
+                ended[number] = history.episode(number, episode.summary.steps)
+                del self._learners[number]
+        return ended
+
+    def _begin(self) -> BatchHistory:
+        """Begins the next episode of each training that has none running."""
+        new = [number for number in self.unfinished if number not in self._learners]
+        learners = {i: _Learner(self.trainings[i], [i]) for i in new}
+        seeds = [learner.episodes[0].summary.seed for learner in learners.values()]
+        with _shared_clock([learner.training for learner in learners.values()]):
+            if self._history is None:
+                every = [0] * self._twin.count
+                for number, seed in zip(new, seeds, strict=True):
+                    every[number] = seed
+                self._twin.reset(every)
+                self._history = BatchHistory(self._twin)
+            elif new:
+                rows = np.array(new)
+                self._twin.start(rows, seeds, self._twin.begin(rows, seeds))
+                self._history.begin(rows)
+        self._learners |= learners
+        return self._history
 
 
 def _result_of(result: BatchResult, row: int) -> StepResult:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from torch.utils._pytree import tree_leaves
 
+from drake_disasm.batch.history import RecordedEpisode
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.progress import ProgressUpdate
 from drake_disasm.learning.experiment import Experiment
@@ -151,14 +152,17 @@ def _side_by_side(count: int, **changes: Any) -> LockstepTrainings:
 
 def test_trainings_side_by_side_are_the_diagrams_one_by_one():
     together = _side_by_side(3, warmup_episodes=9)
-    recorded = together.run_episodes()
+    recorded = dict[int, list[RecordedEpisode]]()
+    while together.unfinished:
+        for number, episode in together.run_episodes().items():
+            recorded.setdefault(number, []).append(episode)
     assert [t.summaries[0].steps for t in together.trainings] == [4, 4, 6]
     for number, training in enumerate(together.trainings):
         alone = _training(1, warmup_episodes=9)
         alone.spec = training.spec
-        _, expected = alone.run_episode()
-        _assert_same_rows(recorded[number].columns(), expected)
-        assert training.replay.size == training.summaries[0].steps
+        for found in recorded[number][:2]:  # the second begins while others run
+            _assert_same_rows(found.columns(), alone.run_episode()[1])
+        assert training.replay.size == sum(s.steps for s in training.summaries)
 
 
 def test_each_of_them_learns_from_its_own_episodes_until_it_has_enough():
@@ -167,11 +171,10 @@ def test_each_of_them_learns_from_its_own_episodes_until_it_has_enough():
     more.spec = dataclasses.replace(
         more.spec, config=dataclasses.replace(more.spec.config, episodes=7)
     )
-    rounds = 0
+    ended = list[list[int]]()
     while together.unfinished:
-        together.run_episodes()
-        rounds += 1
-    assert rounds == 7
+        ended.append(sorted(together.run_episodes()))
+    assert ended[:4] == [[0, 1], [2], [0, 1], [0, 1, 2]]  # nobody waits: 4 and 6 steps
     assert [len(t.summaries) for t in together.trainings] == [7, 5, 5]
     assert [t.agent.updates for t in together.trainings] == [28, 20, 30]
 
