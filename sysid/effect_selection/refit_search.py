@@ -271,17 +271,11 @@ def ties_by_fit(
     limit = (1.0 + found.settings.refit_tie_margin) * found.loss
     losses = {e.effects: fit.loss for e, fit in confirmed if fit is not found}
     known = {e.effects: e for e, fit in confirmed if fit is not found}
-
-    def less(rival: Evidence) -> float:
-        return (best.gain - rival.gain) * before.loss
-
     for rival in rivals:
+        less = (best.gain - rival.gain) * before.loss
+        losses.setdefault(rival.effects, found.loss + less)
         known.setdefault(rival.effects, rival)
-    return tuple(
-        rival
-        for effects, rival in known.items()
-        if losses.get(effects, found.loss + less(rival)) <= limit
-    )
+    return tuple(rival for name, rival in known.items() if losses[name] <= limit)
 
 
 def _pairs(tried: Sequence[_Trial], settings: SelectionSettings) -> list[Evidence]:

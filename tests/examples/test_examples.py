@@ -20,8 +20,18 @@ PRINTED = {
     "hardware_station": ["step  x [mm]", "iiwa: READY", "ft_sensor: READY"],
 }
 
+#: Those that take longer than others.
+SLOW = ("own_effect", "gymnasium_sb3")
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+
+@pytest.mark.parametrize(
+    "example",
+    [
+        pytest.param(each, marks=[pytest.mark.slow] * (each.stem in SLOW))
+        for each in EXAMPLES
+    ],
+    ids=lambda path: path.stem,
+)
 def test_example_runs_and_prints(example: Path, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, str(example)],

@@ -105,6 +105,7 @@ def test_a_twin_from_the_command_line_and_back_into_simulate(
     assert again.returncode == 0, again.stderr
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_a_state_that_resumes_to_the_same_result(
     transitions: Path, tmp_path: Path
 ) -> None:

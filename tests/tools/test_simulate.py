@@ -31,6 +31,7 @@ def test_default_run_takes_the_bolt_out(simulate_apart: Runner) -> None:
     assert "1 of 1 episodes succeeded" in done.stdout
 
 
+@pytest.mark.slow
 def test_straight_jams_on_the_turned_groove(simulate: Runner) -> None:
     done = simulate("--scenario", "removal_turned", "--policy", "straight")
     assert done.returncode == 0, done.stderr

@@ -165,6 +165,7 @@ def test_ctrl_c_keeps_what_is_finished(seeds: int, tmp_path: Path) -> None:
     assert (out / "seed_000/checkpoint.npz").exists()
 
 
+@pytest.mark.slow
 def test_a_pool_whose_parent_dies_stops_by_itself(tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = _command(out, "--episodes=5000", "--seeds=2")

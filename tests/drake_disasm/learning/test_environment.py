@@ -36,6 +36,7 @@ def test_gymnasium_approves(station: str) -> None:
         check_env(DisassemblyEnv("removal", station))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["removal", "removal_turned"])
 def test_random_actions_survive_for_a_hundred_steps(name: str) -> None:
     """As an agent without experience acts; it was 1.1 steps once."""

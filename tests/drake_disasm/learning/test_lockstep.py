@@ -25,20 +25,18 @@ from drake_disasm.mdp import Outcome
 from drake_disasm.policies import load_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.recording import EpisodeRecorder
+from tests.drake_disasm.conftest import without_imprecision
 
-_RANDOMISED = load_scenario(
-    "removal_randomised",
-    [
-        "contact.model=impact",
-        "ft_sensor.noise=[0, 0, 0, 0, 0, 0]",
-        "task.steps=4",
-        "task.max_translation=0.002",
-    ],
-)
-# Without the arm's imprecision: a batch has other random numbers.
-SCENARIO = dataclasses.replace(
-    _RANDOMISED,
-    randomisation=[r for r in _RANDOMISED.randomisation if "." in r.parameter],
+SCENARIO = without_imprecision(
+    load_scenario(
+        "removal_randomised",
+        [
+            "contact.model=impact",
+            "ft_sensor.noise=[0, 0, 0, 0, 0, 0]",
+            "task.steps=4",
+            "task.max_translation=0.002",
+        ],
+    )
 )
 
 
@@ -179,6 +177,7 @@ def test_each_of_them_learns_from_its_own_episodes_until_it_has_enough():
     assert [t.agent.updates for t in together.trainings] == [28, 20, 30]
 
 
+@pytest.mark.slow
 def test_a_program_that_was_stopped_goes_on_bit_for_bit(tmp_path: Path) -> None:
     """The rounds before its last checkpoint are not run again."""
     config = _training(1).spec.config

@@ -134,7 +134,7 @@ def test_a_time_limit_is_not_remembered_as_an_end() -> None:
 
 def test_exploration_shrinks_by_episode_and_without_it_nothing_is_random() -> None:
     training = _training(exploration=0.003, exploration_decay=0.5)
-    assert [training._explorer(n).sigma for n in range(3)] == pytest.approx(
+    assert [training.explorer(n).sigma for n in range(3)] == pytest.approx(
         [1.0, 0.5, 0.25]
     )
     calm = _training(exploration=0.0)

@@ -28,6 +28,7 @@ def _end(simulation: TaskSimulation) -> np.ndarray:
     return np.asarray(result.observation[:6])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("control", IMPEDANCE)
 def test_an_arm_that_yields_goes_as_in_simulation(control: str) -> None:
     scenario = load_scenario("removal", [QUIET, f"arm.control={control}"])
@@ -57,6 +58,7 @@ def test_an_arm_that_yields_may_lag_but_not_stand_still() -> None:
         assert lead.max() > station.config.safety.max_lead, str(hold.value)
 
 
+@pytest.mark.slow
 def test_a_hold_lets_an_arm_that_yields_relax() -> None:
     """Held where it was measured, its spring no longer presses."""
     stiff, soft = (

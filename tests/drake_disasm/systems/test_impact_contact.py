@@ -72,6 +72,7 @@ def test_friction_is_coulombs():
     assert state[6] == pytest.approx(0.3 * state[8], rel=0.02)
 
 
+@pytest.mark.slow
 def test_an_episode_ends_as_with_hydroelastic_contact():
     ends = []
     for model in ("impact", "hydroelastic"):

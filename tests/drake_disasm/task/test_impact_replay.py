@@ -129,6 +129,7 @@ class Wear(EnvironmentEffect):
         return dataclasses.replace(environment, X_GnG=moved, friction=friction)
 
 
+@pytest.mark.slow
 def test_an_effect_of_a_users_own_acts_though_its_equation_takes_no_arrays(
     monkeypatch,
 ):

@@ -31,6 +31,7 @@ def _scatter(model):
     return fit_command_scatter(fitter, fitter.fit(()))
 
 
+@pytest.mark.slow
 def test_finds_by_how_much_commands_scatter(tmp_path):
     """The encoders' noise is allowed for, which this simulated log does not have."""
     truth = np.array([0.0, 1e-4, 0.0])
@@ -54,6 +55,7 @@ def test_what_follows_on_something_is_no_scatter(effects, tmp_path):
     assert _scatter(_model(tmp_path, effects)) is None
 
 
+@pytest.mark.slow
 def test_closing_the_loop_adds_it_to_the_scenario(tmp_path):
     model = _model(tmp_path, [Imprecision(y=4e-5, z=4e-5)])
     episodes = range(len(model.measurements.names))

@@ -37,6 +37,7 @@ def _survey(model):
     return fit, survey_candidates(fitter, fit, candidates(model, registered_effects()))
 
 
+@pytest.mark.slow
 def test_four_of_five_are_found_at_the_limit(model):
     fit, survey = _survey(model)
     limits = {(x.effect, x.field): x for x in detection_limits(survey.linearised)}

@@ -112,6 +112,7 @@ def test_amplitudes_that_gain_nothing_are_left_out(gain):
     assert simplified(fitter, simple) is simple
 
 
+@pytest.mark.slow
 def test_an_added_effect_ends_where_the_models_own_derivatives_lead(tmp_path):
     turned = load_scenario("removal_turned", [STIFF, "task.steps=14"])
     policy = Exploring(make_policy("admittance"), 1.5e-4, 0)

@@ -18,6 +18,7 @@ class _StopError(Exception):
     """What Ctrl-C is here."""
 
 
+@pytest.mark.slow
 def test_what_was_fitted_is_not_fitted_again_and_the_verdict_is_the_same(
     tmp_path, monkeypatch
 ):

@@ -26,6 +26,7 @@ def _verdict(folder, effects: list[Effect], library=None, episodes=12) -> Verdic
     return close_loop(model, library=library).verdict
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", [PoseDelay(0.2), MotionLag(0.03)], ids=repr)
 def test_each_is_named_beside_its_rivals(effect, tmp_path):
     verdict = _verdict(tmp_path, [effect], _RIVALS, episodes=8)

@@ -30,6 +30,7 @@ from sysid.workers import Workers
 _LIBRARY = [GrooveBend, GroovePose, SensorGain, SensorSaturation]
 
 
+@pytest.mark.slow
 def test_a_groove_turned_by_three_degrees_is_named_and_measured(tmp_path):
     hidden = [GroovePose(ry=-0.0524)]
     transitions_log(tmp_path / "log", nominal(), hidden, 0, episodes=6, steps=20)
@@ -81,6 +82,7 @@ class ClosedEndMagnet(EnvironmentEffect):
         return dataclasses.replace(environment, force_Gn=(x, y, z))
 
 
+@pytest.mark.slow
 def test_an_effect_that_a_stop_hides_at_null_is_found_by_fits(tmp_path, monkeypatch):
     """A little of it moves the bolt at A, and so the sensor's zero; more does not."""
     known = registry._effects | {ClosedEndMagnet.__name__: ClosedEndMagnet}
