@@ -68,12 +68,12 @@ def _sb3(config: Hyperparameters) -> float:
     from stable_baselines3.common.callbacks import StopTrainingOnMaxEpisodes
     from stable_baselines3.common.noise import NormalActionNoise
 
-    env = DisassemblyEnv("chapter4")
+    env, task = DisassemblyEnv("chapter4"), load_scenario("chapter4").task
     arguments: dict[str, Any] = {
         "net_arch": list(config.hidden),
         "optimizer_kwargs": {"eps": config.adam_epsilon},
     }
-    sigma = np.full(6, config.exploration / env.scenario.task.max_translation)
+    sigma = np.full(6, config.exploration / task.max_translation)
     agent = DDPG(
         "MlpPolicy",
         env,
@@ -92,5 +92,5 @@ def _sb3(config: Hyperparameters) -> float:
     )
     stop = StopTrainingOnMaxEpisodes(_EPISODES)
     start = time.perf_counter()
-    agent.learn(_EPISODES * env.scenario.task.steps, callback=stop)
+    agent.learn(_EPISODES * task.steps, callback=stop)
     return time.perf_counter() - start
