@@ -39,7 +39,7 @@ Row = dict[str, Any]
 
 def main(arguments: Sequence[str]) -> int:
     """Runs what is missing of the episodes, and prints the table."""
-    args = _parser().parse_args(arguments)
+    args = parse(arguments)
     args.out.mkdir(parents=True, exist_ok=True)
     found = {}
     for name in (args.policy, _BASELINE):
@@ -117,7 +117,8 @@ def _episodes(path: Path, name: str, args: argparse.Namespace) -> list[Row]:
     return rows
 
 
-def _parser() -> argparse.ArgumentParser:
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--policy", default="removal_randomised", metavar="NAME")
     parser.add_argument("--scenario", default="removal_randomised", metavar="NAME")
@@ -126,7 +127,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--episodes", type=options.positive, default=400, metavar="N")
     parser.add_argument("--seed", type=options.seed, default=_FIRST_SEED, metavar="S")
     parser.add_argument("--out", type=Path, default=Path("out/against_baseline"))
-    return parser
+    return parser.parse_args(arguments)
 
 
 if __name__ == "__main__":
