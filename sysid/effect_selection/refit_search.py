@@ -133,7 +133,9 @@ class RefitSearch(ForwardSearch):
                 self._report_rejected(trial)
                 continue
             confirmed.append((trial, found))
-            if found.model.costly and found.objective < self._settings.noise_level:
+            # A model that states an error of its own may be below that and wrong.
+            at_noise = found.objective < self._settings.noise_level
+            if found.model.costly and at_noise and not found.states_model_error:
                 break
         return confirmed, tried
 
