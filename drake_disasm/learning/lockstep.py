@@ -3,6 +3,7 @@
 import contextlib
 import copy
 import dataclasses
+import functools
 import time
 from collections.abc import Iterator, Sequence
 
@@ -12,12 +13,10 @@ from drake_disasm.batch.history import BatchHistory, RecordedEpisode
 from drake_disasm.batch.twin import BatchedTwin, BatchResult, with_impact
 from drake_disasm.common.arrays import to_numpy
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.learning.replay import Replay
 from drake_disasm.learning.training import (
     Explorer,
     Purpose,
     Training,
-    TrainingSpec,
     seed_for,
 )
 from drake_disasm.mdp import Outcome
@@ -158,38 +157,14 @@ class _Learner:
         training.summaries += [episode.summary for episode in self.episodes]
 
 
-def run_round(
-    twin: BatchedTwin, trainings: Sequence[tuple[Training, Sequence[int]]]
-) -> list[list[tuple[EpisodeSummary, RecordedEpisode]]]:
-    """Runs one round of episodes in lockstep, with updates by the schedules.
-
-    All of them begin together; one that ends waits for the others. The agent that
-    explores has learned from the rounds before, and with the schedule `every_step` from
-    the steps of this one.
-
-    Args:
-        twin: the batch.
-        trainings: each with the environments that run its next episodes.
-
-    Returns:
-        The episodes of each training.
-    """
-    learners = [_Learner(training, rows) for training, rows in trainings]
+def _begun(twin: BatchedTwin, learners: Sequence[_Learner]) -> BatchHistory:
+    """Begins the learners' episodes in a batch, all together; returns its history."""
     seeds = [0] * twin.count
     for learner in learners:
         for episode in learner.episodes:
             seeds[episode.row] = episode.summary.seed
-    with _shared_clock([learner.training for learner in learners]):
-        twin.reset(seeds)
-        history = BatchHistory(twin)
-    while any(learner.running for learner in learners):
-        _step(twin, history, learners)
-    for learner in learners:
-        learner.end()
-    return [
-        [(e.summary, history.episode(e.row, e.summary.steps)) for e in learner.episodes]
-        for learner in learners
-    ]
+    twin.reset(seeds)
+    return BatchHistory(twin)
 
 
 def _step(
@@ -221,28 +196,29 @@ def _shared_clock(trainings: Sequence[Training]) -> Iterator[None]:
 class LockstepTraining(Training):
     """A training whose episodes run in rounds, as many at a time as `spec.envs`.
 
-    Seeds, exploration and what is learned from are per episode as in `Training`; see
-    `run_round`. Contact is IMPACT.
-
-    Args:
-        spec, demonstrations, dataset: as of Training.
+    All episodes of a round begin together; one that ends waits for the others. Seeds,
+    exploration and what is learned from are per episode as in `Training`; the agent
+    that explores has learned from the rounds before, and with the schedule
+    `every_step` from the steps of this one. Contact is IMPACT.
     """
 
-    def __init__(
-        self,
-        spec: TrainingSpec,
-        demonstrations: Replay | None = None,
-        dataset: Replay | None = None,
-    ) -> None:
-        super().__init__(spec, demonstrations, dataset)
-        self._twin = BatchedTwin(with_impact(spec.scenario), spec.envs, "numpy")
+    @functools.cached_property
+    def _twin(self) -> BatchedTwin:
+        return BatchedTwin(with_impact(self.spec.scenario), self.spec.envs, "numpy")
 
     def run_episodes(self) -> list[tuple[EpisodeSummary, RecordedEpisode]]:
         """Runs one round of episodes, with updates by the schedule."""
-        spec = self.spec
-        count = min(spec.envs, spec.config.episodes - len(self.summaries))
-        [found] = run_round(self._twin, [(self, range(count))])
-        return found
+        count = min(self.spec.envs, self.spec.config.episodes - len(self.summaries))
+        learner = _Learner(self, range(count))
+        with self.clock("simulation"):
+            history = _begun(self._twin, [learner])
+        while learner.running:
+            _step(self._twin, history, [learner])
+        learner.end()
+        return [
+            (episode.summary, history.episode(episode.row, episode.summary.steps))
+            for episode in learner.episodes
+        ]
 
 
 class LockstepTrainings:
@@ -299,16 +275,12 @@ class LockstepTrainings:
         """Begins the next episode of each training that has none running."""
         new = [number for number in self.unfinished if number not in self._learners]
         learners = {i: _Learner(self.trainings[i], [i]) for i in new}
-        seeds = [learner.episodes[0].summary.seed for learner in learners.values()]
         with _shared_clock([learner.training for learner in learners.values()]):
             if self._history is None:
-                every = [0] * self._twin.count
-                for number, seed in zip(new, seeds, strict=True):
-                    every[number] = seed
-                self._twin.reset(every)
-                self._history = BatchHistory(self._twin)
+                self._history = _begun(self._twin, list(learners.values()))
             elif new:
                 rows = np.array(new)
+                seeds = [x.episodes[0].summary.seed for x in learners.values()]
                 self._twin.start(rows, seeds, self._twin.begin(rows, seeds))
                 self._history.begin(rows)
         self._learners |= learners
