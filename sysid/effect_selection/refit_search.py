@@ -30,34 +30,68 @@ _Starts = Mapping[tuple[str, ...], Fit]
 _Trial = tuple[Evidence, Fit]
 
 
+@dataclasses.dataclass(frozen=True)
+class _Ranking:
+    """Effects in the order of what they promise, and what fits made of the first.
+
+    Attributes:
+        survey: with the evidence for each.
+        likely: that are worth a fit.
+        confirmed: by their fits.
+        tried: all that were fitted.
+    """
+
+    survey: Survey
+    likely: list[Evidence]
+    confirmed: list[_Trial]
+    tried: list[_Trial]
+
+
 class RefitSearch(ForwardSearch):
     """Where effects are not linear: candidates are compared by their fits."""
 
     def _next(self, fit: Fit, survey: Survey) -> Fit | None:
-        limits, starts = self._settings, dict[tuple[str, ...], Fit]()
-        confirmed, tried = list[_Trial](), list[_Trial]()
-        is_far = fit.objective > limits.max_linear_objective
-        likely = self._worth_a_fit(fit, survey, starts)
-        if not is_far:
-            confirmed, tried = self._try_best(fit, survey, likely, starts)
-        # What is not linear at null, as a stop that takes up a force, hides from it;
-        # of a costly model more than noise is always left, and minutes would be lost.
-        is_left = fit.objective > limits.max_objective_at_noise and not fit.model.costly
-        is_open = survey.effects and not confirmed and not self._is_over
-        if is_open and (is_far or is_left):
-            survey, starts = self._prescreened(fit, survey)
-            likely = self._worth_a_fit(fit, survey, starts)
-            confirmed, tried = self._try_best(fit, survey, likely, starts)
-        if not confirmed:
-            confirmed, _ = self._try(fit, survey, _pairs(tried, limits), {})
-        return self._chosen(fit, survey, confirmed, likely) if confirmed else None
+        rankings = list[_Ranking]()
+        if fit.objective <= self._settings.max_linear_objective:
+            rankings.append(self._tried(fit, survey, {}))
+        if self._needs_prescreening(fit, survey, rankings):
+            rankings.append(self._tried(fit, *self._prescreened(fit, survey)))
+        if rankings and not any(ranking.confirmed for ranking in rankings):
+            rankings.append(self._tried_in_pairs(fit, rankings.pop()))
+        return self._chosen(fit, [r for r in rankings if r.confirmed])
 
-    def _try_best(
-        self, fit: Fit, survey: Survey, likely: Sequence[Evidence], starts: _Starts
-    ) -> tuple[list[_Trial], list[_Trial]]:
-        """Returns what fits confirm of the most promising, and all that was tried."""
+    def _needs_prescreening(
+        self, fit: Fit, survey: Survey, rankings: Sequence[_Ranking]
+    ) -> bool:
+        """Returns whether every effect is to be fitted to a few rows.
+
+        What is not linear at null, as a stop that takes up a force, hides from the
+        linear account. Where the model states an error of its own, that account may
+        be content with an effect that ends below it and is not what is missing.
+        """
+        if self._is_over or not survey.effects:
+            return False
+        if not rankings:
+            return True
+        if fit.objective <= self._settings.max_objective_at_noise:
+            return False
+        if fit.states_model_error:
+            return True
+        # Of a costly model more than noise is always left, and minutes would be lost.
+        return not rankings[-1].confirmed and not fit.model.costly
+
+    def _tried(self, fit: Fit, survey: Survey, starts: _Starts) -> _Ranking:
+        """Returns a ranking's most promising effects, with their fits."""
+        likely = self._worth_a_fit(fit, survey, starts)
         chosen = trials(likely, self._settings.max_trials)
-        return self._try(fit, survey, chosen, starts)
+        return _Ranking(survey, likely, *self._try(fit, survey, chosen, starts))
+
+    def _tried_in_pairs(self, fit: Fit, alone: _Ranking) -> _Ranking:
+        """Returns a ranking none of whose effects is confirmed alone, by pairs."""
+        pairs = _pairs(alone.tried, self._settings)
+        return _Ranking(
+            alone.survey, alone.likely, *self._try(fit, alone.survey, pairs, {})
+        )
 
     def _worth_a_fit(self, fit: Fit, survey: Survey, starts: _Starts) -> list[Evidence]:
         """Returns what gains enough; after prescreening, of what has a start alone.
@@ -73,23 +107,21 @@ class RefitSearch(ForwardSearch):
         most = limits.refit_max_linear_p
         return [e for e in likely if linear_p(fit, survey.linearised, e) < most]
 
-    def _chosen(
-        self,
-        fit: Fit,
-        survey: Survey,
-        confirmed: Sequence[_Trial],
-        likely: Sequence[Evidence],
-    ) -> Fit | None:
+    def _chosen(self, fit: Fit, rankings: Sequence[_Ranking]) -> Fit | None:
         """Returns the best of the confirmed fits, on record, if an effect is needed."""
+        if not rankings:
+            return None
         limits = self._settings
+        confirmed = [trial for ranking in rankings for trial in ranking.confirmed]
         best, found = _lowest(confirmed, limits)
+        ranking = next(r for r in rankings if any(e is best for e, _ in r.confirmed))
         again = self.fitter.fit(fit.effects, found)
         if again.loss <= (1.0 + limits.min_gain) * found.loss:
             return self._same_effects(fit, again)
-        rivals = ties(best, likely)
+        rivals = ties(best, ranking.likely)
         rivals = ties_by_fit(best, rivals, confirmed, fit, found)
         found = at_own_minimum(self.fitter, found)
-        self._record(best, rivals, survey, found)
+        self._record(best, rivals, ranking.survey, found)
         return found
 
     def _same_effects(self, fit: Fit, again: Fit) -> Fit | None:
@@ -271,8 +303,10 @@ def ties_by_fit(
     much less they explain by it than the best does by the same.
     """
     limit = (1.0 + found.settings.refit_tie_margin) * found.loss
-    losses = {e.effects: fit.loss for e, fit in confirmed if fit is not found}
-    known = {e.effects: e for e, fit in confirmed if fit is not found}
+    others = sorted(confirmed, key=lambda trial: -trial[1].loss)
+    others = [trial for trial in others if trial[0].effects != best.effects]
+    losses = {e.effects: fit.loss for e, fit in others}
+    known = {e.effects: e for e, _ in others}
     for rival in rivals:
         less = (best.gain - rival.gain) * before.loss
         losses.setdefault(rival.effects, found.loss + less)
