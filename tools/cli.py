@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from drake_disasm.common import options
+from drake_disasm.common.cluster import EXECUTORS
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.common.text import clipped
@@ -112,6 +113,24 @@ def add_workers_argument(parser: argparse.ArgumentParser, more: str = "") -> Non
         default=os.cpu_count() or 1,
         metavar="N",
         help=f"processes (default: one per core){more}",
+    )
+
+
+def add_executor_arguments(parser: argparse.ArgumentParser, more: str = "") -> None:
+    """Adds --workers, --executor and --scheduler."""
+    add_workers_argument(parser, more or "; jobs at a time with --executor dask")
+    parser.add_argument(
+        "--executor",
+        default="local",
+        choices=EXECUTORS,
+        help="what does the work: processes of this program, or a Dask cluster whose "
+        "workers see the same files (default: local)",
+    )
+    parser.add_argument(
+        "--scheduler",
+        default="",
+        metavar="tcp://HOST:PORT",
+        help="of the Dask cluster",
     )
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Collection, Iterable, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,11 @@ def seed_jobs(
 
 
 def train_seeds(
-    jobs: Sequence[SeedJob], workers: int = 1, progress: Progress = ignore_progress
+    jobs: Sequence[SeedJob],
+    workers: int = 1,
+    progress: Progress = ignore_progress,
+    executor: Executor | None = None,
+    host: str = "",
 ) -> None:
     """Trains all seeds, each in a process of its own if there are several workers.
 
@@ -60,10 +65,13 @@ def train_seeds(
         jobs: one for each seed.
         workers: processes.
         progress: gets episodes done, mean reward, and success of the latest.
+        executor, host: as of `WorkerPool`; its workers must see the jobs' folders.
     """
     together = [job for job in jobs if job.experiment.lockstep and not job.is_finished]
     groups = [tuple(together[i::workers]) for i in range(min(workers, len(together)))]
-    with WorkerPool(workers, process_per_job=True, progress=progress) as pool:
+    with WorkerPool(
+        workers, executor=executor, host=host, process_per_job=True, progress=progress
+    ) as pool:
         for _ in pool.run(_train_in_lockstep, groups):
             pass
         for _ in pool.run(train_seed, jobs):

@@ -1,0 +1,92 @@
+"""Executors by name: processes of this program, or a Dask cluster."""
+
+import contextlib
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from typing import TYPE_CHECKING
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.text import clipped
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+EXECUTORS = ("local", "dask")
+_PATIENCE = 10.0  # s until a scheduler must have answered
+#: What results depend on, beside what Dask itself compares.
+_PACKAGES = ["drake_disasm", "pydrake", "torch"]
+
+
+@contextlib.contextmanager
+def executor_for(name: str, scheduler: str) -> Iterator[tuple[Executor | None, str]]:
+    """Gives an executor, and the name under which its workers reach this program.
+
+    Args:
+        name: one of EXECUTORS; "local" gives None: `WorkerPool` has its own processes.
+        scheduler: address of Dask's, as tcp://HOST:PORT.
+
+    Raises:
+        DisasmError: Dask is not installed, its scheduler does not answer, it has no
+            workers, or they have other versions of what the work needs.
+    """
+    if name == "local":
+        if scheduler:
+            raise DisasmError(f"--scheduler {scheduler}: add --executor dask")
+        yield None, ""
+        return
+    if not scheduler:
+        raise DisasmError(
+            "--executor dask: give the scheduler's address, --scheduler tcp://HOST:8786"
+        )
+    with contextlib.ExitStack() as stack:
+        client = stack.enter_context(_client(scheduler))
+        yield stack.enter_context(client.get_executor()), _own_name(scheduler)
+
+
+@contextlib.contextmanager
+def _client(scheduler: str) -> Iterator["Client"]:
+    """Gives a client of a scheduler that answers, and closes it."""
+    try:
+        import distributed
+    except ImportError:
+        raise DisasmError(
+            "--executor dask: Dask is not installed; "
+            "pip install 'drake_disasm[cluster]'"
+        ) from None
+    try:
+        client = distributed.Client(scheduler, timeout=_PATIENCE)
+    except (OSError, ValueError, TypeError) as error:
+        raise DisasmError(
+            f"scheduler {scheduler}: does not answer within {_PATIENCE:g} s "
+            f"({clipped(str(error))}); start one by `dask scheduler`, or check the "
+            "address"
+        ) from None
+    try:
+        _check_workers(client, scheduler)
+        yield client
+    finally:
+        client.close()
+
+
+def _check_workers(client: "Client", scheduler: str) -> None:
+    """Refuses a cluster without workers, or with other versions than here."""
+    if not client.scheduler_info(n_workers=-1)["workers"]:
+        raise DisasmError(
+            f"scheduler {scheduler}: has no workers; start some by "
+            f"`dask worker {scheduler}`"
+        )
+    try:
+        client.get_versions(check=True, packages=_PACKAGES)
+    except ValueError as error:
+        raise DisasmError(
+            f"scheduler {scheduler}: its workers have other versions than this "
+            f"program ({clipped(str(error))}); install the same everywhere"
+        ) from None
+
+
+def _own_name(scheduler: str) -> str:
+    """Returns the address of this machine that a scheduler's machine can reach."""
+    from distributed.comm import get_address_host, resolve_address
+    from distributed.utils import get_ip
+
+    return str(get_ip(get_address_host(resolve_address(scheduler))))

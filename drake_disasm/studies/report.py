@@ -1,0 +1,91 @@
+"""A study's report: Markdown, one HTML page that opens offline, and all rows as CSV."""
+
+import base64
+import csv
+import io
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from drake_disasm.common.files import write_text
+from drake_disasm.studies.results import SEED_COLUMNS, seed_rows
+from drake_disasm.studies.runner import SeedResult, finished
+from drake_disasm.studies.study import Study, Table
+
+_ENVIRONMENT = jinja2.Environment(
+    loader=jinja2.PackageLoader("drake_disasm.studies", "."),
+    autoescape=jinja2.select_autoescape(["html.j2"]),
+    trim_blocks=True,
+    lstrip_blocks=True,
+    undefined=jinja2.StrictUndefined,
+)
+_FORMATS = ("md", "html")
+
+
+def write_report(study: Study, folder: Path, origin: Mapping[str, Any]) -> list[Table]:
+    """Writes report and figures of what is finished.
+
+    Args:
+        study: what was studied.
+        folder: of the study.
+        origin: provenance of its beginning.
+
+    Returns:
+        The tables, for the terminal.
+    """
+    results = finished_of(study, folder)
+    tables = study.tables(folder)
+    pictures = study.pictures(folder)
+    for picture in pictures:
+        picture.draw(folder / picture.name)
+    images = {
+        p.name: base64.b64encode((folder / p.name).read_bytes()).decode()
+        for p in pictures
+    }
+    everything = Table("Every seed", SEED_COLUMNS, seed_rows(results))
+    for kind in _FORMATS:
+        text = _ENVIRONMENT.get_template(f"report.{kind}.j2").render(
+            study=study,
+            origin=origin,
+            machine=_machine(),
+            tables=[*tables, everything],
+            pictures=pictures,
+            images=images,
+        )
+        write_text(folder / f"report.{kind}", text)
+    write_text(folder / "results.csv", _csv(everything.columns, everything.rows))
+    return tables
+
+
+def finished_of(study: Study, folder: Path) -> list[SeedResult]:
+    """Returns all trainings of a study that are finished."""
+    found = []
+    for stage in study.stages(folder):
+        found += finished(list(stage.treatments), tuple(stage.seeds), folder)
+    return found
+
+
+def as_text(table: Table) -> str:
+    """Returns a table for a terminal."""
+    cells = [list(table.columns), *map(list, table.rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = [
+        "  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True))
+        for line in cells
+    ]
+    return "\n".join([f"{table.title}:", *lines, *([table.note] if table.note else [])])
+
+
+def _csv(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    text = io.StringIO(newline="")
+    csv.writer(text, lineterminator="\n").writerows([columns, *rows])
+    return text.getvalue()
+
+
+def _machine() -> str:
+    """Returns the machine in words."""
+    return f"{platform.platform()}, {os.cpu_count()} cores"

@@ -1,0 +1,72 @@
+"""Cells of tables: rates, means and their intervals, as text."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from drake_disasm.learning.statistics import wilson_interval
+from drake_disasm.studies.runner import SeedResult
+
+
+def rate(successes: int, trials: int) -> str:
+    """Returns a rate with Wilson's 95 % interval."""
+    if trials == 0:
+        return "-"
+    low, high = (100.0 * end for end in wilson_interval(successes, trials))
+    return f"{successes}/{trials} ({low:.0f} to {high:.0f} %)"
+
+
+def mean_of(values: Sequence[float], digits: int = 1) -> str:
+    """Returns mean and standard deviation, if there are any values."""
+    if not len(values):
+        return "-"
+    mean, spread = np.mean(values), np.std(values, ddof=1) if len(values) > 1 else 0.0
+    return f"{mean:.{digits}f} ± {spread:.{digits}f}"
+
+
+def instability_index(results: Sequence[SeedResult]) -> tuple[float, int]:
+    """Returns the index I_s, and of how many trainings (thesis, eq. 3.5).
+
+    I_s = sum over trainings of sigma_i / N_i: the standard deviation of the episodic
+    reward in validation, and the number of episodes that succeed. A training without
+    any has no N_i and is left out; the second number says how many are not.
+    """
+    own = [r.validation for r in results if r.validation["successes"]]
+    return sum(v["instability"] / v["successes"] for v in own), len(own)
+
+
+def seed_rows(results: Sequence[SeedResult]) -> list[list[str]]:
+    """Returns a row for each seed, as in `SEED_COLUMNS`."""
+    rows = []
+    for r in results:
+        v, training = r.validation, r.figures.get("training")
+        rows.append(
+            [
+                r.treatment.folder,
+                str(r.seed),
+                str(r.figures.get("first_success") or "-"),
+                f"{training['performance']:.2f}" if training else "-",
+                f"{v['successes']}/{v['episodes']}",
+                f"{v['performance']:.2f}",
+                f"{v['instability']:.2f}",
+                f"{v['mean_force']:.2f}",
+                f"{v['peak_force']:.2f}",
+                f"{v['steps']:.1f}",
+            ]
+        )
+    return rows
+
+
+#: Headings of `seed_rows`.
+SEED_COLUMNS = (
+    "treatment",
+    "seed",
+    "first success",
+    "P",
+    "greedy success",
+    "greedy reward",
+    "its spread",
+    "mean force [N]",
+    "peak force [N]",
+    "steps",
+)

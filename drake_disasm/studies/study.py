@@ -1,0 +1,291 @@
+"""What a study is: factors, their levels, replications, and what is measured.
+
+A study is a module that says so, and makes tables of what was measured; `runner.py`
+does the work, `report.py` writes it down. A study's folder::
+
+    study.json                     what is studied, and by which command
+    TREATMENT/                     one combination of levels: a training of all seeds
+                                   (see learning/experiment.py)
+    TREATMENT/seed_000/tests/      greedy episodes of its policy elsewhere
+    results.csv                    a row for each seed of each treatment
+    report.md, report.html, *.png
+"""
+
+import abc
+import dataclasses
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
+from drake_disasm.learning.experiment import Experiment
+from drake_disasm.learning.hyperparameters import Hyperparameters, override, preset
+from drake_disasm.scenario import Scenario, load_scenario
+
+Level = float | str
+
+
+@dataclasses.dataclass(frozen=True)
+class Factor:
+    """What is varied.
+
+    Attributes:
+        name: in folders, options and columns.
+        unit: of its levels.
+        levels: those of the whole study.
+    """
+
+    name: str
+    unit: str
+    levels: tuple[Level, ...]
+
+    @property
+    def heading(self) -> str:
+        """Its name with its unit, for tables."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    def chosen(self, texts: Sequence[str]) -> tuple[Level, ...]:
+        """Returns some of the levels.
+
+        Args:
+            texts: of the levels, as the user writes them.
+
+        Raises:
+            DisasmError: one is none of the levels.
+        """
+        known = {level_text(level): level for level in self.levels}
+        for text in texts:
+            if text not in known:
+                raise DisasmError(
+                    f"level {self.name}={text}: is not studied; "
+                    f"{closest(text, list(known))}"
+                )
+        return tuple(level for text, level in known.items() if text in texts)
+
+
+def level_text(level: Level) -> str:
+    """Returns a level as users write it."""
+    return level if isinstance(level, str) else f"{level:g}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Treatment:
+    """One combination of levels, and the training that it means.
+
+    Attributes:
+        folder: name within the study's folder.
+        levels: by the factor's name.
+        experiment: of all seeds.
+    """
+
+    folder: str
+    levels: Mapping[str, Level]
+    experiment: Experiment
+
+
+@dataclasses.dataclass(frozen=True)
+class PolicyTest:
+    """Greedy episodes of a policy, as one job.
+
+    Attributes:
+        path: of the JSON file with its figures (`Evaluation`).
+        policy: name of a scripted or shipped one, or an .npz file.
+        scenario, station: where it acts.
+        seeds: of the episodes.
+    """
+
+    path: Path
+    policy: str
+    scenario: Scenario
+    station: str
+    seeds: tuple[int, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Stage:
+    """Work that needs nothing but what stages before it have left.
+
+    Attributes:
+        treatments: to be trained.
+        seeds: of each.
+        tests: after that.
+    """
+
+    treatments: Sequence[Treatment] = ()
+    seeds: Sequence[int] = ()
+    tests: Sequence[PolicyTest] = ()
+
+
+@dataclasses.dataclass(frozen=True)
+class StudyOptions:
+    """What the user chooses of a study; everything else it says itself.
+
+    Attributes:
+        seeds: replications of each treatment.
+        levels: of some factors, by name; others have all theirs.
+        episodes: of each training; None for the study's number.
+        validation: greedy episodes of each policy; None for the study's number.
+        changes: of hyper-parameters, as KEY=VALUE.
+        overrides: of the scenario, as KEY=VALUE.
+        lockstep: whether trainings run side by side on batches of twins.
+        compiled: whether updates are compiled.
+        compare: file of somebody else's results to show beside ours, or None.
+        provenance: command, date, versions, commit.
+    """
+
+    seeds: tuple[int, ...]
+    levels: Mapping[str, Sequence[str]] = dataclasses.field(default_factory=dict)
+    episodes: int | None = None
+    validation: int | None = None
+    changes: tuple[str, ...] = ()
+    overrides: tuple[str, ...] = ()
+    lockstep: bool = True
+    compiled: bool = True
+    compare: Path | None = None
+    provenance: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
+class Table:
+    """A table of a report.
+
+    Attributes:
+        title: above it.
+        columns: headings.
+        rows: texts.
+        note: below it.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Picture:
+    """A figure of a report.
+
+    Attributes:
+        title: above it.
+        name: of the file.
+        draw: writes the file.
+    """
+
+    title: str
+    name: str
+    draw: Callable[[Path], None]
+
+
+class Study(abc.ABC):
+    """One of the studies.
+
+    Attributes:
+        name: by which it is started.
+        question: that it answers.
+        source: in the thesis, or elsewhere.
+        factors: and all their levels.
+        seeds, episodes, validation: of the whole study.
+
+    Args:
+        options: what the user chooses.
+
+    Raises:
+        DisasmError: a level or a factor that is not studied.
+    """
+
+    name: ClassVar[str]
+    question: ClassVar[str]
+    source: ClassVar[str]
+    factors: ClassVar[tuple[Factor, ...]]
+    seeds: ClassVar[int]
+    episodes: ClassVar[int]
+    validation: ClassVar[int] = 10
+
+    def __init__(self, options: StudyOptions) -> None:
+        self.options = options
+        known = [factor.name for factor in self.factors]
+        for name in options.levels:
+            if name not in known:
+                raise DisasmError(
+                    f"factor {name}: is not one of study '{self.name}'; "
+                    f"{closest(name, known)}"
+                )
+        self.levels = {
+            f.name: f.chosen(options.levels[f.name])
+            if f.name in options.levels
+            else f.levels
+            for f in self.factors
+        }
+
+    @abc.abstractmethod
+    def stages(self, folder: Path) -> Iterator[Stage]:
+        """Yields the work, stage by stage; each sees what those before have left."""
+
+    @abc.abstractmethod
+    def tables(self, folder: Path) -> list[Table]:
+        """Returns what was found, of all that is finished."""
+
+    def pictures(self, folder: Path) -> list[Picture]:
+        """Returns what is to be drawn, of all that is finished."""
+        return []
+
+    def combinations(self) -> list[dict[str, Level]]:
+        """Returns all combinations of the chosen levels."""
+        values = itertools.product(*self.levels.values())
+        return [dict(zip(self.levels, each, strict=True)) for each in values]
+
+    def experiment(
+        self,
+        scenario: str,
+        config: Hyperparameters,
+        preset_name: str,
+        overrides: Iterable[str] = (),
+    ) -> Experiment:
+        """Returns a training on the twin, with what the user chooses.
+
+        Args:
+            scenario: its name.
+            config: hyper-parameters, `preset_name` what they started from.
+            overrides: of the scenario.
+        """
+        options = self.options
+        episodes = f"episodes={options.episodes or self.episodes}"
+        return Experiment(
+            scenario=load_scenario(scenario, [*overrides, *options.overrides]),
+            station="twin",
+            preset=preset_name,
+            config=override(config, [episodes, *options.changes]),
+            compiled=options.compiled,
+            validation=self.validation_episodes,
+            lockstep=options.lockstep,
+            provenance=options.provenance,
+        )
+
+    @property
+    def validation_episodes(self) -> int:
+        """Greedy episodes of each policy."""
+        return self.options.validation or self.validation
+
+
+def folder_name(levels: Mapping[str, Level]) -> str:
+    """Returns the name of a treatment's folder."""
+    return "__".join(f"{name}_{level_text(level)}" for name, level in levels.items())
+
+
+#: Agents that studies compare: what each is, and its preset if it has its own.
+AGENTS = ("ddpg", "td3", "sac", "best")
+
+
+def agent_config(agent: str, chapter: str) -> tuple[Hyperparameters, str]:
+    """Returns hyper-parameters of an agent and the name of their preset.
+
+    Args:
+        agent: one of AGENTS; "best" is SAC that corrects `admittance`.
+        chapter: preset of the others.
+    """
+    if agent == "best":
+        return preset("best"), "best"
+    return preset(chapter, agent), chapter
