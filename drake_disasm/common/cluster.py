@@ -1,6 +1,7 @@
 """Executors by name: processes of this program, or a Dask cluster."""
 
 import contextlib
+import logging
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING
@@ -39,8 +40,21 @@ def executor_for(name: str, scheduler: str) -> Iterator[tuple[Executor | None, s
             "--executor dask: give the scheduler's address, --scheduler tcp://HOST:8786"
         )
     with contextlib.ExitStack() as stack:
+        stack.enter_context(_silent())
         client = stack.enter_context(_client(scheduler))
         yield stack.enter_context(client.get_executor()), _own_name(scheduler)
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """Keeps Dask from writing its own tracebacks beside our errors."""
+    logger = logging.getLogger("distributed")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 @contextlib.contextmanager

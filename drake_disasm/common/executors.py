@@ -13,6 +13,7 @@ import threading
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import (
     BrokenExecutor,
+    CancelledError,
     Executor,
     Future,
     ProcessPoolExecutor,
@@ -211,8 +212,8 @@ class WorkerPool:
     def _replace_workers(self, failures: int, error: BrokenExecutor) -> None:
         if self._given:
             raise DisasmError(
-                f"the executor lost its workers ({error}); give them more memory, "
-                "then resume"
+                f"the executor lost its workers or its scheduler ({error}); see their "
+                "logs (out of memory?), then resume"
             ) from error
         if failures == _ATTEMPTS:
             raise DisasmError(
@@ -259,6 +260,8 @@ def _import(module: str) -> None:
 def _result(future: Future[Result]) -> Result:
     try:
         return future.result()
+    except CancelledError as error:  # not by this program: its scheduler went away
+        raise BrokenExecutor("its work was cancelled") from error
     except Exception as error:
         if type(error).__name__ == "KilledWorker":  # Dask's, after trying again itself
             raise BrokenExecutor(str(error)) from error

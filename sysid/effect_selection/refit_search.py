@@ -56,7 +56,9 @@ class RefitSearch(ForwardSearch):
             rankings.append(self._tried(fit, survey, {}))
         if self._needs_prescreening(fit, survey, rankings):
             rankings.append(self._tried(fit, *self._prescreened(fit, survey)))
-        if rankings and not any(ranking.confirmed for ranking in rankings):
+        is_left = fit.objective > self._settings.noise_level
+        is_left = is_left or not fit.states_model_error
+        if rankings and is_left and not any(r.confirmed for r in rankings):
             rankings.append(self._tried_in_pairs(fit, rankings.pop()))
         return self._chosen(fit, [r for r in rankings if r.confirmed])
 

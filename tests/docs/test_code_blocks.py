@@ -19,7 +19,7 @@ from tests.docs.pages import ROOT, Block, blocks, commands, name_of, pages
 
 _PYTHON = {"python", "python3", ".venv/bin/python"}
 #: Programs that are not ours.
-_FOREIGN = {"cat", "cd", "git", "pip", "sha256sum"}
+_FOREIGN = {"cat", "cd", "dask", "git", "pip", "sha256sum"}
 _SHELL = blocks("sh", "bash", "console")
 
 

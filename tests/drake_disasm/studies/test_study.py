@@ -1,0 +1,210 @@
+"""Studies: their levels, what they train, and the same bits whatever does the work."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.studies import STUDIES
+from drake_disasm.studies.report import as_text, write_report
+from drake_disasm.studies.runner import open_study, run_study
+from drake_disasm.studies.study import Study, StudyOptions, Table
+
+_ORIGIN = {"command": "python tools/study.py", "commit": "abc", "date": "today"}
+
+
+def _study(name: str, **changes: Any) -> Study:
+    """Returns a study of seconds."""
+    options: dict[str, Any] = {
+        "seeds": (0, 1),
+        "episodes": 2,
+        "validation": 2,
+        "changes": ("hidden=[8]",),
+        "overrides": ("task.steps=4",),
+        "compiled": False,
+        "provenance": _ORIGIN,
+    }
+    return STUDIES[name](StudyOptions(**(options | changes)))
+
+
+def small_precision(**changes: Any) -> Study:
+    """Returns two trainings at each of two imprecisions."""
+    levels = {"agent": ["ddpg"], "psi": ["0", "0.0003"]}
+    return _study("precision", levels=levels, **changes)
+
+
+def bits(folder: Path) -> dict[str, str]:
+    """Returns a hash of each policy's parameters and each training's episodes."""
+    found = {}
+    for path in folder.rglob("policy.npz"):
+        with np.load(path) as arrays:
+            own = [
+                arrays[k].tobytes() for k in sorted(arrays) if arrays[k].dtype == "f4"
+            ]
+        found[str(path.relative_to(folder))] = hashlib.sha256(b"".join(own)).hexdigest()
+    for path in folder.rglob("episodes.csv"):
+        text = hashlib.sha256(path.read_bytes()).hexdigest()
+        found[str(path.relative_to(folder))] = text
+    return found
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Returns the folder of a finished study, done in this process."""
+    folder = tmp_path_factory.mktemp("study") / "out"
+    study = small_precision()
+    open_study(study, folder, resume=False)
+    run_study(study, folder)
+    return folder
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_study_trains_all_combinations_of_its_levels(name: str) -> None:
+    study = _study(name)
+    first = next(study.stages(Path("nowhere")))
+    count = np.prod([len(factor.levels) for factor in study.factors])
+    assert len({t.folder for t in first.treatments}) == count
+    for treatment in first.treatments:
+        config = treatment.experiment.config
+        scenario = treatment.experiment.scenario
+        for factor, level in treatment.levels.items():
+            if factor == "psi":
+                assert scenario.imprecision == level
+            elif factor == "agent":
+                assert treatment.experiment.preset == "best" or (
+                    config.algorithm == level
+                )
+            else:
+                assert getattr(config, factor) == level
+
+
+def test_the_hyperparameter_study_is_the_thesis_s_of_243_trainings() -> None:
+    study = STUDIES["hyperparameters"](StudyOptions(seeds=(0, 1, 2)))
+    [stage] = study.stages(Path("nowhere"))
+    assert len(stage.treatments) * len(stage.seeds) == 243
+    config = stage.treatments[0].experiment.config
+    assert (config.episodes, config.schedule) == (100, "every_step")
+
+
+@pytest.mark.parametrize(
+    ("levels", "said"),
+    [
+        ({"psi": ["0.3"]}, "level psi=0.3: is not studied"),
+        ({"phi": ["0"]}, "factor phi: is not one of study 'precision'"),
+    ],
+)
+def test_what_is_not_studied_is_refused(
+    levels: dict[str, list[str]], said: str
+) -> None:
+    with pytest.raises(DisasmError, match=said):
+        STUDIES["precision"](StudyOptions((0,), levels))
+
+
+def test_the_pooled_data_train_a_policy_without_acting(done: Path) -> None:
+    policies = sorted(path.parent.name for path in done.glob("pooled/*/policy.npz"))
+    assert policies == ["seed_000", "seed_001"]
+    assert not list(done.glob("pooled/*/log"))
+
+
+def test_a_report_has_every_seed_and_the_command(done: Path) -> None:
+    tables = write_report(small_precision(), done, _ORIGIN)
+    assert "thesis: DDPG" in as_text(tables[0]) and "70 %" in as_text(tables[0])
+    for kind in ("md", "html"):
+        text = (done / f"report.{kind}").read_text()
+        assert "python tools/study.py" in text and "Commit abc" in text
+        for treatment in ("agent_ddpg__psi_0.0003", "pooled"):
+            assert treatment in text
+    rows = (done / "results.csv").read_text().splitlines()[1:]
+    assert [row.split(",")[:2] for row in rows][-2:] == [
+        ["pooled", "0"],
+        ["pooled", "1"],
+    ]
+    assert len(rows) == 6
+    assert (done / "curves_ddpg.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_study_resumes_with_more_seeds_and_changes_nothing_else(done: Path) -> None:
+    before, study = bits(done), small_precision(seeds=(0, 1, 2))
+    with pytest.raises(DisasmError, match="add --resume"):
+        open_study(study, done, resume=False)
+    assert open_study(study, done, resume=True)["provenance"] == _ORIGIN
+    stage = next(study.stages(done))
+    assert list(stage.seeds) == [0, 1, 2]
+    run_study(small_precision(), done)
+    assert bits(done) == before
+
+
+def test_another_study_s_folder_is_refused(done: Path) -> None:
+    with pytest.raises(DisasmError, match="holds the study 'precision', not 'base"):
+        open_study(_study("baselines"), done, resume=True)
+    with pytest.raises(DisasmError, match=r"another episodes \(2, not 3\)"):
+        open_study(small_precision(episodes=3), done, resume=True)
+
+
+def test_policies_are_judged_on_robots_of_other_precision(tmp_path: Path) -> None:
+    levels = {"agent": ["td3"], "psi": ["0", "0.0005"]}
+    study = _study("precision_transfer", levels=levels, episodes=1)
+    open_study(study, tmp_path / "out", resume=False)
+    run_study(study, tmp_path / "out")
+    tables = study.tables(tmp_path / "out")
+    assert [row[:2] for row in tables[0].rows] == [["td3", "0"], ["td3", "0.5"]]
+    assert all("(" in cell for row in tables[0].rows for cell in row[2:])
+    assert tables[2].rows[0][2].startswith("0/4")
+
+
+def test_classical_control_stands_beside_every_agent(tmp_path: Path) -> None:
+    study = _study(
+        "baselines",
+        levels={"agent": ["ddpg"], "psi": ["0"]},
+        seeds=(0,),
+        overrides=("task.steps=70", "task.success=travelled"),
+        validation=1,
+        episodes=1,
+    )
+    open_study(study, tmp_path / "out", resume=False)
+    run_study(study, tmp_path / "out")
+    [table] = study.tables(tmp_path / "out")
+    rows = {row[0]: row for row in table.rows}
+    assert list(rows) == ["straight", "admittance", "ddpg"]
+    assert rows["admittance"][2].startswith("1/1")
+    assert rows["ddpg"][1] == "1"
+
+
+def test_factors_are_analysed_as_the_thesis_s(tmp_path: Path) -> None:
+    levels = {
+        "batch": ["100"],
+        "tau": ["0.1", "0.9"],
+        "actor_rate": ["0.005", "0.5"],
+        "critic_rate": ["0.005"],
+    }
+    study = _study("hyperparameters", levels=levels)
+    open_study(study, tmp_path / "out", resume=False)
+    run_study(study, tmp_path / "out")
+    averages, variance, best, spent = study.tables(tmp_path / "out")
+    assert ["tau", "0.1"] in [list(row[:2]) for row in averages.rows]
+    assert {row[0] for row in variance.rows} == {
+        "tau", "actor_rate", "tau x actor_rate", "residual",
+    }  # fmt: skip
+    assert len(best.rows) == 4 and len(spent.rows) == 3
+    for picture in study.pictures(tmp_path / "out"):
+        picture.draw(tmp_path / picture.name)
+        assert (tmp_path / picture.name).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_processes_give_the_same_bits(tmp_path: Path, lockstep: bool) -> None:
+    for workers in (1, 4):
+        study, folder = small_precision(lockstep=lockstep), tmp_path / str(workers)
+        open_study(study, folder, resume=False)
+        run_study(study, folder, workers)
+    assert bits(tmp_path / "1") == bits(tmp_path / "4")
+    assert len(bits(tmp_path / "1")) == 12
+
+
+def test_tables_for_a_terminal_have_aligned_columns() -> None:
+    text = as_text(Table("T", ["a", "long"], [["1", "2"], ["300", "4"]], "note"))
+    assert text == "T:\n  a  long\n  1     2\n300     4\nnote"

@@ -1,0 +1,52 @@
+"""tools/study.py: a study from its command line, and what it refuses."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.tools.programs import run_program
+
+_SMALL = [
+    "--levels", "agent=ddpg", "psi=0", "--seeds=1", "--episodes=2", "--validation=1",
+    "--hyper", "hidden=[8]", "--set", "task.steps=4", "--eager", "--workers=1",
+]  # fmt: skip
+
+
+def test_a_study_writes_its_report_and_resumes(tmp_path: Path) -> None:
+    arguments = ["precision", *_SMALL, "--out", str(tmp_path / "out")]
+    first = run_program("study", *arguments)
+    assert first.returncode == 0, first.stderr
+    assert "Trainings in which at least one episode succeeds" in first.stdout
+    assert "tools/study.py precision" in (tmp_path / "out/report.md").read_text()
+    again = run_program("study", *arguments, "--resume")
+    assert again.returncode == 0 and again.stdout == first.stdout
+
+
+def test_the_studies_are_listed() -> None:
+    run = run_program("study", "--list")
+    assert run.returncode == 0
+    for name in ("precision", "precision_transfer", "hyperparameters", "baselines"):
+        assert f"{name}: " in run.stdout
+    assert "actor_rate: 0.005, 0.05, 0.5" in run.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["precise", "--out", "x"], "study 'precise' does not exist"),
+        (["precision"], "--out: give a folder"),
+        (["precision", "--out", "x", "--levels", "psi"], "write it as FACTOR=A,B"),
+        (["precision", "--out", "x", "--compare", "none.csv"], "none.csv: is no file"),
+        (
+            ["precision", "--out", "x", "--scheduler", "tcp://a:1"],
+            "add --executor dask",
+        ),
+    ],
+)
+def test_bad_input_is_refused_before_work_starts(
+    arguments: list[str], said: str, tmp_path: Path
+) -> None:
+    arguments = [str(tmp_path / a) if a == "x" else a for a in arguments]
+    run = run_program("study", *arguments)
+    assert run.returncode == 2 and said in run.stderr
+    assert not (tmp_path / "x").exists()
