@@ -115,7 +115,7 @@ class RefitSearch(ForwardSearch):
             return None
         limits = self._settings
         confirmed = [trial for ranking in rankings for trial in ranking.confirmed]
-        best, found = _lowest(confirmed, limits)
+        best, found = _as_good_as_the_best(confirmed, fit)
         ranking = next(r for r in rankings if any(e is best for e, _ in r.confirmed))
         again = self.fitter.fit(fit.effects, found)
         if again.loss <= (1.0 + limits.min_gain) * found.loss:
@@ -329,8 +329,14 @@ def _pairs(tried: Sequence[_Trial], settings: SelectionSettings) -> list[Evidenc
     ][: settings.refit_max_pairs]
 
 
-def _lowest(confirmed: Sequence[_Trial], settings: SelectionSettings) -> _Trial:
-    """Returns the first of the fits that are as good as the best."""
-    least = min(fit.loss for _, fit in confirmed)
-    limit = (1.0 + settings.min_gain) * least
-    return next(trial for trial in confirmed if trial[1].loss <= limit)
+def _as_good_as_the_best(confirmed: Sequence[_Trial], before: Fit) -> _Trial:
+    """Returns the first of the fits that leave about as little as the best does.
+
+    The order is that of their rankings, where the simpler come first. Where the model
+    is off by itself a little less is no reason: a step of the sensor that begins at
+    once is no better than an offset.
+    """
+    settings, least = before.settings, min(fit.loss for _, fit in confirmed)
+    rough = before.states_model_error
+    more = settings.parsimony_tolerance if rough else settings.min_gain
+    return next(trial for trial in confirmed if trial[1].loss <= (1.0 + more) * least)

@@ -155,7 +155,8 @@ class SelectionSettings:
         0.05,
         "of the best gain",
         "the candidate with the fewest amplitudes is taken if it gains at most this "
-        "much less than the best; chosen as a few per cent",
+        "much less than the best, or where the model states an error of its own, "
+        "leaves at most this much more; chosen as a few per cent",
         _BLIND_LOGS,
     )
     tie_parsimony_tolerance: float = _setting(
