@@ -20,7 +20,7 @@ FLOORS = {
         {"effects"},
         {"scenario", "ports"},
         {"mdp", "cell", "logs"},
-        {"impact", "devices"},
+        {"impact", "devices", "importing"},
         {"safety"},
         {"systems"},
         {"stations", "policies"},

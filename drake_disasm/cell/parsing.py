@@ -27,6 +27,19 @@ def add_model(plant: MultibodyPlant, url: str) -> ModelInstanceIndex:
     return instances[0]
 
 
+def movable_joints(url: str) -> tuple[str, ...]:
+    """Returns the names of a model's joints with one degree of freedom, from its base.
+
+    Raises:
+        DisasmError: as of `add_model`.
+    """
+    plant = MultibodyPlant(0.0)
+    instance = add_model(plant, url)
+    plant.Finalize()
+    joints = [plant.get_joint(index) for index in plant.GetJointIndices(instance)]
+    return tuple(joint.name() for joint in joints if joint.num_velocities() == 1)
+
+
 def model_frame(
     plant: MultibodyPlant, instance: ModelInstanceIndex, name: str, url: str
 ) -> Frame:

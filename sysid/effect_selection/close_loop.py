@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.effects import Effect, Imprecision, registered_effects
@@ -44,7 +42,6 @@ from sysid.effect_selection.verdict_sentence import (
     verdict_sentence,
 )
 from sysid.effect_selection.verdict_text import verdict_text
-from sysid.identification.noise import with_estimated_noise
 from sysid.identification.split import train_and_test
 from sysid.models.base import LogModel
 from sysid.workers import Workers
@@ -169,12 +166,11 @@ def close_loop(
     )
     delta = model.default_huber_delta if huber_delta is None else huber_delta
     workers = workers or Workers()
-    base = with_estimated_noise(model.of_episodes(train), workers, delta)
+    fitter = Fitter.of(model.of_episodes(train), workers, delta, settings, folder)
+    base = fitter.base
     refuse_few_rows(base, settings)
     refuse(dead_channels(base))
     applicable = _applicable(base, library)
-    is_stated = not np.isnan(model.measurements.noise).any()
-    fitter = Fitter(base, workers, delta, settings, folder, is_stated)
     found = _search(fitter, applicable, progress or ignore_progress, deadline)
     limits = detection_limits(found.end.linearised)
     refuse_short_logs(found.last, limits)
@@ -209,8 +205,8 @@ def _search(
     base = fitter.base
     if base.affine:
         return LinearSearch(fitter, library, progress, deadline).run()
-    thinned = fitter.with_base(_affordable(base, fitter.settings))
-    if thinned.base is base:
+    thinned = fitter.affordable
+    if thinned is fitter:
         return RefitSearch(fitter, library, progress, deadline).run()
     if not base.costly and not _leaves_more_than_noise(thinned):
         return RefitSearch(fitter, library, progress, deadline).run()
@@ -251,12 +247,6 @@ def _judged(
         scatter,
         not found.is_complete,
     )
-
-
-def _affordable(base: LogModel, settings: SelectionSettings) -> LogModel:
-    """Returns the model of so many rows that hundreds of evaluations are affordable."""
-    every = round(base.measurements.rows / settings.search_rows)
-    return base.thin(every) if every >= 2 else base
 
 
 def _leaves_more_than_noise(fitter: Fitter) -> bool:

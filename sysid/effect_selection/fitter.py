@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from sysid.effect_selection.fit_cache import cached_fit
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.identification.linearisation import Linearisation
+from sysid.identification.noise import with_estimated_noise
 from sysid.models.base import LogModel
 from sysid.objective import Objective
 from sysid.parameters import Scaling
@@ -43,6 +45,29 @@ class Fitter:
     folder: Path | None = None
     noise_is_stated: bool = True
     exact: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        model: LogModel,
+        workers: Workers,
+        huber_delta: float,
+        settings: SelectionSettings,
+        folder: Path | None = None,
+    ) -> Self:
+        """Returns what fits a model, with its noise estimated where none is stated."""
+        base = with_estimated_noise(model, workers, huber_delta)
+        is_stated = not np.isnan(model.measurements.noise).any()
+        return cls(base, workers, huber_delta, settings, folder, is_stated)
+
+    @property
+    def affordable(self) -> "Fitter":
+        """The same of so many rows that hundreds of evaluations are affordable.
+
+        Itself where the log has no more than that.
+        """
+        every = round(self.base.measurements.rows / self.settings.search_rows)
+        return self.with_base(self.base.thin(every)) if every >= 2 else self
 
     def objective(self, model: LogModel) -> Objective:
         """Returns what is minimised, of a model that extends the base."""

@@ -17,6 +17,7 @@ PRINTED = {
     "own_effect": ["MagneticCatch.force = 4.0", "[MagneticCatch(force=4.0"],
     "gymnasium_sb3": ["trained for 20 steps", "outcome: ", "progress"],
     "own_log_model": ["missing: JointCoulombFriction.pivot", "size = 0.150"],
+    "record_bag": ["bag: ", "wrench 12 ms late"],
     "hardware_station": ["step  x [mm]", "iiwa: READY", "ft_sensor: READY"],
 }
 

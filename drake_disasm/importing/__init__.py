@@ -1,0 +1,27 @@
+"""Recordings of other programs, made into logs of ours.
+
+::
+
+    source = read_source(Path("run.mcap"))
+    fields = guessed_map(source, "joint_motion", joints, "arm.urdf")
+    imported = import_recordings([source], fields, Processing())
+    write_log(imported, [source], fields, Path("out/log"), {})
+"""
+
+from drake_disasm.importing.field_map import FieldMap, read_map
+from drake_disasm.importing.guess import guessed_map
+from drake_disasm.importing.importer import Imported, import_recordings, write_log
+from drake_disasm.importing.processing import Processing
+from drake_disasm.importing.source import Source, read_source
+
+__all__ = [
+    "FieldMap",
+    "Imported",
+    "Processing",
+    "Source",
+    "guessed_map",
+    "import_recordings",
+    "read_map",
+    "read_source",
+    "write_log",
+]

@@ -1,0 +1,298 @@
+"""What is what in a recording: our columns from its channels, as a small YAML file.
+
+::
+
+    kind: joint_motion
+    task: track
+    urdf: arm.urdf
+    joints: [a1, a2]
+    time: {from: t, unit: ms}
+    columns:
+      q: {from: [enc1, enc2], unit: deg}
+      tau: {from: [i1, i2], scale: [2.1, -1.4]}   # motor constant, sign
+      extra.temperature: {from: temp}
+
+In a bag a channel is "/topic:field", and the time is what the messages' headers carry.
+A scale may be the name of a constant of the recording, with a minus before it.
+"""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from drake_disasm.common import bounded_yaml
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import read_text
+from drake_disasm.common.text import clipped, shown
+from drake_disasm.importing.units import factor
+from drake_disasm.logs.schema import KINDS, Form, Quantity
+
+_MOST_BYTES = 2**20
+_KEYS = ("kind", "task", "urdf", "joints", "frames", "time", "episode", "columns")
+_COLUMN_KEYS = ("from", "unit", "scale", "sign", "offset")
+_REMEDY = "see docs/your-robot.md, or let --show guess one and --save-map write it"
+
+Scale = float | str
+
+
+@dataclasses.dataclass(frozen=True)
+class Column:
+    """Our quantity from channels of a recording: value = scale channel + offset.
+
+    Attributes:
+        channels: one for each component, in their order.
+        unit: of the channels; "" for SI.
+        scales: one for each channel, sign included; numbers, or names of constants.
+        offset: added, in SI units.
+    """
+
+    channels: tuple[str, ...]
+    unit: str = ""
+    scales: tuple[Scale, ...] = ()
+    offset: float = 0.0
+
+    def factors(self, constants: Mapping[str, float], where: str) -> list[float]:
+        """Returns what each channel is multiplied by.
+
+        Args:
+            constants: of the recording.
+            where: for messages.
+
+        Raises:
+            DisasmError: a constant is not in the recording, or a unit is not known.
+        """
+        unit = factor(self.unit, where) if self.unit else 1.0
+        found = []
+        for scale in self.scales or (1.0,) * len(self.channels):
+            if isinstance(scale, str):
+                scale = _constant(scale, constants, where)
+            found.append(unit * scale)
+        return found
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Returns it as plain data."""
+        found: dict[str, Any] = {"from": list(self.channels)}
+        if self.unit:
+            found["unit"] = self.unit
+        if self.scales:
+            found["scale"] = list(self.scales)
+        if self.offset:
+            found["offset"] = self.offset
+        return found
+
+
+def _constant(name: str, constants: Mapping[str, float], where: str) -> float:
+    """Returns a constant of the recording; with a minus before its name, less it."""
+    known = name.removeprefix("-")
+    if known not in constants:
+        raise DisasmError(
+            f"{where}: scale '{known}' is no constant of the recording; it has "
+            f"{', '.join(constants) or 'none'}"
+        )
+    return -constants[known] if name.startswith("-") else constants[known]
+
+
+@dataclasses.dataclass(frozen=True)
+class FieldMap:
+    """Everything that has to be said about a recording.
+
+    Attributes:
+        kind: of the log.
+        columns: by our quantity's name; "extra.NAME" for anything else.
+        time: channel of the time, or None in a bag.
+        time_unit: of it.
+        episode: channel whose value tells episodes apart, or "".
+        task: name of the task.
+        urdf: of the arm, or "".
+        joints: their names, in the order of the channels.
+        frames: in which quantities are expressed, where the kind leaves a choice.
+    """
+
+    kind: str
+    columns: Mapping[str, Column]
+    time: str | None = None
+    time_unit: str = "s"
+    episode: str = ""
+    task: str = "recorded"
+    urdf: str = ""
+    joints: tuple[str, ...] = ()
+    frames: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Checks columns against the kind.
+
+        Raises:
+            DisasmError: a column that the kind does not have, or of another size.
+        """
+        for name, column in self.columns.items():
+            wanted = width_of(self.kind, name, len(self.joints))
+            if wanted is not None and len(column.channels) != wanted:
+                raise DisasmError(
+                    f"map: {name} has {len(column.channels)} channels, not {wanted}; "
+                    f"{_REMEDY}"
+                )
+            if column.scales and len(column.scales) != len(column.channels):
+                raise DisasmError(
+                    f"map: {name} has {len(column.scales)} scales for "
+                    f"{len(column.channels)} channels; give one, or one for each"
+                )
+        factor(self.time_unit, "map: time")
+
+    def to_yaml(self) -> str:
+        """Returns it as a file's text."""
+        found: dict[str, Any] = {"kind": self.kind, "task": self.task}
+        if self.urdf:
+            found["urdf"] = self.urdf
+        if self.joints:
+            found["joints"] = list(self.joints)
+        if self.frames:
+            found["frames"] = dict(self.frames)
+        if self.time:
+            found["time"] = {"from": self.time, "unit": self.time_unit}
+        if self.episode:
+            found["episode"] = self.episode
+        found["columns"] = {name: c.to_mapping() for name, c in self.columns.items()}
+        return yaml.safe_dump(
+            found, sort_keys=False, allow_unicode=True, default_flow_style=None
+        )
+
+
+def quantity_of(kind: str, name: str) -> Quantity:
+    """Returns the quantity of a kind of log that a column's name means.
+
+    Raises:
+        DisasmError: the kind does not have it.
+    """
+    if kind not in KINDS:
+        raise DisasmError(
+            f"map: kind {shown(kind)} does not exist; known: {', '.join(KINDS)}"
+        )
+    known = [q.name for q in KINDS[kind].quantities]
+    found = KINDS[kind].quantity(name.partition(".")[0])
+    if found is None or (found.form is not Form.TERMS and "." in name):
+        raise DisasmError(
+            f"map: a {kind} log has no column {shown(name)}; it has {', '.join(known)}"
+        )
+    return found
+
+
+def width_of(kind: str, name: str, joints: int) -> int | None:
+    """Returns how many components a column has; None where a robot's joints decide."""
+    quantity = quantity_of(kind, name)
+    if quantity.form is Form.VECTOR:
+        return len(quantity.components)
+    if quantity.form is Form.JOINTS:
+        return joints or None
+    return 1
+
+
+def read_map(path: Path) -> FieldMap:
+    """Reads a map.
+
+    Raises:
+        DisasmError: it can't be read; names the key that is wrong.
+    """
+    try:
+        raw = bounded_yaml.load(read_text(path, _REMEDY, _MOST_BYTES))
+        return parse_map(raw)
+    except DisasmError as error:
+        raise DisasmError(f"{path}: {error}") from None
+
+
+def parse_map(raw: object) -> FieldMap:
+    """Returns the map that plain data describes.
+
+    Raises:
+        DisasmError: names the key that is missing or wrong.
+    """
+    values = _mapping(raw, "the map", _KEYS)
+    for key in ("kind", "columns"):
+        if key not in values:
+            raise DisasmError(f"map: missing key '{key}'; {_REMEDY}")
+    time = _mapping(values.get("time", {}), "time", ("from", "unit"))
+    columns = _mapping(values["columns"], "columns")
+    return FieldMap(
+        kind=str(values["kind"]),
+        columns={str(name): _column(str(name), own) for name, own in columns.items()},
+        time=str(time["from"]) if "from" in time else None,
+        time_unit=str(time.get("unit", "s")),
+        episode=str(values.get("episode", "")),
+        task=str(values.get("task", "recorded")),
+        urdf=str(values.get("urdf", "")),
+        joints=tuple(map(str, _list(values.get("joints", []), "joints"))),
+        frames={
+            str(k): str(v)
+            for k, v in _mapping(values.get("frames", {}), "frames").items()
+        },
+    )
+
+
+def _column(name: str, raw: object) -> Column:
+    if not isinstance(raw, Mapping):
+        raw = {"from": raw}
+    values = _mapping(raw, name, _COLUMN_KEYS)
+    if "from" not in values:
+        raise DisasmError(f"map: {name} has no 'from': the channels that it is made of")
+    channels = tuple(map(str, _list(values["from"], f"{name}.from")))
+    scales = [_scale(s, name) for s in _list(values.get("scale", []), name)]
+    signs = [_scale(s, name) for s in _list(values.get("sign", []), name)]
+    return Column(
+        channels=channels,
+        unit=str(values.get("unit", "")),
+        scales=_combined(_spread(scales, channels), _spread(signs, channels), name),
+        offset=float(_number(values.get("offset", 0.0), name)),
+    )
+
+
+def _combined(
+    scales: Sequence[Scale], signs: Sequence[Scale], name: str
+) -> tuple[Scale, ...]:
+    if not signs:
+        return tuple(scales)
+    if any(sign not in (1.0, -1.0) for sign in signs):
+        raise DisasmError(f"map: {name}.sign is 1 or -1; give a factor as scale")
+    if not scales:
+        return tuple(signs)
+    pairs = zip(scales, signs, strict=False)
+    return tuple(_signed(scale, float(sign)) for scale, sign in pairs)
+
+
+def _signed(scale: Scale, sign: float) -> Scale:
+    if isinstance(scale, str):
+        return f"-{scale}" if sign < 0 else scale
+    return scale * sign
+
+
+def _spread(values: Sequence[Scale], channels: Sequence[str]) -> Sequence[Scale]:
+    """Returns one value for each channel, where one is given for all."""
+    return list(values) * len(channels) if len(values) == 1 else values
+
+
+def _scale(value: object, name: str) -> Scale:
+    return value if isinstance(value, str) else _number(value, name)
+
+
+def _number(value: object, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise DisasmError(f"map: {name}: {clipped(str(value))} is no number")
+    return float(value)
+
+
+def _list(value: object, name: str) -> list[Any]:
+    if isinstance(value, Mapping):
+        raise DisasmError(f"map: {name} is a mapping; give a list")
+    return list(value) if isinstance(value, list | tuple) else [value]
+
+
+def _mapping(value: object, name: str, keys: Sequence[str] = ()) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise DisasmError(f"map: {name} is not a mapping; {_REMEDY}")
+    for key in value:
+        if keys and key not in keys:
+            raise DisasmError(
+                f"map: {name} has an unknown key {shown(key)}; known: {', '.join(keys)}"
+            )
+    return value

@@ -1,0 +1,226 @@
+"""Guesses what is what in a recording, from names and message types."""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.importing.field_map import Column, FieldMap
+from drake_disasm.importing.source import Source
+from drake_disasm.importing.stream import Stream
+
+#: What channels of a table are called, the more usual names first; a number may follow.
+_NAMES = {
+    "time": ("time", "t", "times", "timestamp", "stamp", "time_s", "seconds"),
+    "q": (
+        "q", "qm", "position", "positions", "pos", "joint_position", "joint_positions",
+        "joint_pos", "q_measured", "actual_q", "angle", "angles", "theta",
+        "observation.state", "msr_pos", "q_msr",
+    ),
+    "tau": (
+        "tau", "torque", "torques", "effort", "efforts", "joint_torque",
+        "joint_torques", "joint_effort", "tau_measured", "actual_torque", "tau_j",
+        "msr_trq", "force", "tau_msr", "tau_m",
+    ),
+}  # fmt: skip
+_EPISODE = ("episode_index", "episode", "trial", "run")
+_WRENCH = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
+_QUATERNION = ("orientation.w", "orientation.x", "orientation.y", "orientation.z")
+_PLAIN_WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
+_PLAIN_QUATERNION = ("qw", "qx", "qy", "qz")
+
+
+def guessed_map(
+    source: Source, kind: str, joints: Sequence[str] = (), urdf: str = ""
+) -> FieldMap:
+    """Returns a map of what is there, as far as names tell.
+
+    Velocities and accelerations of the recording are left out: they are made from the
+    position, so that one filter acts on all.
+
+    Args:
+        source: the recording.
+        kind: of the log.
+        joints: their names, of a URDF; () for the recording's.
+        urdf: of the arm.
+
+    Raises:
+        DisasmError: nothing that the kind needs is known by its name.
+    """
+    if kind == "joint_motion":
+        return _joint_motion(source, joints, urdf)
+    if kind == "static_wrench":
+        return _static_wrench(source)
+    raise DisasmError(
+        f"a map of kind {kind} is not guessed; write one and give it by --map, see "
+        "docs/your-robot.md"
+    )
+
+
+def _joint_motion(source: Source, joints: Sequence[str], urdf: str) -> FieldMap:
+    stream, columns = None, dict[str, Column]()
+    for each in source.streams:
+        found = _joints_of(each, joints)
+        if "q" in found and (stream is None or len(found) > len(columns)):
+            stream, columns = each, found
+    if stream is None:
+        raise DisasmError(
+            f"{source.path}: no channel is called as joint positions are; write a map "
+            "and give it by --map; --show prints the channels"
+        )
+    count = len(columns["q"].channels)
+    columns = {n: c for n, c in columns.items() if len(c.channels) == count}
+    return FieldMap(
+        kind="joint_motion",
+        columns=columns | _other_wrenches(source, stream),
+        time=_time_of(stream),
+        time_unit=_time_unit(stream),
+        episode=next((n for n in _EPISODE if n in stream.channels), ""),
+        urdf=urdf,
+        joints=_names_of(columns["q"].channels, joints),
+    )
+
+
+def _joints_of(stream: Stream, joints: Sequence[str]) -> dict[str, Column]:
+    """Returns positions and torques of a stream."""
+    if stream.name:
+        return _joints_of_topic(stream, joints)
+    found = dict[str, Column]()
+    for quantity in ("q", "tau"):
+        channels = _numbered(stream, quantity) or _by_joint(stream, quantity, joints)
+        if channels:
+            found[quantity] = Column(tuple(channels))
+    return found
+
+
+def _joints_of_topic(stream: Stream, joints: Sequence[str]) -> dict[str, Column]:
+    """Returns positions and efforts of JointState, or of a controller's state."""
+    for prefix in ("", "actual.", "feedback."):
+        fields = {"q": f"{prefix}position.", "tau": f"{prefix}effort."}
+        found = {
+            q: tuple(n for n in stream.names if n.startswith(f"{stream.name}:{field}"))
+            for q, field in fields.items()
+        }
+        if joints:
+            found = {q: _ordered(c, joints) for q, c in found.items()}
+        if found["q"]:
+            moving = {q: c for q, c in found.items() if c and _is_alive(stream, c)}
+            return {q: Column(c) for q, c in moving.items()}
+    return {}
+
+
+def _ordered(channels: Sequence[str], joints: Sequence[str]) -> tuple[str, ...]:
+    """Returns the joints' channels in their order; none if one is not there."""
+    by_joint = {name.rpartition(".")[2]: name for name in channels}
+    if not all(joint in by_joint for joint in joints):
+        return ()
+    return tuple(by_joint[joint] for joint in joints)
+
+
+def _is_alive(stream: Stream, channels: Sequence[str]) -> bool:
+    """Whether any channel is not constant: an effort that nobody fills in is 0."""
+    return any(np.ptp(stream.channels[name]) > 0 for name in channels)
+
+
+def _numbered(stream: Stream, quantity: str) -> list[str]:
+    """Returns channels as NAME, or NAME0, NAME.0, NAME_0, NAME[0] ... in order."""
+    lower = {name.lower(): name for name in stream.names}
+    for usual in _NAMES[quantity]:
+        if usual in lower:
+            return [lower[usual]]
+        pattern = re.compile(re.escape(usual) + r"[._\[ ]?(\d+)\]?$")
+        found = {int(m[1]): lower[n] for n in lower if (m := pattern.match(n))}
+        if found and sorted(found) in (
+            list(range(len(found))),
+            list(range(1, len(found) + 1)),
+        ):
+            return [found[i] for i in sorted(found)]
+    return []
+
+
+def _by_joint(stream: Stream, quantity: str, joints: Sequence[str]) -> list[str]:
+    """Returns channels whose names join a quantity's and a joint's."""
+    for usual in _NAMES[quantity]:
+        for form in ("{q}.{j}", "{q}_{j}", "{j}.{q}", "{j}_{q}"):
+            names = [form.format(q=usual, j=joint) for joint in joints]
+            if names and all(name in stream.channels for name in names):
+                return names
+    return []
+
+
+def _time_of(stream: Stream) -> str | None:
+    if stream.time is not None:
+        return None
+    lower = {name.lower(): name for name in stream.names}
+    found = next((lower[name] for name in _NAMES["time"] if name in lower), None)
+    if found is None:
+        raise DisasmError(
+            "no channel is called as time is; write a map with time: {from: NAME, "
+            "unit: s}"
+        )
+    return found
+
+
+def _time_unit(stream: Stream) -> str:
+    """Returns the unit of the time, by how far apart its values are."""
+    name = _time_of(stream)
+    if name is None:
+        return "s"
+    step = float(np.median(np.diff(stream.channels[name])))
+    for unit, most in (("s", 0.5), ("ms", 500.0), ("us", 5e5)):
+        if step < most:
+            return unit
+    return "ns"
+
+
+def _names_of(channels: Sequence[str], joints: Sequence[str]) -> tuple[str, ...]:
+    if joints:
+        return tuple(joints)
+    ends = [re.split(r"[.:]", name)[-1] for name in channels]
+    if len(set(ends)) < len(ends) or all(end.isdigit() for end in ends):
+        return tuple(f"joint_{i}" for i in range(len(channels)))
+    return tuple(ends)
+
+
+def _other_wrenches(source: Source, stream: Stream) -> dict[str, Column]:
+    """Returns a wrench of another topic, as extra columns."""
+    for other in source.streams:
+        channels = _wrench_of(other) if other is not stream else None
+        if channels:
+            return {
+                f"extra.{name}": Column((channel,))
+                for name, channel in zip(_PLAIN_WRENCH, channels, strict=True)
+            }
+    return {}
+
+
+def _wrench_of(stream: Stream) -> tuple[str, ...] | None:
+    if not stream.name:
+        return _PLAIN_WRENCH if set(_PLAIN_WRENCH) <= set(stream.names) else None
+    for prefix in ("wrench.", ""):
+        names = tuple(f"{stream.name}:{prefix}{end}" for end in _WRENCH)
+        if set(names) <= set(stream.names):
+            return names
+    return None
+
+
+def _static_wrench(source: Source) -> FieldMap:
+    columns, time = dict[str, Column](), None
+    for stream in source.streams:
+        if wrench := _wrench_of(stream):
+            columns["wrench"] = Column(wrench)
+            time = _time_of(stream)
+        for prefix in ("pose.", ""):
+            ends = _QUATERNION if stream.name else _PLAIN_QUATERNION
+            names = tuple(
+                f"{stream.name}:{prefix}{e}" if stream.name else e for e in ends
+            )
+            if set(names) <= set(stream.names):
+                columns["R_WS"] = Column(names)
+    if len(columns) < 2:
+        raise DisasmError(
+            f"{source.path}: no wrench with an orientation is found by its names; "
+            "write a map and give it by --map"
+        )
+    return FieldMap("static_wrench", columns, time, frames={"wrench": "S"})

@@ -1,0 +1,183 @@
+"""Writes recordings as a log, with what was done to them in its provenance."""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from drake_disasm.importing.field_map import FieldMap, quantity_of
+from drake_disasm.importing.processing import Done, Processed, Processing, process
+from drake_disasm.importing.recording import Recording, recordings_of
+from drake_disasm.importing.signals import clock_of
+from drake_disasm.importing.source import Source
+from drake_disasm.logs import LogHeader, LogWriter, flat_columns
+from drake_disasm.logs.schema import Form
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Imported:
+    """What a log is to hold.
+
+    Attributes:
+        recordings: as recorded.
+        episodes: columns of each.
+        period: of the rows [s], or None.
+        done: signal processing, of joint motion; None of other kinds.
+    """
+
+    recordings: tuple[Recording, ...]
+    episodes: tuple[dict[str, Array], ...]
+    period: float | None
+    done: Done | None
+
+    @property
+    def rows(self) -> int:
+        """Of all episodes."""
+        return sum(len(next(iter(each.values()))) for each in self.episodes)
+
+
+def import_recordings(
+    sources: Sequence[Source],
+    fields: FieldMap,
+    processing: Processing,
+    shifts: bool = True,
+) -> Imported:
+    """Returns recordings as episodes of a log.
+
+    Args:
+        sources: each gives one episode or more.
+        fields: what is what in all of them.
+        processing: of joint motion; rows of other kinds are taken as they are.
+        shifts: whether to take away shifts between streams of a bag.
+
+    Raises:
+        DisasmError: the map does not fit them, or nothing is left.
+    """
+    found = [
+        each.between(*processing.between)
+        for source in sources
+        for each in recordings_of(source, fields, shifts)
+    ]
+    if fields.kind != "joint_motion":
+        episodes = tuple(_as_recorded(each, fields.kind) for each in found)
+        period = (
+            clock_of(found[0].time).period if fields.kind == "transitions" else None
+        )
+        return Imported(tuple(found), episodes, period, None)
+    parts, done = process(found, processing)
+    period = float(np.median(np.diff(parts[0].columns["time"])))
+    episodes = tuple(_from_its_begin(part) for part in parts)
+    return Imported(tuple(found), episodes, period, done)
+
+
+def _as_recorded(recording: Recording, kind: str) -> dict[str, Array]:
+    columns = {"time": recording.time - recording.time[0], **recording.columns}
+    return _unstacked(columns, kind)
+
+
+def _from_its_begin(part: Processed) -> dict[str, Array]:
+    time = part.columns["time"]
+    return _unstacked(part.columns | {"time": time - time[0]}, "joint_motion")
+
+
+def _unstacked(columns: Mapping[str, Array], kind: str) -> dict[str, Array]:
+    """Returns scalars as (n,), vectors as (n, k)."""
+    scalar = (Form.SCALAR, Form.TERMS)
+    return {
+        name: values[:, 0]
+        if values.ndim == 2 and quantity_of(kind, name).form in scalar
+        else values
+        for name, values in columns.items()
+    }
+
+
+def write_log(
+    imported: Imported,
+    sources: Sequence[Source],
+    fields: FieldMap,
+    folder: Path,
+    provenance: Mapping[str, Any],
+) -> None:
+    """Writes a log.
+
+    Args:
+        imported: what it holds.
+        sources: where that is from.
+        fields: what was what in them.
+        folder: of the log, empty or new.
+        provenance: command, date, versions, commit; all that was done is added.
+
+    Raises:
+        DisasmError: the folder is not empty, or the log would not be valid.
+    """
+    header = LogHeader(
+        kind=fields.kind,
+        task=fields.task,
+        provenance=dict(provenance) | {"import": origin(imported, sources, fields)},
+        frames=fields.frames,
+        period=imported.period,
+        joints=fields.joints,
+        urdf=_lasting(fields.urdf),
+    )
+    with LogWriter(folder, header) as writer:
+        for columns in imported.episodes:
+            writer.write_episode(flat_columns(fields.kind, columns))
+
+
+def _lasting(urdf: str) -> str | None:
+    """Returns the name of a URDF that holds wherever a program is started."""
+    if not urdf or urdf.startswith("package:"):
+        return urdf or None
+    return str(Path(urdf).resolve())
+
+
+def origin(
+    imported: Imported, sources: Sequence[Source], fields: FieldMap
+) -> dict[str, Any]:
+    """Returns everything that was done, as plain data."""
+    found: dict[str, Any] = {
+        "sources": {str(source.path): source.sha256 for source in sources},
+        "map": yaml.safe_load(fields.to_yaml()),
+        "rows_dropped": sum(each.dropped for each in imported.recordings),
+    }
+    shifts = {
+        f"{each.name}: {name}": dataclasses.asdict(shift) | {"taken": shift.is_seen}
+        for each in imported.recordings
+        for name, shift in each.shifts.items()
+    }
+    if shifts:
+        found["shifts"] = {n: _finite(values) for n, values in shifts.items()}
+    if imported.done:
+        found["processing"] = _processing(imported.done)
+    return found
+
+
+def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        n: v if isinstance(v, bool) or math.isfinite(v) else str(v)
+        for n, v in values.items()
+    }
+
+
+def _processing(done: Done) -> dict[str, Any]:
+    filtered = math.isfinite(done.cutoff)
+    return {
+        "filter": "zero-phase FIR low-pass, sinc with Blackman window"
+        if filtered
+        else "none",
+        "cutoff_Hz": float(done.cutoff) if filtered else None,
+        "derivatives": "of the filter's kernel" if filtered else "as recorded",
+        "rows_lost_at_each_end": done.reach,
+        "decimation": done.decimation,
+        "recordings_resampled": done.resampled,
+        "quanta": {name: float(step) for name, step in done.quanta.items()},
+        "gaps": sum(len(clock.gaps) for clock in done.clocks),
+        "rows_lost": sum(clock.lost for clock in done.clocks),
+    }

@@ -1,0 +1,63 @@
+"""A picture of an import: where the cut-off is, and what the filter does."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from drake_disasm.common.files import write_figure
+from drake_disasm.importing.importer import Imported
+from drake_disasm.importing.signals import even_times, resample, spectrum_of, stretches
+
+_SHOWN = 2.0  # s
+
+
+def plot_import(imported: Imported, path: Path) -> None:
+    """Draws the spectrum of each joint's acceleration with the cut-off, and a stretch
+    of the first joint as recorded and as it is in the log; writes a PNG.
+
+    Args:
+        imported: joint motion.
+        path: of the PNG.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    done = imported.done
+    assert done is not None
+    figure, axes = pyplot.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
+    recording = imported.recordings[0]
+    longest = max(stretches(recording.time), key=lambda rows: rows.stop - rows.start)
+    time = recording.time[longest]
+    at = even_times(time)
+    q = resample(time, recording.columns["q"][longest], at)
+    for i, column in enumerate(q.T):
+        if np.ptp(column) > 0:
+            own = spectrum_of(column, float(at[1] - at[0]))
+            axes[0].loglog(own.frequency, np.sqrt(own.power), label=f"joint {i}")
+    if math.isfinite(done.cutoff):
+        axes[0].axvline(done.cutoff, color="black", linestyle="--", label="cut-off")
+    axes[0].set(xlabel="frequency [Hz]", ylabel="acceleration [SI / √Hz]")
+    axes[0].set_title("Spectrum of the acceleration", fontsize="medium")
+    axes[0].legend(fontsize="small")
+    _draw_stretch(axes[1], imported)
+    write_figure(path, figure)
+    pyplot.close(figure)
+
+
+def _draw_stretch(axis, imported: Imported) -> None:  # type: ignore[no-untyped-def]
+    name = "tau" if "tau" in imported.episodes[0] else "q"
+    recording, done = imported.recordings[0], imported.done
+    assert done is not None
+    episode = imported.episodes[0]
+    begin = recording.time[0] + done.reach * done.clocks[0].period
+    time = recording.time - begin
+    rows = (time >= 0) & (time <= _SHOWN)
+    own = episode["time"] <= _SHOWN
+    axis.plot(time[rows], recording.columns[name][rows, 0], alpha=0.4, label="recorded")
+    axis.plot(episode["time"][own], episode[name][own, 0], label="in the log")
+    axis.set(xlabel="time [s]", ylabel=f"{name}.0")
+    axis.set_title("As recorded and as filtered", fontsize="medium")
+    axis.legend(fontsize="small")

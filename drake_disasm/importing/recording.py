@@ -1,0 +1,203 @@
+"""A recording as rows of a log: mapped, in SI units, on one time line."""
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.importing.field_map import Column, FieldMap
+from drake_disasm.importing.shift import (
+    MOST_JOINTS,
+    UNKNOWN,
+    Features,
+    Shift,
+    estimated_shift,
+    joint_features,
+    link_features,
+    motion_features,
+)
+from drake_disasm.importing.signals import resample
+from drake_disasm.importing.source import Source
+from drake_disasm.importing.stream import Stream
+from drake_disasm.importing.units import factor
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Recording:
+    """Rows of one episode, as recorded.
+
+    Attributes:
+        name: of the source, with the episode's number if there are several.
+        time: (n,) increasing [s].
+        columns: (n, k) of each quantity, SI.
+        dropped: rows that held no number, or whose time did not increase.
+        shifts: of other streams' clocks, by the stream's name.
+    """
+
+    name: str
+    time: Array
+    columns: dict[str, Array]
+    dropped: int = 0
+    shifts: dict[str, Shift] = dataclasses.field(default_factory=dict)
+
+    def between(self, begin: float, end: float) -> "Recording":
+        """Returns the rows between two times since its begin [s].
+
+        Raises:
+            DisasmError: there are none.
+        """
+        since = self.time - self.time[0]
+        rows = (since >= begin) & (since <= end)
+        if rows.sum() < 2:
+            raise DisasmError(
+                f"{self.name}: lasts {since[-1]:.4g} s; nothing is left between "
+                f"{begin:g} and {end:g} s"
+            )
+        columns = {name: values[rows] for name, values in self.columns.items()}
+        return dataclasses.replace(self, time=self.time[rows], columns=columns)
+
+
+def recordings_of(
+    source: Source, fields: FieldMap, shifts: bool = True
+) -> list[Recording]:
+    """Returns the episodes of a source.
+
+    Args:
+        source: the recording.
+        fields: what is what in it.
+        shifts: whether to estimate and take away shifts between streams.
+
+    Raises:
+        DisasmError: the map names what is not there, or nothing is left.
+    """
+    stream = _main_stream(source, fields)
+    time = _time(source, stream, fields)
+    own = {
+        name: column
+        for name, column in fields.columns.items()
+        if source.stream_of(column.channels[0]) is stream
+    }
+    columns = {name: _values(source, name, column) for name, column in own.items()}
+    numbers = source.channel(fields.episode) if fields.episode else np.zeros(len(time))
+    found = []
+    for number in np.unique(numbers[np.isfinite(numbers)]):
+        rows = numbers == number
+        label = (
+            f"{source.path.name}[{number:g}]" if fields.episode else source.path.name
+        )
+        part = {name: values[rows] for name, values in columns.items()}
+        found.append(_clean(label, time[rows], part))
+    others = {n: c for n, c in fields.columns.items() if n not in own}
+    features = _features(fields) if shifts and others else None
+    return [_with_others(each, source, others, features) for each in found]
+
+
+def _features(fields: FieldMap) -> Features | None:
+    """Returns what wrenches depend on: the last link's motion, of an arm we know."""
+    if fields.urdf:
+        return link_features(fields.urdf, fields.joints)
+    return joint_features if len(fields.joints) <= MOST_JOINTS else None
+
+
+def _main_stream(source: Source, fields: FieldMap) -> Stream:
+    """Returns the stream on whose time line the log is: that of the first column."""
+    if not fields.columns:
+        raise DisasmError("map: has no columns")
+    return source.stream_of(next(iter(fields.columns.values())).channels[0])
+
+
+def _time(source: Source, stream: Stream, fields: FieldMap) -> Array:
+    if fields.time is not None:
+        return source.channel(fields.time) * factor(fields.time_unit, "map: time")
+    if stream.time is None:
+        raise DisasmError("map: say which channel is the time: time: {from: NAME}")
+    return stream.time
+
+
+def _values(source: Source, name: str, column: Column) -> Array:
+    """Returns a quantity's values (n, k) in SI units."""
+    stream = source.stream_of(column.channels[0])
+    for channel in column.channels:
+        if source.stream_of(channel) is not stream:
+            raise DisasmError(
+                f"map: {name} takes channels of two topics; take them from one"
+            )
+    raw = np.stack([stream.channels[channel] for channel in column.channels], axis=1)
+    return (
+        raw * np.array(column.factors(stream.constants, f"map: {name}")) + column.offset
+    )
+
+
+def _clean(name: str, time: Array, columns: dict[str, Array]) -> Recording:
+    """Returns the rows that hold numbers at times that increase."""
+    whole = np.isfinite(time)
+    for values in columns.values():
+        whole &= np.isfinite(values).all(axis=1)
+    order = np.flatnonzero(whole)
+    greatest = np.maximum.accumulate(time[order])
+    later = np.concatenate([[True], time[order][1:] > greatest[:-1]])[: len(order)]
+    kept = order[later]
+    if len(kept) < 2:
+        raise DisasmError(f"{name}: no two rows hold numbers at times that increase")
+    rows = {n: values[kept] for n, values in columns.items()}
+    return Recording(name, time[kept], rows, len(time) - len(kept))
+
+
+def _with_others(
+    recording: Recording,
+    source: Source,
+    others: dict[str, Column],
+    features: Features | None,
+) -> Recording:
+    """Returns the rows with other streams' channels, where those reach."""
+    for stream, columns in _by_stream(source, others):
+        values = {n: _values(source, n, c) for n, c in columns.items()}
+        if stream.time is None:
+            raise DisasmError(f"map: {', '.join(values)} has no time of its own")
+        other = _clean(stream.name, stream.time, values)
+        recording = _joined(recording, other, features)
+    return recording
+
+
+def _by_stream(
+    source: Source, columns: dict[str, Column]
+) -> Iterator[tuple[Stream, dict[str, Column]]]:
+    for stream in source.streams:
+        own = {
+            name: c
+            for name, c in columns.items()
+            if source.stream_of(c.channels[0]) is stream
+        }
+        if own:
+            yield stream, own
+
+
+def _joined(
+    recording: Recording, other: Recording, features: Features | None
+) -> Recording:
+    seconds, known = 0.0, dict(recording.shifts)
+    known[other.name] = UNKNOWN
+    if features and "q" in recording.columns:
+        stacked = np.concatenate(list(other.columns.values()), axis=1)
+        motion = motion_features(recording.time, recording.columns["q"], features)
+        found = estimated_shift(*motion, other.time, stacked)
+        known[other.name] = found
+        seconds = found.seconds if found.is_seen else 0.0
+    time = other.time + seconds
+    inside = (recording.time >= time[0]) & (recording.time <= time[-1])
+    if inside.sum() < 2:
+        raise DisasmError(
+            f"{recording.name}: {other.name} was recorded at another time"
+        )
+    columns = {name: values[inside] for name, values in recording.columns.items()}
+    columns |= {
+        name: resample(time, values, recording.time[inside])
+        for name, values in other.columns.items()
+    }
+    return dataclasses.replace(
+        recording, time=recording.time[inside], columns=columns, shifts=known
+    )

@@ -1,0 +1,249 @@
+"""Signal processing of recorded motions, as the field does it.
+
+One zero-phase low-pass filter acts on everything that an equation of motion holds, so
+that the equation holds of what comes out (Gautier, 1997): a symmetric FIR kernel, a
+sinc with Blackman's window, which ends smoothly (Oppenheim and Schafer, 2010, section
+7.5; the stop band is down by 74 dB). Velocity and acceleration come from the position
+by the derivatives of that same kernel, which is exact: d/dt (h * q) = h' * q. Where the
+kernel reaches beyond the record there is no result; those ends are left out.
+"""
+
+import dataclasses
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
+from scipy.signal import welch
+
+Array = NDArray[np.float64]
+
+_TRANSITION = 0.8  # of the cut-off: width of the transition band
+LARGEST_CUTOFF = 0.6  # of the Nyquist frequency
+_WINDOW = "blackmanharris"  # a slow motion is 1e9 times as strong as its noise
+_NOISE_BAND = (0.4, 0.9)  # of the Nyquist frequency: noise alone
+_LEAST_SLOPE = 1.0  # exponent below which the record was filtered before
+_CLEARLY = 4.0  # times the noise: twice in amplitude
+_ROOM = 2.0  # times where motion and noise meet
+_SEGMENTS = 8  # of a record, for its spectrum
+_ROWS_PER_PERIOD = 10.0  # of the cut-off, after decimation
+_JITTER = 0.01  # of the period: below it rows are taken as evenly spaced
+_FINE = 16  # points of the continuous kernel between taps
+_COUNTED = 10.5  # quanta: steps up to there must be multiples
+_GAP = 5.0  # periods without a row: a longer one ends a stretch
+
+
+@dataclasses.dataclass(frozen=True)
+class Clock:
+    """How a record was sampled.
+
+    Attributes:
+        period: median time between rows [s].
+        jitter: spread of the time between rows, gaps left out [s].
+        gaps: times between rows that are longer than five periods [s].
+        lost: rows that are missing, gaps left out.
+        repeated: rows whose time does not increase.
+    """
+
+    period: float
+    jitter: float
+    gaps: tuple[float, ...]
+    lost: int
+    repeated: int
+
+    @property
+    def is_even(self) -> bool:
+        """Whether rows may be taken as evenly spaced."""
+        even = self.jitter < _JITTER * self.period
+        return even and not (self.gaps or self.lost or self.repeated)
+
+
+def clock_of(time: Array) -> Clock:
+    """Returns how times (n,) [s] follow one another."""
+    steps = np.diff(time)
+    period = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    is_gap = steps > _GAP * period
+    near = steps[(steps > 0) & ~is_gap]
+    missing = np.maximum(np.round(near / period) - 1, 0) if period else near
+    single = near[missing == 0]
+    return Clock(
+        period=period,
+        jitter=float(single.std()) if len(single) else 0.0,
+        gaps=tuple(float(step) for step in steps[is_gap]),
+        lost=int(missing.sum()),
+        repeated=int((steps <= 0).sum()),
+    )
+
+
+def stretches(time: Array) -> list[slice]:
+    """Returns the rows between gaps of increasing times (n,)."""
+    clock = clock_of(time)
+    ends = np.nonzero(np.diff(time) > _GAP * clock.period)[0] + 1
+    edges = [0, *ends, len(time)]
+    return [slice(first, end) for first, end in itertools.pairwise(edges)]
+
+
+def resample(time: Array, values: Array, at: Array) -> Array:
+    """Returns values (n, k) at other times (m,), by cubic splines.
+
+    Args:
+        time: (n,) increasing [s].
+        values: (n, k).
+        at: (m,) within `time` [s].
+    """
+    return np.asarray(make_interp_spline(time, values, k=min(3, len(time) - 1))(at))
+
+
+def even_times(time: Array) -> Array:
+    """Returns times (m,) a median period apart, from the first to the last."""
+    period = clock_of(time).period
+    count = int(np.floor((time[-1] - time[0]) / period * (1.0 + 1e-9))) + 1
+    return time[0] + period * np.arange(count)
+
+
+@dataclasses.dataclass(frozen=True)
+class LowPass:
+    """A zero-phase low-pass filter, and the derivatives of what it lets through.
+
+    Attributes:
+        cutoff: half amplitude there [Hz].
+        period: of the rows [s].
+    """
+
+    cutoff: float
+    period: float
+
+    @property
+    def reach(self) -> int:
+        """Rows on either side that a result depends on, and that each end loses."""
+        return int(np.ceil(3.0 / (_TRANSITION * self.cutoff * self.period)))
+
+    def kernel(self, order: int = 0) -> Array:
+        """Returns the taps (2 reach + 1,) of the filter's derivative.
+
+        Args:
+            order: 0 for the filter itself, 1 or 2 for a derivative [1/s, 1/s^2].
+        """
+        t = np.arange(-self.reach * _FINE, self.reach * _FINE + 1) / _FINE
+        turn = np.pi * t / self.reach
+        window = 0.42 + 0.5 * np.cos(turn) + 0.08 * np.cos(2.0 * turn)
+        taps = np.sinc(2.0 * self.cutoff * self.period * t) * window
+        spline = make_interp_spline(t, taps, k=5)
+        n = np.arange(-self.reach, self.reach + 1, dtype=float)
+        own = np.asarray(spline(n, nu=order)) / np.sum(taps[::_FINE])
+        if order:
+            own -= own.mean()  # nothing of a constant
+        return own / self.period**order
+
+    def __call__(self, values: Array, order: int = 0) -> Array:
+        """Returns filtered values (n - 2 reach, k), or their derivatives.
+
+        Args:
+            values: (n, k), a period apart.
+            order: as of `kernel`.
+        """
+        taps = self.kernel(order)
+        columns = [np.convolve(column, taps, mode="valid") for column in values.T]
+        return np.stack(columns, axis=1)
+
+    @property
+    def decimation(self) -> int:
+        """Every how many rows hold all that is let through, with a margin of two."""
+        rate = _ROWS_PER_PERIOD * self.cutoff
+        return max(1, int(1.0 / (rate * self.period)))
+
+
+@dataclasses.dataclass(frozen=True)
+class Spectrum:
+    """Of one position.
+
+    Attributes:
+        frequency: (n,) [Hz].
+        power: (n,) density of the acceleration, smoothed.
+        cutoff: where that is least between motion and noise [Hz].
+    """
+
+    frequency: Array
+    power: Array
+    cutoff: float
+
+
+def spectrum_of(position: Array, period: float) -> Spectrum:
+    """Returns the spectrum of a channel's acceleration, and the cut-off it asks for.
+
+    A motion's acceleration fades towards high frequencies, that of noise grows: with
+    the fourth power of the frequency if it is white, as rounding is. What is found in
+    the upper part of the spectrum is continued downwards by a power law. Beyond the
+    last frequency where there is clearly more than that, the two meet where the
+    spectrum is least. The cut-off is twice that, since friction that changes its sign
+    has edges that a filter rounds. Where noise does not grow the record was filtered
+    before; all of the spectrum is searched then.
+
+    Args:
+        position: (n,), evenly spaced.
+        period: of the rows [s].
+    """
+    n = len(position)
+    line = position[0] + (position[-1] - position[0]) * np.arange(n) / (n - 1)
+    rows = min(n, max(16, 2 * n // (_SEGMENTS + 1)))
+    frequency, power = welch(
+        position - line, 1.0 / period, window=_WINDOW, nperseg=rows
+    )
+    frequency, power = frequency[1:], power[1:]
+    power = _smoothed(frequency, power * (2.0 * np.pi * frequency) ** 4)
+    first = min(_end_of_motion(frequency, power), len(frequency) - 1)
+    cutoff = _ROOM * float(frequency[first + np.argmin(power[first:])])
+    return Spectrum(frequency, power, min(cutoff, LARGEST_CUTOFF * frequency[-1]))
+
+
+def _end_of_motion(frequency: Array, power: Array) -> int:
+    """Returns the number after the last frequency with clearly more than noise."""
+    low, high = (share * frequency[-1] for share in _NOISE_BAND)
+    band = (frequency >= low) & (frequency <= high) & (power > 0.0)
+    if band.sum() < 2:
+        return len(frequency)
+    slope, level = np.polyfit(np.log(frequency[band]), np.log(power[band]), 1)
+    if slope < _LEAST_SLOPE:
+        return 0
+    above = np.flatnonzero(power > _CLEARLY * np.exp(level) * frequency**slope)
+    return int(above[-1]) + 1 if len(above) else 0
+
+
+def _smoothed(frequency: Array, power: Array) -> Array:
+    """Returns the mean over half an octave about each frequency."""
+    ends = np.searchsorted(frequency, np.outer((2.0**-0.25, 2.0**0.25), frequency))
+    total = np.concatenate([[0.0], np.cumsum(power)])
+    low, high = ends[0], np.maximum(ends[1], ends[0] + 1)
+    return (total[high] - total[low]) / (high - low)
+
+
+def chosen_cutoff(values: Array, period: float) -> float:
+    """Returns the cut-off [Hz] that the channel with the fastest motion asks for.
+
+    Args:
+        values: (n, k) positions, evenly spaced.
+        period: of them [s].
+    """
+    largest = LARGEST_CUTOFF * 0.5 / period
+    moving = [column for column in values.T if np.ptp(column) > 0]
+    return max((spectrum_of(c, period).cutoff for c in moving), default=largest)
+
+
+def quantum(values: Array) -> float:
+    """Returns the step to which values (n,) are rounded; 0 if they are not.
+
+    They are if every difference between them is a multiple of the smallest.
+    """
+    steps = np.diff(np.unique(values))
+    if not len(steps):
+        return 0.0
+    # What rounding in floating point makes of equal values.
+    steps = steps[steps > 1e-9 * np.ptp(values)]
+    if not len(steps):
+        return 0.0
+    least = float(steps.min())
+    smallest = float(np.median(steps[steps < 1.5 * least]))
+    share = steps[steps < _COUNTED * smallest] / smallest
+    is_multiple = np.abs(share - np.round(share)) < 0.1
+    is_rounded = len(values) > 2 * len(steps) and 2 * len(share) > len(steps)
+    return smallest if is_rounded and is_multiple.all() else 0.0

@@ -1,0 +1,128 @@
+"""What a motion can show at all: parameters and effects, before any is looked for."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from drake_disasm.effects import registered_effects
+from sysid.confidence import Z
+from sysid.effect_selection.candidates import candidates
+from sysid.effect_selection.data_sufficiency import refuse_few_rows
+from sysid.effect_selection.detection import DetectionLimit, detection_limits
+from sysid.effect_selection.effect_names import effect_class
+from sysid.effect_selection.experiments import revealing
+from sysid.effect_selection.fit import Fit
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
+from sysid.effect_selection.survey import survey_candidates
+from sysid.identification.uncertainty import uncertainty
+from sysid.models.base import LogModel
+from sysid.parameters import Scaling
+from sysid.workers import Workers
+
+
+@dataclasses.dataclass(frozen=True)
+class ParameterExcitation:
+    """How well the data determine one of a model's own parameters.
+
+    Attributes:
+        name, unit: of it.
+        value: fitted, without any effect.
+        spread: half its 95 % interval, by the block bootstrap.
+    """
+
+    name: str
+    unit: str
+    value: float
+    spread: float
+
+    @property
+    def is_determined(self) -> bool:
+        """Whether its sign is: its interval does not hold zero."""
+        return abs(self.value) > self.spread
+
+
+@dataclasses.dataclass(frozen=True)
+class Excitation:
+    """What data can show.
+
+    Attributes:
+        parameters: of the model itself.
+        limits: the least amplitude of each effect that would have been found.
+    """
+
+    parameters: tuple[ParameterExcitation, ...]
+    limits: tuple[DetectionLimit, ...]
+
+    @property
+    def hidden(self) -> dict[str, str]:
+        """Kinds of effects that would not have been found however large.
+
+        By the kind's name, with the recording that shows it.
+        """
+        shown = {kind_of(x.effect) for x in self.limits if x.amplitude is not None}
+        kinds = dict.fromkeys(kind_of(limit.effect) for limit in self.limits)
+        return {kind: _experiment(kind) for kind in kinds if kind not in shown}
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Returns it as plain data."""
+        return {
+            "parameters": [dataclasses.asdict(p) for p in self.parameters],
+            "would_have_been_found": [dataclasses.asdict(x) for x in self.limits],
+            "would_not_have_been_found": self.hidden,
+        }
+
+
+def kind_of(effect: str) -> str:
+    """Returns the class of an effect, without its joint."""
+    return effect.partition(".")[0]
+
+
+def _experiment(kind: str) -> str:
+    known = effect_class(kind)
+    return revealing(known) if known else ""
+
+
+def excitation_of(
+    model: LogModel,
+    workers: Workers | None = None,
+    settings: SelectionSettings = DEFAULT_SETTINGS,
+) -> Excitation:
+    """Returns what a model's log can show.
+
+    Costs a fit without effects, and one evaluation for each amplitude.
+
+    Args:
+        model: of the whole log.
+        workers: evaluate; this process if left out.
+        settings: thresholds of the effect selection.
+
+    Raises:
+        DisasmError: there are fewer rows than the model's own parameters need.
+    """
+    delta = model.default_huber_delta
+    fitter = Fitter.of(model, workers or Workers(), delta, settings)
+    if not model.affine:
+        fitter = fitter.affordable
+    refuse_few_rows(fitter.base, settings)
+    fit = fitter.fit(())
+    library = candidates(fitter.base, registered_effects())
+    limits = detection_limits(survey_candidates(fitter, fit, library).linearised)
+    return Excitation(_parameters(fit), tuple(limits))
+
+
+def _parameters(fit: Fit) -> tuple[ParameterExcitation, ...]:
+    parameters = fit.model.parameters
+    if not parameters:
+        return ()
+    found = uncertainty(fit.linearisation, fit.model.measurements.episode)
+    scaling = Scaling(parameters)
+    u = scaling.to_unit(fit.theta)
+    half = Z * np.sqrt(np.diagonal(found.bootstrap_covariance))
+    ends = scaling.from_unit(np.clip(np.stack([u - half, u + half]), 0.0, 1.0))
+    spreads = 0.5 * np.ptp(ends, axis=0)
+    return tuple(
+        ParameterExcitation(p.name, p.unit, float(value), float(spread))
+        for p, value, spread in zip(parameters, fit.theta, spreads, strict=True)
+    )

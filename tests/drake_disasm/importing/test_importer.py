@@ -1,0 +1,225 @@
+"""From recordings to logs: maps, guesses, time lines, and what stands in the log."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.importing import (
+    FieldMap,
+    Processing,
+    guessed_map,
+    import_recordings,
+    read_map,
+    read_source,
+    write_log,
+)
+from drake_disasm.importing.field_map import Column, parse_map
+from drake_disasm.logs import read_log
+from tests.drake_disasm.importing.bag import motion, record_arm
+
+
+def _table(path: Path, rows: int = 2000, period: float = 0.005, **more: Any) -> Path:
+    """Writes a recording of the two joints as NPZ: q in degrees, time in ms."""
+    time = period * np.arange(rows)
+    q, v, vd = (np.stack(x) for x in zip(*map(motion, time), strict=True))
+    values = {"t": 1e3 * time, "angle": np.degrees(q), "current": vd + 0.1 * v}
+    np.savez(path, **(values | more))
+    return path
+
+
+_FIELDS = {
+    "kind": "joint_motion",
+    "joints": ["a", "b"],
+    "time": {"from": "t", "unit": "ms"},
+    "columns": {
+        "q": {"from": ["angle.0", "angle.1"], "unit": "deg"},
+        "tau": {"from": ["current.0", "current.1"], "scale": "kt", "sign": [1, -1]},
+    },
+}
+
+
+def _imported(path: Path, fields: FieldMap, **options: Any) -> Any:
+    return import_recordings([read_source(path)], fields, Processing(**options))
+
+
+def test_units_scales_and_signs_make_SI(tmp_path: Path) -> None:
+    fields = parse_map(_FIELDS | {"columns": _FIELDS["columns"] | {  # type: ignore[operator]
+        "tau": {"from": ["current.0", "current.1"], "scale": 2.0, "sign": [1, -1]},
+    }})  # fmt: skip
+    found = _imported(_table(tmp_path / "run.npz"), fields, cutoff=20.0)
+    [episode] = found.episodes
+    q, v, vd = motion((found.done.reach * 0.005 + episode["time"])[:, None])
+    np.testing.assert_allclose(episode["q"], q, atol=2e-3)
+    np.testing.assert_allclose(episode["v"], v, atol=2e-2)
+    np.testing.assert_allclose(episode["vd"], vd, atol=0.1)
+    torque = 2.0 * (vd + 0.1 * v) * np.array([1.0, -1.0])
+    np.testing.assert_allclose(episode["tau"], torque, atol=0.1)
+
+
+def test_a_scale_may_be_a_constant_of_the_recording(tmp_path: Path) -> None:
+    columns = _FIELDS["columns"] | {
+        "tau": {"from": ["current.0", "current.1"], "scale": "kt"}
+    }  # type: ignore[operator]
+    fields = parse_map(_FIELDS | {"columns": columns})
+    plain = _imported(_table(tmp_path / "a.npz", kt=1.0), fields).episodes[0]["tau"]
+    scaled = _imported(_table(tmp_path / "b.npz", kt=3.0), fields).episodes[0]["tau"]
+    np.testing.assert_allclose(scaled, 3.0 * plain)
+    with pytest.raises(DisasmError, match="scale 'kt' is no constant"):
+        _imported(_table(tmp_path / "c.npz"), fields)
+
+
+def test_the_same_filter_acts_on_both_sides(tmp_path: Path) -> None:
+    """An equation that holds of the recording holds of the log, noise and all."""
+    random, time = np.random.default_rng(5), 0.002 * np.arange(8000)
+    q = sum(np.sin(2.0 * np.pi * f * time) for f in (0.5, 1.3, 2.2))
+    q = q + 1e-3 * random.standard_normal(len(time))
+    np.savez(tmp_path / "run.npz", time=time, q=q, tau=5.0 * q)
+    fields = guessed_map(read_source(tmp_path / "run.npz"), "joint_motion")
+    [episode] = _imported(tmp_path / "run.npz", fields).episodes
+    np.testing.assert_allclose(episode["tau"], 5.0 * episode["q"], atol=1e-12)
+
+
+def test_a_map_survives_its_file(tmp_path: Path) -> None:
+    fields = parse_map(
+        _FIELDS | {"columns": {"q": {"from": ["x", "y"], "offset": 0.1}}}
+    )
+    (tmp_path / "map.yaml").write_text(fields.to_yaml())
+    assert read_map(tmp_path / "map.yaml") == fields
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"kind": "movie"}, "kind 'movie' does not exist"),
+        ({"columns": {"force": {"from": "x"}}}, "has no column 'force'"),
+        ({"columns": {"q": {"from": "x"}}}, "q has 1 channels, not 2"),
+        ({"columns": {"q": {}}}, "q has no 'from'"),
+        ({"columns": {"q": {"from": ["x", "y"], "unit": "degree"}}}, "degree"),
+        ({"columns": {"q": {"from": ["x", "y"], "sign": 2}}}, "sign is 1 or -1"),
+        (
+            {"columns": {"q": {"from": ["x", "y"], "scale": [1, 2, 3]}}},
+            "3 scales for 2",
+        ),
+        ({"clock": 1}, "unknown key 'clock'"),
+        ({"time": {"from": "t", "unit": "min"}}, "unit 'min' is not known"),
+    ],
+)
+def test_a_wrong_map_is_refused(
+    tmp_path: Path, changes: dict[str, Any], said: str
+) -> None:
+    source = tmp_path / "run.npz"
+    np.savez(source, t=np.arange(50.0), x=np.arange(50.0), y=np.arange(50.0))
+    with pytest.raises(DisasmError, match=said):
+        _imported(source, parse_map(_FIELDS | changes))
+
+
+@pytest.mark.parametrize("mcap", [True, False])
+def test_a_bag_s_clocks_are_brought_together(tmp_path: Path, mcap: bool) -> None:
+    record_arm(tmp_path / "bag", shift=0.012, mcap=mcap)
+    source = read_source(tmp_path / "bag")
+    fields = guessed_map(source, "joint_motion", ("shoulder", "elbow"))
+    found = import_recordings([source], fields, Processing())
+    shift = found.recordings[0].shifts["/ft"]
+    assert shift.seconds == pytest.approx(-0.012, abs=1e-3)
+    assert shift.low < shift.seconds < shift.high and shift.is_seen
+    [episode] = found.episodes
+    v = motion(episode["time"][:, None])[1]
+    assert episode["v"].shape == v.shape  # both joints in the order that was asked for
+    amplitude = np.ptp(episode["q"], axis=0)
+    assert amplitude == pytest.approx([1.6, 1.0], rel=1e-2)
+    # The wrench is that of its own time now: force x is twice the acceleration.
+    error = episode["extra.fx"] - 2.0 * episode["vd"][:, 0]
+    assert np.std(error) < 0.01 * np.std(episode["extra.fx"])
+    clock = found.done.clocks[0] if found.done else None
+    assert clock and clock.lost == pytest.approx(80, abs=30)
+
+
+def test_streams_with_nothing_in_common_show_no_shift(tmp_path: Path) -> None:
+    record_arm(tmp_path / "bag", shift=0.0)
+    source = read_source(tmp_path / "bag")
+    random = np.random.default_rng(0)
+    for stream in source.streams:
+        if stream.name == "/ft":
+            for values in stream.channels.values():
+                values[:] = random.standard_normal(len(values))
+    fields = guessed_map(source, "joint_motion")
+    found = import_recordings([source], fields, Processing())
+    assert not found.recordings[0].shifts["/ft"].is_seen
+
+
+def test_gaps_part_episodes_and_rows_without_numbers_go(tmp_path: Path) -> None:
+    time = 0.005 * np.arange(4000)
+    time[2000:] += 1.0
+    q = np.sin(2.0 * np.pi * 0.7 * time)
+    q[100], time[200] = np.nan, time[199]
+    np.savez(tmp_path / "run.npz", time=time, q=q)
+    source = read_source(tmp_path / "run.npz")
+    found = _imported(tmp_path / "run.npz", guessed_map(source, "joint_motion"))
+    assert len(found.episodes) == 2
+    assert sum(each.dropped for each in found.recordings) == 2
+
+
+def test_a_log_says_what_was_done(tmp_path: Path) -> None:
+    path = _table(tmp_path / "run.npz", kt=1.0)
+    source, fields = read_source(path), parse_map(_FIELDS)
+    found = import_recordings([source], fields, Processing())
+    write_log(found, [source], fields, tmp_path / "log", {"command": "x"})
+    log = read_log(tmp_path / "log")
+    origin = log.header.provenance["import"]
+    assert origin["sources"] == {str(path): source.sha256}
+    assert parse_map(origin["map"]) == fields
+    done = origin["processing"]
+    assert done["cutoff_Hz"] == found.done.cutoff if found.done else False
+    assert log.header.joints == ("a", "b") and log.episodes[0].rows == found.rows
+
+
+def test_a_filter_longer_than_the_record_is_refused(tmp_path: Path) -> None:
+    path = _table(tmp_path / "run.npz", rows=200, kt=1.0)
+    with pytest.raises(DisasmError, match="no stretch without gaps is longer"):
+        _imported(path, parse_map(_FIELDS), cutoff=0.5)
+    with pytest.raises(DisasmError, match="is not below half the sampling rate"):
+        _imported(path, parse_map(_FIELDS), cutoff=150.0)
+
+
+def test_readings_at_rest_are_taken_as_they_are(tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    quaternion = random.standard_normal((9, 4))
+    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    names = ["time", "qw", "qx", "qy", "qz", "fx", "fy", "fz", "tx", "ty", "tz"]
+    table = np.column_stack([np.arange(9.0), quaternion, random.random((9, 6))])
+    np.savetxt(
+        tmp_path / "run.csv", table, "%.17g", ",", header=",".join(names), comments=""
+    )
+    source = read_source(tmp_path / "run.csv")
+    fields = guessed_map(source, "static_wrench")
+    found = import_recordings([source], fields, Processing())
+    write_log(found, [source], fields, tmp_path / "log", {})
+    np.testing.assert_array_equal(
+        read_log(tmp_path / "log").episodes[0]["wrench"], table[:, 5:]
+    )
+
+
+def test_names_of_many_kinds_are_guessed(tmp_path: Path) -> None:
+    time = 0.01 * np.arange(100)
+    for names in (
+        ("time", "q_0", "q_1"),
+        ("t", "position.0", "position.1"),
+        ("timestamp", "pos[0]", "pos[1]"),
+        ("Time", "Theta1", "Theta2"),
+    ):
+        table = np.column_stack([time, np.sin(time), np.cos(time)])
+        path = tmp_path / "run.csv"
+        np.savetxt(path, table, delimiter=",", header=",".join(names), comments="")
+        fields = guessed_map(read_source(path), "joint_motion")
+        assert fields.time == names[0]
+        assert fields.columns == {"q": Column(names[1:])}
+
+
+def test_a_time_in_milliseconds_is_noticed(tmp_path: Path) -> None:
+    for unit, step in (("s", 0.01), ("ms", 10.0), ("us", 1e4), ("ns", 1e7)):
+        path = tmp_path / "run.npz"
+        np.savez(path, t=step * np.arange(50), q=np.arange(50.0))
+        assert guessed_map(read_source(path), "joint_motion").time_unit == unit

@@ -1,0 +1,118 @@
+"""What is read of tables, datasets and bags, and what is refused."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow  # type: ignore[import-untyped]
+import pyarrow.parquet  # type: ignore[import-untyped]
+import pytest
+from scipy.io import savemat
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.importing.source import read_source
+
+_T = np.arange(5) * 0.1
+_Q = np.arange(10.0).reshape(5, 2)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t,q,name\n0,1,a\n0.1,2,b\n",
+        "# from a drive\nt;q\n0;1\n0.1;2\n",
+        "t\tq\n0\t1\n0.1\t2\n",
+        "t q\n0 1\n0.1 2\n",
+        "\ufefft,q,\n0,1,\n0.1,2,\n",
+    ],
+)
+def test_csv_as_programs_write_it(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(text, encoding="utf-8")
+    [stream] = read_source(path).streams
+    np.testing.assert_array_equal(stream.channels["t"], [0.0, 0.1])
+    np.testing.assert_array_equal(stream.channels["q"], [1.0, 2.0])
+    assert "name" not in stream.names
+
+
+def test_csv_without_names_and_with_flags_and_holes(tmp_path: Path) -> None:
+    path = tmp_path / "run.txt"
+    path.write_text("0,1\n1,2\n")
+    assert read_source(path).streams[0].names == ["column_0", "column_1"]
+    path.write_text("t,on\n0,true\n1,\n")
+    np.testing.assert_array_equal(read_source(path).channel("on"), [1.0, np.nan])
+
+
+def test_archives_matlab_and_parquet_agree(tmp_path: Path) -> None:
+    np.savez(tmp_path / "run.npz", t=_T, q=_Q, gain=2.5, word=np.array("x"))
+    savemat(tmp_path / "run.mat", {"t": _T[:, None], "q": _Q.T, "gain": 2.5})
+    table = pyarrow.table({"t": _T, "q": [list(row) for row in _Q]})
+    pyarrow.parquet.write_table(table, tmp_path / "run.parquet")
+    for ending in ("npz", "mat", "parquet"):
+        [stream] = read_source(tmp_path / f"run.{ending}").streams
+        assert stream.names == ["t", "q.0", "q.1"] or ending == "mat"
+        np.testing.assert_array_equal(stream.channels["q.1"], _Q[:, 1])
+        assert dict(stream.constants) == ({"gain": 2.5} if ending != "parquet" else {})
+    np.save(tmp_path / "run.npy", _Q)
+    assert read_source(tmp_path / "run.npy").streams[0].names == [
+        "column.0",
+        "column.1",
+    ]
+
+
+def test_a_lerobot_dataset_s_episodes_follow_each_other(tmp_path: Path) -> None:
+    (tmp_path / "meta").mkdir()
+    (tmp_path / "meta/info.json").write_text(json.dumps({"fps": 10}))
+    (tmp_path / "data/chunk-000").mkdir(parents=True)
+    for episode in (0, 1):
+        table = pyarrow.table(
+            {
+                "timestamp": _T,
+                "observation.state": [list(row) for row in _Q + episode],
+                "episode_index": [episode] * 5,
+            }
+        )
+        file = tmp_path / f"data/chunk-000/episode_{episode:06d}.parquet"
+        pyarrow.parquet.write_table(table, file)
+    [stream] = read_source(tmp_path).streams
+    assert stream.rows == 10
+    np.testing.assert_array_equal(
+        stream.channels["observation.state.0"], [*_Q[:, 0], *(_Q[:, 0] + 1)]
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("run.xyz", b"1", "is of no known format"),
+        ("run.npz", b"not a zip", "can't be read"),
+        ("run.mat", b"not MATLAB" * 50, "can't be read"),
+        ("run.parquet", b"PAR1", "can't be read"),
+        ("run.mcap", b"\x89MCAP0\r\n", "can't be read"),
+        ("run.csv", b"", "has no rows"),
+        ("run.csv", b"t,q\n1,2\n1\n", "row 2 has 1 cells"),
+        ("run.csv", b"a,b\nx,y\n", "has no columns of numbers"),
+    ],
+)
+def test_what_can_t_be_read_is_refused_in_one_line(
+    tmp_path: Path, name: str, content: bytes, said: str
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(DisasmError, match=said) as refused:
+        read_source(path)
+    assert "\n" not in str(refused.value) and str(path) in str(refused.value)
+
+
+def test_a_channel_that_is_not_there_names_its_neighbours(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("time,position\n0,1\n1,2\n")
+    with pytest.raises(DisasmError, match="has no channel 'postion'; it has position"):
+        read_source(path).channel("postion")
+
+
+def test_a_folder_that_is_no_recording_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DisasmError, match="neither a ROS 2 bag"):
+        read_source(tmp_path)
+    with pytest.raises(DisasmError, match="does not exist"):
+        read_source(tmp_path / "none.csv")

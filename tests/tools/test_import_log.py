@@ -1,0 +1,111 @@
+"""tools/import_log.py: what it shows, writes and refuses; a real record."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drake_disasm.logs import read_log
+from tests.sysid.real_data import real_folder, write_slide
+from tests.tools.programs import run_program
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    """Returns a recording of two joints."""
+    time = 0.004 * np.arange(3000)
+    q = np.stack([np.sin(2.0 * time), 0.4 * np.sin(5.1 * time)], axis=1)
+    q = np.round(q / 1e-4) * 1e-4
+    path = tmp_path / "run.npz"
+    np.savez(path, time=time, q=q, tau=np.gradient(q, 0.004, axis=0))
+    return path
+
+
+def test_a_recording_is_shown_with_the_guess(table: Path, tmp_path: Path) -> None:
+    run = run_program(
+        "import_log", str(table), "--show", "--save-map", str(tmp_path / "m")
+    )
+    assert run.returncode == 0, run.stderr
+    assert "250 Hz" in run.stdout and "tau.0: -2 to 2, in steps of" in run.stdout
+    assert "from: [q.0, q.1]" in run.stdout
+    assert (tmp_path / "m").read_text().startswith("kind: joint_motion")
+
+
+def test_a_recording_becomes_a_log(table: Path, tmp_path: Path) -> None:
+    run = run_program("import_log", str(table), "--out", str(tmp_path / "log"))
+    assert run.returncode == 0, run.stderr
+    assert "low-pass of" in run.stdout and "rounded" in run.stdout
+    log = read_log(tmp_path / "log")
+    assert set(log.episodes[0].columns) >= {"time", "q.0", "v.0", "vd.1", "tau.1"}
+    assert (tmp_path / "log/import.png").read_bytes().startswith(b"\x89PNG")
+    again = run_program("import_log", str(table), "--out", str(tmp_path / "log"))
+    assert again.returncode == 2 and "is not empty" in again.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["none.csv", "--show"], "none.csv: does not exist"),
+        (["TABLE"], "--out: give a folder"),
+        (["TABLE", "--out", "x", "--kind", "transitions"], "is not guessed"),
+        (["TABLE", "--out", "x", "--joints", "a"], "q has 2 channels, not 1"),
+        (["TABLE", "--out", "x", "--cutoff", "-3"], "--cutoff"),
+        (["TABLE", "--out", "x", "--urdf", "none.urdf"], "none.urdf"),
+    ],
+)
+def test_bad_input_is_one_line(
+    table: Path, tmp_path: Path, arguments: list[str], said: str
+) -> None:
+    named = {"TABLE": str(table), "x": str(tmp_path / "x")}
+    run = run_program("import_log", *[named.get(a, a) for a in arguments])
+    assert run.returncode == 2 and said in run.stderr
+    assert len(run.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "x").exists()
+
+
+def test_a_real_record_is_closed_from_its_raw_file(tmp_path: Path) -> None:
+    source = real_folder("emps") / "DATA_EMPS.mat"
+    fields = {
+        "kind": "joint_motion",
+        "joints": ["slide"],
+        "time": {"from": "t"},
+        "columns": {"q": {"from": "qm"}, "tau": {"from": "vir", "scale": "gtau"}},
+    }
+    (tmp_path / "map.yaml").write_text(json.dumps(fields))
+    urdf = write_slide(tmp_path / "emps.urdf")
+    run = run_program(
+        "import_log", str(source), "--map", str(tmp_path / "map.yaml"),
+        "--urdf", str(urdf), "--out", str(tmp_path / "log"),
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    closed = run_program(
+        "close_loop", "--log", str(tmp_path / "log"), "--out", str(tmp_path / "closed"),
+        "--workers", "1",
+    )  # fmt: skip
+    assert closed.returncode == 0, closed.stderr
+    share = closed.stdout.split("% of the readings")[0].split("->")[-1]
+    assert float(share) <= 3.0
+    assert "ArmDelay" in closed.stdout
+
+
+@pytest.mark.slow
+def test_a_bag_of_an_arm_ends_in_the_truth(tmp_path: Path) -> None:
+    example = Path(__file__).parents[2] / "examples/record_bag.py"
+    bag, log = str(tmp_path / "bag"), str(tmp_path / "log")
+    subprocess.run([sys.executable, example, bag], check=True)
+    arm = "package://disasm_models/iiwa14/iiwa14.urdf"
+    run = run_program("import_log", bag, "--urdf", arm, "--out", log)
+    assert run.returncode == 0, run.stderr
+    late = float(run.stdout.split("is off by ")[1].split(" ms")[0])
+    assert late == pytest.approx(-12.0, abs=1.0)
+    closed = run_program(
+        "close_loop", "--log", log, "--out", str(tmp_path / "closed"), "--workers", "1"
+    )
+    assert closed.returncode == 0, closed.stderr
+    for joint, size in ((2, 4.0), (4, 2.5)):
+        name = f"JointCoulombFriction.iiwa_joint_{joint}.size = "
+        found = float(closed.stdout.split(name)[1].split(" N m")[0])
+        assert found == pytest.approx(size, rel=0.1)
