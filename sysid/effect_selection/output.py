@@ -60,6 +60,7 @@ def _verdict(found: Verdict) -> dict[str, Any]:
         "left_in_channels": [dataclasses.asdict(each) for each in found.findings],
         "would_have_been_found": [dataclasses.asdict(each) for each in found.limits],
         "share_explained": found.explained,
+        "undecided": [dataclasses.asdict(each) for each in found.undecided],
         "left_over": [dataclasses.asdict(each) for each in found.left_over],
         "residual_model": _residual_model(found.residual_model),
     }

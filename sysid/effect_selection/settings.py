@@ -517,6 +517,12 @@ class SelectionSettings:
         "of what the most important quantity is worth",
         "what is worth less is not listed among what a channel depends on",
     )
+    min_undecided: float = _setting(
+        0.2,
+        "of the loss that is left",
+        "an effect that gains so much in nearly all blocks is not passed over, even if "
+        "too few blocks decide; chosen as twice `min_left_over`",
+    )
     min_left_over: float = _setting(
         0.1,
         "of a channel's mean squared residual",

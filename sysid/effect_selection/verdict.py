@@ -73,6 +73,19 @@ class Tie:
 
 
 @dataclass(frozen=True)
+class Undecided:
+    """A kind of effect that gains much in nearly all blocks, of which there are few.
+
+    Attributes:
+        kind: name of its class.
+        gain: share of what is left that it takes away, of blocks that were not fitted.
+    """
+
+    kind: str
+    gain: float
+
+
+@dataclass(frozen=True)
 class Verdict:
     """What a log shows of its model.
 
@@ -93,6 +106,7 @@ class Verdict:
         left_over: what a flexible learner explains of what the effects leave.
         residual_model: learned in their place; not physical. None if it gains little.
         single_strokes: joints of effects with ties that make a single stroke.
+        undecided: more effects that may be there; the log is too short to tell.
     """
 
     ending: Ending
@@ -109,6 +123,7 @@ class Verdict:
     left_over: tuple[LeftOver, ...] = ()
     residual_model: ResidualModel | None = None
     single_strokes: tuple[str, ...] = ()
+    undecided: tuple["Undecided", ...] = ()
 
 
 def judge(
@@ -151,11 +166,27 @@ def judge(
         tuple(limit for limit in limits if limit.effect not in names),
         tuple(left_over),
         residual_model,
+        undecided=_undecided(end, last),
     )
     tied = {n.partition(".")[2] for n, t in zip(names, found.ties, strict=True) if t}
     strokes = joints_of_one_stroke(last.model, tied, last.settings)
     ending = _ending(found, last)
     return dataclasses.replace(found, ending=ending, single_strokes=strokes)
+
+
+def _undecided(end: Survey, last: Fit) -> tuple[Undecided, ...]:
+    """Returns what may be missing besides, were there more blocks to say so.
+
+    Where effects are found the model surely lacked something, and signed ranks of few
+    blocks can't tell what else: a verdict must not say that nothing is left.
+    """
+    if not last.effects or last.noise_is_stated:
+        return ()
+    limits, kinds = last.settings, dict[str, float]()
+    for e in end.effects:
+        if e.gain >= limits.min_undecided and e.block_share >= limits.min_block_share:
+            kinds.setdefault(e.candidates[0].name.partition(".")[0], e.gain)
+    return tuple(Undecided(kind, gain) for kind, gain in kinds.items())
 
 
 def _is_noticeable(dependence: Evidence, last: Fit) -> bool:
@@ -169,7 +200,8 @@ def _is_noticeable(dependence: Evidence, last: Fit) -> bool:
 
 def _ending(found: Verdict, last: Fit) -> Ending:
     enough = found.explained >= last.settings.min_explained_share
-    left = found.dependence or found.contradictions or found.findings or found.left_over
+    of_channels = found.dependence or found.findings or found.left_over
+    left = bool(of_channels or found.contradictions or found.undecided)
     if found.names and enough and not found.excess:
         return "partly" if left else "explained"
     return "unexplained" if left or found.names or found.excess else "none"

@@ -23,7 +23,9 @@ from sysid.effect_selection.effect_names import (
 )
 from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.left_over import LeftOver
-from sysid.effect_selection.verdict import Verdict
+from sysid.effect_selection.verdict import Undecided, Verdict
+
+_SHOWN = 3  # effects that a clause lists: a size of output, no threshold
 
 _QUANTITIES = {"N": "force", "N m": "torque", "m": "position", "rad": "orientation"}
 
@@ -147,6 +149,7 @@ def left_in_words(verdict: Verdict) -> str:
         excess,
         _findings(verdict.findings),
         _left_over(verdict.left_over),
+        undecided_text(verdict.undecided),
     )
     return enumeration([clause for clause in clauses if clause])
 
@@ -193,6 +196,19 @@ def _left_over(found: Sequence[LeftOver]) -> str:
     most = max(each.share for each in found)
     share = f"{'up to ' * (len(found) > 1)}{_two_digits(100.0 * most)} %"
     return f"{share} of what is left in {channels} depends on {enumeration(causes)}"
+
+
+def undecided_text(found: Sequence[Undecided]) -> str:
+    """Returns which more effects may be there; empty for none."""
+    if not found:
+        return ""
+    kinds = [in_words(each.kind) for each in found[:_SHOWN]]
+    more = " or more" if len(found) > _SHOWN else ""
+    share = _two_digits(100.0 * found[0].gain)
+    return (
+        f"{share} % of what is left may be {enumeration(kinds, 'or')}{more}, for which "
+        "this log is too short"
+    )
 
 
 def _nothing(verdict: Verdict) -> str:

@@ -17,6 +17,7 @@ from sysid.effect_selection.verdict_sentence import (
     contradictions_text,
     indistinguishable,
     single_strokes_text,
+    undecided_text,
     verdict_sentence,
 )
 
@@ -101,7 +102,8 @@ def _left_text(verdict: Verdict) -> str:
     if verdict.excess and not other:
         other = f"the residual is {verdict.excess:.2g} times the noise"
     learned = "; ".join(each.text for each in verdict.left_over)
-    parts = (verdict.dependence, other, findings_text(verdict.findings), learned)
+    findings, more = findings_text(verdict.findings), undecided_text(verdict.undecided)
+    parts = (verdict.dependence, other, findings, learned, more)
     return "; ".join(part for part in parts if part)
 
 

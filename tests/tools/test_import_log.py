@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drake_disasm.logs import read_log
-from tests.sysid.real_data import real_folder, write_slide
+from tests.sysid.real_data import real_folder, write_arm, write_slide
 from tests.tools.programs import run_program
 
 
@@ -109,3 +109,19 @@ def test_a_bag_of_an_arm_ends_in_the_truth(tmp_path: Path) -> None:
         name = f"JointCoulombFriction.iiwa_joint_{joint}.size = "
         found = float(closed.stdout.split(name)[1].split(" N m")[0])
         assert found == pytest.approx(size, rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_verdict_on_few_blocks_does_not_claim_to_be_all(tmp_path: Path) -> None:
+    """Its positions contradict its velocities for a while; then little can be proved."""
+    source = real_folder("kuka_lwr4") / "recording_1.npz"
+    arm = str(write_arm(tmp_path / "arm.urdf"))
+    run = run_program(
+        "import_log", str(source), "--urdf", arm, "--out", str(tmp_path / "log")
+    )
+    assert run.returncode == 0, run.stderr
+    closed = run_program(
+        "close_loop", "--log", str(tmp_path / "log"), "--out", str(tmp_path / "closed"),
+        "--workers", "1",
+    )  # fmt: skip
+    assert "but not all is explained" in closed.stdout

@@ -14,7 +14,7 @@ from sysid.effect_selection.experiments import separating
 from sysid.effect_selection.left_over import LeftOver
 from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.effect_selection.strokes import joints_of_one_stroke
-from sysid.effect_selection.verdict import Tie
+from sysid.effect_selection.verdict import Tie, Undecided
 from sysid.effect_selection.verdict_sentence import (
     improvement_in_words,
     indistinguishable_text,
@@ -90,6 +90,15 @@ def test_what_a_flexible_learner_finds_is_said():
     assert verdict_sentence(found, ERRORS).endswith(
         "but not all is explained: up to 40 % of what is left in fx and fy depends on "
         "velocity."
+    )
+
+
+def test_what_few_blocks_can_t_decide_is_not_passed_over():
+    more = (Undecided("TorqueRipple", 0.36), Undecided("TorqueOffset", 0.3))
+    found = dataclasses.replace(made_verdict("partly", ("SensorLag",)), undecided=more)
+    assert verdict_sentence(found, ERRORS).endswith(
+        "but not all is explained: 36 % of what is left may be torque ripple or an "
+        "offset of the torque, for which this log is too short."
     )
 
 
