@@ -18,6 +18,7 @@ import cli
 import data_options
 
 from drake_disasm.common import options, program
+from drake_disasm.common.cluster import executor_for
 from drake_disasm.common.files import make_folder, write_json, write_text
 from drake_disasm.logs import Log
 from drake_disasm.scenario import dump_scenario, load_scenario
@@ -55,7 +56,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         "the same command goes on from (default: none)",
     )
     cli.add_import_argument(parser)
-    cli.add_workers_argument(parser)
+    cli.add_executor_arguments(parser)
     add("--out", required=True, type=Path, metavar="DIR", help="a folder")
     return parser.parse_args(arguments)
 
@@ -108,7 +109,8 @@ def main(arguments: Sequence[str]) -> int:
     fits = args.out / "fits"
     with (
         program.ProgressBar(unit="run") as progress,
-        Workers(args.workers, progress=progress) as workers,
+        executor_for(args.executor, args.scheduler) as (executor, _),
+        Workers(args.workers, executor=executor, progress=progress) as workers,
     ):
         model, findings = data_options.checked(logs, model, args, workers)
         share = model.held_out_share

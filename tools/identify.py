@@ -15,6 +15,7 @@ import data_options
 import numpy as np
 
 from drake_disasm.common import options, program
+from drake_disasm.common.cluster import executor_for
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_json, write_text
 from drake_disasm.logs import Log
@@ -63,7 +64,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     _add_input_arguments(parser.add_argument)
     _add_search_arguments(parser.add_argument)
     cli.add_import_argument(parser)
-    cli.add_workers_argument(parser, "; any number gives the same bits")
+    cli.add_executor_arguments(parser, "; any number gives the same bits")
     data_options.add_data_arguments(parser.add_argument)
     _add_judgement_arguments(parser.add_argument)
     args = parser.parse_args(arguments)
@@ -196,7 +197,11 @@ def main(arguments: Sequence[str]) -> int:
     settings = _settings(args)
     origin = program.provenance("identify", arguments, args.seed) | _data(logs)
     journal = Journal(args.out, _identity(args, logs), args.resume)
-    with program.ProgressBar("evaluation") as bar, Workers(args.workers) as workers:
+    with (
+        program.ProgressBar("evaluation") as bar,
+        executor_for(args.executor, args.scheduler) as (executor, _),
+        Workers(args.workers, executor=executor) as workers,
+    ):
         whole = args.objective == "rollout"
         model, findings = data_options.checked(logs, model, args, workers, whole)
         train, test = split_episodes(model.measurements.names, _held_out(args))
@@ -278,7 +283,9 @@ def _data(logs: Sequence[Log]) -> dict[str, object]:
 
 def _identity(args: argparse.Namespace, logs: Sequence[Log]) -> dict[str, object]:
     """Returns what must be the same for a resumed run to be the same run."""
-    ignored = ("workers", "resume", "out", "log", "profile")
+    ignored = (
+        "workers", "executor", "scheduler", "resume", "out", "log", "profile",
+    )  # fmt: skip
     kept = {k: v for k, v in vars(args).items() if k not in ignored}
     return {**kept, "data": [log.data_hash for log in logs]}
 

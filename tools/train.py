@@ -16,6 +16,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # processes work in parallel, not
 import cli
 
 from drake_disasm.common import options, program
+from drake_disasm.common.cluster import executor_for
 from drake_disasm.learning.experiment import (
     Experiment,
     open_experiment,
@@ -58,7 +59,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     _add_agent_arguments(parser.add_argument)
     _add_data_arguments(parser.add_argument)
     _add_run_arguments(parser.add_argument)
-    cli.add_workers_argument(parser, "; seeds at a time")
+    cli.add_executor_arguments(parser, "; seeds at a time")
     return parser.parse_args(arguments)
 
 
@@ -194,8 +195,11 @@ def main(arguments: Sequence[str]) -> int:
     jobs = seed_jobs(experiment, seeds, args.out)
     try:
         unit = "round" if experiment.logs else "episode"
-        with program.ProgressBar(unit, keep=True) as bar:
-            train_seeds(jobs, args.workers, bar)
+        with (
+            program.ProgressBar(unit, keep=True) as bar,
+            executor_for(args.executor, args.scheduler) as (executor, host),
+        ):
+            train_seeds(jobs, args.workers, bar, executor, host)
     finally:
         print(write_summary(args.out))
     print(f"results: {args.out}")

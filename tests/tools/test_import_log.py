@@ -113,7 +113,7 @@ def test_a_bag_of_an_arm_ends_in_the_truth(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_verdict_on_few_blocks_does_not_claim_to_be_all(tmp_path: Path) -> None:
-    """Its positions contradict its velocities for a while; then little can be proved."""
+    """Its positions contradict its velocities for a while."""
     source = real_folder("kuka_lwr4") / "recording_1.npz"
     arm = str(write_arm(tmp_path / "arm.urdf"))
     run = run_program(
