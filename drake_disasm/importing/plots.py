@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,7 @@ def plot_import(imported: Imported, path: Path) -> None:
     pyplot.close(figure)
 
 
-def _draw_stretch(axis, imported: Imported) -> None:  # type: ignore[no-untyped-def]
+def _draw_stretch(axis: Any, imported: Imported) -> None:
     name = "tau" if "tau" in imported.episodes[0] else "q"
     recording, done = imported.recordings[0], imported.done
     assert done is not None
