@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import cli
+import data_options
 import numpy as np
 
 from drake_disasm.common import program
@@ -40,12 +41,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = program.argument_parser("check_log", __doc__, _EXAMPLES)
     add = parser.add_argument
     add("logs", nargs="+", type=Path, metavar="DIR", help="logs of one kind")
-    add(
-        "--scenario",
-        metavar="NAME|FILE",
-        help="the nominal model (default: the scenario that the log states)",
-    )
-    add("--urdf", metavar="FILE", help="the arm of a joint_motion log")
+    data_options.add_nominal_arguments(add)
     add(
         "--quick",
         action="store_true",

@@ -62,12 +62,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _add_model_arguments(add: Callable[..., object]) -> None:
-    add(
-        "--scenario",
-        metavar="NAME|FILE",
-        help="the nominal model (default: the scenario that the log states)",
-    )
-    add("--urdf", metavar="FILE", help="the arm of a joint_motion log")
+    data_options.add_nominal_arguments(add)
     add(
         "--held-out",
         nargs="+",

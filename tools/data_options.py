@@ -40,6 +40,16 @@ def add_data_arguments(add: Callable[..., Any]) -> None:
     )
 
 
+def add_nominal_arguments(add: Callable[..., Any]) -> None:
+    """Adds what names the nominal model of logs: --scenario and --urdf."""
+    add(
+        "--scenario",
+        metavar="NAME|FILE",
+        help="the nominal model (default: the scenario that the log states)",
+    )
+    add("--urdf", metavar="FILE", help="the arm of a joint_motion log")
+
+
 def checked(
     logs: Sequence[Log],
     model: LogModel,

@@ -14,8 +14,9 @@ _SHOWN = 2.0  # s
 
 
 def plot_import(imported: Imported, path: Path) -> None:
-    """Draws the spectrum of each joint's acceleration with the cut-off, and a stretch
-    of the first joint as recorded and as it is in the log; writes a PNG.
+    """Draws the spectrum with the cut-off, and a stretch before and after the filter.
+
+    The spectrum is that of each joint's acceleration; the stretch is the first joint's.
 
     Args:
         imported: joint motion.

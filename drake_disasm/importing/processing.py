@@ -91,14 +91,7 @@ def process(
     clocks = tuple(clock_of(recording.time) for recording in recordings)
     period = float(np.median([clock.period for clock in clocks]))
     parts = [part for each in recordings for part in _even(each)]
-    cutoff = processing.cutoff
-    if cutoff is None:
-        cutoff = max(chosen_cutoff(part.columns["q"], period) for part in parts)
-    if math.isfinite(cutoff) and cutoff >= 0.5 / period:
-        raise DisasmError(
-            f"--cutoff {cutoff:g}: is not below half the sampling rate, "
-            f"{0.5 / period:.4g} Hz; give a lower one, or none"
-        )
+    cutoff = _cutoff_of(parts, period, processing)
     low = LowPass(cutoff, period) if math.isfinite(cutoff) else None
     decimation = processing.decimate or (low.decimation if low else 1)
     found = [_filtered(part, low, decimation) for part in parts]
@@ -119,6 +112,21 @@ def process(
         resampled,
     )
     return kept, done
+
+
+def _cutoff_of(
+    parts: Sequence[Recording], period: float, processing: Processing
+) -> float:
+    """Returns the cut-off [Hz] that is wanted, or that the fastest stretch asks for."""
+    cutoff = processing.cutoff
+    if cutoff is None:
+        cutoff = max(chosen_cutoff(part.columns["q"], period) for part in parts)
+    if math.isfinite(cutoff) and cutoff >= 0.5 / period:
+        raise DisasmError(
+            f"--cutoff {cutoff:g}: is not below half the sampling rate, "
+            f"{0.5 / period:.4g} Hz; give a lower one, or none"
+        )
+    return cutoff
 
 
 def _even(recording: Recording) -> list[Recording]:

@@ -148,7 +148,7 @@ class LowPass:
 
     @property
     def decimation(self) -> int:
-        """Every how many rows hold all that is let through, with a margin of two."""
+        """Every how many rows hold all that is let through, five times over."""
         rate = _ROWS_PER_PERIOD * self.cutoff
         return max(1, int(1.0 / (rate * self.period)))
 

@@ -30,7 +30,6 @@ def _readable(path: Path) -> Iterator[None]:
         TypeError,
         KeyError,
         EOFError,
-        NotImplementedError,
         zipfile.BadZipFile,
         csv.Error,
         pyarrow.ArrowException,

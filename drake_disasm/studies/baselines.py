@@ -15,8 +15,6 @@ from drake_disasm.studies.study import (
     Study,
     Table,
     Treatment,
-    agent_config,
-    folder_name,
     level_text,
 )
 
@@ -39,15 +37,13 @@ class BaselineStudy(Study):
 
     def stages(self, folder: Path) -> Iterator[Stage]:
         """Yields the trainings, then the same episodes for every policy."""
-        treatments = [self._treatment(levels) for levels in self.combinations()]
+        treatments = self.treatments()
         yield Stage(treatments, self.options.seeds)
         yield Stage(tests=self._tests(treatments, folder))
 
-    def _treatment(self, levels: dict[str, Level]) -> Treatment:
-        config, preset_name = agent_config(str(levels["agent"]), _SCENARIO)
-        psi = [f"imprecision={levels['psi']}"]
-        experiment = self.experiment(_SCENARIO, config, preset_name, psi)
-        return Treatment(folder_name(levels), levels, experiment)
+    def treatment(self, levels: dict[str, Level]) -> Treatment:
+        """See Study."""
+        return self.of_agent(levels, _SCENARIO)
 
     def _tests(self, treatments: list[Treatment], folder: Path) -> list[PolicyTest]:
         results = finished(treatments, self.options.seeds, folder)
@@ -76,7 +72,7 @@ class BaselineStudy(Study):
 
     def tables(self, folder: Path) -> list[Table]:
         """Returns one table for each imprecision."""
-        treatments = [self._treatment(levels) for levels in self.combinations()]
+        treatments = self.treatments()
         results = finished(treatments, self.options.seeds, folder)
         tables = []
         for psi in self.levels["psi"]:

@@ -1,6 +1,7 @@
 """How the robot's imprecision changes what is learned (thesis, table 3.2 and 3.4.2)."""
 
 import dataclasses
+import functools
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -22,8 +23,6 @@ from drake_disasm.studies.study import (
     Study,
     Table,
     Treatment,
-    agent_config,
-    folder_name,
 )
 
 #: Success rate of ten trainings (table 3.2), by psi [m].
@@ -52,36 +51,31 @@ class PrecisionStudy(Study):
     def stages(self, folder: Path) -> Iterator[Stage]:
         """Yields the trainings, then learning from the pooled data of some."""
         seeds = self.options.seeds
-        yield Stage(self._treatments(), seeds)
+        yield Stage(self.treatments(), seeds)
         if pooled := self._pooled(folder):
             yield Stage([pooled], seeds)
 
-    def _treatments(self) -> list[Treatment]:
-        return [self._treatment(levels) for levels in self.combinations()]
-
-    def _treatment(self, levels: dict[str, Level]) -> Treatment:
-        config, preset_name = agent_config(str(levels["agent"]), "chapter3")
-        psi = [f"imprecision={levels['psi']}"]
-        experiment = self.experiment("chapter3", config, preset_name, psi)
-        return Treatment(folder_name(levels), levels, experiment)
+    def treatment(self, levels: dict[str, Level]) -> Treatment:
+        """See Study."""
+        return self.of_agent(levels, "chapter3")
 
     def _pooled(self, folder: Path) -> Treatment | None:
         """Returns learning from all data of the trainings without imprecision."""
-        sources = [t for t in self._treatments() if t.levels == _SOURCE]
+        sources = [t for t in self.treatments() if t.levels == _SOURCE]
         results = finished(sources, self.options.seeds, folder)
         if not results:
             return None
-        logs = [read_log(result.folder / "log") for result in results]
+        logs = [result.folder / "log" for result in results]
         experiment = dataclasses.replace(
             sources[0].experiment,
-            logs={str(log.folder): log.data_hash for log in logs},
+            logs={str(log): _data_hash(log) for log in logs},
             lockstep=False,
         )
         return Treatment(_POOLED, {}, experiment)
 
     def tables(self, folder: Path) -> list[Table]:
         """Returns success, instability and force by imprecision, and the pooled one."""
-        results = finished(self._treatments(), self.options.seeds, folder)
+        results = finished(self.treatments(), self.options.seeds, folder)
         tables = [
             Table(
                 "Trainings in which at least one episode succeeds",
@@ -150,13 +144,19 @@ class PrecisionStudy(Study):
 
     def pictures(self, folder: Path) -> list[Picture]:
         """Returns learning curves of each agent, a line for each imprecision."""
-        results = finished(self._treatments(), self.options.seeds, folder)
+        results = finished(self.treatments(), self.options.seeds, folder)
         found = []
         for agent in self.levels["agent"]:
             own = [r for r in results if r.treatment.levels["agent"] == agent]
             if own:
                 found.append(_curves(str(agent), own))
         return found
+
+
+@functools.cache
+def _data_hash(log: Path) -> str:
+    """Returns the hash of a finished training's log, which takes seconds to read."""
+    return read_log(log).data_hash
 
 
 def _curves(agent: str, results: list[SeedResult]) -> Picture:

@@ -17,8 +17,6 @@ from drake_disasm.studies.study import (
     Study,
     Table,
     Treatment,
-    agent_config,
-    folder_name,
     level_text,
 )
 
@@ -46,16 +44,14 @@ class PrecisionTransferStudy(Study):
 
     def stages(self, folder: Path) -> Iterator[Stage]:
         """Yields the trainings, then tests of their policies at each imprecision."""
-        treatments = [self._treatment(levels) for levels in self.combinations()]
+        treatments = self.treatments()
         yield Stage(treatments, self.options.seeds)
         results = finished(treatments, self.options.seeds, folder)
         yield Stage(tests=[self._test(r, psi) for r in results for psi in _PSI])
 
-    def _treatment(self, levels: dict[str, Level]) -> Treatment:
-        config, preset_name = agent_config(str(levels["agent"]), "chapter3")
-        psi = [f"imprecision={levels['psi']}"]
-        experiment = self.experiment("chapter3", config, preset_name, psi)
-        return Treatment(folder_name(levels), levels, experiment)
+    def treatment(self, levels: dict[str, Level]) -> Treatment:
+        """See Study."""
+        return self.of_agent(levels, "chapter3")
 
     def _test(self, result: SeedResult, psi: float) -> PolicyTest:
         overrides = [f"imprecision={psi}", *self.options.overrides]
@@ -70,7 +66,7 @@ class PrecisionTransferStudy(Study):
 
     def tables(self, folder: Path) -> list[Table]:
         """Returns performance and success for each pair of imprecisions."""
-        treatments = [self._treatment(levels) for levels in self.combinations()]
+        treatments = self.treatments()
         results = finished(treatments, self.options.seeds, folder)
         return [
             Table(

@@ -12,7 +12,7 @@ from typing import Any
 import jinja2
 
 from drake_disasm.common.files import write_text
-from drake_disasm.studies.results import SEED_COLUMNS, seed_rows
+from drake_disasm.studies.results import SEED_COLUMNS, aligned, seed_rows
 from drake_disasm.studies.runner import SeedResult, finished
 from drake_disasm.studies.study import Study, Table
 
@@ -71,12 +71,7 @@ def finished_of(study: Study, folder: Path) -> list[SeedResult]:
 
 def as_text(table: Table) -> str:
     """Returns a table for a terminal."""
-    cells = [list(table.columns), *map(list, table.rows)]
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    lines = [
-        "  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True))
-        for line in cells
-    ]
+    lines = aligned([table.columns, *table.rows])
     return "\n".join([f"{table.title}:", *lines, *([table.note] if table.note else [])])
 
 

@@ -24,6 +24,15 @@ def mean_of(values: Sequence[float], digits: int = 1) -> str:
     return f"{mean:.{digits}f} ± {spread:.{digits}f}"
 
 
+def aligned(cells: Sequence[Sequence[str]]) -> list[str]:
+    """Returns the rows of a table for a terminal, columns aligned to the right."""
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return [
+        "  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True))
+        for row in cells
+    ]
+
+
 def instability_index(results: Sequence[SeedResult]) -> tuple[float, int]:
     """Returns the index I_s, and of how many trainings (thesis, eq. 3.5).
 

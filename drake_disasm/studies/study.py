@@ -221,6 +221,10 @@ class Study(abc.ABC):
         }
 
     @abc.abstractmethod
+    def treatment(self, levels: dict[str, Level]) -> Treatment:
+        """Returns what a combination of levels means."""
+
+    @abc.abstractmethod
     def stages(self, folder: Path) -> Iterator[Stage]:
         """Yields the work, stage by stage; each sees what those before have left."""
 
@@ -236,6 +240,22 @@ class Study(abc.ABC):
         """Returns all combinations of the chosen levels."""
         values = itertools.product(*self.levels.values())
         return [dict(zip(self.levels, each, strict=True)) for each in values]
+
+    def treatments(self) -> list[Treatment]:
+        """Returns the treatments of all combinations of the chosen levels."""
+        return [self.treatment(levels) for levels in self.combinations()]
+
+    def of_agent(self, levels: dict[str, Level], chapter: str) -> Treatment:
+        """Returns the training of the agent "agent" at the imprecision "psi".
+
+        Args:
+            levels: of those two factors.
+            chapter: scenario, and preset of all agents but "best".
+        """
+        config, preset_name = agent_config(str(levels["agent"]), chapter)
+        psi = [f"imprecision={levels['psi']}"]
+        experiment = self.experiment(chapter, config, preset_name, psi)
+        return Treatment(folder_name(levels), levels, experiment)
 
     def experiment(
         self,

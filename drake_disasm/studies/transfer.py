@@ -32,6 +32,7 @@ from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.training import Purpose, seed_for
 from drake_disasm.policies import load_policy
 from drake_disasm.scenario import Scenario
+from drake_disasm.studies.results import aligned
 from drake_disasm.task.simulation import TaskSimulation
 
 
@@ -198,12 +199,7 @@ _HEADER = (
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
     """Returns the figures of `results` as a table for a terminal."""
-    cells = [_HEADER, *map(_cells, rows)]
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    return "\n".join(
-        "  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True))
-        for line in cells
-    )
+    return "\n".join(aligned([_HEADER, *map(_cells, rows)]))
 
 
 def _cells(row: dict[str, Any]) -> tuple[str, ...]:

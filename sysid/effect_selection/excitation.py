@@ -10,8 +10,7 @@ from sysid.confidence import Z
 from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.data_sufficiency import refuse_few_rows
 from sysid.effect_selection.detection import DetectionLimit, detection_limits
-from sysid.effect_selection.effect_names import effect_class
-from sysid.effect_selection.experiments import revealing
+from sysid.effect_selection.experiments import revealing_kind
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
@@ -63,7 +62,7 @@ class Excitation:
         """
         shown = {kind_of(x.effect) for x in self.limits if x.amplitude is not None}
         kinds = dict.fromkeys(kind_of(limit.effect) for limit in self.limits)
-        return {kind: _experiment(kind) for kind in kinds if kind not in shown}
+        return {kind: revealing_kind(kind) for kind in kinds if kind not in shown}
 
     def to_mapping(self) -> dict[str, Any]:
         """Returns it as plain data."""
@@ -77,11 +76,6 @@ class Excitation:
 def kind_of(effect: str) -> str:
     """Returns the class of an effect, without its joint."""
     return effect.partition(".")[0]
-
-
-def _experiment(kind: str) -> str:
-    known = effect_class(kind)
-    return revealing(known) if known else ""
 
 
 def excitation_of(

@@ -37,6 +37,17 @@ def revealing(effect: type[Effect], at_task: bool = False) -> str:
     return (at_task and effect.task_experiment) or effect.experiment
 
 
+def revealing_kind(kind: str, at_task: bool = False) -> str:
+    """Returns the recording that shows a kind of effect; empty if none is known.
+
+    Args:
+        kind: name of its class.
+        at_task: as of `revealing`.
+    """
+    known = effect_class(kind)
+    return revealing(known, at_task) if known else ""
+
+
 def _classes(name: str) -> list[type[Effect]]:
     """Returns the classes of effects that a name speaks of, as far as known."""
     found = [effect_class(part) for part in name.split(" and ")]

@@ -123,7 +123,7 @@ class Verdict:
     left_over: tuple[LeftOver, ...] = ()
     residual_model: ResidualModel | None = None
     single_strokes: tuple[str, ...] = ()
-    undecided: tuple["Undecided", ...] = ()
+    undecided: tuple[Undecided, ...] = ()
 
 
 def judge(
@@ -168,10 +168,15 @@ def judge(
         residual_model,
         undecided=_undecided(end, last),
     )
-    tied = {n.partition(".")[2] for n, t in zip(names, found.ties, strict=True) if t}
-    strokes = joints_of_one_stroke(last.model, tied, last.settings)
-    ending = _ending(found, last)
+    ending, strokes = _ending(found, last), _single_strokes(found, last)
     return dataclasses.replace(found, ending=ending, single_strokes=strokes)
+
+
+def _single_strokes(found: Verdict, last: Fit) -> tuple[str, ...]:
+    """Returns the joints of effects with ties that make a single stroke."""
+    pairs = zip(found.names, found.ties, strict=True)
+    tied = {name.partition(".")[2] for name, ties in pairs if ties}
+    return joints_of_one_stroke(last.model, tied, last.settings)
 
 
 def _undecided(end: Survey, last: Fit) -> tuple[Undecided, ...]:

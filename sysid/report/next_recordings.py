@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effect_class, enumeration, in_words
-from sysid.effect_selection.experiments import revealing
+from sysid.effect_selection.experiments import revealing_kind
 from sysid.effect_selection.verdict import Verdict
 from sysid.effect_selection.verdict_sentence import in_all_words, indistinguishable
 
@@ -61,7 +61,7 @@ def recordings(verdict: Verdict, at_task: bool) -> list[Recording]:
         found += [
             Recording(f"whether it is {in_words(name)} at all", text)
             for name in dict.fromkeys(n.partition(".")[0] for n in verdict.names)
-            if (text := _experiment(name, at_task))
+            if (text := revealing_kind(name, at_task))
         ]
     rows = limit_rows(verdict.limits)
     shown = {row.kind for row in rows if row.least}
@@ -69,7 +69,7 @@ def recordings(verdict: Verdict, at_task: bool) -> list[Recording]:
     found += [
         Recording(f"{in_words(kind)}, which this log could not have shown", text)
         for kind in dict.fromkeys(row.kind for row in hidden)
-        if (text := _experiment(kind, at_task))
+        if (text := revealing_kind(kind, at_task))
     ]
     return found
 
@@ -96,11 +96,6 @@ def _limit_row(kind: str, field: str, limits: list[DetectionLimit]) -> LimitRow:
     least, greatest = (found[0], found[-1]) if found else (None, None)
     doc, words = str(data.get("doc", "")), in_words(kind)
     return LimitRow(kind, words, field, doc, units, least, greatest, tuple(hidden))
-
-
-def _experiment(kind: str, at_task: bool) -> str:
-    known = effect_class(kind)
-    return revealing(known, at_task) if known else ""
 
 
 def _any_of(names: tuple[str, ...]) -> str:
