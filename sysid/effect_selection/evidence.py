@@ -167,7 +167,8 @@ def most_parsimonious(accepted: Sequence[Evidence]) -> Evidence:
     That is the one with the fewest amplitudes, then the first of the library: dry
     friction before friction in proportion to the load. Of those that the blocks can't
     distinguish from the best, a wider margin is about as good, unless they need more
-    parameters.
+    parameters or are less common: a coupling of two joints is no simpler than viscous
+    friction of all.
     """
     best, limits = accepted[0], accepted[0].settings
     order = [effect.__name__ for effect in registered_effects()]
@@ -178,7 +179,8 @@ def most_parsimonious(accepted: Sequence[Evidence]) -> Evidence:
             return True
         enough = behind <= limits.tie_parsimony_tolerance * abs(best.gain)
         no_larger = other.parameter_count <= best.parameter_count
-        return enough and no_larger and other.ties_with(best)
+        as_common = _places(other, order) <= _places(best, order)
+        return enough and no_larger and as_common and other.ties_with(best)
 
     as_good = [e for e in accepted if _is_as_good(e)]
     return min(as_good, key=lambda e: (*_complexity(e, order), -e.gain))
@@ -186,10 +188,14 @@ def most_parsimonious(accepted: Sequence[Evidence]) -> Evidence:
 
 def _complexity(evidence: Evidence, order: Sequence[str]) -> tuple[int, list[int]]:
     """Returns how many amplitudes there are, and the effects' places in the library."""
-    kinds = [type(candidate.effect).__name__ for candidate in evidence.candidates]
-    places = [order.index(kind) if kind in order else len(order) for kind in kinds]
     shapes = _shape_count(evidence.explanation)
-    return evidence.parameter_count - shapes, places
+    return evidence.parameter_count - shapes, _places(evidence, order)
+
+
+def _places(evidence: Evidence, order: Sequence[str]) -> list[int]:
+    """Returns the effects' places in the library, where the more common come first."""
+    kinds = [type(candidate.effect).__name__ for candidate in evidence.candidates]
+    return sorted({order.index(k) if k in order else len(order) for k in kinds})
 
 
 def _shape_count(explanation: Explanation) -> int:

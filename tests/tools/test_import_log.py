@@ -125,3 +125,4 @@ def test_a_verdict_on_few_blocks_does_not_claim_to_be_all(tmp_path: Path) -> Non
         "--workers", "1",
     )  # fmt: skip
     assert "but not all is explained" in closed.stdout
+    assert "missing: JointViscousFriction of" in closed.stdout

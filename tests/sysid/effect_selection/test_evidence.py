@@ -8,7 +8,9 @@ import pytest
 from drake_disasm.effects import (
     JointAsymmetricFriction,
     JointCoulombFriction,
+    JointCoupling,
     JointLoadFriction,
+    JointViscousFriction,
 )
 from sysid.effect_selection.block_regression import BlockRegression
 from sysid.effect_selection.candidates import Candidate
@@ -52,6 +54,14 @@ def test_what_explains_clearly_more_is_named():
         for e, g in ((load, 0.80), (dry, 0.74))
     )
     assert most_parsimonious([load, dry]) is load
+
+
+def test_the_rarer_effect_is_no_simpler_than_one_of_all_joints():
+    """A coupling took up what was viscous friction of an arm (kuka_lwr4)."""
+    coupling = _evidence(JointCoupling, 0.43, 4)
+    each = _evidence(JointViscousFriction, 0.47, 7)
+    assert coupling.ties_with(each)
+    assert most_parsimonious([each, coupling]) is each
 
 
 def test_the_best_shape_of_an_effect_is_taken():
