@@ -58,8 +58,8 @@ def test_what_explains_clearly_more_is_named():
 
 def test_the_rarer_effect_is_no_simpler_than_one_of_all_joints():
     """A coupling took up what was viscous friction of an arm (kuka_lwr4)."""
-    coupling = _evidence(JointCoupling, 0.43, 4)
-    each = _evidence(JointViscousFriction, 0.47, 7)
+    coupling = _evidence(JointCoupling, 0.74, 4)
+    each = _evidence(JointViscousFriction, 0.80, 7)
     assert coupling.ties_with(each)
     assert most_parsimonious([each, coupling]) is each
 
