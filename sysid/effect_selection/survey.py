@@ -25,6 +25,7 @@ from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.prewhitening import Prewhitening
 from sysid.effect_selection.residual_curves import Dependence, dependence_curves
 from sysid.identification.linearisation import Linearisation, extend
+from sysid.objective import huber_weights
 from sysid.parameters import Parameter, nominal_values
 
 Array = NDArray[np.float64]
@@ -251,6 +252,13 @@ def _of_group(group: Sequence[Candidate], columns: Mapping[str, Columns]) -> Col
     return np.concatenate([columns[c.text] for c in group])
 
 
+def _least_squares(J: Array, r: Array, weights: Array) -> Array:
+    """Returns coefficients (k,) of columns (rows, channels, k) that fit a residual."""
+    root = np.sqrt(weights)
+    a, b = (root[..., None] * J).reshape(r.size, J.shape[2]), (root * r).reshape(-1)
+    return np.asarray(np.linalg.lstsq(a, b, rcond=None)[0])
+
+
 def _whitened(
     linearisation: Linearisation,
     episode: NDArray[np.int64],
@@ -272,11 +280,17 @@ def _whitened(
     """
     settings, r = fitter.settings, linearisation.residual
     J = np.concatenate([linearisation.jacobian, curves], axis=2)[..., known]
-    root = np.sqrt(linearisation.weights)
-    a, b = (root[..., None] * J).reshape(r.size, len(known)), (root * r).reshape(-1)
-    left = r - J @ np.linalg.lstsq(a, b, rcond=None)[0]
-    delta = linearisation.huber_delta
+    delta, weights = linearisation.huber_delta, linearisation.weights
+    left = r - J @ _least_squares(J, r, weights)
     filtered = Prewhitening.of(left, episode, delta, settings, len(known))
+    few = settings.whitened_per_parameter * len(known)
+    for _ in range(settings.whitening_steps):
+        whitened = filtered(r)
+        if whitened.size >= few:
+            break
+        by = _least_squares(filtered(J), whitened, huber_weights(whitened, delta))
+        left = r - J @ by
+        filtered = Prewhitening.of(left, episode, delta, settings, len(known))
     found = filtered.whitened(linearisation)
     most = settings.max_test_blocks
     blocks = blocks_of(filtered(left), filtered.episode, settings, most)
