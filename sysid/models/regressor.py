@@ -56,7 +56,7 @@ class ArmDynamics:
         instance = add_model(plant, urdf)
         bodies = [plant.get_body(i) for i in plant.GetBodyIndices(instance)]
         self._bodies: list[RigidBody] = bodies
-        _weld_root(plant, bodies)
+        weld_root(plant, bodies)
         plant.Finalize()
         self._context = plant.CreateDefaultContext()
         self._columns = _velocity_columns(plant, joints, urdf)
@@ -257,7 +257,7 @@ def base_set(Y: Array) -> BaseSet:
     return BaseSet(used[order[:rank]], used[order[rank:]], np.array(K, dtype=float))
 
 
-def _weld_root(plant: MultibodyPlant, bodies: Sequence[RigidBody]) -> None:
+def weld_root(plant: MultibodyPlant, bodies: Sequence[RigidBody]) -> None:
     """Welds bodies that are no joint's child to the world: an arm's base."""
     joints = [plant.get_joint(i) for i in plant.GetJointIndices()]
     held = {int(joint.child_body().index()) for joint in joints}

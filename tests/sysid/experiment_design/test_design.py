@@ -1,0 +1,109 @@
+"""Designed motions: within all limits, better than random, as telling as predicted."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.common.errors import DisasmError
+from sysid.experiment_design.arm_limits import JointLimits, Workspace
+from sysid.experiment_design.design import DesignSettings, design_motion
+from sysid.experiment_design.information import ArmExperiment, uncertainty_of
+from tests.sysid.models.arm import JOINT, JOINTS, LINK
+
+_KINDS = ("JointCoulombFriction", "JointViscousFriction")
+_NOISE = np.array([0.5, 0.2])  # N m
+_DRIVE = """<transmission name="{0}_drive">
+<type>transmission_interface/SimpleTransmission</type>
+<joint name="{0}"/><actuator name="{0}_motor"/></transmission>"""
+_SETTINGS = DesignSettings(duration=8.0, harmonics=4, starts=10, iterations=6)
+
+
+@pytest.fixture(scope="module")
+def urdf(tmp_path_factory) -> str:
+    path = tmp_path_factory.mktemp("arm") / "two.urdf"
+    text = '<robot name="two"><link name="base"/>'
+    text += LINK.format("upper", "0.1 0.02 0.1", 2.0)
+    text += LINK.format("lower", "0.05 0 0.1", 1.0)
+    text += JOINT.format("shoulder", "base", "upper", "0 0 0.3", "1.2 0 0")
+    text += JOINT.format("elbow", "upper", "lower", "0 0.4 0", "0 1.3 0.2")
+    text += "".join(_DRIVE.format(name) for name in JOINTS)
+    path.write_text(text + "</robot>")
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def experiment(urdf) -> ArmExperiment:
+    return ArmExperiment(urdf, JOINTS, _KINDS, _NOISE, _SETTINGS.duration)
+
+
+@pytest.fixture(scope="module")
+def limits(urdf) -> JointLimits:
+    return JointLimits.of_urdf(urdf, JOINTS, 5.0, 0.1)
+
+
+@pytest.fixture(scope="module")
+def design(urdf, experiment, limits):
+    workspace = Workspace(urdf, JOINTS, limits)
+    return design_motion(experiment, limits, workspace, _SETTINGS)
+
+
+def _states(design):
+    return design.motion.states(np.linspace(0.0, _SETTINGS.duration, 1601))
+
+
+def test_it_is_within_all_limits(design, limits, experiment):
+    q, v, vd = _states(design)
+    assert np.all(q <= limits.upper) and np.all(q >= limits.lower)
+    for values, most in (
+        (v, limits.velocity),
+        (vd, limits.acceleration),
+        (experiment.torques(q, v, vd), limits.effort),
+    ):
+        assert np.all(np.abs(values).max(axis=0) <= most)
+    assert np.abs(v[[0, -1]]).max() < 1e-9
+
+
+def test_it_tells_more_than_the_median_of_random_motions(design):
+    assert design.after < design.before - 0.3
+
+
+def test_predicted_intervals_are_those_of_fits_to_noisy_recordings(design, experiment):
+    rows = int(_SETTINGS.duration * _SETTINGS.rate)
+    time = np.arange(rows) / _SETTINGS.rate
+    columns = experiment.columns(time, *design.motion.states(time))
+    A = (columns / _NOISE[:, None]).reshape(-1, columns.shape[-1])
+    random = np.random.default_rng(0)
+    fits = np.linalg.lstsq(A, random.normal(size=(len(A), 400)), rcond=None)[0]
+    measured = 1.96 * fits.std(axis=1)
+    assert measured == pytest.approx(design.spreads, rel=0.2)
+
+
+def test_unknowns_are_base_parameters_and_each_joints_effects(experiment):
+    effects = [u for u in experiment.unknowns if u.is_effect]
+    assert [u.name for u in effects] == [
+        "JointCoulombFriction.shoulder.size",
+        "JointCoulombFriction.elbow.size",
+        "JointViscousFriction.shoulder.coefficient",
+        "JointViscousFriction.elbow.coefficient",
+    ]
+    assert {u.unit for u in effects} == {"N m", "N m s/rad"}
+    assert len(experiment.unknowns) > len(effects)
+
+
+def test_units_change_the_criterion_by_a_constant():
+    random = np.random.default_rng(0)
+    one, other = (x @ x.T for x in random.normal(size=(2, 4, 9)))
+    scale = np.diag([1.0, 10.0, 0.1, 1e3])
+    before = uncertainty_of(one) - uncertainty_of(other)
+    after = uncertainty_of(scale @ one @ scale) - uncertainty_of(scale @ other @ scale)
+    assert after == pytest.approx(before, rel=1e-6)
+
+
+def test_a_floor_above_the_arm_is_refused(urdf, experiment, limits):
+    high = DesignSettings(duration=8.0, harmonics=4, starts=2, iterations=1, floor=5.0)
+    with pytest.raises(DisasmError, match=r"no motion.*--floor"):
+        design_motion(experiment, limits, Workspace(urdf, JOINTS, limits), high)
+
+
+def test_an_effect_that_is_none_of_an_arm_is_refused_with_the_nearest(urdf):
+    with pytest.raises(DisasmError, match="JointCoulombFriction"):
+        ArmExperiment(urdf, JOINTS, ["JointCoulombFrictoin"], _NOISE, 8.0)
