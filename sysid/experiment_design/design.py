@@ -1,6 +1,7 @@
 """Designs a motion: as informative as limits, collisions and the floor allow."""
 
 import dataclasses
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,11 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from sysid.experiment_design.arm_limits import JointLimits, Workspace
 from sysid.experiment_design.fourier import FourierMotion
-from sysid.experiment_design.information import ArmExperiment, uncertainty_of
+from sysid.experiment_design.information import (
+    ArmExperiment,
+    condition_of,
+    uncertainty_of,
+)
 
 Array = NDArray[np.float64]
 
@@ -48,13 +53,30 @@ class DesignSettings:
 
 
 @dataclasses.dataclass(frozen=True)
+class Figures:
+    """How well a motion shows the unknowns.
+
+    Attributes:
+        criterion: see `uncertainty_of`.
+        condition: see `condition_of`.
+    """
+
+    criterion: float
+    condition: float
+
+    @classmethod
+    def of(cls, information: Array) -> Self:
+        """Returns those of an information matrix."""
+        return cls(uncertainty_of(information), condition_of(information))
+
+
+@dataclasses.dataclass(frozen=True)
 class Design:
     """A motion, and what recording it would tell.
 
     Attributes:
         motion: within all limits.
-        before, after: criterion (see `uncertainty_of`) of the median random motion and
-            of this one.
+        before, after: figures of the median random motion and of this one.
         spreads: half the 95 % interval of each unknown of the experiment.
         used: share of each limit that it uses, by the limit's name, (joints,).
         clearance: least distance of links, and of their origins from z = 0 [m].
@@ -62,8 +84,8 @@ class Design:
     """
 
     motion: FourierMotion
-    before: float
-    after: float
+    before: "Figures"
+    after: "Figures"
     spreads: Array
     used: dict[str, Array]
     clearance: float
@@ -102,7 +124,12 @@ def design_motion(
         progress(ProgressUpdate("random motions", number + 1, settings.starts))
     best = points[int(np.argmin(values))]
     found = _improved(search, best, settings.iterations, progress)
-    return search.design(search.allowed(found), float(np.median(values)))
+    random_ones = [Figures.of(search.information(search.motion(p))) for p in points]
+    median = Figures(
+        float(np.median([f.criterion for f in random_ones])),
+        float(np.median([f.condition for f in random_ones])),
+    )
+    return search.design(search.allowed(found), median)
 
 
 def _improved(
@@ -168,12 +195,21 @@ class _Search:
     def value(self, point: Array) -> float:
         """Returns the criterion of a point's motion, with penalties."""
         motion = self.motion(point)
-        q, v, vd = motion.states(self._time)
-        columns = self._experiment.columns(self._time, q, v, vd)
-        rows = int(self._settings.duration * self._settings.rate)
-        told = uncertainty_of(self._experiment.information(columns, rows))
-        excess = self._excess(q, v, vd)
+        excess = self._excess(*motion.states(self._time))
+        told = uncertainty_of(self.information(motion))
         return told + _PENALTY * float(excess @ excess)
+
+    def information(self, motion: FourierMotion, time: Array | None = None) -> Array:
+        """Returns the information matrix of a recording of a motion.
+
+        Args:
+            motion: to be recorded.
+            time: (n,) of samples that stand for all rows; None: those of the search.
+        """
+        time = self._time if time is None else time
+        columns = self._experiment.columns(time, *motion.states(time))
+        rows = int(self._settings.duration * self._settings.rate)
+        return self._experiment.information(columns, rows)
 
     def allowed(self, point: Array) -> FourierMotion:
         """Returns a point's motion, shrunk about its centre until all limits hold."""
@@ -191,14 +227,11 @@ class _Search:
             low, high = (middle, high) if fits else (low, middle)
         return motion.scaled(low)
 
-    def design(self, motion: FourierMotion, before: float) -> Design:
+    def design(self, motion: FourierMotion, before: Figures) -> Design:
         """Returns a motion with what it tells, measured all along it."""
-        settings, limits = self._settings, self._limits
-        time = self._dense
-        q, v, vd = motion.states(time)
-        columns = self._experiment.columns(time, q, v, vd)
-        rows = int(settings.duration * settings.rate)
-        information = self._experiment.information(columns, rows)
+        limits = self._limits
+        q, v, vd = motion.states(self._dense)
+        information = self.information(motion, self._dense)
         room = np.maximum(limits.upper - limits.lower, 1e-12)
         torques = self._experiment.torques(q, v, vd)
         used = {
@@ -210,7 +243,7 @@ class _Search:
         return Design(
             motion,
             before,
-            uncertainty_of(information),
+            Figures.of(information),
             self._experiment.spreads(information),
             used,
             float(self._workspace.clearance(q).min()),

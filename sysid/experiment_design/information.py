@@ -141,6 +141,17 @@ def uncertainty_of(information: Array) -> float:
     return float(-np.linalg.slogdet(information + ridge)[1] / size)
 
 
+def condition_of(information: Array) -> float:
+    """Returns the condition number of the regressor, its columns scaled to one length.
+
+    So that units change nothing. By the eigenvalues of the information matrix.
+    """
+    size = np.sqrt(np.maximum(np.diagonal(information), 1e-300))
+    eigenvalues = np.linalg.eigvalsh(information / np.outer(size, size))
+    least = max(float(eigenvalues[0]), _RIDGE)
+    return float(np.sqrt(eigenvalues[-1] / least))
+
+
 def arm_effects() -> dict[str, type[Effect]]:
     """Returns the effects of arms that a motion can be designed for, by name."""
     return {

@@ -1,6 +1,7 @@
 """A designed motion as files: a table to be played, its data, and a picture."""
 
 import csv
+import dataclasses
 import io
 from collections.abc import Iterator
 from pathlib import Path
@@ -62,7 +63,8 @@ def _data(design: Design, experiment: ArmExperiment) -> dict[str, Any]:
         "centre": motion.centre.tolist(),
         "a": motion.a.tolist(),
         "b": motion.b.tolist(),
-        "criterion": {"random": design.before, "designed": design.after},
+        "random": dataclasses.asdict(design.before),
+        "designed": dataclasses.asdict(design.after),
         "used": {name: share.tolist() for name, share in design.used.items()},
         "clearance": design.clearance,
         "height": design.height,
@@ -102,10 +104,12 @@ def _draw(design: Design, limits: JointLimits, path: Path) -> None:
 
 def summary(design: Design, experiment: ArmExperiment) -> Iterator[str]:
     """Yields what was designed in lines."""
+    before, after = design.before, design.after
     yield (
-        f"criterion -log det / unknown: {design.after:.4g}; the median random motion: "
-        f"{design.before:.4g}, its intervals about "
-        f"{np.exp(0.5 * (design.before - design.after)):.3g} times as wide"
+        f"criterion -log det / unknown: {after.criterion:.4g}, condition number "
+        f"{after.condition:.3g}; the median random motion: {before.criterion:.4g} and "
+        f"{before.condition:.3g}, its intervals about "
+        f"{np.exp(0.5 * (before.criterion - after.criterion)):.3g} times as wide"
     )
     for name, share in design.used.items():
         each = ", ".join(f"{100.0 * s:.0f}" for s in share)

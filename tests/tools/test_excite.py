@@ -23,7 +23,7 @@ def test_a_motion_is_written_with_what_it_will_tell(tmp_path):
     assert list(table[0]) == ["time", "q.0", "q.1", "v.0", "v.1", "vd.0", "vd.1"]
     assert len(table) == 301 and float(table[-1]["time"]) == pytest.approx(6.0)
     data = json.loads((tmp_path / "motion/design.json").read_text())
-    assert data["criterion"]["designed"] < data["criterion"]["random"]
+    assert data["designed"]["criterion"] < data["random"]["criterion"]
     assert data["provenance"]["command"].startswith("python tools/excite.py")
     assert all(np.max(share) <= 1.0 for name, share in data["used"].items())
     assert (tmp_path / "motion/motion.png").read_bytes()[:4] == b"\x89PNG"

@@ -6,7 +6,11 @@ import pytest
 from drake_disasm.common.errors import DisasmError
 from sysid.experiment_design.arm_limits import JointLimits, Workspace
 from sysid.experiment_design.design import DesignSettings, design_motion
-from sysid.experiment_design.information import ArmExperiment, uncertainty_of
+from sysid.experiment_design.information import (
+    ArmExperiment,
+    condition_of,
+    uncertainty_of,
+)
 from tests.sysid.models.arm import JOINT, JOINTS, LINK
 
 _KINDS = ("JointCoulombFriction", "JointViscousFriction")
@@ -63,7 +67,7 @@ def test_it_is_within_all_limits(design, limits, experiment):
 
 
 def test_it_tells_more_than_the_median_of_random_motions(design):
-    assert design.after < design.before - 0.3
+    assert design.after.criterion < design.before.criterion - 0.3
 
 
 def test_predicted_intervals_are_those_of_fits_to_noisy_recordings(design, experiment):
@@ -96,6 +100,12 @@ def test_units_change_the_criterion_by_a_constant():
     before = uncertainty_of(one) - uncertainty_of(other)
     after = uncertainty_of(scale @ one @ scale) - uncertainty_of(scale @ other @ scale)
     assert after == pytest.approx(before, rel=1e-6)
+
+
+def test_the_condition_number_is_the_scaled_regressors():
+    A = np.random.default_rng(0).normal(size=(50, 4)) * [1.0, 1e3, 1e-3, 1.0]
+    scaled = A / np.linalg.norm(A, axis=0)
+    assert condition_of(A.T @ A) == pytest.approx(np.linalg.cond(scaled))
 
 
 def test_a_floor_above_the_arm_is_refused(urdf, experiment, limits):
