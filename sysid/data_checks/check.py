@@ -13,6 +13,7 @@ from sysid.data_checks.constancy import (
     stuck_findings,
 )
 from sysid.data_checks.delays import delay_findings
+from sysid.data_checks.derivatives import derivative_findings
 from sysid.data_checks.expectation import expectation_of
 from sysid.data_checks.finding import DataFinding, Severity
 from sysid.data_checks.processing import processing_findings
@@ -26,7 +27,13 @@ from sysid.workers import Workers
 Model = TypeVar("Model", bound=LogModel)
 
 #: What logs show by themselves, and what shows against a model's expectation.
-_OF_LOGS = (clock_findings, stuck_findings, processing_findings, log_unit_findings)
+_OF_LOGS = (
+    clock_findings,
+    derivative_findings,
+    stuck_findings,
+    processing_findings,
+    log_unit_findings,
+)
 _OF_MODEL = (axes_findings, delay_findings, spike_findings, quantum_findings)
 
 

@@ -14,6 +14,7 @@ from drake_disasm.common.errors import DisasmError
 KINDS: Mapping[str, str] = {
     "axes": "axes are swapped or have the wrong sign",
     "constant": "a channel never changes, where it should",
+    "derivatives": "velocities or accelerations are not the derivatives",
     "late": "a channel is late by whole rows",
     "moving": "readings at rest that move",
     "processing": "wrench is not ft_sensor processed",

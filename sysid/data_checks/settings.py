@@ -41,6 +41,21 @@ class DataSettings:
         0.1, "of the stated period", "clocks of one device differ by far less"
     )
 
+    # Derivatives.
+    derivative_share: float = threshold(
+        0.5,
+        "of what the derivative says",
+        "half is far beyond any smoothing: real filtered logs reach 0.2 inside",
+    )
+    derivative_mads: float = threshold(
+        10.0,
+        "median absolute deviations",
+        "for each joint: beyond noise and the trapezoidal rule's error",
+    )
+    derivative_rows: int = threshold(
+        5, "rows", "fewer are the corners that an impact makes, or a spike"
+    )
+
     # Channels that don't change.
     dead_channel_change: float = threshold(
         10.0,

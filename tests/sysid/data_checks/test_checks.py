@@ -59,9 +59,11 @@ def test_a_real_sensor_has_no_finding(rows, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_real_arm_has_no_finding(tmp_path):
+def test_of_a_real_arm_only_the_ends_of_its_filter_are_named(tmp_path):
     urdf = write_arm(tmp_path / "arm.urdf")
-    assert findings(read_log(write_motion(1, tmp_path / "log", urdf))) == {}
+    found = only(read_log(write_motion(1, tmp_path / "log", urdf)), "derivatives")
+    [rows] = found.rows.values()
+    assert set(range(5010, 5027)) <= set(rows) <= set(range(5000, 5027))
 
 
 # Channels that don't change.
@@ -145,6 +147,28 @@ def test_jitter_is_no_jump(arm_log):
     jitter = np.random.default_rng(0).uniform(-0.2, 0.2, 800) * 0.01
     log = damaged(arm_log, changed("time", slice(None), lambda values: values + jitter))
     assert "time" not in findings(log)
+
+
+def test_a_clock_that_hiccups_is_placed(arm_log):
+    """A logger stamps eight rows at its period while the arm takes three as long."""
+
+    def hiccup(columns):
+        time = columns["time"]
+        real = time + 0.02 * np.clip(np.arange(len(time)) - 400, 0, 8)
+        for name in set(columns) - {"time"}:
+            columns[name] = np.interp(real, time, columns[name])
+
+    found = findings(damaged(arm_log, hiccup))["derivatives"]
+    [rows] = found.rows.values()
+    hiccups = {row for row in rows if row < 700}  # at the end nothing is left to read
+    assert set(range(401, 408)) <= hiccups <= set(range(399, 410))
+    assert "velocities are not the derivatives of the positions" in found.what
+
+
+def test_a_noisy_velocity_contradicts_nothing(arm_log):
+    noise = np.random.default_rng(0).normal(size=800)
+    noisy = changed("v.0", slice(None), lambda values: values + 0.3 * noise)
+    assert "derivatives" not in findings(damaged(arm_log, noisy))
 
 
 def test_a_clock_that_runs_at_another_rate_is_named(twin_log):

@@ -1,0 +1,70 @@
+"""Velocities that contradict the positions, and accelerations the velocities."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drake_disasm.logs import Episode
+from sysid.data_checks.finding import DataFinding, rows_of
+from sysid.data_checks.settings import DataSettings
+from sysid.data_checks.subject import Subject
+
+_PAIRS = (
+    ("q", "v", "velocities", "positions"),
+    ("v", "vd", "accelerations", "velocities"),
+)
+_REMEDY = (
+    "leave them out: --drop-flagged-rows; look at the clock there, and at the ends of "
+    "a filter"
+)
+
+
+def derivative_findings(subject: Subject) -> list[DataFinding]:
+    """Finds stretches in which derivatives are not those of their columns.
+
+    A clock that hiccups moves all joints by another step of time than the one
+    that is written; the ends of a filter bend its derivative.
+    """
+    if subject.kind != "joint_motion":
+        return []
+    found = []
+    for column, rate, rates, columns in _PAIRS:
+        masks = {
+            name: _contradicting(episode, column, rate, subject.settings)
+            for name, episode in subject.named()
+        }
+        if rows := rows_of(masks):
+            what = f"{rates} are not the derivatives of the {columns} at these rows"
+            found.append(DataFinding("derivatives", what, _REMEDY, rows=rows))
+    return found
+
+
+def _contradicting(
+    episode: Episode, column: str, rate: str, settings: DataSettings
+) -> NDArray[np.bool_]:
+    """Returns the rows (n,) of stretches that change otherwise than their rates say.
+
+    By the trapezoidal rule over each step, all joints together, in units of what is
+    usual between the two: its noise, and the rule's own error.
+    """
+    bad = np.zeros(episode.rows, dtype=bool)
+    if column not in episode or rate not in episode or episode.rows < 3:
+        return bad
+    values, rates, steps = episode[column], episode[rate], np.diff(episode["time"])
+    said = 0.5 * (rates[1:] + rates[:-1]) * steps[:, None]
+    error = np.diff(values, axis=0) - said
+    floor = 1e-9 * np.ptp(values, axis=0) + 1e-300
+    usual = np.maximum(1.4826 * np.median(np.abs(error), axis=0), floor)
+    wrong = np.linalg.norm(error / usual, axis=1)
+    moved = np.linalg.norm(said / usual, axis=1)
+    is_wrong = wrong > settings.derivative_share * moved
+    is_wrong &= wrong > settings.derivative_mads * np.sqrt(values.shape[1])
+    for begin, end in _runs(is_wrong):
+        if end - begin >= settings.derivative_rows:
+            bad[begin : end + 1] = True
+    return bad
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Returns where a mask (n,) is true: begins, and ends beyond."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
