@@ -141,7 +141,7 @@ def rank_by_regression(
     before, total = regression.block_losses, regression.block_losses.sum()
     gains = [before - regression.held_out_losses(group) for _, group in columns]
     p = family_p([whitened.scores(group) for _, group in columns], settings)
-    ranks = ranks_p(np.array(gains).T, settings)
+    ranks = ranks_p(np.array(gains).T, settings.min_gain * total, settings)
     found = [
         Evidence(
             explanation,

@@ -8,6 +8,7 @@ from sysid.effect_selection.settings import SelectionSettings
 from sysid.effect_selection.significance import (
     Scores,
     family_p,
+    ranks_p,
     share_better,
     worse_p,
 )
@@ -96,3 +97,31 @@ def test_a_candidate_of_few_blocks_cannot_be_more_certain_than_their_signs():
     bounded = Scores(np.array([30.0]), blocks, 0.25)
     assert family_p([certain], _FEW)[0] < 0.01
     assert family_p([bounded], _FEW)[0] == 0.25
+
+
+def _family(random, blocks=11, useless=200):
+    """Returns gains (blocks, 1 + useless): one that all blocks gain by, then noise."""
+    plain = 1.0 + 0.3 * random.random((blocks, 1))
+    return np.hstack([plain, 1e-4 * random.normal(size=(blocks, useless))])
+
+
+def test_candidates_of_no_use_do_not_hide_what_all_blocks_gain_by():
+    gains = _family(np.random.default_rng(0))
+    p = ranks_p(gains, 0.01 * len(gains), _FEW)
+    assert p[0] < 0.01
+    assert ranks_p(gains, 0.0, _FEW)[0] > 0.05  # as they would otherwise
+
+
+def test_losses_of_all_blocks_speak_for_nothing():
+    gains = -_family(np.random.default_rng(1))
+    assert ranks_p(gains, 0.1, _FEW)[0] > 0.2
+
+
+def test_signed_ranks_of_noise_reject_as_often_as_they_say():
+    random, rejected = np.random.default_rng(2), 0
+    for _ in range(200):
+        shared = random.normal(size=(11, 5))
+        gains = shared @ random.normal(size=(5, 40)) + random.normal(size=(11, 40))
+        p = ranks_p(gains, 1.0, _FEW)
+        rejected += bool((p[gains.sum(axis=0) >= 1.0] < 0.05).any())
+    assert rejected <= 18  # 10 are expected; of 200 at 5 %, 19 are one in a hundred
