@@ -119,4 +119,5 @@ def _done_lines(imported: Imported) -> Iterator[str]:
         f"low-pass of {done.cutoff:.3g} Hz on all columns, without phase shift; v and "
         "vd are its derivatives where they were not recorded"
     )
-    yield (f"{done.reach} rows lost at either end; one of {done.decimation} rows kept")
+    kept = "all others" if done.decimation == 1 else f"one of {done.decimation} others"
+    yield f"{done.reach} rows lost at either end; {kept} kept"
