@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from drake_disasm.common.files import write_json
 from drake_disasm.common.progress import Progress
@@ -215,6 +216,57 @@ def _cells(row: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
+@dataclasses.dataclass(frozen=True)
+class PairedDifference:
+    """By how much P is higher with the loop closed, seed by seed.
+
+    Attributes:
+        against: label of the branch that it is compared with.
+        seeds: that both have, two at least.
+        mean: of the differences of P.
+        interval: 95 %, by Student's t.
+    """
+
+    against: str
+    seeds: tuple[int, ...]
+    mean: float
+    interval: tuple[float, float]
+
+    @property
+    def text(self) -> str:
+        """The difference in one line."""
+        low, high = self.interval
+        return (
+            f"P with the loop closed, less that {self.against}: {self.mean:+.1f} "
+            f"(95 %: {low:+.1f} to {high:+.1f}; {len(self.seeds)} seeds in pairs)"
+        )
+
+
+def paired_differences(rows: Sequence[dict[str, Any]]) -> list[PairedDifference]:
+    """Returns what closing the loop adds to P, against each other branch.
+
+    Args:
+        rows: as of `results`.
+    """
+    by_folder = {row["folder"]: row for row in rows}
+    closed = by_folder.pop("from_after", None)
+    if closed is None:
+        return []
+    of_closed = dict(zip(closed["seeds"], closed["P"], strict=True))
+    found = []
+    for row in by_folder.values():
+        others = dict(zip(row["seeds"], row["P"], strict=True))
+        seeds = tuple(seed for seed in of_closed if seed in others)
+        if len(seeds) < 2:
+            continue
+        d = np.array([of_closed[seed] - others[seed] for seed in seeds])
+        half = stats.t.ppf(0.975, len(d) - 1) * d.std(ddof=1) / np.sqrt(len(d))
+        mean = float(d.mean())
+        interval = (mean - float(half), mean + float(half))
+        found.append(PairedDifference(row["label"], seeds, mean, interval))
+    return found
+
+
 def _percent(shares: Sequence[float]) -> str:
     return f"{100 * np.mean(shares):.0f} %"
 
@@ -230,7 +282,13 @@ def write_results(folder: Path, provenance: dict[str, Any]) -> str:
     rows = results(folder)
     if not rows:
         return "no training in the stand-in is finished yet"
-    write_json(folder / "result.json", {"branches": rows, "provenance": provenance})
+    differences = paired_differences(rows)
+    data = {
+        "branches": rows,
+        "closed_loop_adds": [dataclasses.asdict(each) for each in differences],
+        "provenance": provenance,
+    }
+    write_json(folder / "result.json", data)
     curves = {
         row["label"]: [
             read_episodes(path)
@@ -239,4 +297,4 @@ def write_results(folder: Path, provenance: dict[str, Any]) -> str:
         for row in rows
     }
     plot_learning_curves(curves, folder / "transfer.png")
-    return table(rows)
+    return "\n".join([table(rows), *(each.text for each in differences)])

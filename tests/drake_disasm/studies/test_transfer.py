@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scipy import stats
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.evaluation import Evaluation
@@ -14,7 +15,13 @@ from drake_disasm.learning.hyperparameters import preset
 from drake_disasm.learning.run import write_episodes
 from drake_disasm.learning.warm_start import check_start
 from drake_disasm.scenario import load_scenario
-from drake_disasm.studies.transfer import TransferStudy, results, table, write_results
+from drake_disasm.studies.transfer import (
+    TransferStudy,
+    paired_differences,
+    results,
+    table,
+    write_results,
+)
 from drake_disasm.task.episode import EpisodeSummary
 
 
@@ -91,3 +98,26 @@ def test_the_table_counts_finished_seeds_alone(tmp_path: Path) -> None:
 
 def test_nothing_finished_is_said(tmp_path: Path) -> None:
     assert "no training in the stand-in is finished" in write_results(tmp_path, {})
+
+
+def _row(folder: str, **P: float) -> dict[str, Any]:
+    seeds = [int(name[1:]) for name in P]
+    return {"folder": folder, "label": folder, "seeds": seeds, "P": list(P.values())}
+
+
+def test_what_closing_the_loop_adds_is_compared_seed_by_seed() -> None:
+    rows = [
+        _row("untrained", s0=5.0),
+        _row("from_before", s0=10.0, s1=40.0, s2=20.0, s7=99.0),
+        _row("from_after", s2=23.0, s0=12.0, s1=44.0),
+    ]
+    [found] = paired_differences(rows)  # one seed is no pair of seeds
+    assert found.against == "from_before" and set(found.seeds) == {0, 1, 2}
+    expected = stats.ttest_1samp([2.0, 4.0, 3.0], 0.0).confidence_interval(0.95)
+    assert found.mean == pytest.approx(3.0)
+    assert found.interval == pytest.approx((expected.low, expected.high))
+    assert "+3.0 (95 %: +0.5 to +5.5; 3 seeds in pairs)" in found.text
+
+
+def test_without_the_closed_branch_there_is_no_difference() -> None:
+    assert paired_differences([_row("from_before", s0=1.0, s1=2.0)]) == []
