@@ -117,8 +117,8 @@ def test_an_interrupted_study_goes_on_to_the_same_result(
     out = tmp_path / "out"
     arguments = _arguments(scenarios, out, "--station=twin")
     begun = out / "untrained/seed_000/log/episode_0001.parquet"
-    study = command("transfer_study", *arguments)
-    with running(study, stderr=subprocess.PIPE) as process:
+    words = command("transfer_study", *arguments)
+    with running(words, stderr=subprocess.PIPE) as process:
         wait_until(begun.exists, process)
         os.kill(process.pid, signal.SIGINT)
         _, errors = process.communicate()
