@@ -386,9 +386,12 @@ class ArmEffect(Effect):
 
     Attributes:
         is_common: whether an arm that has it at one joint likely has it at the others.
+        moves_the_arm: whether it acts on the motion, and not on the readings of torque
+            sensors alone.
     """
 
     is_common: ClassVar[bool] = True
+    moves_the_arm: ClassVar[bool] = True
 
     @classmethod
     def places(cls, joints: Sequence[str]) -> list[dict[str, str]]:
@@ -416,6 +419,8 @@ class DelayEffect(ArmEffect):
     """
 
     delay: float
+
+    moves_the_arm = False
 
     @abc.abstractmethod
     def delays(self, joint: str) -> bool:

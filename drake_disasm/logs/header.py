@@ -25,7 +25,7 @@ from drake_disasm.logs.schema import (
 HEADER_NAME = "log.yaml"
 _MOST_BYTES, _MOST_VALUES = 2**21, 50_000  # notes of thousands of episodes fit
 _REQUIRED = ("schema", "kind", "units", "frames", "task", "provenance")
-_KEYS = (*_REQUIRED, "period", "joints", "urdf", "scenario", "notes")
+_KEYS = (*_REQUIRED, "period", "joints", "urdf", "drive", "scenario", "notes")
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class LogHeader:
     """The content of `log.yaml`; schema and units are constants of the format.
 
     Attributes:
-        kind: "transitions", "static_wrench" or "joint_motion".
+        kind: "transitions", "static_wrench", "joint_motion" or "joint_response".
         task: name of the task, for people and for choosing logs.
         provenance: free: program, version, command, date, seed, commit, ...
         frames: the frame in which each quantity is expressed. What the kind leaves
@@ -42,6 +42,7 @@ class LogHeader:
             joint motion that was not sampled evenly.
         joints: names of the joints, in the order of the columns `q.0`, `q.1`, ...
         urdf: the URDF that describes the arm, as `package://` or a path.
+        drive: what is known of the joints' drives: `limit`, `gravity_compensation`.
         scenario: the scenario, as plain data, so that a log describes itself.
         notes: what is to be known of single episodes, by their numbers: `cut_off`
             says why one was ended from outside; else free.
@@ -54,6 +55,7 @@ class LogHeader:
     period: float | None = None
     joints: tuple[str, ...] = ()
     urdf: str | None = None
+    drive: Mapping[str, Any] | None = None
     scenario: Mapping[str, Any] | None = None
     notes: Mapping[int, Mapping[str, Any]] = field(default_factory=dict)
 
@@ -73,11 +75,12 @@ class LogHeader:
             "period": _plain(self.period),
             "joints": list(self.joints) or None,
             "urdf": self.urdf,
+            "drive": _plain(self.drive),
             "scenario": _plain(self.scenario),
             "provenance": _plain(self.provenance),
             "notes": {n: dict(note) for n, note in self.notes.items()} or None,
         }
-        optional = ("joints", "urdf", "scenario", "notes")
+        optional = ("joints", "urdf", "drive", "scenario", "notes")
         return {k: v for k, v in values.items() if k not in optional or v is not None}
 
 
@@ -103,9 +106,8 @@ def parse_header(raw: object, where: str) -> LogHeader:
         period=_checked_period(values, where),
         joints=_checked_joints(values, where),
         urdf=_text(values, "urdf", where) if values.get("urdf") else None,
-        scenario=_mapping(values, "scenario", where)
-        if values.get("scenario") is not None
-        else None,
+        drive=_optional_mapping(values, "drive", where),
+        scenario=_optional_mapping(values, "scenario", where),
         notes=_checked_notes(values.get("notes") or {}, where),
     )
 
@@ -292,3 +294,9 @@ def _mapping(values: Mapping[str, Any], key: str, where: str) -> Mapping[str, An
     if not isinstance(value, Mapping):
         raise refusal(where, f"key '{key}' is {shown(value)}", "give a mapping, or {}")
     return value
+
+
+def _optional_mapping(
+    values: Mapping[str, Any], key: str, where: str
+) -> Mapping[str, Any] | None:
+    return _mapping(values, key, where) if values.get(key) is not None else None

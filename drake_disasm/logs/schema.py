@@ -26,6 +26,8 @@ GREATEST: Mapping[str, float] = MappingProxyType(
         "rad": 1e6,
         "rad/s": 1e6,
         "rad/s\N{SUPERSCRIPT TWO}": 1e9,  # differentiated at some kHz
+        "V": 1e6,
+        "A": 1e6,
         "N": 1e7,
         "N\N{MIDDLE DOT}m": 1e7,
         "1": 1e20,  # order may be nanoseconds since 1970
@@ -116,7 +118,8 @@ class Kind:
     Attributes:
         name: the value of `kind` in `log.yaml`.
         quantities: what a table may hold, in the order of its columns.
-        keys: rule for the keys `period`, `joints` and `urdf` of `log.yaml`.
+        keys: rule for the keys `period`, `joints`, `urdf` and `drive` of
+            `log.yaml`.
         one_of: quantities of which a table must hold at least one.
         min_rows: the least number of rows of a table.
     """
@@ -251,6 +254,7 @@ TRANSITIONS = Kind(
         "period": Rule.REQUIRED,
         "joints": Rule.OPTIONAL,
         "urdf": Rule.OPTIONAL,
+        "drive": Rule.FORBIDDEN,
     },
     min_rows=2,
 )
@@ -280,6 +284,7 @@ STATIC_WRENCH = Kind(
         "period": Rule.FORBIDDEN,
         "joints": Rule.FORBIDDEN,
         "urdf": Rule.FORBIDDEN,
+        "drive": Rule.FORBIDDEN,
     },
     one_of=("order", "time"),
 )
@@ -303,9 +308,46 @@ JOINT_MOTION = Kind(
         "period": Rule.OPTIONAL,
         "joints": Rule.REQUIRED,
         "urdf": Rule.OPTIONAL,
+        "drive": Rule.FORBIDDEN,
     },
 )
 
+JOINT_RESPONSE = Kind(
+    name="joint_response",
+    quantities=(
+        _time("time", "s", "when the row was sampled"),
+        _joints(
+            "q_commanded",
+            "rad",
+            "joint positions that are commanded (m for a prismatic joint)",
+            True,
+        ),
+        _joints("q", "rad", "measured joint positions (m for a prismatic joint)", True),
+        _joints(
+            "gain",
+            "1",
+            "gain of the position controller, as it was set: its torque is in "
+            "proportion to gain times error; 1 if it is left out",
+        ),
+        _joints("supply", "V", "voltage of the drive's supply; 1 if it is left out"),
+        _joints("enabled", "1", "1 while the drive is on, 0 while it is off"),
+        _joints("v", "rad/s", "measured joint velocities; read, not needed"),
+        _joints("current", "A", "of the motors; read, not needed"),
+        _joints("tau", "N·m", "joint torques; read, not needed"),
+        _EXTRA,
+    ),
+    keys={
+        "period": Rule.OPTIONAL,
+        "joints": Rule.REQUIRED,
+        "urdf": Rule.OPTIONAL,
+        "drive": Rule.OPTIONAL,
+    },
+    min_rows=2,
+)
+
 KINDS: Mapping[str, Kind] = MappingProxyType(
-    {kind.name: kind for kind in (TRANSITIONS, STATIC_WRENCH, JOINT_MOTION)}
+    {
+        kind.name: kind
+        for kind in (TRANSITIONS, STATIC_WRENCH, JOINT_MOTION, JOINT_RESPONSE)
+    }
 )

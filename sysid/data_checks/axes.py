@@ -67,7 +67,7 @@ def axes_findings(subject: Subject, expected: Expectation) -> list[DataFinding]:
     if len(measured) < settings.dead_channel_rows:
         return []
     frames = frames_of(subject, expected.rows)
-    is_wrench = subject.kind != "joint_motion"
+    is_wrench = not subject.is_of_joints
     changes = _wrench_changes(measured.shape[1] - len(WRENCH), frames)
     if not is_wrench:
         changes = _joint_changes(subject, frames[0])

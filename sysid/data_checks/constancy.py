@@ -154,8 +154,9 @@ def _noise_by_column(subject: Subject, expected: Expectation) -> dict[str, float
     """Returns what steps of the columns are compared with, by column."""
     measured = subject.model.measurements
     names = [channel.name for channel in measured.channels]
-    if subject.kind == "joint_motion":
-        return {f"tau.{i}": float(s) for i, s in enumerate(expected.scale)}
+    if subject.is_of_joints:
+        scales = expected.scale.tolist()
+        return dict(zip(subject.column_names, scales, strict=True))
     noise = dict(zip(names, expected.scale.tolist(), strict=True))
     columns = _columns(subject)
     declared = subject.declared_quantum

@@ -13,6 +13,10 @@ from sysid.models.base import Array, LogModel
 from sysid.models.measurements import episode_names
 
 
+#: The quantity that the channels of an arm's model are measured by, by kind of log.
+_BY_JOINT = {"joint_motion": "tau", "joint_response": "q"}
+
+
 @dataclass(frozen=True)
 class Subject:
     """Logs of one kind, and their model.
@@ -31,6 +35,11 @@ class Subject:
     def kind(self) -> str:
         """The kind of the logs."""
         return self.logs[0].header.kind
+
+    @property
+    def is_of_joints(self) -> bool:
+        """Whether each channel is a joint's."""
+        return self.kind in _BY_JOINT
 
     @property
     def episodes(self) -> list[Episode]:
@@ -55,8 +64,8 @@ class Subject:
     def column_names(self) -> list[str]:
         """The column of the table that each channel of the model is measured by."""
         names = [channel.name for channel in self.model.measurements.channels]
-        if self.kind == "joint_motion":
-            return [f"tau.{i}" for i in range(len(names))]
+        if self.is_of_joints:
+            return [f"{_BY_JOINT[self.kind]}.{i}" for i in range(len(names))]
         return [f"wrench.{n}" if n in WRENCH else f"X_GB_measured.{n}" for n in names]
 
     @property

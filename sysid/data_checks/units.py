@@ -28,6 +28,7 @@ def log_unit_findings(subject: Subject) -> list[DataFinding]:
         "transitions": _transitions,
         "static_wrench": _static_wrench,
         "joint_motion": _joint_motion,
+        "joint_response": _joint_response,
     }
     return find[subject.kind](subject)
 
@@ -127,6 +128,23 @@ def _joint_motion(subject: Subject) -> list[DataFinding]:
         name = f"{by}, beside the derivative of {of},"
         found += _unit_findings(name, scale, subject.settings, _DEGREES)
         found += sign_findings(name, scale, subject.settings)
+    return found
+
+
+def _joint_response(subject: Subject) -> list[DataFinding]:
+    """Compares measured positions with commanded ones, joint by joint."""
+    settings = subject.settings
+    found = _degrees_of_joints(subject)
+    changes = [
+        [e[name] - e[name].mean(axis=0) for e in subject.episodes]
+        for name in ("q_commanded", "q")
+    ]
+    commanded, measured = (np.concatenate(part) for part in changes)
+    for i in range(commanded.shape[1]):
+        scale = scale_between(commanded[:, [i]], measured[:, [i]], settings)
+        name = f"q.{i}, beside q_commanded.{i},"
+        found += _unit_findings(name, scale, settings, _DEGREES)
+        found += sign_findings(name, scale, settings)
     return found
 
 

@@ -20,7 +20,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from drake_disasm.cell.parsing import add_model
 from drake_disasm.common.errors import DisasmError
-from sysid.models.regressor import weld_root
+from sysid.models.arm_plant import weld_root
 
 Array = NDArray[np.float64]
 

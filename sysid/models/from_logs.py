@@ -11,6 +11,7 @@ from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario, scenario_from_mapping
 from sysid.models.base import LogModel
 from sysid.models.joint_motion import JointMotionModel
+from sysid.models.response.model import JointResponseModel
 from sysid.models.static_wrench import DEFAULT_PARAMETERS, StaticWrenchModel
 from sysid.models.twin import TwinModel
 from sysid.scenario_parameters import Request, scenario_parameters
@@ -20,6 +21,7 @@ OBJECTIVES = {
     "transitions": ("transitions", "rollout"),
     "static_wrench": ("static_wrench",),
     "joint_motion": ("joint_motion",),
+    "joint_response": ("joint_response",),
 }
 
 
@@ -60,7 +62,11 @@ def model_of(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
             f"--objective {objective}: {logs[0].folder} is a log of kind '{kind}'; "
             f"for that use {' or '.join(OBJECTIVES[kind])}"
         )
-    make = {"static_wrench": _static_wrench, "joint_motion": _joint_motion}
+    make = {
+        "static_wrench": _static_wrench,
+        "joint_motion": _joint_motion,
+        "joint_response": _joint_response,
+    }
     model = make.get(kind, _twin)(logs, choice)
     return _with_noise(model, dict(choice.noise))
 
@@ -100,6 +106,11 @@ def _joint_motion(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
     model = JointMotionModel(logs, choice.urdf, known)
     names = [request.name for request in choice.requests]
     return model.only(names) if names else model
+
+
+def _joint_response(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
+    known = choice.scenario or stated_scenario(logs)
+    return JointResponseModel(logs, choice.urdf, known)
 
 
 def _with_noise(model: LogModel, noise: dict[str, float]) -> LogModel:

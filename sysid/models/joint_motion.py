@@ -13,6 +13,7 @@ from drake_disasm.effects import ArmEffect, ArmResidualModel, DelayEffect, Effec
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
+from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_logs
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.base import Array, LogModel
 from sysid.models.joint_units import in_units_of_joints
@@ -54,23 +55,17 @@ class JointMotionModel(LogModel):
             DisasmError: a log is of another kind or arm, lacks a quantity, there is
                 no URDF, or an effect acts at a joint that the log does not have.
         """
-        episodes = [(log, e) for log in logs for e in log.episodes]
-        _refuse_other_logs(logs, episodes)
+        episodes = [e for log in logs for e in log.episodes]
+        refuse_other_logs(logs, "joint_motion", "inverse dynamics")
+        _refuse_missing(episodes)
         header = logs[0].header
-        urdf = urdf or header.urdf
-        if urdf is None:
-            raise refusal(
-                logs[0].folder / "log.yaml",
-                "no 'urdf'",
-                "give the arm's URDF by --urdf FILE",
-            )
-        arm = ArmDynamics(urdf, header.joints)
+        arm = ArmDynamics(arm_urdf(logs, urdf), header.joints)
         base = base_set(arm.random_regressor())
         self._scenario = scenario or Scenario()
         self._effects = tuple(self._scenario.effects)
-        _refuse_other_joints(self._effects, header.joints)
+        refuse_other_joints(self._effects, header.joints)
         # Shifts in time need neighbours of rows that are not fitted themselves.
-        self._whole = ArmMotion.of(arm, base, header.joints, [e for _, e in episodes])
+        self._whole = ArmMotion.of(arm, base, header.joints, episodes)
         self._motion = self._whole
         self._taken = np.ones(len(self._whole.time), dtype=bool)
         self._prismatic = arm.prismatic
@@ -167,32 +162,8 @@ class JointMotionModel(LogModel):
         return self.replace(_motion=self._motion.rows(mask), _taken=taken)
 
 
-def _refuse_other_joints(effects: Sequence[Effect], joints: Sequence[str]) -> None:
-    for number, effect in enumerate(effects):
-        joint = getattr(effect, "joint", None)
-        if joint is not None and joint not in joints:
-            raise DisasmError(
-                f"effects.{number}.joint: the log has no joint '{joint}'; "
-                f"{closest(joint, list(joints))}"
-            )
-
-
-def _refuse_other_logs(
-    logs: Sequence[Log], episodes: Sequence[tuple[Log, Episode]]
-) -> None:
-    for log in logs:
-        where, header = log.folder / "log.yaml", log.header
-        if header.kind != "joint_motion":
-            raise refusal(
-                where,
-                f"a log of kind '{header.kind}', inverse dynamics needs 'joint_motion'",
-                "name such a log",
-            )
-        if header.joints != logs[0].header.joints:
-            raise refusal(
-                where, "other joints than in the first log", "fit it by itself"
-            )
-    for _, episode in episodes:
+def _refuse_missing(episodes: Sequence[Episode]) -> None:
+    for episode in episodes:
         for quantity in _NEEDED:
             if quantity not in episode:
                 raise refusal(

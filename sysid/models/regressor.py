@@ -5,19 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     JacobianWrtVariable,
     MultibodyForces,
-    PrismaticJoint,
-    RigidBody,
     SpatialInertia,
 )
 from scipy.linalg import qr
 
-from drake_disasm.cell.parsing import add_model
-from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.quantity import closest
+from sysid.models.arm_plant import ArmPlant
 
 Array = NDArray[np.float64]
 
@@ -52,24 +47,16 @@ class ArmDynamics:
 
     def __init__(self, urdf: str, joints: Sequence[str]) -> None:
         self.urdf = urdf
-        self._plant = plant = MultibodyPlant(0.0)
-        instance = add_model(plant, urdf)
-        bodies = [plant.get_body(i) for i in plant.GetBodyIndices(instance)]
-        self._bodies: list[RigidBody] = bodies
-        weld_root(plant, bodies)
-        plant.Finalize()
-        self._context = plant.CreateDefaultContext()
-        self._columns = _velocity_columns(plant, joints, urdf)
-        self.prismatic = frozenset(
-            name
-            for name in joints
-            if plant.GetJointByName(name).type_name() == PrismaticJoint.kTypeName
-        )
+        arm = ArmPlant.of(urdf, joints)
+        self._plant, self._columns = arm.plant, arm.columns
+        self._bodies = arm.bodies
+        self._context = arm.plant.CreateDefaultContext()
+        self.prismatic = arm.prismatic(joints)
         self.links = tuple(body.name() for body in self._bodies)
         self.inertia = np.concatenate(
             [_inertial(body.default_spatial_inertia()) for body in self._bodies]
         )
-        last = len(INERTIAL) * _farthest(plant, bodies)
+        last = len(INERTIAL) * arm.last_body
         self.last_link = slice(last, last + len(INERTIAL))
 
     @property
@@ -255,47 +242,6 @@ def base_set(Y: Array) -> BaseSet:
     K = np.linalg.solve(R[:rank, :rank], R[:rank, rank:])
     K[np.abs(K) < 1e-9] = 0.0
     return BaseSet(used[order[:rank]], used[order[rank:]], np.array(K, dtype=float))
-
-
-def weld_root(plant: MultibodyPlant, bodies: Sequence[RigidBody]) -> None:
-    """Welds bodies that are no joint's child to the world: an arm's base."""
-    joints = [plant.get_joint(i) for i in plant.GetJointIndices()]
-    held = {int(joint.child_body().index()) for joint in joints}
-    for body in bodies:
-        if int(body.index()) not in held:
-            plant.WeldFrames(plant.world_frame(), body.body_frame())
-
-
-def _farthest(plant: MultibodyPlant, bodies: Sequence[RigidBody]) -> int:
-    """Returns which body has the most joints, welds too, between it and the world."""
-    joints = [plant.get_joint(i) for i in plant.GetJointIndices()]
-    parents = {j.child_body().index(): j.parent_body().index() for j in joints}
-
-    depths = []
-    for body in bodies:
-        index, depth = body.index(), 0
-        while index in parents:
-            index, depth = parents[index], depth + 1
-        depths.append(depth)
-    return int(np.argmax(depths))
-
-
-def _velocity_columns(
-    plant: MultibodyPlant, joints: Sequence[str], urdf: str
-) -> list[int]:
-    """Returns the index among the plant's velocities of each joint's."""
-    known = {
-        joint.name(): joint
-        for joint in (plant.get_joint(i) for i in plant.GetJointIndices())
-        if joint.num_velocities() == 1
-    }
-    for name in joints:
-        if name not in known:
-            raise DisasmError(
-                f"{urdf}: has no joint '{name}', which the log has; "
-                f"{closest(name, list(known))}"
-            )
-    return [known[name].velocity_start() for name in joints]
 
 
 def _inertial(M_B: SpatialInertia) -> Array:

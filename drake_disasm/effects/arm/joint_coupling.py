@@ -45,7 +45,9 @@ class JointCoupling(ArmTorqueEffect):
         i = samples.joints.index(self.joint)
         pair = slice(i, i + 2)
         v, vd = samples.v[:, pair], samples.vd[:, pair]
-        dry = self.dry * np.tanh(v.sum(axis=1, keepdims=True) / self.creep)
-        other = self.inertia * vd[:, ::-1] + self.viscous * v[:, ::-1]
+        both = v.sum(axis=1, keepdims=True)
+        dry = self.column("dry") * np.tanh(both / self.column("creep"))
+        other = self.column("inertia") * vd[:, ::-1]
+        other = other + self.column("viscous") * v[:, ::-1]
         added[:, pair] = other + dry if v.shape[1] == 2 else 0.0
         return added

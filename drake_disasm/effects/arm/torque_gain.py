@@ -21,6 +21,7 @@ class TorqueGain(JointEffect):
     joint: str = joint_name()
     share: float = amplitude("1", -0.9, 0.9, "relative error of the torque")
 
+    moves_the_arm = False
     noun = "a gain error of the torque"
     experiment = "the same motion with two known payloads"
 

@@ -1,0 +1,134 @@
+"""Many short motions of an arm, integrated side by side.
+
+Friction that changes its sign within a step is stiff, so that steps are implicit: the
+two-stage SDIRK method of order two that is L-stable (Alexander 1977). What Drake gives
+of the rigid bodies is taken at the middle of the step, where the motion before leads:
+of second order, too.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models.base import Array
+from sysid.models.response.rigid_bodies import RigidBodyTerms
+
+_GAMMA = 1.0 - np.sqrt(0.5)
+#: When after a step's begin, in steps, its two stages are.
+STAGES = (_GAMMA, 1.0)
+_MOST_ITERATIONS = 50
+_MOST_HALVINGS = 40
+_DESCENT = 0.1  # of the descent that is promised, at least
+_CHANGE = 1e-7  # rad/s, for differences
+_SMALL = 1e-10  # rad/s: velocities are known so well
+
+#: Torques (lanes, joints) that are missing for accelerations at q, v, vd in a stage.
+Missing = Callable[[Array, Array, Array, RigidBodyTerms, int, int], Array]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Of many lanes, at the ends of steps: (steps + 1, lanes, joints) each."""
+
+    q: Array
+    v: Array
+
+
+def integrate(
+    q: Array,
+    v: Array,
+    steps: int,
+    h: float,
+    terms: Callable[[Array, Array], RigidBodyTerms],
+    missing: Missing,
+) -> Motion:
+    """Returns how lanes move from where they begin; NaN where no step was found.
+
+    Args:
+        q, v: (lanes, joints) at the begin [rad, rad/s].
+        steps: how many.
+        h: of a step [s].
+        terms: rigid bodies at (lanes, joints) positions and velocities.
+        missing: load and friction minus the drives' torque, at positions, velocities
+            and accelerations, with these terms, in a step's stage.
+    """
+    a = np.zeros_like(q)
+    path_q, path_v = [q], [v]
+    for step in range(steps):
+        of_step = terms(q + 0.5 * h * v + 0.125 * h * h * a, v + 0.5 * h * a)
+        first = _stage(q, v, a, _GAMMA * h, of_step, missing, step, 0)
+        v_1 = v + _GAMMA * h * first
+        rest = (1.0 - _GAMMA) * h
+        q, v = q + rest * v_1, v + rest * first
+        second = _stage(q, v, first, _GAMMA * h, of_step, missing, step, 1)
+        v = v + _GAMMA * h * second
+        q = q + _GAMMA * h * v
+        a = second
+        path_q.append(q)
+        path_v.append(v)
+    return Motion(np.stack(path_q), np.stack(path_v))
+
+
+def _stage(
+    q: Array,
+    v: Array,
+    a: Array,
+    dt: float,
+    terms: RigidBodyTerms,
+    missing: Missing,
+    step: int,
+    stage: int,
+) -> Array:
+    """Returns accelerations a with which nothing is missing at the stage's end.
+
+    There v + dt a and q + dt (v + dt a). By Newton's method; a step that does not
+    bring the balance nearer is halved, lane by lane, since dry friction that has
+    changed its sign leads far too far.
+
+    Args:
+        q, v: (lanes, joints) that the stage starts from.
+        a: (lanes, joints) to begin with.
+        dt: of the stage [s].
+        terms: of the step.
+        missing: see `integrate`.
+        step, stage: their numbers.
+    """
+
+    def short(a: Array) -> Array:
+        end = v + dt * a
+        return missing(q + dt * end, end, a, terms, step, stage)
+
+    r = short(a)
+    size = np.linalg.norm(r, axis=1)
+    for _ in range(_MOST_ITERATIONS):
+        change = -np.linalg.solve(_slope(short, a, r, dt), r[..., None])[..., 0]
+        share = np.ones(len(a))
+        for _ in range(_MOST_HALVINGS):
+            trial = a + share[:, None] * change
+            r_trial = short(trial)
+            size_trial = np.linalg.norm(r_trial, axis=1)
+            is_worse = size_trial > (1.0 - _DESCENT * share) * size
+            is_worse &= dt * share * np.abs(change).max(axis=1) > _SMALL
+            if not is_worse.any():
+                break
+            share = np.where(is_worse, 0.5 * share, share)
+        moved = dt * share * np.abs(change).max(axis=1)
+        a, r, size = trial, r_trial, size_trial
+        if not (moved > _SMALL).any():
+            break
+    return np.where((moved <= _SMALL)[:, None], a, np.nan)
+
+
+def _slope(short: Callable[[Array], Array], a: Array, r: Array, dt: float) -> Array:
+    """Returns derivatives (lanes, joints, joints) of what is missing, by differences."""
+    lanes, joints = a.shape
+    J: NDArray[np.float64] = np.empty((lanes, joints, joints))
+    change = _CHANGE / dt
+    for i in range(joints):
+        moved = a.copy()
+        moved[:, i] += change
+        J[:, :, i] = (short(moved) - r) / change
+    J[np.linalg.det(J) == 0.0] = np.nan  # that lane has failed, no other
+    return J

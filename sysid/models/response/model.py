@@ -1,0 +1,291 @@
+"""How an arm's measured positions follow from commanded ones."""
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drake_disasm.effects import ArmEffect, ArmTorqueEffect, Effect
+from drake_disasm.logs import Episode, Log
+from drake_disasm.logs.refusal import refusal
+from drake_disasm.scenario import Scenario
+from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_logs
+from sysid.models.arm_plant import ArmPlant
+from sysid.models.base import Array, LogModel
+from sysid.models.joint_units import in_units_of_joints, prismatic_unit
+from sysid.models.measurements import Channel, Measurements
+from sysid.models.response.drive import Drive, DriveSettings, Inputs
+from sysid.models.response.rigid_bodies import RigidBodies
+from sysid.models.response.segments import (
+    Segment,
+    inputs_of,
+    local_fit,
+    measured_noise,
+    reach_of,
+    segments_of,
+)
+from sysid.models.response.simulation import (
+    ON_BODIES,
+    Arm,
+    ParameterSet,
+    positions_at,
+    simulate,
+)
+from sysid.models.response.start import Guess, guessed_drives
+from sysid.parameters import Parameter
+
+SEGMENT = 1.0  # s: several times what a servo takes to forget where it was
+_STEP = 0.005  # s, of the integrator at most
+_TOGETHER = 16  # parameter sets that are simulated side by side
+_CHUNK = 16  # segments of one piece of work
+_REACH = 30.0  # times what was guessed, on either side
+_LONGEST = 0.3  # s, of damping over stiffness: slower is no servo
+_LATEST = 0.05  # s, of a goal
+_MOST_ROWS = 2000  # that the guess is made of
+
+
+class JointResponseModel(LogModel):
+    """q(t) of an arm that follows its commands, simulated segment by segment.
+
+    M(q) vd + bias(q, v) + effects(q, v, vd, load) = drive(q_d(t - T), q, v), from the
+    state in which each segment was measured to begin. The rigid bodies are those of the
+    URDF, and set the scale of all torques; each joint's drive has a stiffness and a
+    damping, and all have a delay T of the goal. Those are the parameters.
+    """
+
+    effect_types = (ArmTorqueEffect, *ON_BODIES)
+
+    def __init__(
+        self,
+        logs: Sequence[Log],
+        urdf: str | None = None,
+        scenario: Scenario | None = None,
+        segment: float = SEGMENT,
+    ) -> None:
+        """Reads the motion from the logs.
+
+        Args:
+            logs: of kind `joint_response`, of one arm.
+            urdf: of the arm; by default the one named in the first log.
+            scenario: whose arm effects act.
+            segment: length [s]; infinite to simulate each episode as a whole.
+
+        Raises:
+            DisasmError: a log is of another kind or arm, there is no URDF, an effect
+                acts at a joint that the log does not have, or the positions do not
+                follow what is commanded.
+        """
+        refuse_other_logs(logs, "joint_response", "a joint's response")
+        header = logs[0].header
+        self._urdf = arm_urdf(logs, urdf)
+        self._joints = header.joints
+        self._settings = _settings_of(logs)
+        self._scenario = scenario or Scenario()
+        self._effects = tuple(self._scenario.effects)
+        refuse_other_joints(self._effects, header.joints)
+        self._prismatic = ArmPlant.of(self._urdf, header.joints).prismatic(
+            header.joints
+        )
+        episodes = [episode for log in logs for episode in log.episodes]
+        reach = reach_of(episodes)
+        self._cut(episodes, segment, reach)
+        channels = tuple(
+            Channel(
+                joint,
+                "m" if joint in self._prismatic else "rad",
+                float(noise),
+                "scatter about nearby rows",
+            )
+            for joint, noise in zip(
+                header.joints, measured_noise(episodes), strict=True
+            )
+        )
+        self.measurements = Measurements.of_logs(
+            logs, channels, lambda _, episode: episode["q"]
+        )
+        guess = self._guess(episodes, reach)
+        self.parameters = self._drive_parameters(guess, episodes, logs)
+
+    def _cut(self, episodes: Sequence[Episode], length: float, reach: float) -> None:
+        """Cuts episodes into segments, and numbers them for each row."""
+        segments: list[Segment] = []
+        numbers = []
+        for episode in episodes:
+            own, number = segments_of(episode, length, reach)
+            numbers.append(number + len(segments))
+            segments += own
+        self._segments = tuple(segments)
+        self._segment = np.concatenate(numbers)
+        self._time = np.concatenate([episode["time"] for episode in episodes])
+
+    # Parameters.
+
+    def _guess(self, episodes: Sequence[Episode], reach: float) -> Guess:
+        """Returns about what the drives are, by inverse dynamics of some rows."""
+        every = max(1, len(self._time) // _MOST_ROWS)
+        motions, inputs = [], []
+        for episode in episodes:
+            time = episode["time"]
+            fit = local_fit(time, episode["q"], time[::every], reach)
+            motions.append(np.stack([fit.q, fit.v, fit.vd]))
+            inputs.append(inputs_of(episode).at(np.s_[::every]))
+        q, v, vd = np.concatenate(motions, axis=1)
+        load = self._bodies.terms(q, v, ()).load(vd)
+        if self._settings.gravity_compensation:
+            load = load - self._bodies.holding(q)
+        joined = Inputs(
+            *(
+                np.concatenate([getattr(i, f.name) for i in inputs])
+                for f in dataclasses.fields(Inputs)
+            )
+        )
+        return guessed_drives(load, q, v, vd, joined, self._settings.limit)
+
+    def _drive_parameters(
+        self, guess: Guess, episodes: Sequence[Episode], logs: Sequence[Log]
+    ) -> tuple[Parameter, ...]:
+        """Returns each joint's stiffness and damping, and the delay of all goals."""
+        has_gain = any("gain" in e for e in episodes)
+        has_supply = any("supply" in e for e in episodes)
+        per = " per V" * has_supply + " per unit of gain" * has_gain
+        inputs = [inputs_of(episode) for episode in episodes]
+        usual = np.median(
+            np.concatenate([i.gain * i.supply for i in inputs]), axis=0
+        )
+        found = []
+        for i, joint in enumerate(self._joints):
+            k, d = float(guess.stiffness[i]), float(guess.damping[i])
+            if not k > 0.0:
+                raise refusal(
+                    logs[0].folder,
+                    f"joint '{joint}' does not follow 'q_commanded.{i}'",
+                    "check signs and units of both, the gain, and that the joint "
+                    "carries something by the URDF",
+                )
+            unit, of_damping = "N m/rad", "N m s/rad"
+            if joint in self._prismatic:
+                unit, of_damping = prismatic_unit(unit), prismatic_unit(of_damping)
+            most = max(_LONGEST * k * float(usual[i]), 10.0 * d)
+            found += [
+                Parameter(
+                    f"{joint}.stiffness",
+                    k,
+                    k / _REACH,
+                    k * _REACH,
+                    unit,
+                    f"of the drive{per}",
+                    log_scale=True,
+                ),
+                Parameter(
+                    f"{joint}.damping", d, 0.0, most, of_damping, "of the drive"
+                ),
+            ]
+        delay = Parameter("delay", 0.0, 0.0, _LATEST, "s", "of what is commanded")
+        return (*found, delay)
+
+    # Effects.
+
+    def applicable_effects(self, library: Sequence[type[Effect]]) -> list[Effect]:
+        """See LogModel; what is in a torque sensor's reading alone moves nothing."""
+        moving = [k for k in library if issubclass(k, ArmEffect) and k.moves_the_arm]
+        return super().applicable_effects(moving)
+
+    def with_effects(
+        self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
+    ) -> Self:
+        """See LogModel; additional parameters get the units of their joints."""
+        added = in_units_of_joints(parameters, effects, self._prismatic)
+        return super().with_effects(effects, added)
+
+    def scenario_at(self, theta: Array) -> Scenario:
+        """Returns a scenario with the effects; drives are no part of it."""
+        effects: list[Any] = list(self.effects_at(theta))
+        return dataclasses.replace(self._scenario, effects=effects, randomisation=[])
+
+    # Rows.
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """See LogModel."""
+        return self._joints
+
+    def select_rows(self, mask: NDArray[np.bool_]) -> Self:
+        """See LogModel."""
+        return self.replace(_segment=self._segment[mask], _time=self._time[mask])
+
+    def thin(self, every: int) -> Self:
+        """Returns the same model of every n-th segment: rows of one come for free."""
+        kept = np.unique(self._segment)[::every]
+        return self.of_rows(np.isin(self._segment, kept))
+
+    def chunks(self) -> list[slice]:
+        """See LogModel: some segments each."""
+        begins = np.flatnonzero(np.diff(self._segment, prepend=-1))
+        edges = [*begins[::_CHUNK].tolist(), len(self._segment)]
+        return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+    # Prediction.
+
+    @property
+    def together(self) -> int:
+        """See LogModel."""
+        return _TOGETHER
+
+    def predict(self, theta: Array, rows: slice) -> Array:
+        """See LogModel."""
+        return self._simulated(theta[None], rows)[0]
+
+    def simulate_all(self, thetas: Array, rows: slice) -> list[Array | str]:
+        """See LogModel."""
+        found = self._simulated(np.array([self.with_frozen(t) for t in thetas]), rows)
+        return [
+            own if np.isfinite(own).all() else "no step of the integrator was found"
+            for own in found
+        ]
+
+    def _simulated(self, thetas: Array, rows: slice) -> Array:
+        """Returns positions (k, rows, joints) of parameter sets (k, all)."""
+        numbers, segment = np.unique(self._segment[rows], return_inverse=True)
+        segments = [self._segments[number] for number in numbers]
+        after = self._time[rows] - np.array([s.start for s in segments])[segment]
+        steps = max(1, int(np.ceil(float(after.max()) / _STEP - 1e-9)))
+        arm = Arm(self._joints, self._bodies, self._settings.gravity_compensation)
+        sets = [self._parameter_set(theta) for theta in thetas]
+        motion = simulate(arm, sets, segments, steps, _STEP)
+        return positions_at(motion, _STEP, after, segment)
+
+    def _parameter_set(self, theta: Array) -> ParameterSet:
+        """Returns what parameters (all,) stand for: see `parameters`."""
+        count = 2 * len(self._joints)
+        drive = Drive(theta[0:count:2], theta[1:count:2], self._settings.limit)
+        effects = tuple(e for e in self.effects_at(theta) if isinstance(e, ArmEffect))
+        return ParameterSet(drive, float(theta[count]), effects)
+
+    @property
+    def _bodies(self) -> RigidBodies:
+        """Built once in each process that evaluates the model."""
+        return _rigid_bodies(self._urdf, self._joints)
+
+
+@functools.lru_cache(maxsize=4)
+def _rigid_bodies(urdf: str, joints: tuple[str, ...]) -> RigidBodies:
+    return RigidBodies(urdf, joints)
+
+
+def _settings_of(logs: Sequence[Log]) -> DriveSettings:
+    """Returns what the logs say of their drives, which must be the same."""
+    found = [
+        DriveSettings.of(log.header.drive or {}, str(log.folder / "log.yaml"))
+        for log in logs
+    ]
+    for log, settings in zip(logs, found, strict=True):
+        if settings != found[0]:
+            raise refusal(
+                log.folder / "log.yaml",
+                "another 'drive' than in the first log",
+                "fit it by itself",
+            )
+    return found[0]

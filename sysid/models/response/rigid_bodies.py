@@ -1,0 +1,105 @@
+"""Mass matrix and bias of an arm, by Drake, in many states."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.multibody.tree import JacobianWrtVariable, SpatialInertia, UnitInertia
+
+from drake_disasm.effects import ArmEffect, ArmTilt, FlangePayload
+from sysid.models.arm_plant import ArmPlant
+from sysid.models.base import Array
+
+
+@dataclass(frozen=True)
+class RigidBodyTerms:
+    """Of states (n, joints): load = M vd + bias.
+
+    Attributes:
+        M: (n, joints, joints) mass matrix.
+        bias: (n, joints) Coriolis and centrifugal torques minus gravity's.
+    """
+
+    M: Array
+    bias: Array
+
+    def load(self, vd: Array) -> Array:
+        """Returns the torques (n, joints) that accelerations (n, joints) take."""
+        return np.asarray(np.einsum("nij,nj->ni", self.M, vd) + self.bias)
+
+
+class RigidBodies:
+    """An arm of a URDF, with what hangs on it and how its base stands.
+
+    Args:
+        urdf: a path, or `package://`.
+        joints: names of the actuated joints; others rest where they are.
+    """
+
+    def __init__(self, urdf: str, joints: Sequence[str]) -> None:
+        self._arm = arm = ArmPlant.of(urdf, joints)
+        self._context = arm.plant.CreateDefaultContext()
+        self._columns = np.array(arm.columns)
+        self._link = arm.bodies[arm.last_body]
+        self._nominal = self._link.default_spatial_inertia()
+        gravity = arm.plant.gravity_field().gravity_vector()
+        self._g = float(np.linalg.norm(gravity))
+
+    def terms(self, q: Array, v: Array, effects: Sequence[ArmEffect]) -> RigidBodyTerms:
+        """Returns what the torques of states (n, joints) are made of.
+
+        Args:
+            q, v: (n, joints).
+            effects: on the arm; payloads and tilts of its base count.
+        """
+        plant, context, columns = self._arm.plant, self._context, self._columns
+        self._set_payload([e for e in effects if isinstance(e, FlangePayload)])
+        tilts = [e for e in effects if isinstance(e, ArmTilt) and not e.is_null]
+        square = np.ix_(columns, columns)
+        M, bias = np.empty((*q.shape, q.shape[1])), np.empty_like(q)
+        for i in range(len(q)):
+            self._set_state(q[i], v[i])
+            force = plant.CalcGravityGeneralizedForces(context)
+            for tilt in tilts:
+                force = force + self._pull_by_tilt(tilt)
+            M[i] = plant.CalcMassMatrix(context)[square]
+            bias[i] = (plant.CalcBiasTerm(context) - force)[columns]
+        return RigidBodyTerms(M, bias)
+
+    def holding(self, q: Array) -> Array:
+        """Returns torques (n, joints) that hold the arm at rest, by the URDF alone."""
+        plant, found = self._arm.plant, np.empty_like(q)
+        self._set_payload([])
+        for i, position in enumerate(q):
+            self._set_state(position, np.zeros_like(position))
+            force = plant.CalcGravityGeneralizedForces(self._context)
+            found[i] = -force[self._columns]
+        return found
+
+    def _set_state(self, q: Array, v: Array) -> None:
+        plant = self._arm.plant
+        full = np.zeros((2, plant.num_velocities()))
+        # A motion that has failed is NaN; Drake would end all others for it.
+        full[:, self._columns] = np.nan_to_num((q, v))
+        plant.SetPositionsAndVelocities(self._context, full.reshape(-1))
+
+    def _set_payload(self, payloads: Sequence[FlangePayload]) -> None:
+        """Sets what the last link weighs, with payloads on it."""
+        M_F = self._nominal
+        pi = np.sum([p.inertial for p in payloads] or [np.zeros(10)], axis=0)
+        mass = M_F.get_mass() + pi[0]
+        moment = M_F.get_mass() * M_F.get_com() + pi[1:4]
+        upper = M_F.CalcRotationalInertia().CopyToFullMatrix3()[np.triu_indices(3)]
+        xx, xy, xz, yy, yz, zz = (upper + pi[4:]) / mass
+        unit = UnitInertia(xx, yy, zz, xy, xz, yz)
+        loaded = SpatialInertia(mass, moment / mass, unit, skip_validity_check=True)
+        self._link.SetSpatialInertiaInBodyFrame(self._context, loaded)
+
+    def _pull_by_tilt(self, tilt: ArmTilt) -> Array:
+        """Returns generalised forces of what a tilt of the base adds to gravity."""
+        plant, world = self._arm.plant, self._arm.plant.world_frame()
+        J = plant.CalcJacobianCenterOfMassTranslationalVelocity(
+            self._context, JacobianWrtVariable.kV, world, world
+        )
+        dg = self._g * np.array([tilt.ry, -tilt.rx, 0.0])
+        return np.asarray(plant.CalcTotalMass(self._context) * (J.T @ dg))

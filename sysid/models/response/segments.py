@@ -1,0 +1,160 @@
+"""Episodes cut into segments that are simulated from where the arm was measured.
+
+Over a segment errors of the model add up until they show, and errors of the state that
+it began in fade (multiple shooting, Bock 1981, with the states as measured).
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drake_disasm.importing.signals import chosen_cutoff, even_times, quantum, resample
+from drake_disasm.logs import Episode
+from sysid.models.base import Array
+from sysid.models.response.drive import Inputs
+
+_LEAST_NOISE = 1e-6  # rad, or m: no encoder is better
+_LEAST_ROWS = 7  # of a local parabola
+
+
+@dataclass(frozen=True)
+class LocalFit:
+    """Positions, velocities and accelerations by parabolas through nearby rows."""
+
+    q: Array
+    v: Array
+    vd: Array
+
+
+def local_fit(time: Array, q: Array, at: Array, reach: float) -> LocalFit:
+    """Returns what parabolas through nearby rows give, (m, joints) each.
+
+    Savitzky and Golay's filter (1964), for rows that need not be evenly spaced, and up
+    to the ends of a record.
+
+    Args:
+        time: (n,) increasing [s].
+        q: (n, joints) measured.
+        at: (m,) when [s].
+        reach: rows so near count [s]; there are seven at least.
+    """
+    found = np.empty((3, len(at), q.shape[1]))
+    for i, t in enumerate(at):
+        near = np.abs(time - t) <= reach
+        if near.sum() < _LEAST_ROWS:
+            near = np.argsort(np.abs(time - t), kind="stable")[:_LEAST_ROWS]
+        s = time[near] - t
+        A = np.stack([np.ones_like(s), s, 0.5 * s**2], axis=1)
+        found[:, i] = np.linalg.lstsq(A, q[near], rcond=None)[0]
+    return LocalFit(*found)
+
+
+def reach_of(episodes: Sequence[Episode]) -> float:
+    """Returns how far a local parabola may reach [s], by the motion's spectrum."""
+    cutoffs = []
+    for episode in episodes:
+        time = episode["time"]
+        if len(time) > 2 * _LEAST_ROWS:
+            even = even_times(time)
+            q = resample(time, episode["q"], even)
+            cutoffs.append(chosen_cutoff(q, float(even[1] - even[0])))
+    return 0.25 / max(cutoffs) if cutoffs else 0.0
+
+
+def measured_noise(episodes: Sequence[Episode]) -> Array:
+    """Returns the standard deviation (joints,) of measured positions.
+
+    By what three rows in a row are off a line, which no motion of a servo bends as much
+    as noise does; or by the encoder's step, if that is more.
+
+    Args:
+        episodes: of a log of kind `joint_response`.
+    """
+    off, steps = [], []
+    for episode in episodes:
+        time, q = episode["time"], episode["q"]
+        share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
+        middle = (1.0 - share) * q[:-2] + share * q[2:]
+        off.append((q[1:-1] - middle) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2))
+        steps.append([quantum(column) for column in q.T])
+    scatter = 1.4826 * np.median(np.abs(np.concatenate(off)), axis=0)
+    rounding = np.max(steps, axis=0) / np.sqrt(12.0)
+    return np.maximum(np.maximum(scatter, rounding), _LEAST_NOISE)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A piece of an episode.
+
+    Attributes:
+        start: when it begins [s].
+        q, v: (joints,) there.
+        time: (n,) of the episode [s].
+        inputs: of the drives in the episode, row by row (n, joints).
+    """
+
+    start: float
+    q: Array
+    v: Array
+    time: Array
+    inputs: Inputs
+
+    def inputs_at(self, times: Array, delay: float) -> Inputs:
+        """Returns what goes into the drives at times (..., ), with a late goal.
+
+        Goals and supplies are interpolated; gains and switches hold until the next
+        row.
+
+        Args:
+            times: of the episode [s]; beyond its ends, what is there.
+            delay: T, of the goal [s].
+        """
+        before = np.searchsorted(self.time, times, side="right") - 1
+        before = np.clip(before, 0, len(self.time) - 1)
+        return dataclasses.replace(
+            self.inputs.at(before),
+            goal=_interpolated(self.time, self.inputs.goal, times - delay),
+            supply=_interpolated(self.time, self.inputs.supply, times),
+        )
+
+
+def _interpolated(time: Array, values: Array, at: Array) -> Array:
+    """Returns values (n, joints) at times (...), as (..., joints)."""
+    return np.stack([np.interp(at, time, column) for column in values.T], axis=-1)
+
+
+def inputs_of(episode: Episode) -> Inputs:
+    """Returns what goes into the drives in an episode, row by row (n, joints)."""
+    goal = episode["q_commanded"]
+
+    def or_ones(name: str) -> Array:
+        return episode[name] if name in episode else np.ones_like(goal)
+
+    return Inputs(goal, or_ones("gain"), or_ones("supply"), or_ones("enabled"))
+
+
+def segments_of(
+    episode: Episode, length: float, reach: float
+) -> tuple[list[Segment], NDArray[np.int64]]:
+    """Returns an episode's segments, and the number of each row's (n,).
+
+    Args:
+        episode: of a log of kind `joint_response`.
+        length: of a segment at least, the episode's if that is shorter [s].
+        reach: see `local_fit`.
+    """
+    time = episode["time"]
+    duration = float(time[-1] - time[0])
+    count = max(1, int(duration / length))
+    starts = time[0] + duration / count * np.arange(count)
+    number = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, None)
+    state = local_fit(time, episode["q"], starts, reach)
+    inputs = inputs_of(episode)
+    segments = [
+        Segment(float(start), state.q[i], state.v[i], time, inputs)
+        for i, start in enumerate(starts)
+    ]
+    return segments, number
