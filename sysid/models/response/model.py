@@ -39,8 +39,8 @@ from sysid.parameters import Parameter
 
 SEGMENT = 1.0  # s: several times what a servo takes to forget where it was
 _STEP = 0.005  # s, of the integrator at most
-_TOGETHER = 16  # parameter sets that are simulated side by side
-_CHUNK = 16  # segments of one piece of work
+_TOGETHER = 32  # parameter sets that are simulated side by side
+_CHUNK = 32  # segments of one piece of work
 _REACH = 30.0  # times what was guessed, on either side
 _LONGEST = 0.3  # s, of damping over stiffness: slower is no servo
 _LATEST = 0.05  # s, of a goal

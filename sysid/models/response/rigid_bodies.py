@@ -52,36 +52,41 @@ class RigidBodies:
             q, v: (n, joints).
             effects: on the arm; payloads and tilts of its base count.
         """
-        plant, context, columns = self._arm.plant, self._context, self._columns
+        plant, context = self._arm.plant, self._context
         self._set_payload([e for e in effects if isinstance(e, FlangePayload)])
         tilts = [e for e in effects if isinstance(e, ArmTilt) and not e.is_null]
-        square = np.ix_(columns, columns)
-        M, bias = np.empty((*q.shape, q.shape[1])), np.empty_like(q)
-        for i in range(len(q)):
-            self._set_state(q[i], v[i])
+        M, forces = [], []
+        for state in self._states(q, v):
+            plant.SetPositionsAndVelocities(context, state)
             force = plant.CalcGravityGeneralizedForces(context)
             for tilt in tilts:
                 force = force + self._pull_by_tilt(tilt)
-            M[i] = plant.CalcMassMatrix(context)[square]
-            bias[i] = (plant.CalcBiasTerm(context) - force)[columns]
-        return RigidBodyTerms(M, bias)
+            M.append(plant.CalcMassMatrix(context))
+            forces.append(plant.CalcBiasTerm(context) - force)
+        columns = self._columns
+        chosen = np.array(M)[:, columns[:, None], columns]
+        return RigidBodyTerms(chosen, np.array(forces)[:, columns])
 
     def holding(self, q: Array) -> Array:
         """Returns torques (n, joints) that hold the arm at rest, by the URDF alone."""
-        plant, found = self._arm.plant, np.empty_like(q)
+        plant, found = self._arm.plant, []
         self._set_payload([])
-        for i, position in enumerate(q):
-            self._set_state(position, np.zeros_like(position))
-            force = plant.CalcGravityGeneralizedForces(self._context)
-            found[i] = -force[self._columns]
-        return found
+        for state in self._states(q, np.zeros_like(q)):
+            plant.SetPositionsAndVelocities(self._context, state)
+            found.append(-plant.CalcGravityGeneralizedForces(self._context))
+        return np.array(found)[:, self._columns]
 
-    def _set_state(self, q: Array, v: Array) -> None:
-        plant = self._arm.plant
-        full = np.zeros((2, plant.num_velocities()))
-        # A motion that has failed is NaN; Drake would end all others for it.
-        full[:, self._columns] = np.nan_to_num((q, v))
-        plant.SetPositionsAndVelocities(self._context, full.reshape(-1))
+    def _states(self, q: Array, v: Array) -> Array:
+        """Returns the plant's states (n, 2 velocities) of the joints' (n, joints).
+
+        A motion that has failed is NaN, for which Drake would end all others: it is
+        zero here.
+        """
+        count = self._arm.plant.num_velocities()
+        states = np.zeros((len(q), 2 * count))
+        states[:, self._columns] = np.nan_to_num(q)
+        states[:, self._columns + count] = np.nan_to_num(v)
+        return states
 
     def _set_payload(self, payloads: Sequence[FlangePayload]) -> None:
         """Sets what the last link weighs, with payloads on it."""

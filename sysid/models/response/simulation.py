@@ -95,12 +95,13 @@ def _terms(
 ) -> Callable[[Array, Array], RigidBodyTerms]:
     """Returns what gives the rigid bodies of all lanes (sets segments, joints)."""
     on_bodies = [[e for e in s.effects if isinstance(e, ON_BODIES)] for s in sets]
+    groups = on_bodies if any(on_bodies) else [[]]
 
     def terms(q: Array, v: Array) -> _Terms:
         parts = [
             arm.bodies.terms(own_q, own_v, effects)
             for own_q, own_v, effects in zip(
-                np.split(q, len(sets)), np.split(v, len(sets)), on_bodies, strict=True
+                np.split(q, len(groups)), np.split(v, len(groups)), groups, strict=True
             )
         ]
         added = arm.bodies.holding(q) if arm.compensates else np.zeros_like(q)
