@@ -61,8 +61,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add(
         "--kind",
         default="joint_motion",
-        choices=["joint_motion", "static_wrench", "transitions"],
-        help="of log (default: joint_motion; transitions need a map)",
+        choices=["joint_motion", "joint_response", "static_wrench", "transitions"],
+        help="of log (default: joint_motion; a map is needed for joint_response and "
+        "transitions)",
     )
     add("--out", type=Path, metavar="DIR", help="folder of the log")
     _add_map_arguments(add)

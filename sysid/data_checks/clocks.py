@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.importing.signals import stretches
 from drake_disasm.logs import Episode, rotation_matrices
 from sysid.data_checks.finding import DataFinding, rows_of
 from sysid.data_checks.settings import DataSettings
@@ -22,7 +23,8 @@ def clock_findings(subject: Subject) -> list[DataFinding]:
 
 def _jumps(subject: Subject) -> list[DataFinding]:
     """Finds steps of time that are far from the median step."""
-    rows = rows_of(subject.where(lambda e: _jumping(e["time"], subject.settings)))
+    jumping = _lost if subject.kind == "joint_response" else _jumping
+    rows = rows_of(subject.where(lambda e: jumping(e["time"], subject.settings)))
     if not rows:
         return []
     what = "time jumps, or nearly stands, in the step before these rows"
@@ -40,6 +42,17 @@ def _jumping(time: Array, settings: DataSettings) -> NDArray[np.bool_]:
     limit = settings.time_deviation * median
     limit = max(limit, settings.time_mads * float(np.median(off)))
     return np.concatenate([[False], off > limit])
+
+
+def _lost(time: Array, settings: DataSettings) -> NDArray[np.bool_]:
+    """Returns the rows (n,) before which some are lost.
+
+    A motion that is simulated may be sampled at any times: only gaps hide what was
+    commanded.
+    """
+    found = np.zeros(len(time), dtype=bool)
+    found[[rows.start for rows in stretches(time)[1:]]] = True
+    return found
 
 
 def _wrong_periods(subject: Subject) -> list[DataFinding]:

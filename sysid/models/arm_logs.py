@@ -18,7 +18,9 @@ def arm_urdf(logs: Sequence[Log], urdf: str | None) -> str:
     urdf = urdf or logs[0].header.urdf
     if urdf is None:
         raise refusal(
-            logs[0].folder / "log.yaml", "no 'urdf'", "give the arm's URDF by --urdf FILE"
+            logs[0].folder / "log.yaml",
+            "no 'urdf'",
+            "give the arm's URDF by --urdf FILE",
         )
     return urdf
 

@@ -41,9 +41,8 @@ class DriveSettings:
         """
         for key in mapping:
             if key not in _KEYS:
-                raise DisasmError(
-                    f"{where}: unknown key 'drive.{key}'; {closest(key, _KEYS)}"
-                )
+                remedy = closest(str(key), list(_KEYS))
+                raise DisasmError(f"{where}: unknown key 'drive.{key}'; {remedy}")
         limit = mapping.get("limit", np.inf)
         if isinstance(limit, bool) or not isinstance(limit, int | float) or limit <= 0:
             raise DisasmError(

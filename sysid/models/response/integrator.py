@@ -8,12 +8,12 @@ of second order, too.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.models.base import Array
-from sysid.models.response.rigid_bodies import RigidBodyTerms
 
 _GAMMA = 1.0 - np.sqrt(0.5)
 #: When after a step's begin, in steps, its two stages are.
@@ -24,8 +24,8 @@ _DESCENT = 0.1  # of the descent that is promised, at least
 _CHANGE = 1e-7  # rad/s, for differences
 _SMALL = 1e-10  # rad/s: velocities are known so well
 
-#: Torques (lanes, joints) that are missing for accelerations at q, v, vd in a stage.
-Missing = Callable[[Array, Array, Array, RigidBodyTerms, int, int], Array]
+#: What the rigid bodies give, of whatever type.
+Terms = TypeVar("Terms")
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ def integrate(
     v: Array,
     steps: int,
     h: float,
-    terms: Callable[[Array, Array], RigidBodyTerms],
-    missing: Missing,
+    terms: Callable[[Array, Array], Terms],
+    missing: Callable[[Array, Array, Array, Terms, int, int], Array],
 ) -> Motion:
     """Returns how lanes move from where they begin; NaN where no step was found.
 
@@ -51,8 +51,9 @@ def integrate(
         steps: how many.
         h: of a step [s].
         terms: rigid bodies at (lanes, joints) positions and velocities.
-        missing: load and friction minus the drives' torque, at positions, velocities
-            and accelerations, with these terms, in a step's stage.
+        missing: load and friction minus the drives' torque (lanes, joints), at
+            positions, velocities and accelerations, with these terms, in a step's
+            stage.
     """
     a = np.zeros_like(q)
     path_q, path_v = [q], [v]
@@ -76,8 +77,8 @@ def _stage(
     v: Array,
     a: Array,
     dt: float,
-    terms: RigidBodyTerms,
-    missing: Missing,
+    terms: Terms,
+    missing: Callable[[Array, Array, Array, Terms, int, int], Array],
     step: int,
     stage: int,
 ) -> Array:
@@ -97,6 +98,7 @@ def _stage(
     """
 
     def short(a: Array) -> Array:
+        """Returns what is missing (lanes, joints) for accelerations."""
         end = v + dt * a
         return missing(q + dt * end, end, a, terms, step, stage)
 
@@ -122,7 +124,7 @@ def _stage(
 
 
 def _slope(short: Callable[[Array], Array], a: Array, r: Array, dt: float) -> Array:
-    """Returns derivatives (lanes, joints, joints) of what is missing, by differences."""
+    """Returns derivatives (lanes, joints, joints) of what is short, by differences."""
     lanes, joints = a.shape
     J: NDArray[np.float64] = np.empty((lanes, joints, joints))
     change = _CHANGE / dt

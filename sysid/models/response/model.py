@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Sequence
 from typing import Any, Self
 
@@ -152,9 +153,7 @@ class JointResponseModel(LogModel):
         has_supply = any("supply" in e for e in episodes)
         per = " per V" * has_supply + " per unit of gain" * has_gain
         inputs = [inputs_of(episode) for episode in episodes]
-        usual = np.median(
-            np.concatenate([i.gain * i.supply for i in inputs]), axis=0
-        )
+        usual = np.median(np.concatenate([i.gain * i.supply for i in inputs]), axis=0)
         found = []
         for i, joint in enumerate(self._joints):
             k, d = float(guess.stiffness[i]), float(guess.damping[i])
@@ -179,9 +178,7 @@ class JointResponseModel(LogModel):
                     f"of the drive{per}",
                     log_scale=True,
                 ),
-                Parameter(
-                    f"{joint}.damping", d, 0.0, most, of_damping, "of the drive"
-                ),
+                Parameter(f"{joint}.damping", d, 0.0, most, of_damping, "of the drive"),
             ]
         delay = Parameter("delay", 0.0, 0.0, _LATEST, "s", "of what is commanded")
         return (*found, delay)
@@ -225,7 +222,7 @@ class JointResponseModel(LogModel):
         """See LogModel: some segments each."""
         begins = np.flatnonzero(np.diff(self._segment, prepend=-1))
         edges = [*begins[::_CHUNK].tolist(), len(self._segment)]
-        return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return [slice(a, b) for a, b in itertools.pairwise(edges)]
 
     # Prediction.
 

@@ -17,6 +17,7 @@ from sysid.models.base import Array
 from sysid.models.response.drive import Inputs
 
 _LEAST_NOISE = 1e-6  # rad, or m: no encoder is better
+_INNER, _INNER_SHARE = 0.95, 0.87  # of normal noise: rms of those below a quantile
 _LEAST_ROWS = 7  # of a local parabola
 
 
@@ -80,7 +81,10 @@ def measured_noise(episodes: Sequence[Episode]) -> Array:
         middle = (1.0 - share) * q[:-2] + share * q[2:]
         off.append((q[1:-1] - middle) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2))
         steps.append([quantum(column) for column in q.T])
-    scatter = 1.4826 * np.median(np.abs(np.concatenate(off)), axis=0)
+    size = np.abs(np.concatenate(off))
+    most = np.quantile(size, _INNER, axis=0)
+    inner = np.sum(size**2 * (size <= most), axis=0) / np.sum(size <= most, axis=0)
+    scatter = np.sqrt(inner) / _INNER_SHARE
     rounding = np.max(steps, axis=0) / np.sqrt(12.0)
     return np.maximum(np.maximum(scatter, rounding), _LEAST_NOISE)
 
@@ -131,6 +135,7 @@ def inputs_of(episode: Episode) -> Inputs:
     goal = episode["q_commanded"]
 
     def or_ones(name: str) -> Array:
+        """Returns a quantity, or ones if the log lacks it."""
         return episode[name] if name in episode else np.ones_like(goal)
 
     return Inputs(goal, or_ones("gain"), or_ones("supply"), or_ones("enabled"))

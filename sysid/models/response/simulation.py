@@ -90,14 +90,13 @@ def simulate(
     return Motion(*(a.reshape(steps + 1, *shape) for a in (motion.q, motion.v)))
 
 
-def _terms(
-    arm: Arm, sets: Sequence[ParameterSet]
-) -> Callable[[Array, Array], RigidBodyTerms]:
+def _terms(arm: Arm, sets: Sequence[ParameterSet]) -> Callable[[Array, Array], _Terms]:
     """Returns what gives the rigid bodies of all lanes (sets segments, joints)."""
     on_bodies = [[e for e in s.effects if isinstance(e, ON_BODIES)] for s in sets]
     groups = on_bodies if any(on_bodies) else [[]]
 
     def terms(q: Array, v: Array) -> _Terms:
+        """Returns those of positions and velocities (lanes, joints)."""
         parts = [
             arm.bodies.terms(own_q, own_v, effects)
             for own_q, own_v, effects in zip(
@@ -133,6 +132,7 @@ def _missing(
     def missing(
         q: Array, v: Array, a: Array, terms: _Terms, step: int, stage: int
     ) -> Array:
+        """Returns load and friction minus the drives' torque (lanes, joints)."""
         load = terms.load(a)
         given = inputs.at((step, stage))
         torque = drive.torque(q, v, given) + given.enabled * terms.added

@@ -28,6 +28,14 @@ SAMPLE_HEADERS = {
         joints=("a", "b", "c"),
         urdf="package://arm/arm.urdf",
     ),
+    "joint_response": LogHeader(
+        "joint_response",
+        "swing",
+        {},
+        joints=("a", "b"),
+        urdf="package://arm/arm.urdf",
+        drive={"limit": 1.0, "gravity_compensation": True},
+    ),
 }
 
 # Doubles that a careless text format changes.
@@ -78,10 +86,17 @@ def _joint_motion(rng: np.random.Generator, rows: int) -> dict[str, Any]:
     return {"time": 1.5e9 + 0.01 * np.arange(rows), **motion}
 
 
+def _joint_response(rng: np.random.Generator, rows: int) -> dict[str, Any]:
+    names = ("q_commanded", "q", "gain", "supply", "enabled", "current")
+    motion = {name: rng.normal(size=(rows, 2)) for name in names}
+    return {"time": 0.005 * np.arange(rows), **motion}
+
+
 SAMPLES = {
     "transitions": _transitions,
     "static_wrench": _static_wrench,
     "joint_motion": _joint_motion,
+    "joint_response": _joint_response,
 }
 
 

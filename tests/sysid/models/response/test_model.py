@@ -1,0 +1,165 @@
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import (
+    JointCoulombFriction,
+    JointLoadFriction,
+    TorqueGain,
+    registered_effects,
+)
+from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
+from sysid.data_checks.check import check_data
+from sysid.effect_selection.close_loop import close_loop
+from sysid.identification.gauss_newton import gauss_newton
+from sysid.models.from_logs import ModelChoice, model_of
+from sysid.models.response.model import JointResponseModel
+from sysid.objective import Objective
+from tests.sysid.models.response.servo import (
+    DAMPING,
+    DELAY,
+    QUANTUM,
+    STIFFNESS,
+    goals,
+    write_pendulum,
+    write_response,
+)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    return write_response(tmp_path_factory.mktemp("servo") / "log", duration=3.0)
+
+
+def true_parameters():
+    return np.array([STIFFNESS, DAMPING, DELAY])
+
+
+def test_with_the_true_parameters_the_residual_is_the_encoders(log):
+    model = model_of([log], ModelChoice())
+    assert model.measurements.noise == pytest.approx(QUANTUM / math.sqrt(12), rel=0.3)
+    error = model.predictions(true_parameters()) - model.measurements.values
+    assert np.sqrt(np.mean(error**2)) < 0.4 * QUANTUM
+
+
+def test_a_fit_finds_the_drive(log):
+    objective = Objective(JointResponseModel([log]))
+    found = gauss_newton(objective, objective.start, 12)
+    theta = objective.scaling.from_unit(found.u)
+    np.testing.assert_allclose(theta, true_parameters(), rtol=0.05)
+
+
+def test_a_whole_episode_is_one_segment_if_asked(log):
+    model = JointResponseModel([log], segment=math.inf)
+    error = model.predictions(true_parameters()) - model.measurements.values
+    assert np.abs(error).max() < 0.01
+
+
+def test_no_bit_depends_on_what_is_simulated_beside(log):
+    model = JointResponseModel([log])
+    thetas = true_parameters() * np.array([[1.0], [0.9], [1.2]])
+    for rows in model.chunks():
+        beside = model.simulate_all(thetas, rows)
+        for theta, own in zip(thetas, beside, strict=True):
+            np.testing.assert_allclose(own, model.simulate(theta, rows), atol=1e-9)
+
+
+def test_selected_rows_are_predicted_as_among_all(log):
+    model = JointResponseModel([log])
+    mask = np.random.default_rng(0).random(model.measurements.rows) < 0.3
+    some = model.of_rows(mask).predictions(true_parameters())
+    whole = model.predictions(true_parameters())
+    np.testing.assert_allclose(some, whole[mask], atol=1e-12)
+
+
+def test_thinning_keeps_whole_segments(log):
+    model = JointResponseModel([log])
+    assert model.thin(2).measurements.rows == pytest.approx(
+        model.measurements.rows / 2, rel=0.3
+    )
+
+
+def test_what_is_in_a_torque_sensor_alone_is_no_candidate(log):
+    model = JointResponseModel([log])
+    kinds = {type(e) for e in model.applicable_effects(registered_effects())}
+    assert JointCoulombFriction in kinds
+    assert TorqueGain not in kinds
+
+
+def test_uneven_times_are_no_finding_but_gaps_are(tmp_path):
+    write_pendulum(tmp_path / "pendulum.urdf")
+    header = LogHeader(
+        "joint_response",
+        "swing",
+        {},
+        joints=("servo",),
+        urdf=str(tmp_path / "pendulum.urdf"),
+    )
+    rng = np.random.default_rng(0)
+    time = np.cumsum(rng.choice([0.0035, 0.0055], 800))
+    gap = time + np.where(np.arange(800) > 400, 0.3, 0.0)
+    found = []
+    for name, t in (("even", time), ("gap", gap)):
+        goal = goals(t, 0)
+        q = 0.8 * goals(t - 0.03, 0)
+        with LogWriter(tmp_path / name, header) as writer:
+            table = {"time": t, "q_commanded": goal, "q": q}
+            writer.write_episode(flat_columns("joint_response", table))
+        log = read_log(tmp_path / name)
+        findings = check_data([log], JointResponseModel([log]))
+        found.append([f for f in findings if f.kind == "time"])
+    assert not found[0]
+    assert found[1]
+
+
+def rewritten(log, folder, header=None, **columns):
+    """Returns a log with other columns or another header."""
+    episode = log.episodes[0]
+    table = {name: episode[name] for name in ("time", "q_commanded", "q")} | columns
+    with LogWriter(folder, header or log.header) as writer:
+        writer.write_episode(flat_columns("joint_response", table))
+    return read_log(folder)
+
+
+def test_degrees_and_a_wrong_sign_are_found(log, tmp_path):
+    q = log.episodes[0]["q"]
+    degrees = rewritten(log, tmp_path / "degrees", q=np.rad2deg(q))
+    findings = check_data([degrees], JointResponseModel([degrees]))
+    assert any("57" in f.what or "degrees" in f.what for f in findings)
+    mirrored = rewritten(log, tmp_path / "mirrored", q=-q)
+    with pytest.raises(DisasmError, match="does not follow"):
+        JointResponseModel([mirrored])
+
+
+@pytest.mark.parametrize(
+    ("drive", "why"),
+    [
+        ({"limits": 1.0}, r"unknown key 'drive.limits'"),
+        ({"limit": -1.0}, "give a number above zero"),
+        ({"limit": True}, "give a number above zero"),
+        ({"gravity_compensation": "yes"}, "give true or false"),
+    ],
+)
+def test_a_drive_that_can_not_be_is_refused(log, tmp_path, drive, why):
+    header = dataclasses.replace(log.header, drive=drive)
+    other = rewritten(log, tmp_path / "other", header)
+    with pytest.raises(DisasmError, match=why):
+        JointResponseModel([other])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        JointCoulombFriction("servo", 0.08, 0.005),
+        JointLoadFriction("servo", 0.4, 0.02),
+    ],
+    ids=lambda e: type(e).__name__,
+)
+def test_the_loop_names_a_hidden_friction(tmp_path, hidden):
+    log = write_response(tmp_path / "log", hidden)
+    closed = close_loop(JointResponseModel([log]))
+    assert closed.verdict.names[0].startswith(type(hidden).__name__)
