@@ -5,12 +5,14 @@ from typing import Any
 
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.evidence import Evidence
+from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.residual_diagnosis import diagnose
 from sysid.effect_selection.residual_model import ResidualModel
 from sysid.effect_selection.search import SelectionRound
 from sysid.effect_selection.survey import Survey
 from sysid.effect_selection.verdict import Verdict
+from sysid.models.effects import field_of
 
 _DEPENDENCES = 10  # listed of each survey, the best ones: a size, no threshold
 
@@ -23,6 +25,7 @@ def to_mapping(closed: ClosedLoop) -> dict[str, Any]:
     )
     return {
         **_verdict(closed.verdict),
+        "model_parameters": _of_model(closed.last),
         "sentence": closed.sentence,
         "not_told_apart": closed.not_told_apart,
         "text": closed.text,
@@ -33,6 +36,16 @@ def to_mapping(closed: ClosedLoop) -> dict[str, Any]:
         "residual_after": [dataclasses.asdict(channel) for channel in after],
         "rounds": [_round(each) for each in closed.rounds],
         "end": _survey(closed.end),
+    }
+
+
+def _of_model(fit: Fit) -> dict[str, Any]:
+    """Returns the values of the parameters that the model has without effects."""
+    own = zip(fit.model.parameters, fit.theta.tolist(), strict=True)
+    return {
+        parameter.name: {"value": value, "unit": parameter.unit}
+        for parameter, value in own
+        if not field_of(parameter)
     }
 
 

@@ -27,7 +27,7 @@ from sysid.effect_selection.verdict import Undecided, Verdict
 
 _SHOWN = 3  # effects that a clause lists: a size of output, no threshold
 
-_QUANTITIES = {"N": "force", "N m": "torque", "m": "position", "rad": "orientation"}
+_QUANTITIES = {"N": "force", "N m": "torque", "m": "position", "rad": "position"}
 
 
 @dataclass(frozen=True)
