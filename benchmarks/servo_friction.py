@@ -2,12 +2,12 @@
 
     python benchmarks/servo_friction.py ../shared/data/servo_pendulum --out out/servo
 
-A servo swings a pendulum in four motions at three gains (Duclusaud, Passault, Padois and
-Ly, Extended Friction Models for the Physics Simulation of Servo Actuators, ICRA 2025).
-Their models M1 to M6 are fitted here to two motions at the gains 100 and 200, by the
-same simulation that closing the loop uses, and so is what that finds by itself. Each is
-judged as there: by the mean absolute error of the position over whole runs, on the
-other motions and on the gain 400.
+A servo swings a pendulum in four motions at three gains (Duclusaud, Passault, Padois
+and Ly, Extended Friction Models for the Physics Simulation of Servo Actuators, ICRA
+2025). Their models M1 to M6 are fitted here to two motions at the gains 100 and 200,
+by the same simulation that closing the loop uses, and so is what that finds by itself.
+Each is judged as there: by the mean absolute error of the position over whole runs, on
+the other motions and on the gain 400.
 """
 
 import argparse

@@ -62,8 +62,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         "--kind",
         default="joint_motion",
         choices=["joint_motion", "joint_response", "static_wrench", "transitions"],
-        help="of log (default: joint_motion; a map is needed for joint_response and "
-        "transitions)",
+        help="of log (default: joint_motion; joint_response: commanded and measured "
+        "positions; transitions need a map)",
     )
     add("--out", type=Path, metavar="DIR", help="folder of the log")
     _add_map_arguments(add)

@@ -31,7 +31,17 @@ from drake_disasm.importing.units import factor
 from drake_disasm.logs.schema import KINDS, Form, Quantity
 
 _MOST_BYTES = 2**20
-_KEYS = ("kind", "task", "urdf", "joints", "frames", "time", "episode", "columns")
+_KEYS = (
+    "kind",
+    "task",
+    "urdf",
+    "joints",
+    "drive",
+    "frames",
+    "time",
+    "episode",
+    "columns",
+)
 _COLUMN_KEYS = ("from", "unit", "scale", "sign", "offset")
 _REMEDY = "see docs/your-robot.md, or let --show guess one and --save-map write it"
 
@@ -109,6 +119,7 @@ class FieldMap:
         urdf: of the arm, or "".
         joints: their names, in the order of the channels.
         frames: in which quantities are expressed, where the kind leaves a choice.
+        drive: what is known of the joints' drives, for a `joint_response` log.
     """
 
     kind: str
@@ -120,6 +131,7 @@ class FieldMap:
     urdf: str = ""
     joints: tuple[str, ...] = ()
     frames: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    drive: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Checks columns against the kind.
@@ -148,6 +160,8 @@ class FieldMap:
             found["urdf"] = self.urdf
         if self.joints:
             found["joints"] = list(self.joints)
+        if self.drive:
+            found["drive"] = dict(self.drive)
         if self.frames:
             found["frames"] = dict(self.frames)
         if self.time:
@@ -227,6 +241,7 @@ def parse_map(raw: object) -> FieldMap:
             str(k): str(v)
             for k, v in _mapping(values.get("frames", {}), "frames").items()
         },
+        drive=dict(_mapping(values.get("drive", {}), "drive")),
     )
 
 

@@ -23,12 +23,28 @@ _NAMES = {
         "joint_torques", "joint_effort", "tau_measured", "actual_torque", "tau_j",
         "msr_trq", "force", "tau_msr", "tau_m",
     ),
+    "q_commanded": (
+        "q_commanded", "q_cmd", "q_desired", "q_des", "q_d", "q_ref", "q_target",
+        "goal_position", "goal_positions", "goal", "position_command", "command",
+        "commanded_position", "desired_position", "target_position", "target_q",
+        "reference", "setpoint", "action",
+    ),
+    "supply": ("supply", "input_volts", "supply_voltage", "voltage", "vin"),
+    "enabled": ("enabled", "torque_enable", "enable", "motor_on"),
 }  # fmt: skip
 _EPISODE = ("episode_index", "episode", "trial", "run")
 _WRENCH = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 _QUATERNION = ("orientation.w", "orientation.x", "orientation.y", "orientation.z")
 _PLAIN_WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
 _PLAIN_QUATERNION = ("qw", "qx", "qy", "qz")
+
+#: What is looked for, by the kind of log.
+_OF_JOINTS = {
+    "joint_motion": ("q", "tau"),
+    "joint_response": ("q", "q_commanded", "supply", "enabled"),
+}
+#: Before measured and commanded points of a controller's state, old and new names.
+_PREFIXES = {"": "", "actual.": "desired.", "feedback.": "reference."}
 
 
 def guessed_map(
@@ -48,8 +64,8 @@ def guessed_map(
     Raises:
         DisasmError: nothing that the kind needs is known by its name.
     """
-    if kind == "joint_motion":
-        return _joint_motion(source, joints, urdf)
+    if kind in ("joint_motion", "joint_response"):
+        return _joint_motion(source, joints, urdf, kind)
     if kind == "static_wrench":
         return _static_wrench(source)
     raise DisasmError(
@@ -58,10 +74,14 @@ def guessed_map(
     )
 
 
-def _joint_motion(source: Source, joints: Sequence[str], urdf: str) -> FieldMap:
+def _joint_motion(
+    source: Source, joints: Sequence[str], urdf: str, kind: str
+) -> FieldMap:
+    """Returns the map of an arm's positions and torques, or what was commanded."""
+    quantities = _OF_JOINTS[kind]
     stream, columns = None, dict[str, Column]()
     for each in source.streams:
-        found = _joints_of(each, joints)
+        found = _joints_of(each, joints, quantities)
         if "q" in found and (stream is None or len(found) > len(columns)):
             stream, columns = each, found
     if stream is None:
@@ -71,8 +91,13 @@ def _joint_motion(source: Source, joints: Sequence[str], urdf: str) -> FieldMap:
         )
     count = len(columns["q"].channels)
     columns = {n: c for n, c in columns.items() if len(c.channels) == count}
+    if kind == "joint_response" and "q_commanded" not in columns:
+        raise DisasmError(
+            f"{source.path}: no channel is called as commanded joint positions are; "
+            "write a map and give it by --map; --show prints the channels"
+        )
     return FieldMap(
-        kind="joint_motion",
+        kind=kind,
         columns=columns | _other_wrenches(source, stream),
         time=_time_of(stream),
         time_unit=_time_unit(stream),
@@ -82,12 +107,15 @@ def _joint_motion(source: Source, joints: Sequence[str], urdf: str) -> FieldMap:
     )
 
 
-def _joints_of(stream: Stream, joints: Sequence[str]) -> dict[str, Column]:
-    """Returns positions and torques of a stream."""
+def _joints_of(
+    stream: Stream, joints: Sequence[str], quantities: Sequence[str]
+) -> dict[str, Column]:
+    """Returns those quantities of joints that a stream has."""
     if stream.name:
-        return _joints_of_topic(stream, joints)
+        found = _joints_of_topic(stream, joints)
+        return {q: column for q, column in found.items() if q in quantities}
     found = dict[str, Column]()
-    for quantity in ("q", "tau"):
+    for quantity in quantities:
         channels = _numbered(stream, quantity) or _by_joint(stream, quantity, joints)
         if channels:
             found[quantity] = Column(tuple(channels))
@@ -96,8 +124,10 @@ def _joints_of(stream: Stream, joints: Sequence[str]) -> dict[str, Column]:
 
 def _joints_of_topic(stream: Stream, joints: Sequence[str]) -> dict[str, Column]:
     """Returns positions and efforts of JointState, or of a controller's state."""
-    for prefix in ("", "actual.", "feedback."):
+    for prefix, goal in _PREFIXES.items():
         fields = {"q": f"{prefix}position.", "tau": f"{prefix}effort."}
+        if goal:
+            fields["q_commanded"] = f"{goal}position."
         found = {
             q: tuple(n for n in stream.names if n.startswith(f"{stream.name}:{field}"))
             for q, field in fields.items()

@@ -125,6 +125,7 @@ def write_log(
         period=imported.period,
         joints=fields.joints,
         urdf=_lasting(fields.urdf),
+        drive=dict(fields.drive) or None,
     )
     with LogWriter(folder, header) as writer:
         for columns in imported.episodes:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.importing import (
@@ -223,3 +224,29 @@ def test_a_time_in_milliseconds_is_noticed(tmp_path: Path) -> None:
         path = tmp_path / "run.npz"
         np.savez(path, t=step * np.arange(50), q=np.arange(50.0))
         assert guessed_map(read_source(path), "joint_motion").time_unit == unit
+
+
+def test_commanded_and_measured_positions_become_a_response(tmp_path: Path) -> None:
+    path = tmp_path / "servo.csv"
+    lines = [f"{0.005 * i},{0.01 * i},{0.009 * i},7.4,1" for i in range(40)]
+    head = "time,goal_position,position,input_volts,torque_enable"
+    path.write_text("\n".join(["# a servo", head, *lines]))
+    fields = guessed_map(read_source(path), "joint_response", ["servo"], "servo.urdf")
+    fields = parse_map(yaml.safe_load(fields.to_yaml()) | {"drive": {"limit": 1.0}})
+    imported = _imported(path, fields)
+    write_log(imported, [read_source(path)], fields, tmp_path / "log", {})
+    log = read_log(tmp_path / "log")
+    assert log.header.drive == {"limit": 1.0}
+    assert log.header.joints == ("servo",)
+    [episode] = log.episodes
+    np.testing.assert_allclose(episode["q_commanded"][:, 0], 0.01 * np.arange(40))
+    np.testing.assert_allclose(episode["q"][:, 0], 0.009 * np.arange(40))
+    np.testing.assert_array_equal(episode["supply"], 7.4)
+    np.testing.assert_array_equal(episode["enabled"], 1.0)
+
+
+def test_a_response_without_commands_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(["t,q", *(f"{0.01 * i},{i}" for i in range(20))]))
+    with pytest.raises(DisasmError, match="commanded joint positions"):
+        guessed_map(read_source(path), "joint_response", ["a"], "arm.urdf")
