@@ -90,8 +90,8 @@ _STARTS: tuple[Mapping[type[Effect], float], ...] = (
 
 def main(arguments: Sequence[str]) -> int:
     """Fits, closes the loop, and prints the table."""
-    args = _parser().parse_args(arguments)
-    logs = _written_logs(args.data, args.out / "logs")
+    args = parse(arguments)
+    logs = written_logs(args.data, args.out / "logs")
     fitted = [f"{motion}_kp{gain}" for motion in _FITTED for gain in (100, 200)]
     runs = _runs(logs, fitted)
     table: dict[str, object] = {}
@@ -119,7 +119,8 @@ def main(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -129,7 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--by-hand", action="store_true", help="only the models made by hand"
     )
-    return parser
+    return parser.parse_args(arguments)
 
 
 def _models() -> dict[str, tuple[type[Effect], ...]]:
@@ -190,7 +191,7 @@ def _runs(
     }
 
 
-def _written_logs(data: Path, folder: Path) -> dict[str, Log]:
+def written_logs(data: Path, folder: Path) -> dict[str, Log]:
     """Returns the runs as logs of kind `joint_response`, written if need be."""
     folder.mkdir(parents=True, exist_ok=True)
     urdf = folder / "pendulum.urdf"
