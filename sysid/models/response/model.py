@@ -45,6 +45,7 @@ _CHUNK = 32  # segments of one piece of work
 _REACH = 30.0  # times what was guessed, on either side
 _LONGEST = 0.3  # s, of damping over stiffness: slower is no servo
 _LATEST = 0.05  # s, of a goal
+_MANY = 5.0  # times the greatest torque of the rigid bodies, at most, by any effect
 _MOST_ROWS = 2000  # that the guess is made of
 
 
@@ -135,6 +136,7 @@ class JointResponseModel(LogModel):
             inputs.append(inputs_of(episode).at(np.s_[::every]))
         q, v, vd = np.concatenate(motions, axis=1)
         load = self._bodies.terms(q, v, ()).load(vd)
+        self._most = _largest(load, v, vd)
         if self._settings.gravity_compensation:
             load = load - self._bodies.holding(q)
         joined = Inputs(
@@ -193,9 +195,22 @@ class JointResponseModel(LogModel):
     def with_effects(
         self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
     ) -> Self:
-        """See LogModel; additional parameters get the units of their joints."""
+        """See LogModel; additional parameters get the units of their joints.
+
+        And bounds for an arm of this size: a step of a ten-thousandth of 200 N m is
+        more than a small servo has.
+        """
         added = in_units_of_joints(parameters, effects, self._prismatic)
-        return super().with_effects(effects, added)
+        return super().with_effects(effects, [self._bounded(p) for p in added])
+
+    def _bounded(self, parameter: Parameter) -> Parameter:
+        """Returns a parameter with bounds that no arm of this size exceeds."""
+        most = self._most.get(parameter.unit)
+        if most is None or parameter.is_shape:
+            return parameter
+        most = max(most, 2.0 * abs(parameter.nominal))
+        low, high = max(parameter.low, -most), min(parameter.high, most)
+        return dataclasses.replace(parameter, low=low, high=high)
 
     def scenario_at(self, theta: Array) -> Scenario:
         """Returns a scenario with the effects; drives are no part of it."""
@@ -270,6 +285,22 @@ class JointResponseModel(LogModel):
 @functools.lru_cache(maxsize=4)
 def _rigid_bodies(urdf: str, joints: tuple[str, ...]) -> RigidBodies:
     return RigidBodies(urdf, joints)
+
+
+def _largest(load: Array, v: Array, vd: Array) -> dict[str, float]:
+    """Returns how large effects may be, by the unit of their amplitudes.
+
+    Args:
+        load: (n, joints) torques of the rigid bodies.
+        v, vd: (n, joints) the motion.
+    """
+    torque = _MANY * float(np.abs(load).max())
+    speed, acceleration = (float(np.sqrt(np.mean(a**2))) for a in (v, vd))
+    found = {"N m": torque, "N m s/rad": torque / speed}
+    found["kg m^2"] = torque / acceleration
+    return {k: most for k, most in found.items() if 0.0 < most < np.inf} | {
+        prismatic_unit(k): most for k, most in found.items() if 0.0 < most < np.inf
+    }
 
 
 def _settings_of(logs: Sequence[Log]) -> DriveSettings:

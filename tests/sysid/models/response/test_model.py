@@ -13,11 +13,16 @@ from drake_disasm.effects import (
 )
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from sysid.data_checks.check import check_data
+from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.close_loop import close_loop
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.effect_selection.survey import survey_candidates
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.response.model import JointResponseModel
 from sysid.objective import Objective
+from sysid.workers import Workers
 from tests.sysid.models.response.servo import (
     DAMPING,
     DELAY,
@@ -148,6 +153,16 @@ def test_a_drive_that_can_not_be_is_refused(log, tmp_path, drive, why):
     other = rewritten(log, tmp_path / "other", header)
     with pytest.raises(DisasmError, match=why):
         JointResponseModel([other])
+
+
+def test_no_candidate_fails_where_its_derivative_is_taken(log):
+    model = JointResponseModel([log])
+    fitter = Fitter.of(model, Workers(), model.default_huber_delta, DEFAULT_SETTINGS)
+    fit = fitter.fit(())
+    found = survey_candidates(fitter, fit, candidates(model)).linearised
+    size = np.abs(found.linearisation.jacobian).max()
+    # A failure counts as a million times the noise, over a step of a ten-thousandth.
+    assert size < 1e8
 
 
 @pytest.mark.slow
