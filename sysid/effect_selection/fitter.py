@@ -66,8 +66,10 @@ class Fitter:
 
         Itself where the log has no more than that.
         """
-        every = round(self.base.measurements.rows / self.settings.search_rows)
-        return self.with_base(self.base.thin(every)) if every >= 2 else self
+        rows = self.base.measurements.rows
+        every = round(rows / self.settings.search_rows)
+        thinned = self.base.thin(every) if every >= 2 else self.base
+        return self if thinned.measurements.rows == rows else self.with_base(thinned)
 
     def objective(self, model: LogModel) -> Objective:
         """Returns what is minimised, of a model that extends the base."""

@@ -42,6 +42,7 @@ SEGMENT = 1.0  # s: several times what a servo takes to forget where it was
 _STEP = 0.005  # s, of the integrator at most
 _TOGETHER = 32  # parameter sets that are simulated side by side
 _CHUNK = 32  # segments of one piece of work
+_FEWEST = 24  # of a thinned model, if there are so many
 _REACH = 30.0  # times what was guessed, on either side
 _LONGEST = 0.3  # s, of damping over stiffness: slower is no servo
 _LATEST = 0.05  # s, of a goal
@@ -229,8 +230,13 @@ class JointResponseModel(LogModel):
         return self.replace(_segment=self._segment[mask], _time=self._time[mask])
 
     def thin(self, every: int) -> Self:
-        """Returns the same model of every n-th segment: rows of one come for free."""
-        kept = np.unique(self._segment)[::every]
+        """Returns the same model of every n-th segment: rows of one come for free.
+
+        So do a few dozen segments side by side, and fewer would not show all that the
+        arm did: those stay.
+        """
+        numbers = np.unique(self._segment)
+        kept = numbers[:: max(1, min(every, len(numbers) // _FEWEST))]
         return self.of_rows(np.isin(self._segment, kept))
 
     def chunks(self) -> list[slice]:

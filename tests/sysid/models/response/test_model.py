@@ -81,10 +81,17 @@ def test_selected_rows_are_predicted_as_among_all(log):
 
 
 def test_thinning_keeps_whole_segments(log):
-    model = JointResponseModel([log])
+    model = JointResponseModel([log], segment=0.05)
     assert model.thin(2).measurements.rows == pytest.approx(
         model.measurements.rows / 2, rel=0.3
     )
+
+
+def test_a_few_dozen_segments_are_not_thinned(log):
+    model = JointResponseModel([log], segment=0.5)
+    assert model.thin(1000).measurements.rows == model.measurements.rows
+    fitter = Fitter.of(model, Workers(), np.inf, DEFAULT_SETTINGS)
+    assert fitter.affordable is fitter
 
 
 def test_what_is_in_a_torque_sensor_alone_is_no_candidate(log):
