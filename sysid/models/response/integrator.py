@@ -103,24 +103,37 @@ def _stage(
         return missing(q + dt * end, end, a, terms, step, stage)
 
     r = short(a)
-    size = np.linalg.norm(r, axis=1)
     for _ in range(_MOST_ITERATIONS):
-        change = -np.linalg.solve(_slope(short, a, r, dt), r[..., None])[..., 0]
-        share = np.ones(len(a))
-        for _ in range(_MOST_HALVINGS):
-            trial = a + share[:, None] * change
-            r_trial = short(trial)
-            size_trial = np.linalg.norm(r_trial, axis=1)
-            is_worse = size_trial > (1.0 - _DESCENT * share) * size
-            is_worse &= dt * share * np.abs(change).max(axis=1) > _SMALL
-            if not is_worse.any():
-                break
-            share = np.where(is_worse, 0.5 * share, share)
-        moved = dt * share * np.abs(change).max(axis=1)
-        a, r, size = trial, r_trial, size_trial
+        newton = np.linalg.solve(_slope(short, a, r, dt), -r[..., None])[..., 0]
+        change, r = _descent(short, a, r, np.asarray(newton, np.float64), dt)
+        a = a + change
+        moved = dt * np.abs(change).max(axis=1)
         if not (moved > _SMALL).any():
             break
     return np.where((moved <= _SMALL)[:, None], a, np.nan)
+
+
+def _descent(
+    short: Callable[[Array], Array], a: Array, r: Array, change: Array, dt: float
+) -> tuple[Array, Array]:
+    """Returns Newton's change, halved in lanes that miss more by it, and what is left.
+
+    Args:
+        short: what is missing (lanes, joints) for accelerations.
+        a, r: accelerations, and what is missing for them.
+        change: of the accelerations, by Newton's method.
+        dt: of the stage [s].
+    """
+    size, share = np.linalg.norm(r, axis=1), np.ones(len(a))
+    most = dt * np.abs(change).max(axis=1)
+    for _ in range(_MOST_HALVINGS):
+        left = short(a + share[:, None] * change)
+        is_worse = np.linalg.norm(left, axis=1) > (1.0 - _DESCENT * share) * size
+        is_worse &= share * most > _SMALL
+        if not is_worse.any():
+            break
+        share = np.where(is_worse, 0.5 * share, share)
+    return share[:, None] * change, left
 
 
 def _slope(short: Callable[[Array], Array], a: Array, r: Array, dt: float) -> Array:

@@ -95,22 +95,24 @@ class JointResponseModel(LogModel):
         episodes = [episode for log in logs for episode in log.episodes]
         reach = reach_of(episodes)
         self._cut(episodes, segment, reach)
-        channels = tuple(
+        self.measurements = Measurements.of_logs(
+            logs, self._channels(episodes), lambda _, episode: episode["q"]
+        )
+        guess = self._guess(episodes, reach)
+        self.parameters = self._drive_parameters(guess, episodes, logs)
+
+    def _channels(self, episodes: Sequence[Episode]) -> tuple[Channel, ...]:
+        """Returns the joints' positions as channels, with the noise of readings."""
+        noises = zip(self._joints, measured_noise(episodes), strict=True)
+        return tuple(
             Channel(
                 joint,
                 "m" if joint in self._prismatic else "rad",
                 float(noise),
                 "scatter about nearby rows",
             )
-            for joint, noise in zip(
-                header.joints, measured_noise(episodes), strict=True
-            )
+            for joint, noise in noises
         )
-        self.measurements = Measurements.of_logs(
-            logs, channels, lambda _, episode: episode["q"]
-        )
-        guess = self._guess(episodes, reach)
-        self.parameters = self._drive_parameters(guess, episodes, logs)
 
     def _cut(self, episodes: Sequence[Episode], length: float, reach: float) -> None:
         """Cuts episodes into segments, and numbers them for each row."""
@@ -302,11 +304,13 @@ def _largest(load: Array, v: Array, vd: Array) -> dict[str, float]:
     """
     torque = _MANY * float(np.abs(load).max())
     speed, acceleration = (float(np.sqrt(np.mean(a**2))) for a in (v, vd))
-    found = {"N m": torque, "N m s/rad": torque / speed}
-    found["kg m^2"] = torque / acceleration
-    return {k: most for k, most in found.items() if 0.0 < most < np.inf} | {
-        prismatic_unit(k): most for k, most in found.items() if 0.0 < most < np.inf
+    sizes = {
+        "N m": torque,
+        "N m s/rad": torque / speed,
+        "kg m^2": torque / acceleration,
     }
+    found = {unit: most for unit, most in sizes.items() if 0.0 < most < np.inf}
+    return found | {prismatic_unit(unit): most for unit, most in found.items()}
 
 
 def _settings_of(logs: Sequence[Log]) -> DriveSettings:
