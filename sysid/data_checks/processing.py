@@ -53,8 +53,8 @@ def _carried(model: TwinModel) -> list[Payload]:
     """Returns what may hang on the sensor: of the twin, and of the cell."""
     scenario = model.scenario
     tool = Tool.from_models(scenario)
-    twin = SensorReading(scenario, tool).payload
-    return [twin, Payload(tool.mass, tool.p_SoScm_S, twin.g_W)]
+    stations = ("twin", "cell")
+    return [SensorReading(scenario, tool, station).payload for station in stations]
 
 
 def _errors(subject: Subject, carried: Payload) -> list[Array]:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Self
 
 import numpy as np
@@ -22,7 +22,9 @@ from sysid.models.grip_offset import GripOffset
 from sysid.models.late_pose import on_time
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 
-_PASSES = 4  # to undo effects on the sensor: gains of a half are undone to 6 %
+_PASSES = 4  # to undo effects on the sensor; where they are affine one is enough
+_CHANGE = 1e-4  # N, N m: of wrenches, for differences
+_DAMPING = 1e-6  # of steps along what a channel no longer shows, as in saturation
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,17 +72,20 @@ class RecordedEpisode:
     ) -> Self:
         """Returns the episode with the wrench as it was before effects on the sensor.
 
-        What is read of a first guess is off by as much as the guess: by fixed points.
+        By Newton's method, row by row: gains that drift may more than double a reading.
         """
         if not effects:
             return self
         poses = bolt_path(self.measured, p_BoTo_B)
         read = at_sensor(np.hstack([poses, self.wrench]), sensing.X_SB)
         times = self.grip.period * np.arange(len(read), dtype=np.float64)
-        found = read
-        for _ in range(_PASSES):
-            again = sensing.read(effects, found, sensing.at_rest, times)
-            found = found + read - again
+
+        def reading(wrench: Array) -> Array:
+            """Returns how wrenches (n, 6) at So in S are read."""
+            states = np.hstack([read[:, :6], wrench])
+            return sensing.read(effects, states, sensing.at_rest, times)[:, 6:]
+
+        found = np.hstack([read[:, :6], undone(reading, read[:, 6:])])
         wrench = at_bolt(found, sensing.X_SB)[:, 6:]
         return dataclasses.replace(self, wrench=wrench)
 
@@ -132,6 +137,26 @@ class RecordedEpisode:
             elastic,
             self.grip.rates(elastic, wrench[:-1]),
         )
+
+
+def undone(reading: Callable[[Array], Array], read: Array) -> Array:
+    """Returns the wrenches (n, 6) that are read as these, or as nearly as can be.
+
+    What a reading does not show, since a channel is saturated or within its dead band,
+    is left as it is read.
+    """
+    found = read.copy()
+    for _ in range(_PASSES):
+        missing = read - reading(found)
+        if not missing.any():
+            break
+        J = np.empty((*read.shape, read.shape[1]))
+        for i, step in enumerate(_CHANGE * np.eye(read.shape[1])):
+            J[..., i] = (reading(found + step) - reading(found - step)) / (2 * _CHANGE)
+        J_T = J.transpose(0, 2, 1)
+        normal = J_T @ J + _DAMPING * np.eye(read.shape[1])
+        found += np.linalg.solve(normal, J_T @ missing[..., None])[..., 0]
+    return found
 
 
 def _coordinates(poses: Array, twin: BoltCoordinates) -> Array:

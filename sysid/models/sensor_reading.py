@@ -1,6 +1,7 @@
 """The wrench at the sensor: where its channels' noise is independent, and errs."""
 
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -15,8 +16,15 @@ from drake_disasm.devices.sensor_chain import (
     sensed_at_zeroing,
 )
 from drake_disasm.effects import Sensing, SensorEffect
+from drake_disasm.logs import Log
+from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
 from sysid.models.base import Array
+
+
+def station_of(log: Log) -> str:
+    """Returns where a log was recorded, as it says."""
+    return str(log.header.provenance.get("station", ""))
 
 
 def at_sensor(states: Array, X_SB: RigidTransform) -> Array:
@@ -55,20 +63,55 @@ class SensorReading:
 
     Attributes:
         X_SB: the bolt in the sensor's frame.
-        payload: what hangs on the twin's sensor: bolt and fingers.
+        payload: what hangs on the log's sensor: the gripper and the bolt, or bolt and
+            fingers alone if it is the twin's.
 
     Processing takes the reading at zeroing off, and the change of the known weight
     since then (`contact_wrench`); so what effects add to readings, and to the
     one at zeroing, is added to what is processed.
     """
 
-    def __init__(self, scenario: Scenario, tool: Tool) -> None:
-        carried = tool.M_gripped_B
-        self.X_SB = X_SB = tool.X_SB
-        g_W = UniformGravityFieldElement().gravity_vector()
-        self.payload = Payload(carried.get_mass(), X_SB @ carried.get_com(), g_W)
+    def __init__(self, scenario: Scenario, tool: Tool, station: str = "twin") -> None:
+        """Takes what hangs on the sensor.
+
+        Args:
+            scenario: of the log.
+            tool: on the flange.
+            station: where the log was recorded: "cell", "hardware", or the twin.
+        """
+        self.X_SB = tool.X_SB
         self._R_WG = nominal_groove_pose(scenario.placement).rotation().matrix()
-        self._R_BS = X_SB.inverse().rotation().matrix()
+        self._R_BS = tool.X_SB.inverse().rotation().matrix()
+        g_W = UniformGravityFieldElement().gravity_vector()
+        carried = tool.M_gripped_B
+        p_SoScm_S = tool.X_SB @ carried.get_com()
+        self.payload = Payload(carried.get_mass(), p_SoScm_S, g_W)
+        self._of_twin = self.at_rest
+        if station in ("cell", "hardware"):
+            self.payload = Payload(tool.mass, tool.p_SoScm_S, g_W)
+
+    @classmethod
+    def of(cls, logs: Sequence[Log], scenario: Scenario) -> Self:
+        """Returns what the sensor of some logs reads.
+
+        Raises:
+            DisasmError: not the same hangs on all their sensors.
+        """
+        tool = Tool.from_models(scenario)
+        found = [cls(scenario, tool, station_of(log)) for log in logs]
+        for log, other in zip(logs, found, strict=True):
+            if other.payload.mass != found[0].payload.mass:
+                raise refusal(
+                    log.folder / "log.yaml",
+                    f"of the station '{station_of(log)}', the first log is of "
+                    f"'{station_of(logs[0])}': other loads hang on their sensors",
+                    "give logs of the twin and logs of a cell apart",
+                )
+        return found[0]
+
+    def zeroed(self, reading: Array) -> Array:
+        """Returns the log's reading (6,) at zeroing, of the twin's."""
+        return np.asarray(reading + self.at_rest - self._of_twin)
 
     @property
     def at_rest(self) -> Array:

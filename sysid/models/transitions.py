@@ -26,7 +26,7 @@ from sysid.models.grip_offset import GripOffset, of_encoders
 from sysid.models.late_pose import LatePoses
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.recorded_episode import RecordedEpisode
-from sysid.models.sensor_reading import SensorReading, at_sensor
+from sysid.models.sensor_reading import SensorReading, at_sensor, station_of
 
 #: Repeatability of a robot's own encoders within an episode, m and rad: below that of
 #: the robot (0.1 mm, against an external frame), above their resolution.
@@ -258,7 +258,7 @@ def _model_error(log: Log, sensing: SensorReading) -> Array:
     changes = [np.diff(observations(e)[:, 6:9], axis=0) for e in log.episodes]
     change = np.linalg.norm(np.concatenate(changes), axis=1)
     found = np.zeros((len(change), 12))
-    if _station(log) not in ("cell", "hardware"):
+    if station_of(log) not in ("cell", "hardware"):
         return found
     least, share = FORCE_ERROR
     force = np.hypot(least, share * change)
@@ -304,14 +304,9 @@ def _refuse_other_logs(log: Log, scenario: Scenario) -> None:
         )
 
 
-def _station(log: Log) -> str:
-    """Returns where a log was recorded, as it says."""
-    return str(log.header.provenance.get("station", ""))
-
-
 def _sway(log: Log, scenario: Scenario, sensing: SensorReading) -> Array:
     """Returns what moving loads the sensor with (rows, 6), at So in S."""
-    moves = Sway.of(scenario, _station(log))
+    moves = Sway.of(scenario, station_of(log))
     R_SB = sensing.X_SB.rotation().matrix()
     paths = [e["X_GB_commanded"][:, :3] for e in log.episodes]
     rates = [np.diff(path, axis=0) / scenario.task.period for path in paths]
@@ -320,9 +315,9 @@ def _sway(log: Log, scenario: Scenario, sensing: SensorReading) -> Array:
 
 def _offsets(logs: Sequence[Log], scenario: Scenario) -> list[GripOffset]:
     """Returns where the bolt is in the grip, beyond its springs, in each log."""
-    return [GripOffset.of(scenario, _station(log)) for log in logs]
+    return [GripOffset.of(scenario, station_of(log)) for log in logs]
 
 
 def _arms(logs: Sequence[Log], scenario: Scenario) -> list[CellArm]:
     """Returns how the arm of each log differs from the twin's."""
-    return [CellArm.of(scenario, _station(log)) for log in logs]
+    return [CellArm.of(scenario, station_of(log)) for log in logs]

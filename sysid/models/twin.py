@@ -8,7 +8,6 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     Effect,
@@ -85,7 +84,7 @@ class TwinModel(ScenarioModel):
         """
         self.parameters = tuple(parameters)
         self.scenario, self.rollout, self.coarse = scenario, rollout, coarse
-        self.reading = SensorReading(scenario, Tool.from_models(scenario))
+        self.reading = SensorReading.of(logs, scenario)
         recorded = Transitions.of(logs, scenario, self.reading)
         effects = sensor_chain(scenario.effects)
         self._transitions = recorded.begun(effects, self.reading)
@@ -139,8 +138,8 @@ class TwinModel(ScenarioModel):
         states = self._transitions.of_encoders(found.states, steps, rows)
         states = self.at_sensor(states)
         states[:, 6:] += self._transitions.sway[rows]
-        zero = np.broadcast_to(found.reading_at_zeroing, (len(states), 6))
-        return np.hstack([states, zero])
+        zero = self.reading.zeroed(found.reading_at_zeroing)
+        return np.hstack([states, np.broadcast_to(zero, (len(states), 6))])
 
     def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
         """Returns the states (len(rows), 12), wrench and pose read through effects."""

@@ -7,8 +7,9 @@ import pytest
 from pydrake.math import RigidTransform
 
 from drake_disasm.cell.twin_parameters import twin_of
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.spatial import velocity_shift
-from drake_disasm.effects import SensorBias
+from drake_disasm.effects import SensorBias, SensorGainDrift
 from drake_disasm.logs import Log
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
@@ -149,3 +150,30 @@ def test_where_the_arm_has_turned_the_grip_carries_the_weight_elsewhere(leaning)
         for s in ("cell", "twin")
     )
     assert turned.max() < 1.0 and (turned < 0.5 * even).all()
+
+
+@pytest.fixture(scope="module")
+def drifting(tmp_path_factory) -> tuple[Log, Scenario]:
+    """A sensor whose gain doubles within six seconds."""
+    hidden = SensorGainDrift(fz=0.16)
+    scenario = dataclasses.replace(_SCENARIO, effects=[hidden])
+    policy = Exploring(make_policy("admittance", scenario), 1.5e-4, 3)
+    simulation = TaskSimulation(scenario, "cell", policy)
+    folder = tmp_path_factory.mktemp("drifting") / "log"
+    return record_transitions(folder, simulation, 60, 3), scenario
+
+
+def test_a_gain_acts_on_the_weight_of_all_that_hangs_on_the_cells_sensor(drifting):
+    """Of the gripper, 15 N, and not of the twin's bolt and fingers, 3 N."""
+    log, scenario = drifting
+    whole, of_twin = (
+        np.sqrt(np.mean(_residual(_as_of(log, s), scenario)[:, 8] ** 2))
+        for s in ("cell", "twin")
+    )
+    assert whole < 1.5 and of_twin > 10.0
+
+
+def test_logs_of_twin_and_cell_have_other_loads_on_their_sensors(cell_log):
+    with pytest.raises(DisasmError, match="give logs of the twin and logs of a cell"):
+        TwinModel([cell_log, _as_of(cell_log, "twin")], _SCENARIO, ())
+    TwinModel([cell_log, _as_of(cell_log, "hardware")], _SCENARIO, ())
