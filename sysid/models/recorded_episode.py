@@ -24,7 +24,7 @@ from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 
 _PASSES = 4  # to undo effects on the sensor; where they are affine one is enough
 _CHANGE = 1e-4  # N, N m: of wrenches, for differences
-_DAMPING = 1e-6  # of steps along what a channel no longer shows, as in saturation
+_DAMPING = 1e-3  # of steps where a reading hardly shows a wrench: in a dead band
 
 
 @dataclasses.dataclass(frozen=True)

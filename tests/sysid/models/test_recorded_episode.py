@@ -52,12 +52,13 @@ def test_what_was_read_is_undone(effect):
     np.testing.assert_allclose(found, wrench, atol=1e-6)
 
 
-def test_what_a_dead_band_hides_is_left_as_it_is_read():
+def test_what_a_dead_band_hides_stays_small():
+    """Outside of the band the wrench is found, within it there are no leaps."""
     wrench, effect = _wrenches(), SensorDeadBand(force=1.0, width=2.0)
-    read = _read(effect, wrench)
-    found = undone(lambda w: _read(effect, w), read)
-    assert np.isfinite(found).all()
-    np.testing.assert_allclose(_read(effect, found), read, atol=1e-6)
+    found = undone(lambda w: _read(effect, w), _read(effect, wrench))
+    wide = np.abs(wrench) > 4.0
+    np.testing.assert_allclose(found[wide], wrench[wide], atol=0.01)
+    assert np.abs(found - wrench).max() < 2.0
 
 
 def test_a_saturated_channel_is_left_as_it_is_read():
