@@ -107,10 +107,14 @@ def _tried(
 ) -> _Outcome:
     """Returns what a change of the axes of measured values (n, channels) leaves.
 
-    The ratio is infinite if it explains nothing either, or something else less.
+    The ratio is infinite if it explains nothing either, or something else less: a
+    force that is not expected weighs less as one of a channel with more noise.
     """
     turned = change.of(measured)
-    size = np.mean(np.abs(measured - measured.mean(axis=0)), axis=0) / expected.scale
+    size, turned_size = (
+        np.mean(np.abs(values - values.mean(axis=0)), axis=0) / expected.scale
+        for values in (measured, turned)
+    )
     by = np.mean(np.abs(turned - measured), axis=0) / expected.scale
     moved = by > settings.least_change * size
     asis, left = (
@@ -118,7 +122,8 @@ def _tried(
         for values in (measured, turned)
     )
     ratio = np.inf
-    explains = left[moved].sum() < settings.explained_share * size[moved].sum()
+    most = settings.explained_share * turned_size[moved].sum()
+    explains = left[moved].sum() < most
     if moved.any() and explains and left.sum() < asis.sum():
         ratio = float(left[moved].sum() / asis[moved].sum())
     return _Outcome(change, float(left.mean()), ratio)

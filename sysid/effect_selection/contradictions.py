@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from sysid.effect_selection.block_regression import BlockRegression, Columns
 from sysid.effect_selection.fit import Fit
@@ -64,7 +65,11 @@ def _is_noise(fit: Fit) -> bool:
 def _difference(
     fit: Fit, survey: LinearSurvey, own: int, number: int, tests: int
 ) -> tuple[str, float] | None:
-    """Returns what differs in an episode and how much that explains; else None."""
+    """Returns what differs in an episode and how much that explains; else None.
+
+    Most blocks have to gain, or the noise is stated and can't be so large: what an
+    episode alone has gains nothing in the others, if its rows weigh little in a fit.
+    """
     limits, size, begin = fit.settings, len(survey.fields), len(survey.raw.scale)
     both = survey.raw.with_own_parameters(survey.episodes == number, size)
     regression = both.project_out(np.arange(len(fit.theta)))
@@ -78,6 +83,10 @@ def _difference(
     share = np.mean(gains > 0.0, axis=0)
     gain = gains.sum(axis=0) / regression.block_losses.sum()
     passed = (p < limits.alpha) & (share >= limits.contradiction_min_block_share)
+    if fit.noise_is_stated:
+        counts = np.array([len(columns) for _, columns in sets])
+        by_noise = chi2.sf(np.maximum(gains.sum(axis=0), 0.0), counts)
+        passed |= by_noise * len(sets) * tests < limits.alpha
     passed &= gain >= limits.contradiction_min_gain
     if not passed.any():
         return None

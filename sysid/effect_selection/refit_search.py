@@ -69,18 +69,19 @@ class RefitSearch(ForwardSearch):
 
         What is not linear at null, as a stop that takes up a force, hides from the
         linear account. Where the model states an error of its own, that account may
-        be content with an effect that ends below it and is not what is missing.
+        be content with an effect that ends below it and is not what is missing; and
+        the residual may be below it, too, and yet halved by what is.
         """
         if self._is_over or not survey.effects:
             return False
         if not rankings:
             return True
-        if fit.objective <= self._settings.max_objective_at_noise:
-            return False
+        is_confirmed = bool(rankings[-1].confirmed)
+        is_more = fit.objective > self._settings.max_objective_at_noise
         if fit.states_model_error:
-            return True
+            return is_confirmed or is_more
         # Of a costly model more than noise is always left, and minutes would be lost.
-        return not rankings[-1].confirmed and not fit.model.costly
+        return is_more and not is_confirmed and not fit.model.costly
 
     def _tried(self, fit: Fit, survey: Survey, starts: _Starts) -> _Ranking:
         """Returns a ranking's most promising effects, with their fits."""

@@ -1,6 +1,6 @@
 """Gauss-Newton within the box, damped as by Levenberg and Marquardt."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +52,8 @@ def gauss_newton(
         if callback:
             callback(value)
         points = np.clip(linearisation.u + _steps(linearisation), 0.0, 1.0)
-        point, residual = _best(objective, points, value, all_at_once=central)
+        batches = _batches(objective, linearisation, points, min_gain, central)
+        point, residual = _best(objective, batches, value)
         reached = objective.value(residual)
         if reached >= value:
             break
@@ -64,14 +65,35 @@ def gauss_newton(
     return linearisation
 
 
+def _batches(
+    objective: Objective,
+    linearisation: Linearisation,
+    points: Array,
+    min_gain: float,
+    all_at_once: bool,
+) -> list[Array]:
+    """Returns which of the points (d, p) are evaluated together, one batch after
+    the other as long as none is better.
+
+    Damped steps promise less than the full one: where that promises less than is worth
+    another iteration, they are not tried.
+    """
+    if all_at_once:
+        return [points]
+    change = linearisation.jacobian @ (points[0] - linearisation.u)
+    promised = objective.value(linearisation.residual + change)
+    if promised > (1.0 - min_gain) * objective.value(linearisation.residual):
+        return [points[:1]]
+    return [points[:1], points[1:]]
+
+
 def _best(
-    objective: Objective, points: Array, value: float, all_at_once: bool
+    objective: Objective, batches: Sequence[Array], value: float
 ) -> tuple[Array, Array]:
-    """Returns the best of points (d, p), or the first that is better than a value.
+    """Returns the best of the first batch of points (d, p) that betters a value.
 
     And the residuals there.
     """
-    batches = [points] if all_at_once else [points[:1], points[1:]]
     for batch in batches:
         residuals = objective.residuals(objective.scaling.from_unit(batch))
         values = [objective.value(r) for r in residuals]

@@ -10,7 +10,7 @@ import dataclasses
 import functools
 import hashlib
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +35,7 @@ class Replayed(NamedTuple):
 
 
 class DiagramReplays:
-    """The replay of scenarios by Drake, one after the other.
+    """The replay of scenarios by Drake, one after the other, but what is known.
 
     Args:
         scenarios: of the k twins.
@@ -54,7 +54,11 @@ class DiagramReplays:
             RuntimeError: Drake's contact solver did not converge.
         """
         pairs = zip(self._scenarios, steps, strict=True)
-        return [self._replayed(scenario, own) for scenario, own in pairs]
+        keys = [f"whole={self._whole} {s!r}{_digest(own)}" for s, own in pairs]
+        return _remembered(
+            keys,
+            lambda new: [self._replayed(self._scenarios[i], steps[i]) for i in new],
+        )
 
     def _replayed(self, scenario: Scenario, steps: Steps) -> Replayed:
         replay = twin_replay(scenario)
@@ -82,14 +86,7 @@ class ImpactReplays:
         """
         pairs = zip(self._texts, steps, strict=True)
         keys = [text + _digest(own) for text, own in pairs]
-        found = {key: known for key in keys if (known := _kept.get(key))}
-        new = {key: i for i, key in enumerate(keys) if key not in found}
-        if new:
-            replayed = self._replayed(list(new.values()), steps)
-            for key, own in zip(new, replayed, strict=True):
-                found[key] = own
-                _kept.put(key, own)
-        return [Replayed(*(part.copy() for part in found[key])) for key in keys]
+        return _remembered(keys, lambda new: self._replayed(new, steps))
 
     def _replayed(self, which: Sequence[int], steps: Sequence[Steps]) -> list[Replayed]:
         """Returns the replays of some of the twins."""
@@ -99,6 +96,24 @@ class ImpactReplays:
         states = replay.transitions([steps[i] for i in which])
         pairs = zip(states, replay.reading_at_zeroing, strict=True)
         return [Replayed(*pair) for pair in pairs]
+
+
+def _remembered(
+    keys: Sequence[str], replay: Callable[[Sequence[int]], Sequence[Replayed]]
+) -> list[Replayed]:
+    """Returns simulations by their keys; those that are not kept are made together.
+
+    Args:
+        keys: of each.
+        replay: makes some of them, by their places.
+    """
+    found = {key: known for key in keys if (known := _kept.get(key))}
+    new = {key: i for i, key in enumerate(keys) if key not in found}
+    if new:
+        for key, own in zip(new, replay(list(new.values())), strict=True):
+            found[key] = own
+            _kept.put(key, own)
+    return [Replayed(*(part.copy() for part in found[key])) for key in keys]
 
 
 class _Kept:
