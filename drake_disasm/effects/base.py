@@ -446,3 +446,14 @@ class JointEffect(ArmTorqueEffect):
     @abc.abstractmethod
     def torque(self, samples: JointSamples) -> np.ndarray:
         """Returns what it adds to the torque of the rigid bodies, (n,) [N m]."""
+
+    @classmethod
+    def least_shapes(cls, travel: float) -> dict[str, float]:
+        """Returns the least values of shape parameters that a motion can show.
+
+        By name; a smaller one is beyond what the motion could tell from others.
+
+        Args:
+            travel: from one end of the joint's motion to the other [rad].
+        """
+        return {}

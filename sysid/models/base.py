@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Effect
 from drake_disasm.scenario import Scenario
-from sysid.models.effects import at_null, field_of, with_fields
+from sysid.models.effects import (
+    at_null,
+    field_of,
+    is_shown,
+    with_fields,
+    within_travel,
+)
 from sysid.models.measurements import Measurements
 from sysid.parameters import Parameter, by_name, by_path
 
@@ -121,6 +127,11 @@ class LogModel(abc.ABC):
         """Of the longest episode, in the time of effects [s]; infinite: not known."""
         return np.inf
 
+    @property
+    def travel(self) -> Mapping[str, float]:
+        """How far each joint moves, from end to end [rad or m]; empty: not known."""
+        return {}
+
     def effects_at(self, theta: Array) -> tuple[Effect, ...]:
         """Returns the effects with values of parameters (p,), as `predict` gets it."""
         own = [p for p in self.parameters if field_of(p)]
@@ -143,6 +154,7 @@ class LogModel(abc.ABC):
             if issubclass(kind, self.effect_types)
             if kind.is_physical and not kind.is_random
             for effect in at_null(kind, self.joints, self.duration)
+            if is_shown(effect, self.travel)
         ]
 
     def with_effects(
@@ -155,8 +167,9 @@ class LogModel(abc.ABC):
             parameters: additional ones, fields of effects: their paths are
                 `effects.0.size` and the like.
         """
+        added = within_travel(parameters, effects, self.travel)
         return self.replace(
-            _effects=tuple(effects), parameters=(*self.parameters, *parameters)
+            _effects=tuple(effects), parameters=(*self.parameters, *added)
         )
 
     # Which parameters vary.

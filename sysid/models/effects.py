@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from drake_disasm.effects import ArmEffect, Effect
+from drake_disasm.effects import ArmEffect, Effect, JointEffect
 from sysid.parameters import Parameter
 
 
@@ -64,3 +64,41 @@ def with_fields(
         _, number, field = path.split(".")
         found[int(number)] = dataclasses.replace(found[int(number)], **{field: value})
     return tuple(found)
+
+
+def is_shown(effect: Effect, travel: Mapping[str, float]) -> bool:
+    """Returns whether a motion can show an effect in its shape.
+
+    Args:
+        effect: at null.
+        travel: of each joint, by name [rad or m]; none if the model has no joints.
+    """
+    least = _least_shapes(effect, travel)
+    return all(getattr(effect, name) >= value for name, value in least.items())
+
+
+def within_travel(
+    parameters: Sequence[Parameter],
+    effects: Sequence[Effect],
+    travel: Mapping[str, float],
+) -> list[Parameter]:
+    """Returns fields of effects, their shapes bounded by what a motion can show.
+
+    Args:
+        parameters: whose paths are `effects.0.size` and the like.
+        effects: of the model.
+        travel: of each joint, by name [rad or m].
+    """
+    found = []
+    for parameter in parameters:
+        effect = effects[int(parameter.path.split(".")[1])]
+        least = _least_shapes(effect, travel).get(field_of(parameter), parameter.low)
+        low = min(max(parameter.low, least), parameter.nominal)
+        found.append(dataclasses.replace(parameter, low=low))
+    return found
+
+
+def _least_shapes(effect: Effect, travel: Mapping[str, float]) -> dict[str, float]:
+    if not isinstance(effect, JointEffect) or effect.joint not in travel:
+        return {}
+    return effect.least_shapes(travel[effect.joint])

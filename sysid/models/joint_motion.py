@@ -111,6 +111,12 @@ class JointMotionModel(LogModel):
         inputs_of = ArmResidualModel.inputs_of
         return {joint: inputs_of(samples, joint) for joint in samples.joints}
 
+    @property
+    def travel(self) -> dict[str, float]:
+        """See LogModel."""
+        far = np.ptp(self._motion.q, axis=0)
+        return dict(zip(self.joints, far.tolist(), strict=True))
+
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: the joint's own motion."""
         names = {"q": "position", "v": "velocity", "vd": "acceleration"}

@@ -17,7 +17,8 @@ class TorqueRipple(JointEffect):
     Equation: tau = s sin(n q) + c cos(n q), n periods per turn (for a prismatic joint
     per 2 pi metres). A strain-wave gear has two per turn of its wave generator.
     Where it acts: one joint of the arm, on the torque that its sensor measures. One
-    period per turn is what an offset of the centre of mass looks like.
+    period per turn is what an offset of the centre of mass looks like; less than a
+    whole period within a motion is a curve of the position like any other, no ripple.
     """
 
     joint: str = joint_name()
@@ -34,3 +35,8 @@ class TorqueRipple(JointEffect):
         """See JointEffect."""
         phase = self.periods * samples.q
         return self.sine * np.sin(phase) + self.cosine * np.cos(phase)
+
+    @classmethod
+    def least_shapes(cls, travel: float) -> dict[str, float]:
+        """See JointEffect: a whole period."""
+        return {"periods": 2.0 * np.pi / max(travel, 1e-9)}

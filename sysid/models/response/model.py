@@ -227,6 +227,12 @@ class JointResponseModel(LogModel):
         """See LogModel."""
         return self._joints
 
+    @property
+    def travel(self) -> dict[str, float]:
+        """See LogModel."""
+        far = np.ptp(self.measurements.values, axis=0)
+        return dict(zip(self._joints, far.tolist(), strict=True))
+
     def select_rows(self, mask: NDArray[np.bool_]) -> Self:
         """See LogModel."""
         return self.replace(_segment=self._segment[mask], _time=self._time[mask])

@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import GroovePose
 from drake_disasm.logs import Log, read_log
 from sysid.data_checks import KINDS, Severity, check_data, refuse, without_flagged_rows
 from sysid.data_checks.constancy import dead_channels
 from sysid.data_checks.finding import DataFinding
 from sysid.models.base import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
+from sysid.validation.blind_tests import nominal
+from sysid.validation.synthetic_logs import transitions_log
 from tests.sysid.data_checks.damage import (
     both,
     changed,
@@ -270,6 +273,12 @@ def test_a_lever_that_nothing_has_is_named(damage, static_log):
 
 
 # Axes.
+
+
+def test_a_turned_groove_is_no_exchange_of_axes(tmp_path):
+    """Its forces are not expected, and weigh less as those of a noisier channel."""
+    transitions_log(tmp_path / "log", nominal(), [GroovePose(ry=0.0349)], seed=1)
+    assert "axes" not in findings(read_log(tmp_path / "log"))
 
 
 @pytest.mark.parametrize(

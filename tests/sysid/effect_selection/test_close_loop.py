@@ -7,6 +7,7 @@ import pytest
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
+    SensorBias,
     SensorDrift,
     SensorGain,
     SensorGainDrift,
@@ -19,8 +20,11 @@ from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.experiments import separating
 from sysid.effect_selection.output import to_mapping
 from sysid.models.from_logs import ModelChoice, model_of
+from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.report import closing_page
+from sysid.validation.blind_tests import nominal
+from sysid.validation.synthetic_logs import transitions_log
 from tests.sysid.effect_selection.blind import closed, static_log, verdict_of
 
 _BIASED = ("SensorDrift", "SensorGain", "SensorMounting")
@@ -122,6 +126,21 @@ def test_episodes_that_contradict_each_other_are_named(tmp_path):
     assert "no common effect" in found.text
     assert "contradict" in closing_page(found, {})
     assert to_mapping(found)["contradictions"][0]["effect"] == against.effect
+
+
+def test_an_offset_in_one_episode_of_nine_is_named_with_it(tmp_path):
+    """Its rows weigh little in a common fit, so that no other episode gains."""
+    parts = []
+    for name, effects, count in (("with", [SensorBias(fy=1.0)], 1), ("log", [], 8)):
+        transitions_log(tmp_path / name, nominal(), effects, 8, count)
+        parts.append(read_log(tmp_path / name))
+    one, rest = parts
+    mixed = (*rest.episodes[:4], *one.episodes, *rest.episodes[4:])
+    model = TwinModel([dataclasses.replace(rest, episodes=mixed)], nominal(), ())
+    found = close_loop(model, library=[SensorBias], train=range(9), test=[])
+    [against] = found.verdict.contradictions
+    assert against.effect == "SensorBias"
+    assert against.episodes == (model.measurements.names[4],)
 
 
 def test_a_common_effect_is_no_contradiction(tmp_path):

@@ -1,12 +1,14 @@
-"""A pose that comes late, and what could be taken for it, in logs of transitions."""
+"""A pose or a wrench that comes late, and what could be taken for it."""
 
 import pytest
 
 from drake_disasm.effects import (
     Backlash,
+    CommandGain,
     Effect,
     MotionLag,
     PoseDelay,
+    SensorDeadBand,
     SensorDelay,
 )
 from drake_disasm.logs import read_log
@@ -48,3 +50,12 @@ def test_a_pose_on_time_is_given_no_delay(tmp_path):
 def test_each_is_named_first_of_the_whole_library(effect, tmp_path):
     verdict = _verdict(tmp_path, [effect])
     assert (verdict.ending, verdict.names) == ("explained", (type(effect).__name__,))
+
+
+def test_a_wrench_that_is_rows_late_is_found_far_from_the_data(tmp_path):
+    """Fits to a few rows see the rows before: it was "unexplained"."""
+    late = [SensorDelay(0.1)]
+    verdict = _verdict(tmp_path, late, [SensorDelay, SensorDeadBand, CommandGain])
+    assert (verdict.ending, verdict.names) == ("explained", ("SensorDelay",))
+    (value,) = verdict.values
+    assert value.value == pytest.approx(0.1, abs=1e-3)

@@ -5,9 +5,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import JointViscousFriction
+from drake_disasm.effects import JointViscousFriction, TorqueRipple
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.scenario import Scenario
+from sysid.effect_selection.candidates import Candidate, extended
 from sysid.identification import SearchSettings, Settings, identify
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
@@ -159,6 +160,19 @@ def test_a_scenarios_own_effects_at_joints_act(urdf, tmp_path):
     more = rubbing.predictions(theta) - bare.predictions(theta)
     v = states(300)[1]
     np.testing.assert_allclose(more, np.column_stack([0 * v[:, 0], 0.7 * v[:, 1]]))
+
+
+def test_a_ripple_shows_in_a_motion_over_a_whole_period(urdf, tmp_path):
+    model = JointMotionModel([motion_log(tmp_path / "log", urdf)])
+    assert model.travel == pytest.approx(dict.fromkeys(JOINTS, 4.0), abs=0.1)
+    ripples = model.applicable_effects([TorqueRipple])
+    assert {effect.periods for effect in ripples} == {2.0, 4.0, 8.0}
+    [_, _, periods] = extended(model, [Candidate.of(ripples[0])], with_shapes=True)[
+        0
+    ].parameters[-3:]
+    assert periods.low == pytest.approx(2.0 * np.pi / model.travel[JOINTS[0]])
+    short = model.of_rows(np.abs(states(300)[0]).max(axis=1) < 0.7)
+    assert {e.periods for e in short.applicable_effects([TorqueRipple])} == {8.0}
 
 
 def test_refuses_an_effect_at_a_joint_that_the_log_does_not_have(urdf, tmp_path):

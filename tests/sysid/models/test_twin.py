@@ -8,6 +8,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.spatial import rotation_from_vector, shift_and_express
 from drake_disasm.scenario import load_scenario
+from drake_disasm.task.replay import TwinReplay
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models import PredictionError
 from sysid.models.twin import TwinModel, at_sensor
@@ -74,6 +75,31 @@ def test_workers_and_chunks_do_not_change_a_bit(log, turned, monkeypatch):
 
 
 @pytest.mark.slow
+def test_drake_simulates_nothing_twice(log, turned, monkeypatch):
+    """What acts on the readings alone changes no simulation."""
+    simulated = []
+    transitions = TwinReplay.transitions
+
+    def count(self, steps):
+        simulated.append(len(steps))
+        return transitions(self, steps)
+
+    monkeypatch.setattr(TwinReplay, "transitions", count)
+    rows = slice(0, 24)
+    theta = np.array([0.21, 4.1e-4, 0.0351])  # of no other test
+    first = make(log, turned).simulate(theta, rows)
+    again = make(log, turned).simulate(theta, rows)
+    assert simulated == [24] and np.array_equal(first, again)
+
+
+def test_a_thinned_log_keeps_rows_that_follow_each_other(log, turned):
+    thin = make(log, turned).thin(2)
+    rows = thin._transitions.rows
+    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    assert {len(run) for run in runs} == {6}
+    assert len(rows) == thin.measurements.rows == 36
+
+
 def test_recovers_parameters_from_nearby(log, turned):
     start = dataclasses.replace(turned, effects=[])
     model = make(log, start, ["contact.friction", "GroovePose.ry"], coarse=False)
@@ -144,7 +170,7 @@ def test_episodes_rows_and_frozen_parameters(log, turned):
     part = model.of_episodes([0, 2])
     assert part.measurements.names == ("log/episode_0000", "log/episode_0002")
     assert set(part.measurements.episode) == {0, 1} and part.measurements.rows == 48
-    assert model.thin(8).measurements.rows == 9
+    assert model.thin(8).measurements.rows == 12
     frozen = model.freeze({"GroovePose.ry": 0.01})
     assert [p.name for p in frozen.parameters] == list(NAMES[:2])
     assert frozen.scenario.effects[0].ry == 0.01 and model.scenario.effects[0].ry > 0.03
