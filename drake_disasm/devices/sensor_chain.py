@@ -148,17 +148,44 @@ def _along(
 ) -> Array:
     """Returns what an effect with a memory reads of loads (n, 6), each in its turn.
 
-    Between two of them the load changes linearly. An episode begins at rest.
+    Between two of them the load changes linearly. An episode begins at rest. Episodes
+    are read side by side.
     """
-    found, previous, before = np.empty_like(loads), at_rest, 0.0
-    memory = effect.begin(at_rest)
-    for i, (load, time) in enumerate(zip(loads, times, strict=True)):
-        if time <= before:
-            memory, previous, before = effect.begin(at_rest), at_rest, 0.0
-        interval = (time - before) / _SAMPLES
-        for part in np.arange(1, _SAMPLES + 1) / _SAMPLES:
-            now = previous + part * (load - previous)
-            memory = effect.remember(memory, now, interval)
-        found[i] = effect.read(load, memory)
-        previous, before = load, time
+    begins = np.flatnonzero(np.diff(times, prepend=np.inf) <= 0.0)
+    lengths = np.diff(begins, append=len(times))
+    found, previous = np.empty_like(loads), np.tile(at_rest, (len(begins), 1))
+    memory, before = effect.begin(previous).copy(), np.zeros(len(begins))
+    for k in range(int(lengths.max(initial=0))):
+        reading = np.flatnonzero(lengths > k)
+        rows = begins[reading] + k
+        intervals = times[rows] - before[reading]
+        for interval in np.unique(intervals):
+            own = intervals == interval
+            e, row = reading[own], rows[own]
+            memory[e] = _remembered(
+                effect, memory[e], previous[e], loads[row], interval
+            )
+            found[row] = effect.read(loads[row], memory[e])
+        previous[reading], before[reading] = loads[rows], times[rows]
     return found
+
+
+def _remembered(
+    effect: SensorMemoryEffect,
+    memory: Array,
+    before: Array,
+    now: Array,
+    interval: float,
+) -> Array:
+    """Returns what an effect remembers (e, m) after a while with loads in between.
+
+    Args:
+        effect: with a memory.
+        memory: (e, m).
+        before, now: (e, 6) loads at the begin and at the end of the while.
+        interval: its length [s].
+    """
+    for part in np.arange(1, _SAMPLES + 1) / _SAMPLES:
+        load = before + part * (now - before)
+        memory = effect.remember(memory, load, interval / _SAMPLES)
+    return memory
