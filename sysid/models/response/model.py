@@ -23,6 +23,7 @@ from sysid.models.response.rigid_bodies import RigidBodies
 from sysid.models.response.segments import (
     Segment,
     inputs_of,
+    interpolated,
     local_fit,
     measured_noise,
     reach_of,
@@ -129,14 +130,20 @@ class JointResponseModel(LogModel):
     # Parameters.
 
     def _guess(self, episodes: Sequence[Episode], reach: float) -> Guess:
-        """Returns about what the drives are, by inverse dynamics of some rows."""
+        """Returns about what the drives are, by inverse dynamics of some rows.
+
+        Keeps each row's goal and velocity.
+        """
         every = max(1, len(self._time) // _MOST_ROWS)
-        motions, inputs = [], []
+        motions, inputs, velocities = [], [], []
         for episode in episodes:
             time = episode["time"]
             fit = local_fit(time, episode["q"], time[::every], reach)
             motions.append(np.stack([fit.q, fit.v, fit.vd]))
             inputs.append(inputs_of(episode).at(np.s_[::every]))
+            velocities.append(interpolated(time[::every], fit.v, time))
+        goals = np.concatenate([inputs_of(episode).goal for episode in episodes])
+        self._state = np.stack([goals, np.concatenate(velocities)])
         q, v, vd = np.concatenate(motions, axis=1)
         load = self._bodies.terms(q, v, ()).load(vd)
         self._most = _largest(load, v, vd)
@@ -235,7 +242,22 @@ class JointResponseModel(LogModel):
 
     def select_rows(self, mask: NDArray[np.bool_]) -> Self:
         """See LogModel."""
-        return self.replace(_segment=self._segment[mask], _time=self._time[mask])
+        return self.replace(
+            _segment=self._segment[mask],
+            _time=self._time[mask],
+            _state=self._state[:, mask],
+        )
+
+    def covariates(self, channel: int) -> dict[str, Array]:
+        """See LogModel: the joint's own motion as it was measured, and its goal."""
+        goal, velocity = self._state[..., channel]
+        position = self.measurements.values[:, channel]
+        return {
+            "time": self._time,
+            "position": position,
+            "velocity": velocity,
+            "distance to the goal": goal - position,
+        }
 
     def thin(self, every: int) -> Self:
         """Returns the same model of every n-th segment: rows of one come for free.

@@ -120,12 +120,12 @@ class Segment:
         before = np.clip(before, 0, len(self.time) - 1)
         return dataclasses.replace(
             self.inputs.at(before),
-            goal=_interpolated(self.time, self.inputs.goal, times - delay),
-            supply=_interpolated(self.time, self.inputs.supply, times),
+            goal=interpolated(self.time, self.inputs.goal, times - delay),
+            supply=interpolated(self.time, self.inputs.supply, times),
         )
 
 
-def _interpolated(time: Array, values: Array, at: Array) -> Array:
+def interpolated(time: Array, values: Array, at: Array) -> Array:
     """Returns values (n, joints) at times (...), as (..., joints)."""
     return np.stack([np.interp(at, time, column) for column in values.T], axis=-1)
 

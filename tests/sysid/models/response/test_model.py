@@ -80,6 +80,18 @@ def test_selected_rows_are_predicted_as_among_all(log):
     np.testing.assert_allclose(some, whole[mask], atol=1e-12)
 
 
+def test_covariates_are_the_joints_own_motion(log):
+    whole = JointResponseModel([log])
+    model = whole.of_rows(whole.measurements.episode == 1)
+    found = model.covariates(0)
+    assert set(found) == {"time", "position", "velocity", "distance to the goal"}
+    time, position = found["time"], found["position"]
+    speed = np.gradient(position, time)
+    assert np.corrcoef(found["velocity"], speed)[0, 1] > 0.99
+    goal = log.episodes[1]["q_commanded"][:, 0]
+    np.testing.assert_allclose(found["distance to the goal"] + position, goal)
+
+
 def test_thinning_keeps_whole_segments(log):
     model = JointResponseModel([log], segment=0.05)
     assert model.thin(2).measurements.rows == pytest.approx(
