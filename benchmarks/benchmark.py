@@ -434,6 +434,14 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
             metavar="N",
             help=f"with --effects: {words} (default: {usual})",
         )
+    parser.add_argument(
+        "--first-seed",
+        type=options.seed,
+        default=0,
+        metavar="N",
+        help="with --effects: of the seeds, which count up from it; none that a "
+        "threshold was chosen by (default: 0)",
+    )
     args = parser.parse_args(arguments)
     for key in args.only or []:
         if key not in keys:
@@ -445,7 +453,8 @@ def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
     if args.effects:
-        print(run_matrix(args.effects, args.seeds, args.nulls, args.pairs))
+        counts = args.seeds, args.nulls, args.pairs
+        print(run_matrix(args.effects, *counts, args.first_seed))
         return 0
     wanted = set(args.only) if args.only else {k for g in MEASUREMENTS for k in g}
     groups = {g: m for g, m in MEASUREMENTS.items() if wanted & set(g)}

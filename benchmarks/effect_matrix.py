@@ -3,6 +3,7 @@
 import os
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -38,7 +39,7 @@ _PAIR_LEVEL = 3.0
 _STEPS, _TURN = 80, 0.0349066  # of an episode; rad, as in removal_turned
 
 
-def run_matrix(folder: Path, seeds: int, nulls: int, pairs: int) -> str:
+def run_matrix(folder: Path, seeds: int, nulls: int, pairs: int, first: int = 0) -> str:
     """Runs the blind tests; returns what they show, as Markdown.
 
     Answers that are in the folder already are not asked for again.
@@ -48,12 +49,13 @@ def run_matrix(folder: Path, seeds: int, nulls: int, pairs: int) -> str:
         seeds: of each effect at each level.
         nulls: logs without an effect, of each correlation of the noise.
         pairs: logs with two effects.
+        first: of the seeds.
     """
     groups: dict[str, list[Case]] = {
-        "singles": single_cases(LEVELS, range(seeds)),
-        "pairs": pair_cases(_PAIR_LEVEL, range(pairs)),
-        "nulls": null_cases(CORRELATIONS, range(nulls)),
-        "left out": left_out_cases(_LEFT_OUT_LEVEL, range(1)),
+        "singles": single_cases(LEVELS, range(first, first + seeds)),
+        "pairs": pair_cases(_PAIR_LEVEL, range(first, first + pairs)),
+        "nulls": null_cases(CORRELATIONS, range(first, first + nulls)),
+        "left out": left_out_cases(_LEFT_OUT_LEVEL, range(first, first + 1)),
     }
     cases = [case for group in groups.values() for case in group]
     make_folder(folder)
@@ -87,11 +89,12 @@ def in_words(found: dict[str, list[Answer]]) -> str:
                 f"{alarms} alarms in {len(own)} logs"
             )
     if left:
-        honest = sum(a.ending == "unexplained" for a in left)
-        silent = sum(a.ending == "none" for a in left)
+        said = Counter(a.ending for a in left)
         lines.append(
-            f"an effect that the library lacks: unexplained in {honest}, none in "
-            f"{silent}, another name in {len(left) - honest - silent} of {len(left)}"
+            "an effect that the library lacks: "
+            f"unexplained in {said['unexplained']}, none in {said['none']}, explained "
+            f"in part by another name in {said['partly']} and wholly in "
+            f"{said['explained']} of {len(left)}"
         )
     return "\n".join(lines)
 

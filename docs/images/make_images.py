@@ -53,10 +53,11 @@ def _take(file: Path, close_up: bool) -> None:
     simulation.reset(0)
     for _ in range(_STEPS):
         simulation.step()
-    _screenshot(view.meshcat.web_url(), file)
+    screenshot(view.meshcat.web_url(), file)
 
 
-def _screenshot(url: str, file: Path) -> None:
+def screenshot(url: str, file: Path) -> None:
+    """Takes a picture of a page."""
     with tempfile.TemporaryDirectory() as profile:
         subprocess.run(
             [
