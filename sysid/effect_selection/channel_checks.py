@@ -23,6 +23,7 @@ from sysid.objective import pseudo_residual
 Array = NDArray[np.float64]
 
 _NEAR = 2  # frequencies over which a window spreads a line
+_FINE = 41  # frequencies between a line's neighbours
 _SHOWN = 5  # rows that a text lists: a size of output, no threshold
 
 
@@ -33,10 +34,13 @@ class ChannelFinding:
     Attributes:
         channel: its name.
         text: what it is, in words.
+        clause: the same behind the channel's name in a sentence; empty: that something
+            is left is all there is to say.
     """
 
     channel: str
     text: str
+    clause: str = ""
 
 
 def channel_findings(fit: Fit) -> list[ChannelFinding]:
@@ -46,13 +50,13 @@ def channel_findings(fit: Fit) -> list[ChannelFinding]:
     for number, channel in enumerate(measured.channels):
         r = residual[:, number]
         least = fit.noticeable(number)
-        texts = [
-            _outlying(r, measured, fit.settings, least),
-            _line(r, measured, fit.settings, least),
-        ]
-        if fit.noise_is_stated:
-            texts.append(_excess(r, measured, fit.settings))
-        found += [ChannelFinding(channel.name, text) for text in texts if text]
+        rows = _outlying(r, measured, fit.settings, least)
+        line = _line(r, measured, fit.settings, least)
+        excess = _excess(r, measured, fit.settings) if fit.noise_is_stated else ""
+        for text, verb in ((rows, "has"), (line, "is"), (excess, "")):
+            clause = f"{verb} {text.partition(' (')[0]}" if verb else ""
+            if text:
+                found.append(ChannelFinding(channel.name, text, clause))
     return found
 
 
@@ -118,10 +122,23 @@ def _line(
     is_small = share < settings.line_power or share * np.mean(r**2) < least**2
     if is_small or len(bins) * tail > settings.line_alpha:
         return ""
-    cycles = bins[best] / longest
+    cycles = _refined(parts, bins[best], longest)
     if measured.period:
-        return f"periodic at {cycles / measured.period:.3g} Hz ({100 * share:.0f} %)"
-    return f"periodic, every {1.0 / cycles:.3g} rows ({100 * share:.0f} %)"
+        return f"periodic at {cycles / measured.period:.2g} Hz ({100 * share:.0f} %)"
+    return f"periodic, every {1.0 / cycles:.2g} rows ({100 * share:.0f} %)"
+
+
+def _refined(parts: Sequence[Array], bin_: int, longest: int) -> float:
+    """Returns the frequency [1/row] near a bin at which parts have the most power.
+
+    Between the periodogram's own frequencies, which are far apart in short episodes.
+    """
+    cycles = (bin_ + np.linspace(-1.0, 1.0, _FINE)) / longest
+    power = np.zeros_like(cycles)
+    for part in parts:
+        waves = np.exp(-2j * np.pi * np.outer(cycles, np.arange(len(part))))
+        power += np.abs(waves @ _windowed(part)) ** 2
+    return float(cycles[np.argmax(power)])
 
 
 def _around(level: Array, bin_: int, count: int) -> Array:
@@ -139,9 +156,12 @@ def _innovations(part: Array) -> Array:
 
 
 def _periodogram(part: Array, longest: int) -> Array:
+    return np.abs(np.fft.rfft(_windowed(part), longest)) ** 2
+
+
+def _windowed(part: Array) -> Array:
     window = np.hanning(len(part) + 2)[1:-1]
-    centred = (part - part.mean()) * window / np.linalg.norm(window)
-    return np.abs(np.fft.rfft(centred, longest)) ** 2
+    return np.asarray((part - part.mean()) * window / np.linalg.norm(window))
 
 
 def findings_text(found: Sequence[ChannelFinding]) -> str:

@@ -183,8 +183,27 @@ def single_strokes_text(verdict: Verdict) -> str:
 
 
 def _findings(found: Sequence[ChannelFinding]) -> str:
-    names = list(dict.fromkeys(each.channel for each in found))
-    return f"something is left in {enumeration(names)}" if names else ""
+    """Returns what single channels show: what it is if that is known; else which."""
+    said: dict[str, list[str]] = {}
+    for each in found:
+        if each.clause:
+            said.setdefault(each.clause, []).append(each.channel)
+    known = {channel for channels in said.values() for channel in channels}
+    if len(said) > _SHOWN:
+        said, known = {}, set()
+    texts = [
+        f"{enumeration(channels)} {clause if len(channels) == 1 else _of_many(clause)}"
+        for clause, channels in said.items()
+    ]
+    rest = [c for c in dict.fromkeys(each.channel for each in found) if c not in known]
+    if rest:
+        texts.append(f"something is left in {enumeration(rest)}")
+    return enumeration(texts)
+
+
+def _of_many(clause: str) -> str:
+    """Returns a clause behind several channels."""
+    return clause.replace("has ", "have ", 1).replace("is ", "are ", 1)
 
 
 def _left_over(found: Sequence[LeftOver]) -> str:

@@ -70,7 +70,7 @@ def test_a_sine_is_found_with_its_frequency():
     residual = _white()
     residual[:, 1] += 3.0 * np.sin(2 * np.pi * 1.3 * _time())
     text = _found(residual)
-    assert "fy: periodic at 1.33 Hz" in text  # of frequencies 0.17 Hz apart
+    assert "fy: periodic at 1.3 Hz" in text  # of frequencies 0.17 Hz apart
     assert "fy: 2.3 times its noise" in text and "fx" not in text
 
 

@@ -81,6 +81,18 @@ def test_partly_explained_says_what_is_left():
     )
 
 
+def test_what_a_channel_shows_is_said_where_it_is_known():
+    findings = (
+        ChannelFinding("fx", "periodic at 1.3 Hz (90 %)", "is periodic at 1.3 Hz"),
+        ChannelFinding("fy", "periodic at 1.3 Hz (90 %)", "is periodic at 1.3 Hz"),
+        ChannelFinding("fy", "3.1 times its noise, of unknown origin"),
+        ChannelFinding("tz", "1.4 times its noise, of unknown origin"),
+    )
+    assert verdict_sentence(
+        made_verdict("unexplained", findings=findings), ERRORS
+    ).endswith("since fx and fy are periodic at 1.3 Hz and something is left in tz.")
+
+
 def test_what_a_flexible_learner_finds_is_said():
     left = (
         LeftOver("fx", 0.4, 0.1, "N", ("velocity", "time")),
