@@ -1,5 +1,7 @@
 """tools/study.py: a study from its command line, and what it refuses."""
 
+import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -20,6 +22,36 @@ def test_a_study_writes_its_report_and_resumes(tmp_path: Path) -> None:
     assert "tools/study.py precision" in (tmp_path / "out/report.md").read_text()
     again = run_program("study", *arguments, "--resume")
     assert again.returncode == 0 and again.stdout == first.stdout
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 60 kB; skips the test where none may be mounted."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=60k", "tmpfs", str(folder)]
+    try:
+        subprocess.run(mount, check=True, capture_output=True)
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("no file system may be mounted here")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+@pytest.mark.slow
+def test_a_disk_that_fills_up_loses_nothing(small_disk: Path, tmp_path: Path) -> None:
+    arguments = ["precision", *_SMALL, "--episodes=6", "--out"]
+    full = run_program("study", *arguments, str(small_disk / "out"))
+    assert full.returncode == 2 and "No space left on device" in full.stderr
+    assert "check the disk's space" in full.stderr.splitlines()[-1]
+    grow = ["mount", "-o", "remount,size=60m", str(small_disk)]
+    subprocess.run(grow, check=True)
+    on = run_program("study", *arguments, str(small_disk / "out"), "--resume")
+    assert on.returncode == 0, on.stderr
+    run_program("study", *arguments, str(tmp_path / "out"))
+    table = "results.csv"
+    expected = (tmp_path / "out" / table).read_bytes()
+    assert (small_disk / "out" / table).read_bytes() == expected
 
 
 def test_the_studies_are_listed() -> None:
