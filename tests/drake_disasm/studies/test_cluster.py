@@ -1,6 +1,8 @@
 """A study on a Dask cluster: same bits, workers that die, and what is refused."""
 
+import contextlib
 import os
+import random
 import signal
 import threading
 from collections.abc import Iterator
@@ -11,49 +13,68 @@ import pytest
 from drake_disasm.common.cluster import executor_for
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.studies.runner import open_study, run_study
+from drake_disasm.studies.study import Study
 from tests.drake_disasm.studies.test_study import bits, small_precision
 from tests.progress import wait_until
 
 distributed = pytest.importorskip("distributed")
 
 
-@pytest.fixture
-def cluster() -> Iterator["distributed.LocalCluster"]:
-    """Returns a cluster whose workers are processes."""
+@contextlib.contextmanager
+def cluster_of(workers: int) -> Iterator["distributed.LocalCluster"]:
+    """Yields a cluster whose workers are processes."""
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
+        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0"
     ) as cluster:
         yield cluster
 
 
-def _run(folder: Path, address: str) -> dict[str, str]:
-    study = small_precision(lockstep=False, seeds=(0,))
+def _run_here(study: Study, folder: Path, workers: int) -> dict[str, str]:
     open_study(study, folder, resume=False)
-    with executor_for("dask", address) as (executor, host):
-        run_study(study, folder, 2, executor, host)
+    run_study(study, folder, workers)
     return bits(folder)
 
 
-def test_workers_that_are_killed_change_no_bit(
-    cluster: "distributed.LocalCluster", tmp_path: Path
+def _run_and_kill_two(study: Study, folder: Path, workers: int) -> dict[str, str]:
+    """Runs a study on a cluster, of which two workers at random are killed.
+
+    One after the other, once episodes are written.
+    """
+    killed: list[int] = []
+    with cluster_of(workers) as cluster:
+
+        def kill() -> None:
+            """Kills the two."""
+            for worker in random.sample(list(cluster.workers.values()), 2):
+                wait_until(lambda: len(list(folder.rglob("episode_*"))) > len(killed))
+                os.kill(worker.process.pid, signal.SIGKILL)
+                killed.append(worker.process.pid)
+
+        thread = threading.Thread(target=kill)
+        thread.start()
+        open_study(study, folder, resume=False)
+        address = cluster.scheduler_address
+        with executor_for("dask", address) as (executor, host):
+            run_study(study, folder, workers, executor, host)
+        thread.join()
+    assert len(killed) == 2
+    return bits(folder)
+
+
+def test_workers_that_are_killed_change_no_bit(tmp_path: Path) -> None:
+    study = small_precision(lockstep=False, seeds=(0,))
+    alone = _run_here(study, tmp_path / "alone", 1)
+    assert _run_and_kill_two(study, tmp_path / "cluster", 2) == alone
+
+
+@pytest.mark.slow
+def test_one_worker_four_and_a_cluster_of_four_give_the_same_bits(
+    tmp_path: Path,
 ) -> None:
-    study, alone = small_precision(lockstep=False, seeds=(0,)), tmp_path / "alone"
-    open_study(study, alone, resume=False)
-    run_study(study, alone)
-    folder, killed = tmp_path / "cluster", []
-
-    def kill() -> None:
-        """Kills both workers, one after the other, once episodes are written."""
-        for worker in list(cluster.workers.values()):
-            wait_until(lambda: len(list(folder.rglob("episode_*"))) > len(killed))
-            os.kill(worker.process.pid, signal.SIGKILL)
-            killed.append(worker.process.pid)
-
-    thread = threading.Thread(target=kill)
-    thread.start()
-    found = _run(folder, cluster.scheduler_address)
-    thread.join()
-    assert len(killed) == 2 and found == bits(alone)
+    study = small_precision(lockstep=False, seeds=(0, 1))
+    alone = _run_here(study, tmp_path / "one", 1)
+    assert _run_here(study, tmp_path / "four", 4) == alone
+    assert _run_and_kill_two(study, tmp_path / "cluster", 4) == alone
 
 
 def test_a_scheduler_that_does_not_answer_is_named(
