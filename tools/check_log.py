@@ -137,7 +137,8 @@ def _limit_words(row: LimitRow) -> str:
     if high[0] != low[0]:
         size += f" ({low[1]}) to {high[0]:.3g} ({high[1]})"
     hidden = f"; not at {', '.join(row.hidden)}" if any(row.hidden) else ""
-    return f"{row.kind}.{row.field}: {size} {row.unit}{hidden}"
+    shapes = f" ({'; '.join(row.shapes)})" if row.shapes else ""
+    return f"{row.kind}.{row.field}: {size} {row.unit}{shapes}{hidden}"
 
 
 if __name__ == "__main__":

@@ -28,6 +28,8 @@ class DetectionLimit:
             have been found.
         unit: of the amplitude.
         share: of the way to its farther bound; above 1 if it is beyond.
+        shape: values of the effect's shape parameters, as text: other shapes would have
+            to be larger.
     """
 
     effect: str
@@ -35,6 +37,7 @@ class DetectionLimit:
     amplitude: float | None
     unit: str
     share: float
+    shape: str = ""
 
 
 def detection_limits(survey: LinearSurvey) -> list[DetectionLimit]:
@@ -55,7 +58,7 @@ def detection_limits(survey: LinearSurvey) -> list[DetectionLimit]:
     critical = float(np.quantile(highest, 1.0 - settings.alpha))
     best: dict[tuple[str, str], DetectionLimit] = {}
     for text, group in groups.items():
-        for limit in _limits(survey, text.partition("[")[0], group, critical):
+        for limit in _limits(survey, text, group, critical):
             known = best.get((limit.effect, limit.field))
             if known is None or limit.share < known.share:
                 best[limit.effect, limit.field] = limit
@@ -63,9 +66,10 @@ def detection_limits(survey: LinearSurvey) -> list[DetectionLimit]:
 
 
 def _limits(
-    survey: LinearSurvey, effect: str, group: Columns, critical: float
+    survey: LinearSurvey, text: str, group: Columns, critical: float
 ) -> list[DetectionLimit]:
-    """Returns the limit of each amplitude of an effect."""
+    """Returns the limit of each amplitude of an effect, by its text: `name[shape]`."""
+    effect, _, shape = text.removesuffix("]").partition("[")
     scaling, nominal = Scaling(survey.parameters), nominal_values(survey.parameters)
     at, slope = scaling.to_unit(nominal)[group], scaling.slope(nominal)[group]
     found = _in_unit_box(survey, group, critical)
@@ -77,6 +81,7 @@ def _limits(
             float(amplitude) if share <= 1.0 else None,
             survey.parameters[column].unit,
             float(share),
+            shape,
         )
         for column, amplitude, share in zip(group, found * slope, shares, strict=True)
     ]

@@ -33,6 +33,7 @@ class LimitRow:
         least, greatest: that would have been found, with their joints; None if none.
         hidden: joints where none would have been found within its bounds, or all that
             there is if it acts at none.
+        shapes: in which they would have been found: other shapes have to be larger.
     """
 
     kind: str
@@ -43,6 +44,7 @@ class LimitRow:
     least: tuple[float, str] | None
     greatest: tuple[float, str] | None
     hidden: tuple[str, ...]
+    shapes: tuple[str, ...]
 
 
 def recordings(verdict: Verdict, at_task: bool) -> list[Recording]:
@@ -94,8 +96,18 @@ def _limit_row(kind: str, field: str, limits: list[DetectionLimit]) -> LimitRow:
     hidden = [x.effect.partition(".")[2] for x in limits if x.amplitude is None]
     units = " or ".join(dict.fromkeys(limit.unit for limit in limits))
     least, greatest = (found[0], found[-1]) if found else (None, None)
-    doc, words = str(data.get("doc", "")), in_words(kind)
-    return LimitRow(kind, words, field, doc, units, least, greatest, tuple(hidden))
+    shapes = dict.fromkeys(x.shape for x in limits if x.shape and x.amplitude)
+    return LimitRow(
+        kind,
+        in_words(kind),
+        field,
+        str(data.get("doc", "")),
+        units,
+        least,
+        greatest,
+        tuple(hidden),
+        tuple(shapes),
+    )
 
 
 def _any_of(names: tuple[str, ...]) -> str:

@@ -53,7 +53,7 @@ def record(folder: Path, scenario: Scenario, seed: int) -> Log:
 def draw(number: int, limits: list[list[object]]) -> Effect:
     """Returns the effect of a case: another kind for each, as far as there are."""
     random = np.random.default_rng(_SEEDS["effect"])
-    known = {str(name) for name, _, size, share in limits if size and share < _FAR}
+    known = {str(row[0]) for row in limits if row[2] and row[3] < _FAR}
     kinds = [kind for kind in observable_effects() if kind.__name__ in known]
     order = np.concatenate(
         [random.permutation(len(kinds)) for _ in range(1 + number // len(kinds))]
@@ -61,8 +61,10 @@ def draw(number: int, limits: list[list[object]]) -> Effect:
     kind, random = kinds[order[number]], np.random.default_rng([7000, number])
     own = [row for row in limits if row[0] == kind.__name__ and row[2]]
     own = [row for row in own if row[3] < _FAR]
-    _, field, size, _ = own[int(random.integers(len(own)))]
-    return kind(**{str(field): float(size) * random.uniform(*_TIMES)})
+    _, field, size, _, shape = own[int(random.integers(len(own)))]
+    pairs = (part.split("=") for part in str(shape).split(", ") if part)
+    shapes = {name: float(value) for name, value in pairs}
+    return kind(**{str(field): float(size) * random.uniform(*_TIMES)}, **shapes)
 
 
 def answer(log: Log, scenario: Scenario) -> Answer:
@@ -80,7 +82,9 @@ def answer(log: Log, scenario: Scenario) -> Answer:
         "ties": [[tie.name for tie in ties] for ties in found.ties],
         "text": closed.text,
         "rms": np.sqrt(np.mean(residual**2, axis=0)).round(2).tolist(),
-        "limits": [[x.effect, x.field, x.amplitude, x.share] for x in found.limits],
+        "limits": [
+            [x.effect, x.field, x.amplitude, x.share, x.shape] for x in found.limits
+        ],
     }
 
 

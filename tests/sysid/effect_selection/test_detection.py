@@ -75,6 +75,14 @@ def test_more_noise_takes_larger_effects(model):
     assert 2.0 < ratio < 5.0  # the noise is sqrt(1 + 9) times as large
 
 
+def test_a_limit_says_in_which_shape(model):
+    """A warm-up of an hour would have to be larger than one of some readings."""
+    _, survey = _survey(model)
+    shapes = {x.effect: x.shape for x in detection_limits(survey.linearised)}
+    assert shapes["SensorWarmUp"].startswith("time_constant=")
+    assert shapes["SensorGain"] == ""
+
+
 def test_a_log_that_can_show_nothing_is_refused(model):
     fit, survey = _survey(model)
     limits = detection_limits(survey.linearised)

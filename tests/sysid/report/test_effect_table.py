@@ -39,8 +39,10 @@ def test_detection_limits_of_joints_are_one_row():
         DetectionLimit("TorqueOffset.j2", "size", -0.1, "N m", 0.1),
         DetectionLimit("TorqueOffset.j3", "size", None, "N m", 1.2),
         DetectionLimit("SensorBias", "fx", None, "N", 2.0),
+        DetectionLimit("SensorWarmUp", "fx", 0.1, "N", 0.2, "time_constant=1"),
     )
-    offset, bias = limit_rows(limits)
+    offset, bias, warm_up = limit_rows(limits)
+    assert warm_up.shapes == ("time_constant=1",) and offset.shapes == ()
     assert (offset.least, offset.greatest) == ((0.1, "j2"), (0.3, "j1"))
     assert offset.hidden == ("j3",) and bias.least is None
     told = recordings(made_verdict("none", limits=limits), at_task=False)
