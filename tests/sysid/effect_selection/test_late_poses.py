@@ -52,6 +52,7 @@ def test_each_is_named_first_of_the_whole_library(effect, tmp_path):
     assert (verdict.ending, verdict.names) == ("explained", (type(effect).__name__,))
 
 
+@pytest.mark.slow
 def test_a_wrench_that_is_rows_late_is_found_far_from_the_data(tmp_path):
     """Fits to a few rows see the rows before: it was "unexplained"."""
     late = [SensorDelay(0.1)]

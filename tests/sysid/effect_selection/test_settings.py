@@ -32,6 +32,7 @@ ALLOWED = {
     "_CURVATURE_STEP",
     "_LEAST_SIZE",
     "_DEPENDENCES",
+    "_FINE",
 }
 #: Numbers with a meaning of their own: none, one, a pair, all.
 PLAIN = {0, 1, 2}
