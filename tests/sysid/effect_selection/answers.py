@@ -25,9 +25,11 @@ def complete(path: Path, count: int, answer: Callable[[int], Answer]) -> list[An
         count: answers.
         answer: to the log of a number.
     """
+    known = {each["number"] for each in read_answers(path)}
     with path.open("a") as stream:
-        for number in range(len(read_answers(path)), count):
-            print(json.dumps(answer(number)), file=stream, flush=True)
+        for number in (n for n in range(count) if n not in known):
+            found = {"number": number} | answer(number)
+            print(json.dumps(found), file=stream, flush=True)
     return read_answers(path)
 
 

@@ -11,6 +11,7 @@ each answer to out/cell_verdicts as it comes, and goes on from there.
 
 import argparse
 import copy
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -104,12 +105,18 @@ def _case(kind: str, number: int, out: Path, scenario: Scenario) -> Answer:
 
 def _summary(kind: str, answers: list[Answer]) -> str:
     """Returns alarms of null logs, or effects named, with Wilson's intervals."""
-    if kind == "effect":
-        right = sum(a["names"][:1] == [a.get("kind")] for a in answers)
-        return counted(kind, "named first", right, answers)
-    return counted(
-        kind, "name an effect", sum(bool(a["names"]) for a in answers), answers
+    if kind != "effect":
+        alarms = sum(bool(a["names"]) for a in answers)
+        return counted(kind, "name an effect", alarms, answers)
+    first = [a["names"][:1] == [a["kind"]] for a in answers]
+    named = [a["kind"] in {*a["names"], *itertools.chain(*a["ties"])} for a in answers]
+    explained = [a["ending"] == "explained" for a in answers]
+    rows = (
+        ("named first", first),
+        ("named, or in a reported tie", named),
+        ("the same, and explained", map(all, zip(named, explained, strict=True))),
     )
+    return "\n".join(counted(kind, what, sum(right), answers) for what, right in rows)
 
 
 def main() -> None:
