@@ -67,8 +67,10 @@ def _difference(
 ) -> tuple[str, float] | None:
     """Returns what differs in an episode and how much that explains; else None.
 
-    Most blocks have to gain, or the noise is stated and can't be so large: what an
-    episode alone has gains nothing in the others, if its rows weigh little in a fit.
+    Most blocks have to gain, or the noise is stated and can't be so large, and all
+    other episodes are at the noise: what an episode alone has gains nothing in those,
+    if its rows weigh little in a fit. (Rows that are missed by far in every episode are
+    no contradiction.)
     """
     limits, size, begin = fit.settings, len(survey.fields), len(survey.raw.scale)
     both = survey.raw.with_own_parameters(survey.episodes == number, size)
@@ -83,7 +85,7 @@ def _difference(
     share = np.mean(gains > 0.0, axis=0)
     gain = gains.sum(axis=0) / regression.block_losses.sum()
     passed = (p < limits.alpha) & (share >= limits.contradiction_min_block_share)
-    if fit.noise_is_stated:
+    if fit.noise_is_stated and _are_at_noise(fit, regression, survey, number):
         counts = np.array([len(columns) for _, columns in sets])
         by_noise = chi2.sf(np.maximum(gains.sum(axis=0), 0.0), counts)
         passed |= by_noise * len(sets) * tests < limits.alpha
@@ -96,9 +98,25 @@ def _difference(
     return sets[best][0], float(gain[best])
 
 
+def _are_at_noise(
+    fit: Fit, regression: BlockRegression, survey: LinearSurvey, number: int
+) -> bool:
+    """Returns whether the episodes but one leave no more than the noise."""
+    others = survey.episodes != number
+    sizes = np.diff(regression.begins, append=len(regression.r))
+    left = regression.block_losses[others].sum() / sizes[others].sum()
+    return bool(np.sqrt(left) <= fit.settings.max_objective_at_noise)
+
+
 def _gains(
     regression: BlockRegression, columns: Columns, begin: int
 ) -> NDArray[np.float64]:
-    """Returns what blocks gain, (B,), if columns may differ in the episode."""
+    """Returns what blocks gain, (B,), if columns may differ in the episode.
+
+    Than with the same in all, or without them where that leaves less.
+    """
+    common = regression.held_out_losses(columns)
+    if common.sum() > regression.block_losses.sum():
+        common = regression.block_losses
     both = np.concatenate([columns, begin + columns])
-    return regression.held_out_losses(columns) - regression.held_out_losses(both)
+    return common - regression.held_out_losses(both)

@@ -7,6 +7,7 @@ import pytest
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
+    GroovePose,
     SensorBias,
     SensorDrift,
     SensorGain,
@@ -25,6 +26,7 @@ from sysid.objective import Objective
 from sysid.report import closing_page
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
+from tests.sysid.data_checks.damage import changed, damaged
 from tests.sysid.effect_selection.blind import closed, static_log, verdict_of
 
 _BIASED = ("SensorDrift", "SensorGain", "SensorMounting")
@@ -141,6 +143,16 @@ def test_an_offset_in_one_episode_of_nine_is_named_with_it(tmp_path):
     [against] = found.verdict.contradictions
     assert against.effect == "SensorBias"
     assert against.episodes == (model.measurements.names[4],)
+
+
+def test_rows_that_are_off_in_every_episode_are_no_contradiction(tmp_path):
+    transitions_log(tmp_path / "log", nominal(), [], 8, 9)
+    add = changed("wrench.fy", [3, 9, 15], lambda values: values + 5.0)
+    log = damaged(read_log(tmp_path / "log"), add)
+    model = TwinModel([log], nominal(), ())
+    found = close_loop(model, library=[GroovePose], train=range(9), test=[])
+    assert found.verdict.contradictions == ()
+    assert found.verdict.ending == "unexplained"
 
 
 def test_a_common_effect_is_no_contradiction(tmp_path):
