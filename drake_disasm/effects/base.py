@@ -432,9 +432,11 @@ class JointEffect(ArmTorqueEffect):
 
     Attributes:
         joint: its name in the URDF.
+        needs_both_ways: whether only motion in both directions can show what it is.
     """
 
     joint: str
+    needs_both_ways: ClassVar[bool] = False
 
     def torques(self, samples: ArmSamples) -> np.ndarray:
         """See ArmTorqueEffect."""

@@ -132,6 +132,11 @@ class LogModel(abc.ABC):
         """How far each joint moves, from end to end [rad or m]; empty: not known."""
         return {}
 
+    @property
+    def one_way(self) -> tuple[str, ...]:
+        """Joints that move one way only; by default none is known."""
+        return ()
+
     def effects_at(self, theta: Array) -> tuple[Effect, ...]:
         """Returns the effects with values of parameters (p,), as `predict` gets it."""
         own = [p for p in self.parameters if field_of(p)]
@@ -154,7 +159,7 @@ class LogModel(abc.ABC):
             if issubclass(kind, self.effect_types)
             if kind.is_physical and not kind.is_random
             for effect in at_null(kind, self.joints, self.duration)
-            if is_shown(effect, self.travel)
+            if is_shown(effect, self.travel, self.one_way)
         ]
 
     def with_effects(

@@ -3,11 +3,17 @@
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from drake_disasm.effects import ArmEffect, Effect, JointEffect
 from sysid.parameters import Parameter
+
+_RESTS = 0.05  # of the greatest speed: noise of a filtered velocity is no motion
+_NEXT_TO_NOTHING = 0.02  # of the rows that move
 
 
 def at_null(
@@ -66,13 +72,36 @@ def with_fields(
     return tuple(found)
 
 
-def is_shown(effect: Effect, travel: Mapping[str, float]) -> bool:
+def one_way_joints(joints: Sequence[str], v: NDArray[np.float64]) -> tuple[str, ...]:
+    """Returns the joints that move one way only.
+
+    Args:
+        joints: their names.
+        v: (n, joints) velocities.
+    """
+    found = []
+    for joint, own in zip(joints, v.T, strict=True):
+        moving = own[np.abs(own) > _RESTS * np.abs(own).max(initial=0.0)]
+        forth = float(np.mean(moving > 0.0)) if len(moving) else 0.0
+        if min(forth, 1.0 - forth) < _NEXT_TO_NOTHING:
+            found.append(joint)
+    return tuple(found)
+
+
+def is_shown(
+    effect: Effect, travel: Mapping[str, float], one_way: Collection[str]
+) -> bool:
     """Returns whether a motion can show an effect in its shape.
 
     Args:
         effect: at null.
         travel: of each joint, by name [rad or m]; none if the model has no joints.
+        one_way: joints that move one way only.
     """
+    if not isinstance(effect, JointEffect):
+        return True
+    if effect.needs_both_ways and effect.joint in one_way:
+        return False
     least = _least_shapes(effect, travel)
     return all(getattr(effect, name) >= value for name, value in least.items())
 

@@ -16,6 +16,7 @@ from drake_disasm.scenario import Scenario
 from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_logs
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.base import Array, LogModel
+from sysid.models.effects import one_way_joints
 from sysid.models.joint_units import in_units_of_joints
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
@@ -116,6 +117,11 @@ class JointMotionModel(LogModel):
         """See LogModel."""
         far = np.ptp(self._motion.q, axis=0)
         return dict(zip(self.joints, far.tolist(), strict=True))
+
+    @property
+    def one_way(self) -> tuple[str, ...]:
+        """See LogModel."""
+        return one_way_joints(self.joints, self._motion.v)
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: the joint's own motion."""

@@ -29,6 +29,7 @@ class JointAsymmetricFriction(JointEffect):
         0.02, "rad/s", 1e-4, 0.1, "velocity of the transition", _CREEP
     )
 
+    needs_both_ways = True
     noun = "friction that depends on the direction"
     experiment = "this joint both ways at the same speeds, with rests"
     experiments_against: ClassVar = {

@@ -16,6 +16,7 @@ from drake_disasm.scenario import Scenario
 from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_logs
 from sysid.models.arm_plant import ArmPlant
 from sysid.models.base import Array, LogModel
+from sysid.models.effects import one_way_joints
 from sysid.models.joint_units import in_units_of_joints, prismatic_unit
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.response.drive import Drive, DriveSettings, Inputs
@@ -239,6 +240,11 @@ class JointResponseModel(LogModel):
         """See LogModel."""
         far = np.ptp(self.measurements.values, axis=0)
         return dict(zip(self._joints, far.tolist(), strict=True))
+
+    @property
+    def one_way(self) -> tuple[str, ...]:
+        """See LogModel."""
+        return one_way_joints(self._joints, self._state[1])
 
     def select_rows(self, mask: NDArray[np.bool_]) -> Self:
         """See LogModel."""

@@ -5,7 +5,11 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import JointViscousFriction, TorqueRipple
+from drake_disasm.effects import (
+    JointAsymmetricFriction,
+    JointViscousFriction,
+    TorqueRipple,
+)
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.candidates import Candidate, extended
@@ -173,6 +177,15 @@ def test_a_ripple_shows_in_a_motion_over_a_whole_period(urdf, tmp_path):
     assert periods.low == pytest.approx(2.0 * np.pi / model.travel[JOINTS[0]])
     short = model.of_rows(np.abs(states(300)[0]).max(axis=1) < 0.7)
     assert {e.periods for e in short.applicable_effects([TorqueRipple])} == {8.0}
+
+
+def test_one_stroke_shows_no_friction_that_depends_on_the_direction(urdf, tmp_path):
+    model = JointMotionModel([motion_log(tmp_path / "log", urdf)])
+    assert len(model.applicable_effects([JointAsymmetricFriction])) >= 2
+    forth = model.of_rows(states(300)[1][:, 0] > 0.0)
+    assert forth.one_way == (JOINTS[0],)
+    found = forth.applicable_effects([JointAsymmetricFriction])
+    assert {effect.joint for effect in found} == {JOINTS[1]}
 
 
 def test_refuses_an_effect_at_a_joint_that_the_log_does_not_have(urdf, tmp_path):
