@@ -145,6 +145,7 @@ def test_an_offset_in_one_episode_of_nine_is_named_with_it(tmp_path):
     assert against.episodes == (model.measurements.names[4],)
 
 
+@pytest.mark.slow
 def test_rows_that_are_off_in_every_episode_are_no_contradiction(tmp_path):
     transitions_log(tmp_path / "log", nominal(), [], 8, 9)
     add = changed("wrench.fy", [3, 9, 15], lambda values: values + 5.0)
