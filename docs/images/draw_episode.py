@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 matplotlib.use("Agg")
-from make_images import screenshot
+from make_images import BAR, screenshot
 from matplotlib import pyplot
 from PIL import Image
 
@@ -26,7 +26,6 @@ from drake_disasm.visualization import MeshcatView, start_meshcat
 
 LEARNED, _SCENARIO, _SEED = "removal_randomised", "removal_turned", 1000
 _COLOURS = {LEARNED: "tab:red", "admittance": "tab:gray"}
-_BAR = 24  # pixels of Meshcat's controls
 
 
 def run(
@@ -73,7 +72,7 @@ def main(out: Path) -> None:
         for panel, step in (("before", 30), ("lifting", lift)):
             file = Path(folder) / f"{panel}.png"
             run(LEARNED, step, file)
-            picture = np.asarray(Image.open(file).convert("RGB"))[_BAR:]
+            picture = np.asarray(Image.open(file).convert("RGB"))[BAR:]
             panels[panel].imshow(picture)
             panels[panel].set(title=f"{LEARNED}, step {step}")
             panels[panel].axis("off")

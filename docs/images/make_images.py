@@ -16,7 +16,7 @@ from drake_disasm.task.simulation import TaskSimulation
 from drake_disasm.visualization import MeshcatView, start_meshcat
 
 _STEPS = 45
-_BAR, _GAP = 24, 12  # pixels
+BAR, _GAP = 24, 12  # pixels
 _FLAGS = (
     "--headless --no-sandbox --disable-quic --no-first-run --disable-sync "
     "--disable-background-networking --disable-component-update "
@@ -37,8 +37,8 @@ def _side_by_side(files: Sequence[Path], to: Path) -> None:
     """Joins pictures without the bar of Meshcat's controls at their top."""
     pictures = [Image.open(file).convert("RGB") for file in files]
     width, height = pictures[0].size
-    left, right = (p.crop((0, _BAR, width, height)) for p in pictures)
-    joined = Image.new("RGB", (2 * width + _GAP, height - _BAR), "white")
+    left, right = (p.crop((0, BAR, width, height)) for p in pictures)
+    joined = Image.new("RGB", (2 * width + _GAP, height - BAR), "white")
     joined.paste(left, (0, 0))
     joined.paste(right, (width + _GAP, 0))
     joined.save(to, optimize=True)

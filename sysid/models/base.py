@@ -153,13 +153,14 @@ class LogModel(abc.ABC):
             library: classes of effects; those not of `effect_types` are passed over,
                 and those that are not physical or act on the variance alone.
         """
+        travel, one_way = self.travel, self.one_way
         return [
             effect
             for kind in library
             if issubclass(kind, self.effect_types)
             if kind.is_physical and not kind.is_random
             for effect in at_null(kind, self.joints, self.duration)
-            if is_shown(effect, self.travel, self.one_way)
+            if is_shown(effect, travel, one_way)
         ]
 
     def with_effects(

@@ -72,6 +72,11 @@ def with_fields(
     return tuple(found)
 
 
+def travel_of(joints: Sequence[str], q: NDArray[np.float64]) -> dict[str, float]:
+    """Returns how far each joint moves in positions (n, joints), from end to end."""
+    return dict(zip(joints, np.ptp(q, axis=0).tolist(), strict=True))
+
+
 def one_way_joints(joints: Sequence[str], v: NDArray[np.float64]) -> tuple[str, ...]:
     """Returns the joints that move one way only.
 

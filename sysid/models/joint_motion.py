@@ -16,7 +16,7 @@ from drake_disasm.scenario import Scenario
 from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_logs
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.base import Array, LogModel
-from sysid.models.effects import one_way_joints
+from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
@@ -115,8 +115,7 @@ class JointMotionModel(LogModel):
     @property
     def travel(self) -> dict[str, float]:
         """See LogModel."""
-        far = np.ptp(self._motion.q, axis=0)
-        return dict(zip(self.joints, far.tolist(), strict=True))
+        return travel_of(self.joints, self._motion.q)
 
     @property
     def one_way(self) -> tuple[str, ...]:

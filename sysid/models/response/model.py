@@ -16,7 +16,7 @@ from drake_disasm.scenario import Scenario
 from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_logs
 from sysid.models.arm_plant import ArmPlant
 from sysid.models.base import Array, LogModel
-from sysid.models.effects import one_way_joints
+from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints, prismatic_unit
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.response.drive import Drive, DriveSettings, Inputs
@@ -136,15 +136,16 @@ class JointResponseModel(LogModel):
         Keeps each row's goal and velocity.
         """
         every = max(1, len(self._time) // _MOST_ROWS)
-        motions, inputs, velocities = [], [], []
+        motions, inputs, states = [], [], []
         for episode in episodes:
             time = episode["time"]
             fit = local_fit(time, episode["q"], time[::every], reach)
             motions.append(np.stack([fit.q, fit.v, fit.vd]))
-            inputs.append(inputs_of(episode).at(np.s_[::every]))
-            velocities.append(interpolated(time[::every], fit.v, time))
-        goals = np.concatenate([inputs_of(episode).goal for episode in episodes])
-        self._state = np.stack([goals, np.concatenate(velocities)])
+            given = inputs_of(episode)
+            inputs.append(given.at(np.s_[::every]))
+            velocity = interpolated(time[::every], fit.v, time)
+            states.append(np.stack([given.goal, velocity]))
+        self._state = np.concatenate(states, axis=1)
         q, v, vd = np.concatenate(motions, axis=1)
         load = self._bodies.terms(q, v, ()).load(vd)
         self._most = _largest(load, v, vd)
@@ -238,8 +239,7 @@ class JointResponseModel(LogModel):
     @property
     def travel(self) -> dict[str, float]:
         """See LogModel."""
-        far = np.ptp(self.measurements.values, axis=0)
-        return dict(zip(self._joints, far.tolist(), strict=True))
+        return travel_of(self._joints, self.measurements.values)
 
     @property
     def one_way(self) -> tuple[str, ...]:

@@ -60,7 +60,7 @@ from tests.sysid.real_data import (
 SENSOR = ("wrench", "ft_sensor")
 _PROGRAM = "tools/close_loop.py"
 _SAID = ("data:", "error:")  # begins of lines on stderr that are part of an answer
-_TURNED = 8001  # seed of the logs of this table
+_SEED = 8001  # of the logs of this table
 
 
 @dataclasses.dataclass
@@ -99,7 +99,7 @@ def _transitions(
     """Returns what writes a log of the twin, maybe with columns that are damaged."""
 
     def make(folder: Path) -> list[str]:
-        transitions_log(folder / "log", nominal(), effects, _TURNED)
+        transitions_log(folder / "log", nominal(), effects, _SEED)
         if damage:
             _rewritten(folder / "log", damaged(read_log(folder / "log"), damage))
         return ["--log", str(folder / "log"), *_stated(folder)]
@@ -127,7 +127,7 @@ def _one_episode_offset(folder: Path) -> list[str]:
     """Writes eleven episodes without, and one with an offset of 1 N in fy."""
     parts = []
     for name, effects, count in (("with", [SensorBias(fy=1.0)], 1), ("log", [], 11)):
-        transitions_log(folder / name, nominal(), effects, _TURNED, count)
+        transitions_log(folder / name, nominal(), effects, _SEED, count)
         parts.append(read_log(folder / name))
     with_offset, without = parts
     episodes = (*without.episodes[:4], *with_offset.episodes, *without.episodes[4:])
@@ -137,7 +137,7 @@ def _one_episode_offset(folder: Path) -> list[str]:
 
 def _moving(folder: Path) -> list[str]:
     """Writes readings "at rest", 0.1 s apart, of a payload that is turned all along."""
-    random, time = np.random.default_rng(_TURNED), 0.1 * np.arange(600)
+    random, time = np.random.default_rng(_SEED), 0.1 * np.arange(600)
     angles = np.cumsum(0.05 * random.standard_normal((600, 3)), axis=0)
     turn = Rotation.from_euler("xyz", angles)
     g_S = turn.inv().apply([0.0, 0.0, -9.81])
@@ -148,16 +148,16 @@ def _moving(folder: Path) -> list[str]:
     return ["--log", str(folder / "log")]
 
 
-def _arm(rows: int | None, *options: str) -> Callable[[Path], list[str]]:
+def _arm(rows: int | None) -> Callable[[Path], list[str]]:
     """Returns what writes the begin of a real arm's recording 1, or both recordings."""
 
     def make(folder: Path) -> list[str]:
         urdf = write_arm(folder / "arm.urdf")
         logs = [write_motion(n, folder / f"run_{n}", urdf) for n in (1, 2)]
         if rows is None:
-            return ["--log", *map(str, logs), "--held-out", "run_2", *options]
+            return ["--log", *map(str, logs), "--held-out", "run_2"]
         _cut(logs[0], slice(0, rows))
-        return ["--log", str(logs[0]), *options]
+        return ["--log", str(logs[0])]
 
     return make
 
@@ -205,7 +205,7 @@ def _cell(*effects: Effect) -> Callable[[Path], list[str]]:
     def make(folder: Path) -> list[str]:
         scenario = load_scenario("removal")
         scenario.effects = list(effects)
-        record(folder / "log", scenario, _TURNED)
+        record(folder / "log", scenario, _SEED)
         return ["--log", str(folder / "log"), "--scenario", "removal"]
 
     return make

@@ -18,7 +18,7 @@ def test_at_a_minimum_one_step_is_tried_and_no_damped_ones():
     assert np.array_equal(again.u, found.u)
 
 
-def test_far_from_it_damped_steps_are_tried_where_the_full_one_fails():
+def test_far_from_it_a_fit_still_arrives():
     model = Decay()
     objective = Objective(model, Workers())
     u = np.array([0.9, 0.02, 0.9])
