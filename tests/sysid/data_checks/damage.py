@@ -24,6 +24,12 @@ def damaged(log: Log, damage: Damage, episode: int | None = None) -> Log:
     return dataclasses.replace(log, episodes=tuple(episodes))
 
 
+def with_episode(log: Log, other: Log, place: int) -> Log:
+    """Returns a log with the first episode of another at a place among its own."""
+    before, after = log.episodes[:place], log.episodes[place:]
+    return dataclasses.replace(log, episodes=(*before, other.episodes[0], *after))
+
+
 def scaled(factor: float, *names: str) -> Damage:
     """Returns what scales columns; a name ends where that of a column begins."""
 

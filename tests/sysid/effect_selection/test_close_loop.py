@@ -26,7 +26,7 @@ from sysid.objective import Objective
 from sysid.report import closing_page
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
-from tests.sysid.data_checks.damage import changed, damaged
+from tests.sysid.data_checks.damage import changed, damaged, with_episode
 from tests.sysid.effect_selection.blind import closed, static_log, verdict_of
 
 _BIASED = ("SensorDrift", "SensorGain", "SensorMounting")
@@ -132,13 +132,10 @@ def test_episodes_that_contradict_each_other_are_named(tmp_path):
 
 def test_an_offset_in_one_episode_of_nine_is_named_with_it(tmp_path):
     """Its rows weigh little in a common fit, so that no other episode gains."""
-    parts = []
-    for name, effects, count in (("with", [SensorBias(fy=1.0)], 1), ("log", [], 8)):
-        transitions_log(tmp_path / name, nominal(), effects, 8, count)
-        parts.append(read_log(tmp_path / name))
-    one, rest = parts
-    mixed = (*rest.episodes[:4], *one.episodes, *rest.episodes[4:])
-    model = TwinModel([dataclasses.replace(rest, episodes=mixed)], nominal(), ())
+    transitions_log(tmp_path / "log", nominal(), [], 8, 8)
+    transitions_log(tmp_path / "with", nominal(), [SensorBias(fy=1.0)], 8, 1)
+    log, with_offset = (read_log(tmp_path / name) for name in ("log", "with"))
+    model = TwinModel([with_episode(log, with_offset, 4)], nominal(), ())
     found = close_loop(model, library=[SensorBias], train=range(9), test=[])
     [against] = found.verdict.contradictions
     assert against.effect == "SensorBias"

@@ -47,6 +47,7 @@ from tests.sysid.data_checks.damage import (
     rounded,
     scaled,
     swapped,
+    with_episode,
 )
 from tests.sysid.effect_selection.cell_verdicts import record
 from tests.sysid.real_data import (
@@ -125,13 +126,10 @@ def _stated(folder: Path) -> list[str]:
 
 def _one_episode_offset(folder: Path) -> list[str]:
     """Writes eleven episodes without, and one with an offset of 1 N in fy."""
-    parts = []
-    for name, effects, count in (("with", [SensorBias(fy=1.0)], 1), ("log", [], 11)):
-        transitions_log(folder / name, nominal(), effects, _SEED, count)
-        parts.append(read_log(folder / name))
-    with_offset, without = parts
-    episodes = (*without.episodes[:4], *with_offset.episodes, *without.episodes[4:])
-    _rewritten(folder / "log", dataclasses.replace(without, episodes=episodes))
+    transitions_log(folder / "log", nominal(), [], _SEED, 11)
+    transitions_log(folder / "with", nominal(), [SensorBias(fy=1.0)], _SEED, 1)
+    log, with_offset = (read_log(folder / name) for name in ("log", "with"))
+    _rewritten(folder / "log", with_episode(log, with_offset, 4))
     return ["--log", str(folder / "log"), *_stated(folder)]
 
 
