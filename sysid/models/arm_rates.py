@@ -17,11 +17,11 @@ from sysid.models.base import Array
 class ArmRates:
     """Estimates the arm's rates at the end of a step from where it was and went.
 
-    Where it went tells its mean rate. Of an arm in impedance control, which lags by
-    several steps, the model says by how much the rate at the end is another. A stiff
-    arm has forgotten by then what was at the begin; what counts is when in the step a
-    force came, which nobody knows, and the mean is the better guess. An error of the
-    rate at the begin is gone after a step or two: of a free mass at once.
+    Where it went tells its mean rate; the model says by how much the rate at the end is
+    another, as after a command that turned back. When in the step a force came nobody
+    knows: of an arm in impedance control, which lags by several steps, it is taken to
+    grow evenly; of a stiff arm, which feels a contact for a moment, not to change. An
+    error of the rate at the begin is gone after a step or two: of a free mass at once.
 
     Attributes:
         step: of the arm in one period of the task; coordinates as in the twin.
@@ -49,11 +49,23 @@ class ArmRates:
             q, qd: (n, 2, 6) measured and commanded coordinates at begin and end.
             wrench: (n, 2, 6) measured on the bolt then, [f; tau] at Bo in Gn.
         """
-        mean: Array = (q[:, 1] - q[:, 0]) / self.step.h
-        if not self.lags:
-            return mean
-        ahead = self._ahead(np.hstack([q[:, 0], v]), qd, wrench)
-        return mean + ahead[:, 6:] - (ahead[:, :6] - q[:, 0]) / self.step.h
+        load = wrench if self.lags else wrench[:, [0, 0]]
+        ahead = self._ahead(np.hstack([q[:, 0], v]), qd, load)
+        return np.asarray(ahead[:, 6:] + (q[:, 1] - ahead[:, :6]) / self.step.h)
+
+    def along(self, q: Array, qd: Array, wrench: Array) -> Array:
+        """Returns the rates (n, 6) as an episode's steps begin, from rest on.
+
+        Args:
+            q, qd, wrench: (n + 1, 6), see `after`.
+        """
+        pairs = [np.stack([a[:-1], a[1:]], axis=1) for a in (q, qd, wrench)]
+        from_rest = self.after(np.zeros((len(q) - 1, 6)), *pairs)
+        carries_on = self.step.F[6:, 6:] - self.step.F[:6, 6:] / self.step.h
+        v = np.zeros_like(from_rest)
+        for k in range(1, len(v)):
+            v[k] = from_rest[k - 1] + carries_on @ v[k - 1]
+        return v
 
     def path(self, qd: Array, wrench: Array) -> Array:
         """Returns where the arm goes in an episode (n + 1, 6), from rest on.

@@ -4,15 +4,19 @@ import dataclasses
 from typing import Self
 
 import numpy as np
-from pydrake.math import RigidTransform
 
+from drake_disasm.cell.coordinates import BoltCoordinates
 from drake_disasm.cell.grip import AXIS_ORDER
-from drake_disasm.cell.twin_parameters import twin_of
+from drake_disasm.cell.twin_parameters import TwinParameters, twin_of
+from drake_disasm.common.arrays import apply_matrix
 from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import Scenario
+from drake_disasm.stations.arm_node import ArmStep
 from sysid.models.base import Array
 
-_FAR = 0.06  # m along x, where the bolt runs into stop B
+#: How far from A compliance is compared, in coordinates [m, rad]: along x that is where
+#: the bolt runs into stop B.
+_FAR = np.array([0.06, 0.01, 0.01, 0.05, 0.05, 0.05])
 
 #: What the cell's sensor reads of free motion, and the twin's does not: force along
 #: x, y and z by the commanded rate, and by its change since the step before [N s/m].
@@ -58,18 +62,25 @@ class CellArm:
 
     The cell's arm is commanded for each control period to where it should be at the
     end; the plant takes that at the end of each of its own steps: on average the
-    command is ahead. (The twin's is even.) And an arm's compliance depends on its
-    posture, the twin has that of A: under a load the arm stands elsewhere, as if it
-    had been commanded there.
+    command is ahead. (The twin's is even.) The commanded rate comes a control period
+    late, since it is the difference of commands that the plant already has: where it
+    changes by a, the arm misses the momentum D a h of its damper. And an arm's
+    compliance depends on its posture, the twin has that of A; and it carries the moment
+    of a load that the grip's springs have moved: under a load the arm stands elsewhere,
+    as if it had been commanded there.
 
     Attributes:
         lead: of the command [s].
-        softer: (6, 6) growth of the compliance with the travel along x, at the pads in
-            Gn [1/N, ...].
+        late: (6, 6) by how much the command is elsewhere for a change of its rate, so
+            that the arm ends a step where the late rate has it; in coordinates [s].
+        yields: (6, 3) how far the arm yields at A to a moment at the pads, in Gn.
+        softer: (6, 6, 6) growth of its compliance with each coordinate, there.
         to_grip: (6, 6) wrench at the pads by that on the bolt at Bo, in Gn.
     """
 
     lead: float
+    late: Array
+    yields: Array
     softer: Array
     to_grip: Array
 
@@ -84,20 +95,52 @@ class CellArm:
             station: "cell", "hardware", "twin", or whatever the log says.
         """
         here, held = twin_of(scenario), scenario.arm.control_period
-        lead, softer = 0.0, np.zeros((6, 6))
+        lead, late = 0.0, np.zeros((6, 6))
+        at_A = np.linalg.inv(here.arm.K)
+        softer = np.zeros((6, 6, 6))
         if station == "cell":
             lead = max(held - scenario.simulation.cell_time_step, 0.0) / 2.0
+            late = _late(here, held, scenario.task.period)
         if station in ("cell", "hardware"):
-            there = twin_of(scenario, RigidTransform([_FAR, 0.0, 0.0]))
-            softer = np.linalg.inv(there.arm.K) - np.linalg.inv(here.arm.K)
-        return cls(lead, softer / _FAR, velocity_shift(here.p_BoTo_B).T)
+            softer = _softer(scenario, here)
+        return cls(lead, late, at_A[:, 3:], softer, velocity_shift(here.p_BoTo_B).T)
 
-    def shifts(self, q: Array, wrench: Array) -> Array:
+    def ahead(self, rates: Array) -> Array:
+        """Returns by how much (n, 6) the command is ahead, in coordinates.
+
+        Args:
+            rates: (n, 6) commanded in an episode's steps, which begins at rest.
+        """
+        change = np.diff(rates, axis=0, prepend=np.zeros((1, 6)))
+        return np.asarray(self.lead * rates + change @ self.late.T)
+
+    def shifts(self, q: Array, wrench: Array, moment: Array) -> Array:
         """Returns by how much (n, 6) the command is shifted, in coordinates.
 
         Args:
             q: (n, 6) coordinates of the arm.
             wrench: (n, 6) measured on the bolt at Bo in Gn.
+            moment: (n, 3) of what the springs have moved, see `GripOffset`.
         """
-        moved = (wrench @ self.to_grip.T) @ self.softer.T
-        return np.asarray(q[:, :1] * moved[:, list(AXIS_ORDER)])
+        softer = np.einsum("ni,ijk->njk", q, self.softer)
+        moved = apply_matrix(softer, wrench @ self.to_grip.T) + moment @ self.yields.T
+        return np.asarray(moved[:, list(AXIS_ORDER)])
+
+
+def _softer(scenario: Scenario, here: TwinParameters) -> Array:
+    """Returns `CellArm.softer` of a scenario's arm, whose parameters at A are these."""
+    coordinates, at_A = BoltCoordinates(here.p_BoTo_B), np.linalg.inv(here.arm.K)
+    found = np.empty((6, 6, 6))
+    for i, far in enumerate(_FAR):
+        there = twin_of(scenario, coordinates.pose(far * np.eye(6)[i]))
+        found[i] = (np.linalg.inv(there.arm.K) - at_A) / far
+    return found
+
+
+def _late(twin: TwinParameters, delay: float, period: float) -> Array:
+    """Returns `CellArm.late` of an arm whose commanded rate is late by a delay [s]."""
+    order = np.ix_(AXIS_ORDER, AXIS_ORDER)
+    step = ArmStep.of(twin.arm, twin.grip, period)
+    by_place, by_rate = step.F[:6, :6], step.F[:6, 6:]
+    kick = -delay * np.linalg.solve(twin.arm.M, twin.arm.D)[order]
+    return np.asarray(np.linalg.solve(np.eye(6) - by_place, by_rate @ kick))

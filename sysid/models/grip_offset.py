@@ -35,18 +35,21 @@ class GripOffset:
     has neither, the arm stands elsewhere by as much.
 
     Attributes:
-        mobility: (6, 6) rates at the pads, To, by the wrench there [f; tau], in Gn.
-        sag: (6, 6) deflection by the weight that turned away, likewise.
-        rest: (6,) the weight that the springs carry at the start, [f; tau] at To.
+        mobility: (6, 6) rates at the pads, To, by the wrench there [f; tau], along and
+            about the axes of the bolt as gripped, which turn with the arm.
+        compliance: (6,) of the springs, likewise.
+        rest: (6,) the weight that the springs carry at the start, [f; tau] at To in Gn.
         p_BoTo_B: (3,) that point [m].
         period: of the task [s].
+        turns: whether the springs turn with the arm; a twin's do not.
     """
 
     mobility: Array
-    sag: Array
+    compliance: Array
     rest: Array
     p_BoTo_B: Array
     period: float
+    turns: bool
 
     @classmethod
     def of(cls, scenario: Scenario, station: str) -> Self:
@@ -62,17 +65,17 @@ class GripOffset:
         creeps = station == "cell" and gripper.hold == "friction"
         creeps &= gripper.compliance == "adaptive"
         S = velocity_shift(_PATCH - twin.p_BoTo_B)
-        turns = station in ("cell", "hardware")
         R_GW = nominal_groove_pose(scenario.placement).rotation().inverse()
         g_W = UniformGravityFieldElement().gravity_vector()
         f = R_GW @ (carried.get_mass() * g_W)
         tau = np.cross(carried.get_com() - twin.p_BoTo_B, f)
         return cls(
             S @ np.diag(_MOBILITY * creeps) @ S.T,
-            np.diag(turns / twin.grip.stiffness),
+            1.0 / twin.grip.stiffness,
             np.concatenate([f, tau]),
             twin.p_BoTo_B,
             scenario.task.period,
+            station in ("cell", "hardware"),
         )
 
     def at_grip(self, measured: Array, wrench: Array) -> Array:
@@ -94,13 +97,40 @@ class GripOffset:
         Args:
             measured, wrench: see `at_grip`.
         """
-        at_grip, turns = self.at_grip(measured, wrench), _turns(measured)
-        steps = 0.5 * self.period * (at_grip[1:] + at_grip[:-1])
-        total = np.vstack([np.zeros((1, 6)), np.cumsum(steps, axis=0)])
-        f, tau = self.rest[:3], self.rest[3:]
-        turned_away = self.rest - np.hstack([turns.apply(f), turns.apply(tau)])
-        offset = total @ self.mobility.T + turned_away @ self.sag.T
+        offset = self._crept(measured, wrench)
+        offset += self._turned_away(measured) * self.compliance
         return np.asarray(offset[:, list(AXIS_ORDER)])
+
+    def moved_moment(self, measured: Array, wrench: Array) -> Array:
+        """Returns the moment (n, 3) at To of a load that the springs have moved, in Gn.
+
+        The arm carries it besides what the springs do, which act where they have given
+        way to. In the twin it does not.
+
+        Args:
+            measured, wrench: see `at_grip`.
+        """
+        if not self.turns:
+            return np.zeros((len(measured), 3))
+        f = wrench[:, :3]
+        moved = (f + self._turned_away(measured)[:, :3]) * self.compliance[:3]
+        return np.cross(moved, f + self.rest[:3])
+
+    def _turned_away(self, measured: Array) -> Array:
+        """Returns the weight (n, 6) that springs would carry had they not turned."""
+        if not self.turns:
+            return np.zeros((len(measured), 6))
+        return self.rest - _turned(_turns(measured), self.rest)
+
+    def _crept(self, measured: Array, wrench: Array) -> Array:
+        """Returns how far (n, 6) the bolt has crept in the pads, at To in Gn."""
+        if not self.mobility.any():
+            return np.zeros_like(wrench)
+        turns, load = _turns(measured), self.at_grip(measured, wrench)
+        load[:, 3:] -= self.moved_moment(measured, wrench)
+        rates = _turned(turns.inv(), load) @ self.mobility.T
+        steps = 0.5 * self.period * (rates[1:] + rates[:-1])
+        return _turned(turns, np.vstack([np.zeros((1, 6)), np.cumsum(steps, axis=0)]))
 
 
 def of_encoders(states: Array, q: Array, offset: Array, p_BoTo_B: Array) -> Array:
@@ -124,3 +154,9 @@ def of_encoders(states: Array, q: Array, offset: Array, p_BoTo_B: Array) -> Arra
 def _turns(coordinates: Array) -> Rotation:
     """Returns the rotations of coordinates (n, 6)."""
     return Rotation.from_euler("ZYX", coordinates[:, 3:])
+
+
+def _turned(turns: Rotation, vectors: Array) -> Array:
+    """Returns pairs of vectors (6,) or (n, 6) that are turned by n rotations."""
+    parts = [turns.apply(part) for part in np.split(vectors, 2, axis=-1)]
+    return np.hstack(parts)

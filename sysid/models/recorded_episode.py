@@ -76,8 +76,7 @@ class RecordedEpisode:
         """
         if not effects:
             return self
-        poses = bolt_path(self.measured, p_BoTo_B)
-        read = at_sensor(np.hstack([poses, self.wrench]), sensing.X_SB)
+        read = self.at_sensor(sensing, p_BoTo_B)
         times = self.grip.period * np.arange(len(read), dtype=np.float64)
 
         def reading(wrench: Array) -> Array:
@@ -89,16 +88,32 @@ class RecordedEpisode:
         wrench = at_bolt(found, sensing.X_SB)[:, 6:]
         return dataclasses.replace(self, wrench=wrench)
 
+    def at_sensor(self, sensing: SensorReading, p_BoTo_B: Array) -> Array:
+        """Returns the states (n + 1, 12) with the wrench at So in S."""
+        poses = bolt_path(self.measured, p_BoTo_B)
+        return at_sensor(np.hstack([poses, self.wrench]), sensing.X_SB)
+
+    def without(self, offset: Array, sensing: SensorReading, p_BoTo_B: Array) -> Self:
+        """Returns the episode with a wrench (6,) at So in S taken off, throughout."""
+        states = self.at_sensor(sensing, p_BoTo_B)
+        states[:, 6:] -= offset
+        return dataclasses.replace(self, wrench=at_bolt(states, sensing.X_SB)[:, 6:])
+
     def begins_elsewhere(self, other: Self, noticeable: tuple[float, float]) -> bool:
         """Returns whether the grip gives by more than (m, rad) more than another's."""
         change = np.abs(self.grip.deflections(self.wrench - other.wrench))
         m, rad = noticeable
         return bool(np.any(change[:, :3] > m) or np.any(change[:, 3:] > rad))
 
-    def shifts(self) -> Array:
-        """Returns by how much (n, 6) the arm's command is elsewhere."""
-        own = self.arm.shifts(self.measured[:-1], self.carried[:-1])
-        return own + self.elsewhere[:-1]
+    def ahead(self, rates: Array) -> Array:
+        """Returns by how much (n, 6) the arm's command is elsewhere.
+
+        Args:
+            rates: (n, 6) commanded, in coordinates.
+        """
+        moment = self.offset.moved_moment(self.measured, self.wrench)
+        by_load = self.arm.shifts(self.measured, self.carried, moment)
+        return self.arm.ahead(rates) + (by_load + self.elsewhere)[:-1]
 
     @functools.cached_property
     def elsewhere(self) -> Array:
@@ -123,20 +138,27 @@ class RecordedEpisode:
     def steps(self) -> Steps:
         """Returns its steps."""
         q, qd, wrench = self.measured, self.commanded, self.carried
-        v, elastic = np.zeros((len(q) - 1, 6)), np.array(wrench[:-1])
-        for k in range(1, len(v)):
+        elastic = np.array(wrench[:-1])
+        for k in range(1, len(elastic)):
             last = np.s_[None, k - 1 : k + 1]
-            v[k] = self.rates.after(v[None, k - 1], q[last], qd[last], wrench[last])
             elastic[k] = self.grip.after(elastic[None, k - 1], wrench[last])
         return Steps(
-            np.arange(len(v)),
+            np.arange(len(elastic)),
             q[:-1] + self.elsewhere[:-1],
-            v,
+            self.begin_rates(qd),
             qd[:-1],
             np.diff(qd, axis=0) / self.rates.step.h,
             elastic,
             self.grip.rates(elastic, wrench[:-1]),
         )
+
+    def begin_rates(self, path: Array) -> Array:
+        """Returns how fast the arm moves (n, 6) as each step begins.
+
+        Args:
+            path: (n + 1, 6) what it was commanded to do, in coordinates.
+        """
+        return self.rates.along(self.measured, path, self.carried)
 
 
 def undone(reading: Callable[[Array], Array], read: Array) -> Array:

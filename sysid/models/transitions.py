@@ -39,14 +39,18 @@ POSE_NOISE = (2e-5, 1e-4)
 #: within about three standard deviations (docs/physics.md, "Twin against cell").
 FORCE_ERROR = (0.02, 0.15)
 
-#: And of where the arm is [m], beyond what its encoders say: the twin's arm has six
-#: axes instead of seven joints, and follows a change of rate a little differently (in
-#: those logs by 10 um along y). It is no noise, so it counts twice.
-POSITION_ERROR = 2e-5
+#: And of where the arm is [m, rad], beyond what its encoders say: its posture is taken
+#: to first order, and it follows a change of rate a little differently. By 20 um, and a
+#: hand that yields so far turns by 40 urad. It is no noise, so it counts twice.
+POSE_ERROR = (2e-5, 4e-5)
 
 #: By how much the grip gives, so that a step begins noticeably elsewhere [m, rad]: a
 #: tenth of what encoders repeat.
 _NOTICEABLE = (0.1 * POSE_NOISE[0], 0.1 * POSE_NOISE[1])
+
+#: Standard deviations of the mean of a log's first readings beyond which they are an
+#: offset: by chance once in a million logs of six channels.
+_OFFSET = 5.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,9 +62,12 @@ class Transitions:
         before: (rows, 12) state at its beginning, the wrench at So in S.
         rows: (rows,) its number among all transitions of the episodes.
         recorded: whole episodes, in the twin's coordinates.
-        episodes: the same, with the wrench as it was before effects on the sensor.
+        logs: (episodes,) number of the log of each.
+        first: (logs, 6) what the first readings of each log are taken for on average,
+            at So in S.
+        episodes: the same, with the wrench as it was before effects on the sensor, and
+            without an offset in the first readings.
         commands: of whole episodes, since effects on the motion have a memory.
-        lead: (rows,) by which the command is ahead on average [s].
         sway: (rows, 6) what moving loads the sensor with besides, at So in S.
         elsewhere: (rows, 6) by how much the bolt is elsewhere in the grip as a step
             begins, in coordinates.
@@ -72,9 +79,10 @@ class Transitions:
     before: Array
     rows: NDArray[np.int64]
     recorded: tuple[RecordedEpisode, ...]
+    logs: NDArray[np.int64]
+    first: Array
     episodes: tuple[RecordedEpisode, ...]
     commands: tuple[Commands, ...]
-    lead: Array
     sway: Array
     elsewhere: Array
     period: float
@@ -103,8 +111,11 @@ class Transitions:
             )
             for episode in log.episodes
         )
-        steps = Steps.concatenated([each.steps() for each in recorded])
-        lead = [np.full(len(each.wrench) - 1, each.arm.lead) for each in recorded]
+        noise = np.array([channel.noise for channel in _channels(scenario)][6:])
+        first = np.array([_first_readings(log, noise, sensing) for log in logs])
+        sources = np.repeat(np.arange(len(logs)), [len(log.episodes) for log in logs])
+        begun = _without_offset(recorded, sources, first, sensing, p_BoTo_B)
+        steps = Steps.concatenated([each.steps() for each in begun])
         found = cls(
             steps=steps,
             before=np.concatenate(
@@ -112,11 +123,12 @@ class Transitions:
             ),
             rows=np.arange(len(steps)),
             recorded=recorded,
-            episodes=recorded,
+            logs=sources,
+            first=first,
+            episodes=begun,
             commands=tuple(Commands.of(e, period) for e in episodes),
-            lead=np.concatenate(lead),
             sway=np.concatenate([_sway(log, scenario, sensing) for log in logs]),
-            elsewhere=np.concatenate([each.elsewhere[:-1] for each in recorded]),
+            elsewhere=np.concatenate([each.elsewhere[:-1] for each in begun]),
             period=period,
             p_BoTo_B=p_BoTo_B,
         )
@@ -125,8 +137,9 @@ class Transitions:
     def begun(self, effects: Sequence[SensorEffect], sensing: SensorReading) -> Self:
         """Returns the transitions as they begin where effects on the sensor are undone.
 
-        By how much the grip gives as a step begins is known from the measured wrench.
-        These transitions, if none begins noticeably elsewhere.
+        By how much the grip gives as a step begins is known from the measured wrench,
+        but not as an episode begins: an offset is an offset. These transitions, if none
+        begins noticeably elsewhere.
 
         Args:
             effects: in the chain's order; those with a memory are not undone, since
@@ -134,14 +147,20 @@ class Transitions:
             sensing: of the scenario.
         """
         known = [e for e in effects if not isinstance(e, SensorMemoryEffect)]
-        episodes = tuple(e.unread(known, sensing, self.p_BoTo_B) for e in self.recorded)
+        unread = [e.unread(known, sensing, self.p_BoTo_B) for e in self.recorded]
+        episodes = _without_offset(
+            unread, self.logs, self.first, sensing, self.p_BoTo_B
+        )
         pairs = zip(episodes, self.episodes, strict=True)
         if not any(one.begins_elsewhere(other, _NOTICEABLE) for one, other in pairs):
             return self
-        begun = Steps.concatenated([e.steps() for e in episodes]).select(self.rows)
+        begun = Steps.concatenated([e.steps() for e in episodes])
         elsewhere = np.concatenate([each.elsewhere[:-1] for each in episodes])
         found = dataclasses.replace(
-            self, steps=begun, episodes=episodes, elsewhere=elsewhere[self.rows]
+            self,
+            steps=begun.select(self.rows),
+            episodes=episodes,
+            elsewhere=elsewhere[self.rows],
         )
         return dataclasses.replace(found, steps=found._moved(begun.qd, begun.qd_rate))
 
@@ -152,7 +171,6 @@ class Transitions:
             steps=self.steps.select(mask),
             before=self.before[mask],
             rows=self.rows[mask],
-            lead=self.lead[mask],
             sway=self.sway[mask],
             elsewhere=self.elsewhere[mask],
         )
@@ -174,24 +192,39 @@ class Transitions:
         ]
         qd = np.concatenate([path[:-1] for path in paths])
         moved = np.concatenate([np.diff(path, axis=0) for path in paths])
-        steps = self._moved(qd[self.rows], moved[self.rows] / self.period)
+        steps = self._moved(qd, moved / self.period)
+        pairs = zip(self.episodes, paths, strict=True)
+        v = np.concatenate([each.begin_rates(path) for each, path in pairs])
+        steps = dataclasses.replace(steps, v=v[self.rows])
         if not is_late:
             return steps, None
-        pairs = list(zip(self.episodes, paths, strict=True))
-        went = [each.rates.path(path, each.carried) for each, path in pairs]
+        went = [
+            each.rates.path(path, each.carried)
+            for each, path in zip(self.episodes, paths, strict=True)
+        ]
         late = LatePoses.of(went, weights)
-        pairs = list(zip(self.episodes, went, strict=True))
         begun = Steps.concatenated(
-            [e.on_time(path, weights).steps() for e, path in pairs]
+            [
+                each.on_time(path, weights).steps()
+                for each, path in zip(self.episodes, went, strict=True)
+            ]
         )
         begun = begun.select(self.rows)
         return dataclasses.replace(steps, q=begun.q, v=begun.v), late
 
     def _moved(self, qd: Array, qd_rate: Array) -> Steps:
-        """Returns the steps with commands (rows, 6) as the arm has them."""
-        shifts = np.concatenate([each.shifts() for each in self.episodes])
-        led = qd + self.lead[:, None] * qd_rate + shifts[self.rows]
-        return dataclasses.replace(self.steps, qd=led, qd_rate=qd_rate)
+        """Returns the steps with commands as the arm has them.
+
+        Args:
+            qd, qd_rate: (n, 6) commanded in all steps of the episodes.
+        """
+        ends = np.cumsum([len(each.wrench) - 1 for each in self.episodes])[:-1]
+        rates = np.split(qd_rate, ends)
+        pairs = zip(self.episodes, rates, strict=True)
+        moved = qd + np.concatenate([each.ahead(own) for each, own in pairs])
+        return dataclasses.replace(
+            self.steps, qd=moved[self.rows], qd_rate=qd_rate[self.rows]
+        )
 
     def of_encoders(self, states: Array, steps: Steps, rows: slice) -> Array:
         """Returns the states (n, 12) after some steps as encoders have them.
@@ -245,15 +278,21 @@ def measured_states(
         _channels(scenario),
         lambda _, episode: at_sensor(observations(episode)[1:], sensing.X_SB),
     )
-    error = np.concatenate([_model_error(log, sensing) for log in logs])
+    head = scenario.lock.head_diameter / 2.0
+    error = np.concatenate([_model_error(log, sensing, head) for log in logs])
     return dataclasses.replace(found, model_error=error) if error.any() else found
 
 
-def _model_error(log: Log, sensing: SensorReading) -> Array:
+def _model_error(log: Log, sensing: SensorReading, head: float) -> Array:
     """Returns by how much the twin is off (rows, 12) in a log of an arm, 1 sigma.
 
-    The force may be off to any side, and turns the sensor with the lever to the bolt.
-    A log of the twin has none.
+    The force may be off to any side, and turns the sensor with the lever to the bolt,
+    on whose head it acts anywhere. A log of the twin has none.
+
+    Args:
+        log: of transitions.
+        sensing: of the scenario.
+        head: the head's radius [m].
     """
     changes = [np.diff(observations(e)[:, 6:9], axis=0) for e in log.episodes]
     change = np.linalg.norm(np.concatenate(changes), axis=1)
@@ -263,8 +302,8 @@ def _model_error(log: Log, sensing: SensorReading) -> Array:
     least, share = FORCE_ERROR
     force = np.hypot(least, share * change)
     lever = np.abs(sensing.X_SB.translation())
-    across = np.sqrt(np.maximum(lever @ lever - lever**2, 0.0))
-    found[:, :3] = POSITION_ERROR
+    across = np.sqrt(np.maximum(lever @ lever - lever**2, 0.0) + head**2)
+    found[:, :3], found[:, 3:6] = POSE_ERROR
     found[:, 6:9] = force[:, None]
     found[:, 9:] = force[:, None] * across
     return found
@@ -302,6 +341,47 @@ def _refuse_other_logs(log: Log, scenario: Scenario) -> None:
             f"period {period} s, the scenario has task.period {scenario.task.period} s",
             "give the scenario that was recorded, or --set task.period",
         )
+
+
+def _first_readings(log: Log, noise: Array, sensing: SensorReading) -> Array:
+    """Returns what a log's first readings are taken for on average (6,), at So in S.
+
+    Zero where their average is beyond chance: the sensor is zeroed there, and no load
+    has moved the bolt in the grip yet. The noise of a reading would move it as far as a
+    small offset does.
+
+    Args:
+        log: of transitions.
+        noise: (6,) of a reading.
+        sensing: of the scenario.
+    """
+    first = [at_sensor(observations(e)[:1], sensing.X_SB)[0, 6:] for e in log.episodes]
+    mean = np.mean(first, axis=0)
+    is_offset = np.abs(mean) > _OFFSET * noise / np.sqrt(len(first))
+    return np.where(is_offset, 0.0, mean)
+
+
+def _without_offset(
+    episodes: Sequence[RecordedEpisode],
+    logs: NDArray[np.int64],
+    first: Array,
+    sensing: SensorReading,
+    p_BoTo_B: Array,
+) -> tuple[RecordedEpisode, ...]:
+    """Returns the episodes without an offset in the first readings of their log.
+
+    Args:
+        episodes: with the wrench as it was measured.
+        logs, first: see `Transitions`.
+        sensing: of the scenario.
+        p_BoTo_B: (3,) of the twin's coordinates [m].
+    """
+    read = np.array([e.at_sensor(sensing, p_BoTo_B)[0, 6:] for e in episodes])
+    offsets = [read[logs == log].mean(axis=0) - mean for log, mean in enumerate(first)]
+    return tuple(
+        episode.without(offsets[log], sensing, p_BoTo_B)
+        for episode, log in zip(episodes, logs, strict=True)
+    )
 
 
 def _sway(log: Log, scenario: Scenario, sensing: SensorReading) -> Array:

@@ -195,9 +195,10 @@ class _Measured:
     def __init__(self, scenario: Scenario, commanded: Array) -> None:
         self._rates, self._grip = ArmRates.of(scenario), GripLag.of(scenario)
         self._p_BoTo_B = Tool.from_models(scenario).p_BoTo_B
-        self._qd = self._coordinates(commanded)
-        self._q, self._wrench = np.zeros_like(self._qd), np.zeros_like(self._qd)
-        self._v, self._elastic = np.zeros((2, *self._qd[:, 0].shape))
+        self._q = np.zeros_like(self._coordinates(commanded))
+        self._wrench = np.zeros_like(self._q)
+        self._v, self._elastic = np.zeros((2, *self._q[:, 0].shape))
+        self._went = np.zeros_like(self._q[:, :2])
 
     def steps(self, k: int, states: Array, executed: Array) -> Steps:
         """Returns step k of all episodes; steps are asked for in their order.
@@ -215,9 +216,9 @@ class _Measured:
             last = np.s_[:, k - 1 : k + 1]
             self._elastic = self._grip.after(self._elastic, self._wrench[last])
             self._v = self._rates.after(
-                self._v, self._q[last], self._qd[last], self._wrench[last]
+                self._v, self._q[last], self._went, self._wrench[last]
             )
-        qd = self._coordinates(executed)
+        qd = self._went = self._coordinates(executed)
         rate = (qd[:, 1] - qd[:, 0]) / self._rates.step.h
         give_rate = self._grip.rates(self._elastic, self._wrench[:, k])
         return Steps(

@@ -1,11 +1,13 @@
 """Logs of the cell, which the twin predicts to the noise and error that it states."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from drake_disasm.cell.coordinates import BoltCoordinates
 from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.spatial import velocity_shift
@@ -13,10 +15,11 @@ from drake_disasm.effects import SensorBias, SensorGainDrift
 from drake_disasm.logs import Log
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.stations.arm_node import ArmStep
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
 from sysid.models.cell_arm import CellArm, Sway
-from sysid.models.transitions import FORCE_ERROR, POSITION_ERROR
+from sysid.models.transitions import FORCE_ERROR, POSE_ERROR
 from sysid.models.twin import TwinModel
 from tests.physics import free_motion
 
@@ -72,10 +75,10 @@ def test_the_error_grows_with_the_forces_change(cell_log):
         np.testing.assert_allclose(measured.model_error[:, axis], force)
     lever = measured.model_error[:, 9:] / force[:, None]
     np.testing.assert_allclose(
-        lever, np.tile([0.297, 0.297, 0.0], (_STEPS, 1)), atol=1e-3
+        lever, np.tile([0.297, 0.297, 0.005], (_STEPS, 1)), atol=1e-3
     )
-    np.testing.assert_array_equal(measured.model_error[:, :3], POSITION_ERROR)
-    assert not measured.model_error[:, 3:6].any()
+    place = np.repeat(POSE_ERROR, 3)
+    np.testing.assert_array_equal(measured.model_error[:, :6], [place] * _STEPS)
     half = measured.select(np.arange(_STEPS) % 2 == 0)
     np.testing.assert_array_equal(half.model_error, measured.model_error[::2])
 
@@ -86,21 +89,74 @@ def test_a_log_of_the_twin_has_none(cell_log):
     np.testing.assert_array_equal(measured.sigma, measured.noise)
 
 
-def test_the_compliance_is_that_of_the_arms_posture():
+@pytest.mark.parametrize("at", [[0.06, 0, 0, 0, 0, 0], [0, 0, 0, 0.05, 0, 0]])
+def test_the_compliance_is_that_of_the_arms_posture(at):
     """At stop B, along x, the arm is 4 micrometres stiffer per newton than at A."""
-    arm = CellArm.of(_SCENARIO, "cell")
-    at_B, push = np.array([[0.06, 0, 0, 0, 0, 0]]), np.zeros((1, 6))
-    push[0, 0] = -3.0
+    arm, twin = CellArm.of(_SCENARIO, "cell"), twin_of(_SCENARIO)
+    q, push, none = np.array([at]), np.array([[-3.0, 0, 0, 0, 0, 0]]), np.zeros((1, 3))
+    X_GB = BoltCoordinates(twin.p_BoTo_B).pose(q[0])
     here, there = (
-        np.linalg.inv(twin_of(_SCENARIO, RigidTransform([x, 0, 0])).arm.K)
-        for x in (0.0, 0.06)
+        np.linalg.inv(twin_of(_SCENARIO, X).arm.K) for X in (RigidTransform(), X_GB)
     )
-    S = velocity_shift(twin_of(_SCENARIO).p_BoTo_B)
-    expected = (there - here) @ S.T @ push[0]
-    np.testing.assert_allclose(arm.shifts(at_B, push)[0, :3], expected[:3], rtol=1e-6)
-    assert 8e-6 < arm.shifts(at_B, push)[0, 0] < 2e-5
-    assert not arm.shifts(0.0 * at_B, push).any()
-    assert not CellArm.of(_SCENARIO, "twin").shifts(at_B, push).any()
+    expected = (there - here) @ velocity_shift(twin.p_BoTo_B).T @ push[0]
+    found = arm.shifts(q, push, none)[0]
+    np.testing.assert_allclose(found[:3], expected[:3], rtol=1e-6, atol=1e-12)
+    assert 3e-6 < abs(found[0]) < 2e-5
+    assert not arm.shifts(0.0 * q, push, none).any()
+    assert not CellArm.of(_SCENARIO, "twin").shifts(q, push, none).any()
+
+
+def test_the_arm_carries_a_moment_of_what_the_springs_have_moved():
+    arm, twin = CellArm.of(_SCENARIO, "cell"), twin_of(_SCENARIO)
+    moment, at_A = np.array([[0.0, 0.0, 0.05]]), np.zeros((1, 6))
+    turned = np.linalg.solve(twin.arm.K, [0.0, 0.0, 0.0, 0.0, 0.0, 0.05])
+    found = arm.shifts(at_A, at_A, moment)[0]
+    np.testing.assert_allclose(found[:3], turned[:3], atol=1e-15)
+    np.testing.assert_allclose(found[3:], turned[[5, 4, 3]], atol=1e-15)
+
+
+def test_a_rate_that_comes_late_is_a_command_elsewhere():
+    """The arm ends a step where a late rate of the same command has it."""
+    arm, twin, h = CellArm.of(_SCENARIO, "cell"), twin_of(_SCENARIO), 0.1
+    late = _SCENARIO.arm.control_period
+    short, rest = (ArmStep.of(twin.arm, twin.grip, t) for t in (late, h - late))
+    whole, rate = ArmStep.of(twin.arm, twin.grip, h), 0.01 * np.eye(6)[1]
+
+    def command(time: float, rate_told: np.ndarray) -> np.ndarray:
+        return np.hstack([rate * time, rate_told])[None]
+
+    at_begin = short.ahead(np.zeros((1, 12)), command(late, rate))
+    # What the damper would have done with the rate that is not there yet.
+    missing = late * np.linalg.solve(twin.arm.M, twin.arm.D)[1, 1] * rate[1]
+    at_begin[0, 7] -= missing
+    expected = rest.ahead(at_begin, command(h, rate))[0, 1]
+    told = command(h, rate)
+    told[0, :6] += arm.ahead(np.array([np.zeros(6), rate]))[1] - arm.lead * rate
+    found = whole.ahead(np.zeros((1, 12)), told)[0, 1]
+    even = whole.ahead(np.zeros((1, 12)), command(h, rate))[0, 1]
+    assert found == pytest.approx(expected, abs=0.3 * abs(even - expected))
+
+
+@pytest.fixture(scope="module")
+def back_and_forth(tmp_path_factory) -> Log:
+    """The hand goes up and down along y by a millimetre a step, on the lips."""
+    ways = itertools.cycle([1e-3, 1e-3, -1e-3, 1e-3, -1e-3, -1e-3])
+    first = [1e-3] * 8
+    steps = itertools.chain(first, ways)
+    scenario = load_scenario("removal", ["task.steps=24"])
+
+    def policy(_: np.ndarray) -> np.ndarray:
+        return np.array([0.0, next(steps), 0.0, 0.0, 0.0, 0.0])
+
+    folder = tmp_path_factory.mktemp("up and down") / "log"
+    return record_transitions(folder, TaskSimulation(scenario, "cell", policy), 24)
+
+
+def test_an_arm_whose_command_turns_back_is_where_the_twin_says(back_and_forth):
+    """Within 15 micrometres; the rate that comes late is 35 of them along y."""
+    model = TwinModel([back_and_forth], _SCENARIO, ())
+    residual = model.predictions(np.zeros(0)) - model.measurements.values
+    assert np.abs(residual[:, :3]).max() < 15e-6
 
 
 def test_the_sway_is_what_cell_and_twin_read_of_free_motion():

@@ -1,12 +1,18 @@
 """A bolt that creeps in the pads, and whose weight turns: not so in the twin."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
+from drake_disasm.cell.coordinates import BoltCoordinates
 from drake_disasm.cell.tool import Tool
-from drake_disasm.common.spatial import velocity_shift
+from drake_disasm.common.spatial import rotation_vector, velocity_shift
+from drake_disasm.effects import SensorBias
+from drake_disasm.policies import make_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import make_station
+from drake_disasm.task.simulation import TaskSimulation
 from sysid.models.commands import bolt_path
 from sysid.models.grip_offset import GripOffset, of_encoders
 from tests.drake_disasm.conftest import QUIET
@@ -38,11 +44,29 @@ def test_a_torque_about_z_turns_the_bolt_about_the_middle_of_its_patch():
     assert np.abs(crept[:, [2, 4, 5]]).max() < 1e-12
 
 
-def test_a_force_along_x_through_the_patch_turns_nothing():
-    wrench = np.tile(_at_Bo([5.0, 0.0, 0.0, 0.0, 0.0, 0.0]), (11, 1))
-    crept = _offset().along(np.zeros_like(wrench), wrench)
+def test_a_force_through_the_patch_where_the_springs_have_moved_it_turns_nothing():
+    """The sensor reads its lever, and that of the weight that moves along."""
+    offset, force = _offset(), np.array([5.0, 0.0, 0.0])
+    moved = force * offset.compliance[:3]
+    assert moved[0] > 8e-3
+    lever = np.cross(moved, force + offset.rest[:3])
+    wrench = np.tile(_at_Bo(np.concatenate([force, lever])), (11, 1))
+    np.testing.assert_allclose(
+        offset.moved_moment(np.zeros((11, 6)), wrench), np.tile(lever, (11, 1))
+    )
+    crept = offset.along(np.zeros_like(wrench), wrench)
     assert np.abs(crept[:, 3:]).max() < 1e-15
     assert crept[-1, 0] == pytest.approx(2.1e-6 * 5.0 * 1.0)
+
+
+def test_the_axes_along_which_it_creeps_turn_with_the_arm():
+    """Rolled by a right angle: what was about z is about y."""
+    torque, offset = 0.1, dataclasses.replace(_offset(), rest=np.zeros(6))
+    roll = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, np.pi / 2.0], (11, 1))
+    wrench = np.tile([0.0, 0.0, 0.0, 0.0, -torque, 0.0], (11, 1))
+    crept = offset.along(roll, wrench)
+    assert crept[-1, 4] == pytest.approx(-_RATE * torque, rel=1e-9)  # pitch
+    assert np.abs(crept[:, [3, 5]]).max() < 1e-12
 
 
 @pytest.mark.parametrize(
@@ -57,7 +81,7 @@ def test_a_force_along_x_through_the_patch_turns_nothing():
 def test_where_nothing_creeps_or_nobody_knows_there_is_none(station, changes):
     offset = _offset(station, load_scenario("removal", changes))
     assert not offset.mobility.any()
-    assert offset.sag.any() == (station != "twin")
+    assert offset.turns == (station != "twin")
 
 
 def test_the_springs_give_by_the_weight_that_turned_away():
@@ -69,8 +93,8 @@ def test_the_springs_give_by_the_weight_that_turned_away():
     np.testing.assert_allclose(found[0], 0.0, atol=1e-15)
     f = offset.rest[:3]
     turned_away = f - np.array([f[0], -f[2], f[1]])
-    k = 1.0 / np.diag(offset.sag)[:3]
-    np.testing.assert_allclose(found[1, :3], turned_away / k, atol=1e-12)
+    given = turned_away * offset.compliance[:3]
+    np.testing.assert_allclose(found[1, :3], given, atol=1e-12)
     carried = Tool.from_models(_SCENARIO).M_gripped_B.get_mass()
     assert np.linalg.norm(f) == pytest.approx(carried * 9.81, rel=1e-3)
 
@@ -109,3 +133,31 @@ def test_the_cells_bolt_creeps_as_stated(load):
     stated = _offset().mobility @ wrench
     assert (late - early)[5] == pytest.approx(stated[5], rel=0.1)
     assert (late - early)[0] == pytest.approx(stated[0], rel=0.2)
+
+
+@pytest.mark.slow
+def test_in_a_jam_the_bolt_creeps_as_the_measured_wrenches_tell():
+    """The hand is tilted by an offset of ty, and leans on the groove with 8 N."""
+    scenario = dataclasses.replace(_SCENARIO, effects=[SensorBias(ty=0.07)])
+    simulation = TaskSimulation(scenario, "cell", make_policy("admittance", scenario))
+    simulation.reset(0)
+    station, offset = simulation.station, _offset()
+    pads = station.plant.GetFrameByName("sprung")
+    bolt, coordinates = station.lock.bolt.body_frame(), BoltCoordinates(offset.p_BoTo_B)
+    turns, measured, wrenches = [], [], []
+    for _ in range(50):
+        context = station.plant.GetMyContextFromRoot(simulation.context)
+        turns.append(bolt.CalcPose(context, pads).rotation())
+        angles = simulation.evaluate(station, "iiwa.position_measured")
+        pose = station.coordinates.pose(angles)
+        measured.append(coordinates.solve(pose, np.zeros(6)))
+        wrenches.append(simulation.observation()[6:])
+        simulation.step()
+    wrench, path = np.array(wrenches), np.array(measured)
+    assert wrench[:, 1].min() < -7.0
+    wrench[:, 5] -= wrench[0, 5]  # the offset
+    still = dataclasses.replace(offset, mobility=np.zeros((6, 6)))
+    told = (offset.along(path, wrench) - still.along(path, wrench))[-1, 3]
+    crept = rotation_vector(turns[-1] @ turns[0].inverse())[2]
+    assert crept < -0.5e-3
+    assert told == pytest.approx(crept, rel=0.25)

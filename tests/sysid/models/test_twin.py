@@ -29,14 +29,14 @@ def truth(model: TwinModel) -> np.ndarray:
 
 
 def test_reproduces_the_twins_own_log(silent_log, turned):
-    """Each step from its measured state: the pose to 5 um, forces to noise / 4.
+    """Each step from its measured state: the pose to 8 um, forces to noise / 4.
 
-    What is left is the arm's velocity at the step's start, which no log has: an arm
-    behind a grip that yields has not come to rest.
+    What is left is the arm's velocity at the step's start, which no log has: a contact
+    was made in the step before, nobody knows when.
     """
     model = make(silent_log, turned, coarse=False)
     residual = Objective(model, Workers()).residuals(truth(model))[0]
-    assert np.abs(residual[:, :6]).max() < 0.25
+    assert np.abs(residual[:, :6]).max() < 0.4
     assert np.quantile(np.abs(residual[:, 6:]), 0.95) < 0.25
 
 
