@@ -181,10 +181,10 @@ class SelectionSettings:
         "wider for a rival that the blocks can't distinguish from the best: which of "
         "the two is named is a matter of which is simpler, not of a tenth of a gain",
     )
-    stroke_speed: float = _setting(
+    stroke_share: float = _setting(
         0.05,
-        "of a joint's greatest speed",
-        "slower than that it rests: noise of a filtered velocity is no reversal",
+        "of a joint's travel",
+        "by less it does not turn back: noise of a rest is no reversal",
     )
     tie_min_gain: float = _setting(
         0.5,

@@ -4,34 +4,41 @@ from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import find_peaks
 
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.models.base import LogModel
 
-_VELOCITY = "velocity"  # the covariate of a joint's own motion
+_POSITION = "position"  # the covariate of a joint's own motion
 
 
 def joints_of_one_stroke(
     model: LogModel, joints: Collection[str], settings: SelectionSettings
 ) -> tuple[str, ...]:
-    """Returns those of some joints that move one way only, or there and back once.
+    """Returns those of some joints that move one way, or there and back, an episode.
 
     Args:
-        model: whose channels are joints, each with its velocity as a covariate; of any
+        model: whose channels are joints, each with its position as a covariate; of any
             other there are none.
         joints: their names.
         settings: thresholds.
     """
-    found = []
+    found, episode = [], model.measurements.episode
     for number, channel in enumerate(model.measurements.channels):
         if channel.name in joints:
-            v = model.covariates(number).get(_VELOCITY)
-            if v is not None and _reversals(v, settings) < 2:
+            q = model.covariates(number).get(_POSITION)
+            if q is None:
+                continue
+            each = [q[episode == one] for one in np.unique(episode)]
+            if all(_reversals(own, settings) < 2 for own in each):
                 found.append(channel.name)
     return tuple(found)
 
 
-def _reversals(v: NDArray[np.float64], settings: SelectionSettings) -> int:
-    """Returns how often a velocity (n,) changes its sign, rests left out."""
-    moving = v[np.abs(v) > settings.stroke_speed * np.abs(v).max()]
-    return int(np.count_nonzero(np.diff(np.sign(moving))))
+def _reversals(q: NDArray[np.float64], settings: SelectionSettings) -> int:
+    """Returns how often a position (n,) turns back, by more than a share of its range.
+
+    A cut that begins a few rows too early, or the noise of a rest, is no reversal.
+    """
+    least = settings.stroke_share * np.ptp(q)
+    return sum(len(find_peaks(way * q, prominence=least)[0]) for way in (1.0, -1.0))

@@ -27,22 +27,22 @@ _FALLS = "the held-out error falls from 10 % to 1 % of the force"
 
 
 class Sliding(LogModel):
-    """A joint with a velocity (n,)."""
+    """A joint with a position (n,)."""
 
     parameters = ()
 
-    def __init__(self, v):
-        self.v = v
-        self.measurements = Measurements.of_array(v, [Channel("rack", "N")])
+    def __init__(self, q):
+        self.q = q
+        self.measurements = Measurements.of_array(q, [Channel("rack", "N")])
 
     def covariates(self, channel):
-        return {"velocity": self.v}
+        return {"position": self.q}
 
     def predict(self, theta, rows):
-        return self.v[rows]
+        return self.q[rows]
 
     def select_rows(self, mask):
-        return Sliding(self.v[mask])
+        return Sliding(self.q[mask])
 
 
 def _joints(kind, count):
@@ -168,17 +168,28 @@ def test_a_joint_that_makes_a_single_stroke_is_said_to_be_why():
     ("position", "is_single"),
     [
         (lambda t: t, True),
+        (lambda t: np.maximum(t - 3.0, 0.05 * np.cos(t)), True),
         (lambda t: -np.cos(t), True),
         (lambda t: np.sin(t), False),
     ],
+    ids=["one way", "after a rest, and a few rows back", "there and back", "more"],
 )
 def test_strokes_are_counted_by_reversals(position, is_single):
     t = np.linspace(0.0, 2.0 * np.pi, 200)
-    v = np.gradient(position(t), t) + 1e-3 * np.sin(300.0 * t)
-    model = Sliding(v)
+    model = Sliding(position(t) + 1e-3 * np.sin(300.0 * t))
     found = joints_of_one_stroke(model, {"rack"}, DEFAULT_SETTINGS)
     assert found == (("rack",) if is_single else ())
     assert joints_of_one_stroke(model, {"another"}, DEFAULT_SETTINGS) == ()
+
+
+def test_each_episode_is_a_stroke_of_its_own():
+    t = np.linspace(0.0, 1.0, 50)
+    model = Sliding(np.concatenate([t, t]))
+    assert joints_of_one_stroke(model, {"rack"}, DEFAULT_SETTINGS) == ()
+    model.measurements = dataclasses.replace(
+        model.measurements, episode=np.repeat([0, 1], 50), names=("first", "second")
+    )
+    assert joints_of_one_stroke(model, {"rack"}, DEFAULT_SETTINGS) == ("rack",)
 
 
 def test_errors_of_several_units_are_no_shares_and_those_that_rise_are_said():
