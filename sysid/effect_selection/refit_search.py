@@ -68,9 +68,10 @@ class RefitSearch(ForwardSearch):
         """Returns whether every effect is to be fitted to a few rows.
 
         What is not linear at null, as a stop that takes up a force, hides from the
-        linear account. Where the model states an error of its own, that account may
-        be content with an effect that ends below it and is not what is missing; and
-        the residual may be below it, too, and yet halved by what is.
+        linear account, which may be content with an effect that explains a little.
+        Where the model states an error of its own, also with one that ends below it and
+        is not what is missing; and the residual may be below it, too, and yet halved by
+        what is.
         """
         if self._is_over or not survey.effects:
             return False
@@ -80,8 +81,10 @@ class RefitSearch(ForwardSearch):
         is_more = fit.objective > self._settings.max_objective_at_noise
         if fit.states_model_error:
             return is_confirmed or is_more
+        left = min([fit.loss, *(found.loss for _, found in rankings[-1].confirmed)])
+        is_little = left > (1.0 - self._settings.prescreen_below_gain) * fit.loss
         # Of a costly model more than noise is always left, and minutes would be lost.
-        return is_more and not is_confirmed and not fit.model.costly
+        return is_more and is_little and not fit.model.costly
 
     def _tried(self, fit: Fit, survey: Survey, starts: _Starts) -> _Ranking:
         """Returns a ranking's most promising effects, with their fits."""

@@ -418,6 +418,13 @@ class SelectionSettings:
         "null ends where contact does",
         "a groove turned by 3 degrees is found from them",
     )
+    prescreen_below_gain: float = _setting(
+        0.5,
+        "of the loss",
+        "what explains less of it, and leaves more than noise, may stand for another "
+        "effect that is not linear at null",
+        "a groove that is offset to two sides by 30 um was named a bend",
+    )
     prescreen_max_loss_ratio: float = _setting(
         2.0,
         "of the least loss of the prescreening fits",
