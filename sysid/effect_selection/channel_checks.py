@@ -50,7 +50,7 @@ def channel_findings(fit: Fit) -> list[ChannelFinding]:
     for number, channel in enumerate(measured.channels):
         r = residual[:, number]
         least = fit.noticeable(number)
-        rows = _outlying(r, measured, fit.settings, least)
+        rows = _outlying(r, measured, fit.settings, fit.noticeable_row(number))
         line = _line(r, measured, fit.settings, least)
         excess = _excess(r, measured, fit.settings) if fit.noise_is_stated else ""
         for text, verb in ((rows, "has"), (line, "is"), (excess, "")):

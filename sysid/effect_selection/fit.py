@@ -67,6 +67,12 @@ class Fit:
         own = self.settings.model_error_reach * float(np.sqrt(np.mean(share**2)))
         return max(self.settings.noticeable, own)
 
+    def noticeable_row(self, channel: int) -> float:
+        """Returns the residual, in units of sigma, below which a row is no finding."""
+        if not self.noise_is_stated:
+            return 0.0
+        return max(self.settings.noticeable_row, self.noticeable(channel))
+
     @property
     def states_model_error(self) -> bool:
         """Whether it is known by how much the model itself is off."""

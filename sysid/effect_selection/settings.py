@@ -265,9 +265,16 @@ class SelectionSettings:
     noticeable: float = _setting(
         0.3,
         "times the noise, if that is stated",
-        "lines and rows below it are what a solver leaves, and of no consequence",
+        "lines below it are what a solver leaves, and of no consequence",
         "poses of simulated logs have residuals of a thousandth of the noise, periodic "
         "with the strokes",
+    )
+    noticeable_row: float = _setting(
+        3.0,
+        "times the noise and the model's own error, if they are stated",
+        "a row within three standard deviations is as it was said to be, however small "
+        "all others are",
+        "where a bolt leaves the stop the cell's arm is off by two, 0.1 elsewhere",
     )
     outlying_alpha: float = _setting(
         0.003,

@@ -156,7 +156,7 @@ def test_a_step_begins_where_the_load_has_the_grip_not_the_reading(tmp_path):
         np.sqrt(np.mean((m.predictions(t) - m.measurements.values)[:, :3] ** 2))
         for m, t in ((fitted, theta), (begun, theta), (stated, _NOTHING))
     ]
-    assert errors[1] < 0.5 * errors[0]
+    assert errors[1] < 0.7 * errors[0]
     np.testing.assert_allclose(errors[1], errors[2], rtol=1e-9)
 
 

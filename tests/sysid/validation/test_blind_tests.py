@@ -74,7 +74,7 @@ def test_a_model_with_the_effects_explains_a_blind_log(tmp_path):
     model = TwinModel([read_log(tmp_path / "log")], scenario, ())
     error = model.predictions(np.zeros(0)) - model.measurements.values
     rms = np.sqrt(np.mean((error / model.measurements.noise) ** 2, axis=0))
-    assert rms[:6].max() < 1e-3
+    assert rms[:6].max() < 2e-3  # what the noise of the first readings is of an offset
     np.testing.assert_allclose(rms[6:], 1.0, atol=0.35)
 
 
