@@ -111,9 +111,14 @@ class RecordedEpisode:
         Args:
             rates: (n, 6) commanded, in coordinates.
         """
+        return self.arm.ahead(rates) + self._by_load[:-1]
+
+    @functools.cached_property
+    def _by_load(self) -> Array:
+        """By how much the command is elsewhere (n + 1, 6) whatever it is."""
         moment = self.offset.moved_moment(self.measured, self.wrench)
-        by_load = self.arm.shifts(self.measured, self.carried, moment)
-        return self.arm.ahead(rates) + (by_load + self.elsewhere)[:-1]
+        shifts = self.arm.shifts(self.measured, self.carried, moment)
+        return shifts + self.elsewhere
 
     @functools.cached_property
     def elsewhere(self) -> Array:

@@ -49,7 +49,7 @@ POSE_ERROR = (2e-5, 4e-5)
 _NOTICEABLE = (0.1 * POSE_NOISE[0], 0.1 * POSE_NOISE[1])
 
 #: Standard deviations of the mean of a log's first readings beyond which they are an
-#: offset: by chance once in a million logs of six channels.
+#: offset: by chance three times in a million logs of six channels.
 _OFFSET = 5.0
 
 
