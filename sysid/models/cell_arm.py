@@ -102,7 +102,7 @@ class CellArm:
             lead = max(held - scenario.simulation.cell_time_step, 0.0) / 2.0
             late = _late(here, held, scenario.task.period)
         if station in ("cell", "hardware"):
-            softer = _softer(scenario, here)
+            softer = _softer(scenario, here.p_BoTo_B, at_A)
         return cls(lead, late, at_A[:, 3:], softer, velocity_shift(here.p_BoTo_B).T)
 
     def ahead(self, rates: Array) -> Array:
@@ -127,9 +127,15 @@ class CellArm:
         return np.asarray(moved[:, list(AXIS_ORDER)])
 
 
-def _softer(scenario: Scenario, here: TwinParameters) -> Array:
-    """Returns `CellArm.softer` of a scenario's arm, whose parameters at A are these."""
-    coordinates, at_A = BoltCoordinates(here.p_BoTo_B), np.linalg.inv(here.arm.K)
+def _softer(scenario: Scenario, p_BoTo_B: Array, at_A: Array) -> Array:
+    """Returns `CellArm.softer` of a scenario's arm.
+
+    Args:
+        scenario: of the log.
+        p_BoTo_B: (3,) of the twin's coordinates [m].
+        at_A: (6, 6) its compliance there.
+    """
+    coordinates = BoltCoordinates(p_BoTo_B)
     found = np.empty((6, 6, 6))
     for i, far in enumerate(_FAR):
         there = twin_of(scenario, coordinates.pose(far * np.eye(6)[i]))

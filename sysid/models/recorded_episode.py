@@ -95,6 +95,8 @@ class RecordedEpisode:
 
     def without(self, offset: Array, sensing: SensorReading, p_BoTo_B: Array) -> Self:
         """Returns the episode with a wrench (6,) at So in S taken off, throughout."""
+        if not offset.any():
+            return self
         states = self.at_sensor(sensing, p_BoTo_B)
         states[:, 6:] -= offset
         return dataclasses.replace(self, wrench=at_bolt(states, sensing.X_SB)[:, 6:])

@@ -193,21 +193,15 @@ class Transitions:
         qd = np.concatenate([path[:-1] for path in paths])
         moved = np.concatenate([np.diff(path, axis=0) for path in paths])
         steps = self._moved(qd, moved / self.period)
-        pairs = zip(self.episodes, paths, strict=True)
-        v = np.concatenate([each.begin_rates(path) for each, path in pairs])
-        steps = dataclasses.replace(steps, v=v[self.rows])
+        pairs = list(zip(self.episodes, paths, strict=True))
         if not is_late:
-            return steps, None
-        went = [
-            each.rates.path(path, each.carried)
-            for each, path in zip(self.episodes, paths, strict=True)
-        ]
+            v = np.concatenate([each.begin_rates(path) for each, path in pairs])
+            return dataclasses.replace(steps, v=v[self.rows]), None
+        went = [each.rates.path(path, each.carried) for each, path in pairs]
         late = LatePoses.of(went, weights)
+        pairs = list(zip(self.episodes, went, strict=True))
         begun = Steps.concatenated(
-            [
-                each.on_time(path, weights).steps()
-                for each, path in zip(self.episodes, went, strict=True)
-            ]
+            [e.on_time(path, weights).steps() for e, path in pairs]
         )
         begun = begun.select(self.rows)
         return dataclasses.replace(steps, q=begun.q, v=begun.v), late

@@ -195,10 +195,9 @@ class _Measured:
     def __init__(self, scenario: Scenario, commanded: Array) -> None:
         self._rates, self._grip = ArmRates.of(scenario), GripLag.of(scenario)
         self._p_BoTo_B = Tool.from_models(scenario).p_BoTo_B
-        self._q = np.zeros_like(self._coordinates(commanded))
-        self._wrench = np.zeros_like(self._q)
-        self._v, self._elastic = np.zeros((2, *self._q[:, 0].shape))
-        self._went = np.zeros_like(self._q[:, :2])
+        self._q, self._wrench = np.zeros((2, *commanded.shape))
+        self._v, self._elastic = np.zeros((2, len(commanded), 6))
+        self._went = np.zeros((len(commanded), 2, 6))
 
     def steps(self, k: int, states: Array, executed: Array) -> Steps:
         """Returns step k of all episodes; steps are asked for in their order.

@@ -153,7 +153,7 @@ def back_and_forth(tmp_path_factory) -> Log:
 
 
 def test_an_arm_whose_command_turns_back_is_where_the_twin_says(back_and_forth):
-    """Within 15 micrometres; the rate that comes late is 35 of them along y."""
+    """Within 15 micrometres, along y 22 without the rate that comes late."""
     model = TwinModel([back_and_forth], _SCENARIO, ())
     residual = model.predictions(np.zeros(0)) - model.measurements.values
     assert np.abs(residual[:, :3]).max() < 15e-6
