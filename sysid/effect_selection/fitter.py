@@ -18,7 +18,7 @@ from sysid.identification.linearisation import Linearisation
 from sysid.identification.noise import with_estimated_noise
 from sysid.models.base import LogModel
 from sysid.objective import Objective
-from sysid.parameters import Scaling
+from sysid.parameters import Scaling, by_name
 from sysid.workers import Workers
 
 Array = NDArray[np.float64]
@@ -102,23 +102,70 @@ class Fitter:
             u = Scaling(model.parameters).to_unit(theta)
             known = _extended_linearisation(start, model, u, derivatives)
         found = self._fit_of(effects, model, theta, known)
+        if found.model.begun(found.theta) is found.model:
+            return found
+        theta = self._settled(effects, theta)
+        found = self._fit_of(effects, model.varying(), theta, is_minimum=True)
+        return dataclasses.replace(found, model=model.begun(theta))
+
+    def _settled(self, effects: tuple[Candidate, ...], theta: Array) -> Array:
+        """Returns parameters (p,) that fit where the model begins with them.
+
+        Effects on the sensor tell where steps begin, which tells the effects. Shapes
+        come last: what a wrong begin leaves may look like any of them.
+
+        Args:
+            effects: of the model.
+            theta: (p,) where to begin.
+        """
+        model, _ = extended(self.base, effects, with_shapes=True)
+        values = dict(by_name(model.parameters, theta))
+        shapes = {p.name: values[p.name] for p in model.parameters if p.is_shape}
+        if shapes:
+            held = model.freeze(shapes)
+            start = np.array([values[p.name] for p in held.parameters])
+            values |= by_name(held.parameters, self._settled_of(effects, held, start))
+        start = np.array([values[p.name] for p in model.parameters])
+        return self._settled_of(effects, model, start)
+
+    def _settled_of(
+        self, effects: tuple[Candidate, ...], model: LogModel, theta: Array
+    ) -> Array:
+        """Returns what `_settled` does of a model's parameters (p,).
+
+        Each fit takes for known where the model begins with the last; the way there is
+        halved if it does not fit better from where it begins itself.
+        """
+        value = self._value_begun_at(model, theta)
         for _ in range(self.settings.fits_begun_again):
-            model = found.model.begun(found.theta)
-            if model is found.model:
+            found = self._fit_of(effects, model.begun(theta), theta).theta
+            for tried in (found, 0.5 * (theta + found)):
+                reached = self._value_begun_at(model, tried)
+                if reached < value:
+                    break
+            else:
+                return theta
+            gain, theta, value = 1.0 - reached / value, tried, reached
+            if gain < self.settings.fit_min_progress:
                 break
-            found = self._fit_of(effects, model, found.theta, None)
-        return found
+        return theta
+
+    def _value_begun_at(self, model: LogModel, theta: Array) -> float:
+        """Returns the objective at parameters (p,) of a model that begins with them."""
+        return float(self.objective(model.begun(theta))(theta[None])[0])
 
     def _fit_of(
         self,
         effects: tuple[Candidate, ...],
         model: LogModel,
         theta: Array,
-        known: Linearisation | None,
+        known: Linearisation | None = None,
+        is_minimum: bool = False,
     ) -> Fit:
-        """Returns a model's fit from parameters (p,) on."""
+        """Returns a model's fit from parameters (p,) on, which may be its minimum."""
         objective = self.objective(model)
-        found = self._minimised(objective, objective.scaling.to_unit(theta), known)
+        u = objective.scaling.to_unit(theta)
+        found = self._minimised(objective, u, known, is_minimum)
         return Fit(
             effects,
             model,
@@ -138,7 +185,11 @@ class Fitter:
         return dataclasses.replace(self, base=base)
 
     def _minimised(
-        self, objective: Objective, u: Array, known: Linearisation | None
+        self,
+        objective: Objective,
+        u: Array,
+        known: Linearisation | None,
+        is_minimum: bool,
     ) -> Linearisation:
         """Returns the linearisation at the minimum that is downhill from u (p,)."""
         model, limits = objective.model, self.settings
@@ -146,6 +197,8 @@ class Fitter:
         if model.costly:
             iterations = limits.costly_fit_iterations
             progress = limits.costly_fit_min_progress
+        if is_minimum:
+            iterations = 0
         return cached_fit(
             None if model.affine else self.folder,
             (model, self.huber_delta, self.exact, u, known, iterations, progress),

@@ -325,6 +325,13 @@ class LogModel(abc.ABC):
         """
         return self
 
+    def varying(self) -> Self:
+        """Returns the same model with inputs as they are at whatever parameters.
+
+        Its derivatives are those of `begun` along the parameters.
+        """
+        return self
+
     def displaced(self, displacement: Array, push: Array) -> Self:
         """Returns the same model with each step displaced from its command.
 

@@ -1,6 +1,7 @@
 """By how much the grip gives when a step begins, which no encoder measures."""
 
 import dataclasses
+import functools
 from typing import Self
 
 import numpy as np
@@ -59,16 +60,34 @@ class GripLag:
         """
         if not self.lags:
             return wrench[:, 1]
+        parts = np.stack([elastic, wrench[:, 0], wrench[:, 1]], axis=1) @ self.to_grip.T
+        return self._at_bolt(np.sum(self._weights * parts, axis=1))
+
+    def along(self, wrench: Array) -> Array:
+        """Returns the springs' wrench (n, 6) along an episode, from the first row on.
+
+        Args:
+            wrench: (n, 6) measured, [f; tau] at Bo in Gn.
+        """
+        if not self.lags:
+            return wrench
+        forgets, of_begin, of_end = self._weights
+        elastic = wrench @ self.to_grip.T
+        elastic[1:] = of_begin * elastic[:-1] + of_end * elastic[1:]
+        for k in range(1, len(elastic)):
+            elastic[k] += forgets * elastic[k - 1]
+        return self._at_bolt(elastic)
+
+    @functools.cached_property
+    def _weights(self) -> Array:
+        """Of the springs' wrench and the measured one at begin and end (3, 6)."""
         lag = self.springs.damping / self.springs.stiffness
         forgets = np.exp(-self.period / lag)
         of_begin = lag / self.period * (1.0 - forgets) - forgets
-        of_end = 1.0 - forgets - of_begin
-        parts = (elastic, wrench[:, 0], wrench[:, 1])
-        weights = (forgets, of_begin, of_end)
-        at_grip = sum(
-            weight * (part @ self.to_grip.T)
-            for weight, part in zip(weights, parts, strict=True)
-        )
+        return np.array([forgets, of_begin, 1.0 - forgets - of_begin])
+
+    def _at_bolt(self, at_grip: Array) -> Array:
+        """Returns wrenches (n, 6) at Bo in Gn, of those at the pads."""
         return np.asarray(np.linalg.solve(self.to_grip, at_grip.T).T)
 
     def deflections(self, wrench: Array) -> Array:

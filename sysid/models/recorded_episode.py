@@ -2,14 +2,12 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
 from typing import Self
 
 import numpy as np
 
 from drake_disasm.cell.coordinates import BoltCoordinates
 from drake_disasm.common.spatial import pose_from_vector
-from drake_disasm.effects import SensorEffect
 from drake_disasm.logs import Episode
 from drake_disasm.logs.transitions import observations
 from drake_disasm.task.replay import Steps
@@ -21,10 +19,6 @@ from sysid.models.grip_lag import GripLag
 from sysid.models.grip_offset import GripOffset
 from sysid.models.late_pose import on_time
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
-
-_PASSES = 4  # to undo effects on the sensor; where they are affine one is enough
-_CHANGE = 1e-4  # N, N m: of wrenches, for differences
-_DAMPING = 1e-3  # of steps where a reading hardly shows a wrench: in a dead band
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,34 +61,13 @@ class RecordedEpisode:
             arm,
         )
 
-    def unread(
-        self, effects: Sequence[SensorEffect], sensing: SensorReading, p_BoTo_B: Array
-    ) -> Self:
-        """Returns the episode with the wrench as it was before effects on the sensor.
-
-        By Newton's method, row by row: gains that drift may more than double a reading.
-        """
-        if not effects:
-            return self
-        read = self.at_sensor(sensing, p_BoTo_B)
-        times = self.grip.period * np.arange(len(read), dtype=np.float64)
-
-        def reading(wrench: Array) -> Array:
-            """Returns how wrenches (n, 6) at So in S are read."""
-            states = np.hstack([read[:, :6], wrench])
-            return sensing.read(effects, states, sensing.at_rest, times)[:, 6:]
-
-        found = np.hstack([read[:, :6], undone(reading, read[:, 6:])])
-        wrench = at_bolt(found, sensing.X_SB)[:, 6:]
-        return dataclasses.replace(self, wrench=wrench)
-
     def at_sensor(self, sensing: SensorReading, p_BoTo_B: Array) -> Array:
         """Returns the states (n + 1, 12) with the wrench at So in S."""
         poses = bolt_path(self.measured, p_BoTo_B)
         return at_sensor(np.hstack([poses, self.wrench]), sensing.X_SB)
 
     def without(self, offset: Array, sensing: SensorReading, p_BoTo_B: Array) -> Self:
-        """Returns the episode with a wrench (6,) at So in S taken off, throughout."""
+        """Returns the episode with wrenches (n + 1, 6) at So in S taken off."""
         if not offset.any():
             return self
         states = self.at_sensor(sensing, p_BoTo_B)
@@ -102,8 +75,9 @@ class RecordedEpisode:
         return dataclasses.replace(self, wrench=at_bolt(states, sensing.X_SB)[:, 6:])
 
     def begins_elsewhere(self, other: Self, noticeable: tuple[float, float]) -> bool:
-        """Returns whether the grip gives by more than (m, rad) more than another's."""
-        change = np.abs(self.grip.deflections(self.wrench - other.wrench))
+        """Returns whether the grip gives or creeps by (m, rad) more than another's."""
+        given = self.grip.deflections(self.wrench - other.wrench)
+        change = np.abs(np.vstack([given, self.elsewhere - other.elsewhere]))
         m, rad = noticeable
         return bool(np.any(change[:, :3] > m) or np.any(change[:, 3:] > rad))
 
@@ -145,10 +119,7 @@ class RecordedEpisode:
     def steps(self) -> Steps:
         """Returns its steps."""
         q, qd, wrench = self.measured, self.commanded, self.carried
-        elastic = np.array(wrench[:-1])
-        for k in range(1, len(elastic)):
-            last = np.s_[None, k - 1 : k + 1]
-            elastic[k] = self.grip.after(elastic[None, k - 1], wrench[last])
+        elastic = self.grip.along(wrench[:-1])
         return Steps(
             np.arange(len(elastic)),
             q[:-1] + self.elsewhere[:-1],
@@ -166,26 +137,6 @@ class RecordedEpisode:
             path: (n + 1, 6) what it was commanded to do, in coordinates.
         """
         return self.rates.along(self.measured, path, self.carried)
-
-
-def undone(reading: Callable[[Array], Array], read: Array) -> Array:
-    """Returns the wrenches (n, 6) that are read as these, or as nearly as can be.
-
-    What a reading does not show, since a channel is saturated or within its dead band,
-    is left as it is read.
-    """
-    found = read.copy()
-    for _ in range(_PASSES):
-        missing = read - reading(found)
-        if not missing.any():
-            break
-        J = np.empty((*read.shape, read.shape[1]))
-        for i, step in enumerate(_CHANGE * np.eye(read.shape[1])):
-            J[..., i] = (reading(found + step) - reading(found - step)) / (2 * _CHANGE)
-        J_T = J.transpose(0, 2, 1)
-        normal = J_T @ J + _DAMPING * np.eye(read.shape[1])
-        found += np.linalg.solve(normal, J_T @ missing[..., None])[..., 0]
-    return found
 
 
 def _coordinates(poses: Array, twin: BoltCoordinates) -> Array:

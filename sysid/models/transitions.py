@@ -23,10 +23,12 @@ from sysid.models.cell_arm import CellArm, Sway
 from sysid.models.commands import Commands, twin_coordinates
 from sysid.models.grip_lag import GripLag
 from sysid.models.grip_offset import GripOffset, of_encoders
+from sysid.models.idle_readings import IdleReadings
 from sysid.models.late_pose import LatePoses
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.recorded_episode import RecordedEpisode
 from sysid.models.sensor_reading import SensorReading, at_sensor, station_of
+from sysid.models.unread import unread
 
 #: Repeatability of a robot's own encoders within an episode, m and rad: below that of
 #: the robot (0.1 mm, against an external frame), above their resolution.
@@ -48,10 +50,6 @@ POSE_ERROR = (2e-5, 4e-5)
 #: tenth of what encoders repeat.
 _NOTICEABLE = (0.1 * POSE_NOISE[0], 0.1 * POSE_NOISE[1])
 
-#: Standard deviations of the mean of a log's first readings beyond which they are an
-#: offset: by chance three times in a million logs of six channels.
-_OFFSET = 5.0
-
 
 @dataclasses.dataclass(frozen=True)
 class Transitions:
@@ -63,10 +61,9 @@ class Transitions:
         rows: (rows,) its number among all transitions of the episodes.
         recorded: whole episodes, in the twin's coordinates.
         logs: (episodes,) number of the log of each.
-        first: (logs, 6) what the first readings of each log are taken for on average,
-            at So in S.
+        idle: what the readings of each log without a load say of its sensor.
         episodes: the same, with the wrench as it was before effects on the sensor, and
-            without an offset in the first readings.
+            without its offset.
         commands: of whole episodes, since effects on the motion have a memory.
         sway: (rows, 6) what moving loads the sensor with besides, at So in S.
         elsewhere: (rows, 6) by how much the bolt is elsewhere in the grip as a step
@@ -80,7 +77,7 @@ class Transitions:
     rows: NDArray[np.int64]
     recorded: tuple[RecordedEpisode, ...]
     logs: NDArray[np.int64]
-    first: Array
+    idle: tuple[IdleReadings, ...]
     episodes: tuple[RecordedEpisode, ...]
     commands: tuple[Commands, ...]
     sway: Array
@@ -112,9 +109,9 @@ class Transitions:
             for episode in log.episodes
         )
         noise = np.array([channel.noise for channel in _channels(scenario)][6:])
-        first = np.array([_first_readings(log, noise, sensing) for log in logs])
+        idle = tuple(_idle_readings(log, noise, sensing) for log in logs)
         sources = np.repeat(np.arange(len(logs)), [len(log.episodes) for log in logs])
-        begun = _without_offset(recorded, sources, first, sensing, p_BoTo_B)
+        begun = _without_offset(recorded, sources, idle, sensing, p_BoTo_B)
         steps = Steps.concatenated([each.steps() for each in begun])
         found = cls(
             steps=steps,
@@ -124,7 +121,7 @@ class Transitions:
             rows=np.arange(len(steps)),
             recorded=recorded,
             logs=sources,
-            first=first,
+            idle=idle,
             episodes=begun,
             commands=tuple(Commands.of(e, period) for e in episodes),
             sway=np.concatenate([_sway(log, scenario, sensing) for log in logs]),
@@ -147,10 +144,8 @@ class Transitions:
             sensing: of the scenario.
         """
         known = [e for e in effects if not isinstance(e, SensorMemoryEffect)]
-        unread = [e.unread(known, sensing, self.p_BoTo_B) for e in self.recorded]
-        episodes = _without_offset(
-            unread, self.logs, self.first, sensing, self.p_BoTo_B
-        )
+        before = unread(self.recorded, known, sensing, self.p_BoTo_B)
+        episodes = _without_offset(before, self.logs, self.idle, sensing, self.p_BoTo_B)
         pairs = zip(episodes, self.episodes, strict=True)
         if not any(one.begins_elsewhere(other, _NOTICEABLE) for one, other in pairs):
             return self
@@ -337,44 +332,41 @@ def _refuse_other_logs(log: Log, scenario: Scenario) -> None:
         )
 
 
-def _first_readings(log: Log, noise: Array, sensing: SensorReading) -> Array:
-    """Returns what a log's first readings are taken for on average (6,), at So in S.
-
-    Zero where their average is beyond chance: the sensor is zeroed there, and no load
-    has moved the bolt in the grip yet. The noise of a reading would move it as far as a
-    small offset does.
+def _idle_readings(log: Log, noise: Array, sensing: SensorReading) -> IdleReadings:
+    """Returns what a log's readings without a load say of its sensor.
 
     Args:
         log: of transitions.
         noise: (6,) of a reading.
         sensing: of the scenario.
     """
-    first = [at_sensor(observations(e)[:1], sensing.X_SB)[0, 6:] for e in log.episodes]
-    mean = np.mean(first, axis=0)
-    is_offset = np.abs(mean) > _OFFSET * noise / np.sqrt(len(first))
-    return np.where(is_offset, 0.0, mean)
+    readings = [at_sensor(observations(e), sensing.X_SB)[:, 6:] for e in log.episodes]
+    return IdleReadings.of(readings, noise, sensing.X_SB.translation())
 
 
 def _without_offset(
     episodes: Sequence[RecordedEpisode],
     logs: NDArray[np.int64],
-    first: Array,
+    idle: Sequence[IdleReadings],
     sensing: SensorReading,
     p_BoTo_B: Array,
 ) -> tuple[RecordedEpisode, ...]:
-    """Returns the episodes without an offset in the first readings of their log.
+    """Returns the episodes without the offset of the sensor in their log.
 
     Args:
         episodes: with the wrench as it was measured.
-        logs, first: see `Transitions`.
+        logs, idle: see `Transitions`.
         sensing: of the scenario.
         p_BoTo_B: (3,) of the twin's coordinates [m].
     """
-    read = np.array([e.at_sensor(sensing, p_BoTo_B)[0, 6:] for e in episodes])
-    offsets = [read[logs == log].mean(axis=0) - mean for log, mean in enumerate(first)]
+    read = [each.at_sensor(sensing, p_BoTo_B)[:, 6:] for each in episodes]
+    offsets = [
+        each.offsets([read[i] for i in np.flatnonzero(logs == log)])
+        for log, each in enumerate(idle)
+    ]
     return tuple(
-        episode.without(offsets[log], sensing, p_BoTo_B)
-        for episode, log in zip(episodes, logs, strict=True)
+        episode.without(offsets[log][: len(own)], sensing, p_BoTo_B)
+        for episode, own, log in zip(episodes, read, logs, strict=True)
     )
 
 

@@ -1,9 +1,9 @@
 """The digital twin as a model of measured transitions (thesis, eq. 4.8)."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,8 @@ _FRICTION = "contact.friction"  # which both kinds of contact have
 _CHUNK = 32  # transitions: a tenth of a second of work
 _IMPACT_CHUNK = 512  # large enough for arrays, small enough to share
 _IMPACT_BATCH = 4096  # with more an array operation hardly gets faster
-_KEPT = 64  # executed commands of that many parameter sets
+_KEPT = 64  # steps of that many parameter sets
+_T = TypeVar("_T")
 _RUN = 6  # rows that follow each other in a thinned log: 0.6 s
 
 
@@ -90,7 +91,9 @@ class TwinModel(ScenarioModel):
         effects = sensor_chain(scenario.effects)
         self._transitions = recorded.begun(effects, self.reading)
         self.measurements = measured_states(logs, scenario, self.reading)
+        self._begins_vary = False  # with parameters of effects on the sensor
         self._displacement: Array | None = None  # (rows, 2, 3) of begin and end
+        self._begun: dict[str, Transitions] = {}
         self._executed: dict[str, tuple[Steps, LatePoses | None]] = {}
 
     def predict(self, theta: Array, rows: slice) -> Array:
@@ -130,13 +133,17 @@ class TwinModel(ScenarioModel):
         if not self.rollout:
             late = [poses for _, poses in executed]
             self._carry_on(replays, steps, [each.states for each in found], late, rows)
-        begun = [own for own, _ in executed]
-        pairs = zip(found, begun, strict=True)
-        return [self._at_sensor_and_zero(each, own, rows) for each, own in pairs]
+        begun = [self._begun_at(scenario) for scenario in scenarios]
+        return [
+            self._at_sensor_and_zero(each, own, went, rows)
+            for each, own, (went, _) in zip(found, begun, executed, strict=True)
+        ]
 
-    def _at_sensor_and_zero(self, found: Replayed, steps: Steps, rows: slice) -> Array:
+    def _at_sensor_and_zero(
+        self, found: Replayed, begun: Transitions, steps: Steps, rows: slice
+    ) -> Array:
         """Returns the states and the reading at zeroing (len(rows), 18)."""
-        states = self._transitions.of_encoders(found.states, steps, rows)
+        states = begun.of_encoders(found.states, steps, rows)
         states = self.at_sensor(states)
         states[:, 6:] += self._transitions.sway[rows]
         zero = self.reading.zeroed(found.reading_at_zeroing)
@@ -152,7 +159,7 @@ class TwinModel(ScenarioModel):
         steps, late = self._executed_at(scenario)
         if late is None:
             return states
-        poses = self._reported(states, steps, late, rows)
+        poses = self._reported(scenario, states, steps, late, rows)
         return self.reading.reported(states, poses)
 
     def residual_inputs(self, theta: Array) -> dict[str, Array]:
@@ -172,11 +179,12 @@ class TwinModel(ScenarioModel):
 
     @property
     def simulated(self) -> NDArray[np.bool_]:
-        """All parameters but those of the sensor's effects."""
+        """All parameters but those of the sensor's effects, unless begins vary."""
         paths = [parameter.path.split(".") for parameter in self.parameters]
         return np.array(
             [
                 part[0] != "effects"
+                or self._begins_vary
                 or not isinstance(self.scenario.effects[int(part[1])], SensorEffect)
                 for part in paths
             ],
@@ -226,6 +234,10 @@ class TwinModel(ScenarioModel):
             return self
         return self.replace(_transitions=transitions)
 
+    def varying(self) -> Self:
+        """See LogModel: steps begin where the wrench says, at each parameter set."""
+        return self.replace(_begins_vary=True)
+
     def displaced(self, displacement: Array, push: Array) -> Self:
         """See LogModel."""
         begin = self._transitions.ends_before(displacement)
@@ -245,14 +257,19 @@ class TwinModel(ScenarioModel):
         return at_sensor(states, self.reading.X_SB)
 
     def _reported(
-        self, states: Array, steps: Steps, late: LatePoses, rows: slice
+        self,
+        scenario: Scenario,
+        states: Array,
+        steps: Steps,
+        late: LatePoses,
+        rows: slice,
     ) -> Array:
         """Returns the poses (n, 6) that are reported where steps led, of states."""
         poses, before = states[:, :6], self._transitions.before[rows, :6]
         if not self.rollout:
             p, own = self._transitions.p_BoTo_B, self._transitions.rows[rows]
             q, q_before = (twin_coordinates(x, p) for x in (poses, before))
-            q_begin = steps.q[rows] - self._transitions.elsewhere[rows]
+            q_begin = steps.q[rows] - self._begun_at(scenario).elsewhere[rows]
             return bolt_path(late.at_ends(own, q_before, q_begin, q), p)
         episode, found = self.measurements.episode[rows], np.empty_like(poses)
         for number in np.unique(episode):
@@ -263,14 +280,22 @@ class TwinModel(ScenarioModel):
 
     def _executed_at(self, scenario: Scenario) -> tuple[Steps, LatePoses | None]:
         """Returns the steps as effects have them executed, and late poses, if any."""
-        effects = _mean_chain(scenario)
-        weights = pose_weights(scenario.effects, self._transitions.period)
-        key = repr((effects, weights.tolist()))
-        if key not in self._executed:
-            while len(self._executed) >= _KEPT:
-                del self._executed[next(iter(self._executed))]
-            self._executed[key] = self._transitions.executed(effects, weights)
-        return self._executed[key]
+        begun, effects = self._begun_at(scenario), _mean_chain(scenario)
+        weights = pose_weights(scenario.effects, begun.period)
+        sensor = sensor_chain(scenario.effects) if self._begins_vary else ()
+        key = repr((effects, weights.tolist(), sensor))
+        return _kept(self._executed, key, lambda: begun.executed(effects, weights))
+
+    def _begun_at(self, scenario: Scenario) -> Transitions:
+        """Returns the transitions as they begin with a scenario's sensor."""
+        if not self._begins_vary:
+            return self._transitions
+        effects = sensor_chain(scenario.effects)
+        return _kept(
+            self._begun,
+            repr(effects),
+            lambda: self._transitions.begun(effects, self.reading),
+        )
 
     def _displaced(self, steps: Steps, rows: slice) -> Steps:
         """Returns steps as the arm scatters about its commands, if it does."""
@@ -366,7 +391,16 @@ class TwinModel(ScenarioModel):
 
     def __getstate__(self) -> dict[str, Any]:
         """Leaves out what is quickly found again."""
-        return self.__dict__ | {"_executed": {}}
+        return self.__dict__ | {"_begun": {}, "_executed": {}}
+
+
+def _kept(found: dict[str, _T], key: str, compute: Callable[[], _T]) -> _T:
+    """Returns what was found before of a key, or is found now and kept for a while."""
+    if key not in found:
+        while len(found) >= _KEPT:
+            del found[next(iter(found))]
+        found[key] = compute()
+    return found[key]
 
 
 def _mean_chain(scenario: Scenario) -> tuple[MotionEffect, ...]:

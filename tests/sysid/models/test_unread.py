@@ -15,8 +15,8 @@ from drake_disasm.effects import (
     SensorSaturation,
 )
 from drake_disasm.scenario import load_scenario
-from sysid.models.recorded_episode import undone
 from sysid.models.sensor_reading import SensorReading
+from sysid.models.unread import undone
 
 _SCENARIO = load_scenario("removal")
 _READING = SensorReading(_SCENARIO, Tool.from_models(_SCENARIO), "cell")
@@ -27,6 +27,11 @@ def _read(effect: Effect, wrench: np.ndarray) -> np.ndarray:
     """Returns how wrenches are read, once a second at A."""
     states = np.hstack([np.zeros_like(wrench), wrench])
     return _READING.read([effect], states, _READING.at_rest, _TIMES)[:, 6:]
+
+
+def _read_all(effect: Effect, wrenches: np.ndarray) -> np.ndarray:
+    """Returns how some such records (k, n, 6) are read."""
+    return np.stack([_read(effect, wrench) for wrench in wrenches])
 
 
 def _wrenches() -> np.ndarray:
@@ -48,14 +53,14 @@ def _wrenches() -> np.ndarray:
 def test_what_was_read_is_undone(effect):
     """Gains that grow fivefold, too."""
     wrench = _wrenches()
-    found = undone(lambda w: _read(effect, w), _read(effect, wrench))
+    found = undone(lambda w: _read_all(effect, w), _read(effect, wrench))
     np.testing.assert_allclose(found, wrench, atol=1e-6)
 
 
 def test_what_a_dead_band_hides_stays_small():
     """Outside of the band the wrench is found, within it there are no leaps."""
     wrench, effect = _wrenches(), SensorDeadBand(force=1.0, width=2.0)
-    found = undone(lambda w: _read(effect, w), _read(effect, wrench))
+    found = undone(lambda w: _read_all(effect, w), _read(effect, wrench))
     wide = np.abs(wrench) > 4.0
     np.testing.assert_allclose(found[wide], wrench[wide], atol=0.01)
     assert np.abs(found - wrench).max() < 2.0
@@ -64,6 +69,6 @@ def test_what_a_dead_band_hides_stays_small():
 def test_a_saturated_channel_is_left_as_it_is_read():
     wrench, effect = _wrenches(), SensorSaturation(share=1.0, limit=3.0)
     read = _read(effect, wrench)
-    found = undone(lambda w: _read(effect, w), read)
+    found = undone(lambda w: _read_all(effect, w), read)
     assert np.isfinite(found).all()
     np.testing.assert_allclose(_read(effect, found), read, atol=1e-2)

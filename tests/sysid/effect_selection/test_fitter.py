@@ -1,0 +1,52 @@
+"""Fits of a model that begins where its own parameters say."""
+
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.models.base import Array, LogModel
+from sysid.models.measurements import Channel, Measurements
+from sysid.parameters import Parameter
+from sysid.workers import Workers
+
+
+class _Begun(LogModel):
+    """y = a + k b, where b is what a was taken for as the model began."""
+
+    def __init__(self, measured: Array, reaction: float) -> None:
+        self.parameters = (Parameter("a", 0.0, -5.0, 5.0, "N"),)
+        channels = [Channel("y", "N", noise=0.01)]
+        self.measurements = Measurements.of_array(measured, channels)
+        self.reaction, self.taken = reaction, 0.0
+
+    def predict(self, theta: Array, rows: slice) -> Array:
+        value = float(theta[0]) + self.reaction * self.taken
+        return np.full(len(self.measurements.values[rows]), value)
+
+    def select_rows(self, mask: NDArray[np.bool_]) -> Self:
+        return self.replace()
+
+    def begun(self, theta: Array) -> Self:
+        taken = float(theta[0])
+        if abs(taken - self.taken) < 1e-6:
+            return self
+        return self.replace(taken=taken)
+
+
+def _fitted(reaction: float, measured: float) -> float:
+    random = np.random.default_rng(1)
+    model = _Begun(random.normal(measured, 0.01, 50), reaction)
+    fitter = Fitter.of(model, Workers(), np.inf, DEFAULT_SETTINGS)
+    return float(fitter.fit(()).theta[0])
+
+
+def test_what_a_model_does_not_react_to_is_one_fit():
+    np.testing.assert_allclose(_fitted(0.0, 1.0), 1.0, atol=0.01)
+
+
+def test_where_the_begin_overshoots_the_way_is_halved():
+    """Taken in full, each way would be 1.5 times as far as the last, and back."""
+    np.testing.assert_allclose(_fitted(1.5, 1.0), 0.4, atol=0.06)
