@@ -119,7 +119,7 @@ class RefitSearch(ForwardSearch):
             return None
         limits = self._settings
         confirmed = [trial for ranking in rankings for trial in ranking.confirmed]
-        best, found = _as_good_as_the_best(confirmed, fit)
+        best, found = as_good_as_the_best(confirmed, fit)
         ranking = next(r for r in rankings if any(e is best for e, _ in r.confirmed))
         again = self.fitter.fit(fit.effects, found)
         if again.loss <= (1.0 + limits.min_gain) * found.loss:
@@ -305,19 +305,27 @@ def ties_by_fit(
 ) -> tuple[Evidence, ...]:
     """Returns rivals that could explain as much as the chosen effect's fit does.
 
-    Those that were fitted are judged by their fits, others by the linear account: how
-    much less they explain by it than the best does by the same.
+    Those that were fitted are judged by their fits, but for the row at which they are
+    worst in comparison: where a bolt jams, a millimetre decides. Others are judged by
+    the linear account: how much less they explain by it than the best does by the same.
     """
     limit = (1.0 + found.settings.refit_tie_margin) * found.loss
     others = sorted(confirmed, key=lambda trial: -trial[1].loss)
     others = [trial for trial in others if trial[0].effects != best.effects]
-    losses = {e.effects: fit.loss for e, fit in others}
+    losses = {e.effects: loss_but_for_a_row(fit, found) for e, fit in others}
     known = {e.effects: e for e, _ in others}
     for rival in rivals:
         less = (best.gain - rival.gain) * before.loss
         losses.setdefault(rival.effects, found.loss + less)
         known.setdefault(rival.effects, rival)
     return tuple(rival for name, rival in known.items() if losses[name] <= limit)
+
+
+def loss_but_for_a_row(fit: Fit, other: Fit) -> float:
+    """Returns a fit's loss, with another's at the row at which they differ most."""
+    losses = [np.sum(each.bounded_residual**2, axis=1) for each in (fit, other)]
+    more = losses[0] - losses[1]
+    return fit.loss - float(more[np.argmax(np.abs(more))])
 
 
 def _pairs(tried: Sequence[_Trial], settings: SelectionSettings) -> list[Evidence]:
@@ -333,14 +341,20 @@ def _pairs(tried: Sequence[_Trial], settings: SelectionSettings) -> list[Evidenc
     ][: settings.refit_max_pairs]
 
 
-def _as_good_as_the_best(confirmed: Sequence[_Trial], before: Fit) -> _Trial:
-    """Returns the first of the fits that leave about as little as the best does.
+def as_good_as_the_best(confirmed: Sequence[_Trial], before: Fit) -> _Trial:
+    """Returns the simplest of the fits that leave about as little as the best does.
 
-    The order is that of their rankings, where the simpler come first. Where the model
-    is off by itself a little less is no reason: a step of the sensor that begins at
-    once is no better than an offset.
+    That is the first in their rankings. Where the model is off by itself a little less
+    is no reason: a step of the sensor that begins at once is no better than an offset.
+    Nor is a single row; the simplest is that with the fewest parameters then.
     """
-    settings, least = before.settings, min(fit.loss for _, fit in confirmed)
-    rough = before.states_model_error
-    more = settings.parsimony_tolerance if rough else settings.min_gain
-    return next(trial for trial in confirmed if trial[1].loss <= (1.0 + more) * least)
+    settings = before.settings
+    best = min((fit for _, fit in confirmed), key=lambda fit: fit.loss)
+    if not before.states_model_error:
+        limit = (1.0 + settings.min_gain) * best.loss
+        return next(trial for trial in confirmed if trial[1].loss <= limit)
+    rivals = [fit for _, fit in confirmed if loss_but_for_a_row(fit, best) < best.loss]
+    best = min(rivals, key=lambda fit: loss_but_for_a_row(fit, best), default=best)
+    limit = (1.0 + settings.parsimony_tolerance) * best.loss
+    as_good = [t for t in confirmed if loss_but_for_a_row(t[1], best) <= limit]
+    return min(as_good, key=lambda trial: len(trial[1].theta))

@@ -39,6 +39,7 @@ _FRICTION = "contact.friction"  # which both kinds of contact have
 _CHUNK = 32  # transitions: a tenth of a second of work
 _IMPACT_CHUNK = 512  # large enough for arrays, small enough to share
 _IMPACT_BATCH = 4096  # with more an array operation hardly gets faster
+_N_PER_MM = 1e-3  # of N/m
 _KEPT = 64  # steps of that many parameter sets
 _T = TypeVar("_T")
 _RUN = 6  # rows that follow each other in a thinned log: 0.6 s
@@ -216,10 +217,7 @@ class TwinModel(ScenarioModel):
         own = [p for p in paths if p.startswith("contact.") and p != _FRICTION]
         if self._has_impact or self.rollout or own:
             return self
-        contact = dataclasses.replace(self.scenario.contact, model="impact")
-        return self.replace(
-            scenario=dataclasses.replace(self.scenario, contact=contact)
-        )
+        return self.replace(scenario=_with_impact_as_stiff(self.scenario))
 
     def refined(self) -> Self | None:
         """See LogModel: without coarse steps."""
@@ -401,6 +399,20 @@ def _kept(found: dict[str, _T], key: str, compute: Callable[[], _T]) -> _T:
             del found[next(iter(found))]
         found[key] = compute()
     return found[key]
+
+
+def _with_impact_as_stiff(scenario: Scenario) -> Scenario:
+    """Returns a scenario with IMPACT contact about as stiff as its hydroelastic one.
+
+    That is the head's, the softer part, with its edge against a wall: an elastic
+    foundation as deep as the radius under diameter times thickness, k = 2 E t. On three
+    logs of the cell that is near the best there is (docs/closing-the-loop.md).
+    """
+    contact, lock = scenario.contact, scenario.lock
+    stiffness = 2.0 * contact.head_modulus * lock.head_thickness
+    impact = dataclasses.replace(contact.impact, stiffness=stiffness * _N_PER_MM)
+    contact = dataclasses.replace(contact, model="impact", impact=impact)
+    return dataclasses.replace(scenario, contact=contact)
 
 
 def _mean_chain(scenario: Scenario) -> tuple[MotionEffect, ...]:

@@ -15,7 +15,7 @@ from drake_disasm.effects import (
 from sysid.effect_selection.block_regression import BlockRegression
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence, most_parsimonious
-from sysid.effect_selection.refit_search import ties_by_fit
+from sysid.effect_selection.refit_search import as_good_as_the_best, ties_by_fit
 from sysid.effect_selection.search import trials
 from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
 
@@ -105,3 +105,39 @@ def test_a_rival_that_was_not_fitted_may_gain_by_a_fit_as_the_best_did(gain, is_
     )
     ties = ties_by_fit(best, [rival], [(best, found)], before, found)
     assert ties == ((rival,) if is_tie else ())
+
+
+def _fit_of_rows(rows: list[float], parameters: int) -> SimpleNamespace:
+    """Returns a fit, as far as it is compared, with some losses of its rows."""
+    return SimpleNamespace(
+        loss=sum(rows),
+        bounded_residual=np.sqrt(np.array(rows))[:, None],
+        theta=np.zeros(parameters),
+        settings=DEFAULT_SETTINGS,
+    )
+
+
+@pytest.mark.parametrize(
+    ("rows", "is_tie"), [([1.0, 1.0, 50.0, 1.0], True), ([9.0, 9.0, 9.0, 9.0], False)]
+)
+def test_one_row_at_which_a_rival_is_worse_is_no_reason_to_leave_it_out(rows, is_tie):
+    """A jam, say, that one effect's model of the grip solves and another's does not."""
+    best, rival = (
+        _evidence(kind, 0.5, 1) for kind in (JointCoulombFriction, JointLoadFriction)
+    )
+    found, other = _fit_of_rows([1.0, 1.0, 1.0, 1.0], 1), _fit_of_rows(rows, 1)
+    pairs = [(best, found), (rival, other)]
+    ties = ties_by_fit(best, [rival], pairs, SimpleNamespace(loss=100.0), found)
+    assert ties == ((rival,) if is_tie else ())
+
+
+def test_of_two_that_differ_at_one_row_the_simpler_is_taken():
+    first, second = (
+        _evidence(kind, 0.5, 1) for kind in (JointCoulombFriction, JointLoadFriction)
+    )
+    before = SimpleNamespace(settings=DEFAULT_SETTINGS, states_model_error=True)
+    fits = _fit_of_rows([1.0] * 4, 2), _fit_of_rows([1.0, 1.0, 50.0, 1.0], 1)
+    trials = list(zip((first, second), fits, strict=True))
+    assert as_good_as_the_best(trials, before)[0] is second
+    before.states_model_error = False
+    assert as_good_as_the_best(trials, before)[0] is first

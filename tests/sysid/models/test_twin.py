@@ -8,6 +8,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.spatial import rotation_from_vector, shift_and_express
 from drake_disasm.scenario import load_scenario
+from drake_disasm.scenario.schema import ImpactConfig
 from drake_disasm.task.replay import TwinReplay
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models import PredictionError
@@ -193,6 +194,21 @@ def test_the_wrench_at_the_sensor_is_the_inverse_of_the_shift_to_the_bolt():
     found = at_sensor(state[None], X_SB)[0]
     np.testing.assert_allclose(found[6:], load, atol=1e-12)
     np.testing.assert_array_equal(found[:6], state[:6])
+
+
+def test_what_is_alike_is_as_stiff_as_the_head(log, turned):
+    """Between walls that the bolt leans on, with IMPACT of another stiffness it is not
+    where it is with hydroelastic contact."""
+    model = make(log, turned)
+    theta = np.array([p.nominal for p in model.parameters])
+    wanted, stiff = model.predictions(theta), model.surrogate()
+    contact = dataclasses.replace(stiff.scenario.contact, impact=ImpactConfig())
+    other = stiff.replace(scenario=dataclasses.replace(stiff.scenario, contact=contact))
+    errors = [
+        np.sqrt(np.mean(((m.predictions(theta) - wanted) / m.measurements.sigma) ** 2))
+        for m in (stiff, other)
+    ]
+    assert errors[0] < errors[1]
 
 
 def test_what_is_alike_has_impact_unless_a_parameter_means_nothing_to_it(log, turned):
