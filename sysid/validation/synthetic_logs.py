@@ -147,7 +147,6 @@ def rollout(
     measured = _Measured(scenario, commanded)
     count, size, _ = commanded.shape
     clean, states = np.zeros((2, count, size, 12))
-    states[:, 0, 6:] = noise[:, 0]
     # A step begins under the load as the model knows it, see `Transitions.begun`.
     is_undone = not any(isinstance(e, SensorMemoryEffect) for e in sensor)
     noise_of_states = np.concatenate([np.zeros_like(noise), noise], axis=2)
@@ -155,6 +154,8 @@ def rollout(
     memories = np.zeros((count, len(motion), 6))
     times = np.arange(1, size, dtype=np.float64) * scenario.task.period
     [zero] = replay.reading_at_zeroing
+    at_once = reading.read(sensor, clean[:, 0], zero, np.zeros(count))
+    states[:, 0, 6:] = at_once[:, 6:] + noise[:, 0]
     for k in range(size - 1):
         in_G = at_bolt(states[:, k], reading.X_SB)
         for e in range(count):

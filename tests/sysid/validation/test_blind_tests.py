@@ -9,6 +9,8 @@ from drake_disasm.common.executors import WorkerPool
 from drake_disasm.common.finished_work import FinishedWork
 from drake_disasm.effects import CommandGain, SensorBias
 from drake_disasm.logs import read_log
+from drake_disasm.logs.transitions import observations
+from sysid.models.sensor_reading import at_sensor
 from sysid.models.twin import TwinModel
 from sysid.validation.blind_tests import (
     Answer,
@@ -121,3 +123,19 @@ def test_tables_and_figure_count_what_was_said():
     assert "2.00 → 1.05" in errors_table([right, tied])
     labels = confusion_figure([right, tied]).axes[0].get_xticklabels()
     assert [label.get_text() for label in labels] == ["SensorBias", "SensorGain"]
+
+
+def test_the_first_reading_has_what_the_sensor_adds(tmp_path):
+    """Else an offset would be a step, from the first reading to the second."""
+    bias = SensorBias(fx=2.0, ty=-0.3)
+    transitions_log(tmp_path / "log", nominal(), [bias], seed=4)
+    model = TwinModel([read_log(tmp_path / "log")], nominal(), ())
+    noise = model.measurements.sigma[0, 6:]
+    first = np.array(
+        [
+            at_sensor(observations(e)[:1], model.reading.X_SB)[0, 6:]
+            for e in read_log(tmp_path / "log").episodes
+        ]
+    )
+    wanted = np.array([2.0, 0.0, 0.0, 0.0, -0.3, 0.0])
+    assert np.all(np.abs(first.mean(axis=0) - wanted) < 4.0 * noise / len(first) ** 0.5)
