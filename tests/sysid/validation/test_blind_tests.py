@@ -130,7 +130,7 @@ def test_the_first_reading_has_what_the_sensor_adds(tmp_path):
     bias = SensorBias(fx=2.0, ty=-0.3)
     transitions_log(tmp_path / "log", nominal(), [bias], seed=4)
     model = TwinModel([read_log(tmp_path / "log")], nominal(), ())
-    noise = model.measurements.sigma[0, 6:]
+    noise = model.measurements.sigma[6:]
     first = np.array(
         [
             at_sensor(observations(e)[:1], model.reading.X_SB)[0, 6:]
