@@ -50,6 +50,14 @@ class Fit:
         return float(np.sum(self.bounded_residual**2))
 
     @property
+    def worst_channel(self) -> float:
+        """The objective of the channel that has the largest.
+
+        Of a log of the twin, whose poses are exact, half of the channels are silent.
+        """
+        return float(np.sqrt(np.mean(self.bounded_residual**2, axis=0)).max())
+
+    @property
     def bounded_residual(self) -> Array:
         """Residuals (rows, channels) whose squares add up to the loss."""
         linear = self.linearisation

@@ -78,7 +78,7 @@ class RefitSearch(ForwardSearch):
         if not rankings:
             return True
         is_confirmed = bool(rankings[-1].confirmed)
-        is_more = fit.objective > self._settings.max_objective_at_noise
+        is_more = fit.worst_channel > self._settings.max_objective_at_noise
         if fit.states_model_error:
             return is_confirmed or is_more
         left = min([fit.loss, *(found.loss for _, found in rankings[-1].confirmed)])
@@ -289,11 +289,42 @@ def _with(effect: Candidate, kept: NDArray[np.bool_]) -> Candidate:
 
 
 def _significant_only(fitter: Fitter, fit: Fit, known: int) -> Fit:
-    """Returns the fit whose effects after the known ones are all significant."""
+    """Returns the fit whose effects after the known ones are all significant.
+
+    Or as few amplitudes as will do, where that costs more: the derivative of one that
+    makes contact hides what the others are worth.
+    """
     effects = fit.significant_only(known)
     if len(effects) == known or effects == fit.effects:
         return fit
-    return fitter.fit(effects, fit)
+    found = fitter.fit(effects, fit)
+    most = (1.0 + fit.settings.min_gain) * fit.loss
+    return found if found.loss <= most else _few_enough(fitter, fit, known, most)
+
+
+def _few_enough(fitter: Fitter, fit: Fit, known: int, most: float) -> Fit:
+    """Returns the fit without amplitudes that it can do without, tried one by one.
+
+    Args:
+        fitter: of all rows.
+        fit: with all of them.
+        known: number of the effects that keep all amplitudes.
+        most: loss that is as good.
+    """
+    names = [(effect.name, f) for effect in fit.effects[known:] for f in effect.fields]
+    for name, field in names:
+        effects = [_without(e, field) if e.name == name else e for e in fit.effects]
+        if any(not effect.fields for effect in effects):
+            continue
+        found = fitter.fit(tuple(effects), fit)
+        if found.loss <= most:
+            fit = found
+    return fit
+
+
+def _without(effect: Candidate, field: str) -> Candidate:
+    """Returns an effect without an amplitude."""
+    return effect.only([each for each in effect.fields if each != field])
 
 
 def ties_by_fit(

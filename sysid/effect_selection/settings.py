@@ -426,7 +426,7 @@ class SelectionSettings:
         "a groove turned by 3 degrees is found from them",
     )
     prescreen_below_gain: float = _setting(
-        0.5,
+        0.8,
         "of the loss",
         "what explains less of it, and leaves more than noise, may stand for another "
         "effect that is not linear at null",

@@ -33,7 +33,8 @@ def gauss_newton(
 
     Each step is SciPy's bounded linear least squares, weighted by Huber's weights
     and damped as by Levenberg and Marquardt; of six dampings, evaluated at once, the
-    best is taken. It finds the local optimum, and how sharp that is.
+    best is taken. It finds the local optimum, and how sharp that is. With one-sided
+    differences each parameter is tried alone where no step of all of them helps.
 
     Args:
         objective: to minimise.
@@ -53,6 +54,8 @@ def gauss_newton(
             callback(value)
         points = np.clip(linearisation.u + _steps(linearisation), 0.0, 1.0)
         batches = _batches(objective, linearisation, points, min_gain, central)
+        if len(u) > 1 and len(batches) > 1:
+            batches.append(np.clip(linearisation.u + _alone(linearisation), 0.0, 1.0))
         point, residual = _best(objective, batches, value)
         reached = objective.value(residual)
         if reached >= value:
@@ -101,6 +104,18 @@ def _best(
         if values[best] < value:
             break
     return batch[best], residuals[best]
+
+
+def _alone(linearisation: Linearisation) -> Array:
+    """Returns steps (p, p) along one parameter each.
+
+    A parameter whose derivative is that of a wall, since its difference makes a contact
+    that is not there, spoils every step that all take together.
+    """
+    J, r = linearisation.flat_jacobian, linearisation.residual.reshape(-1)
+    w = linearisation.weights.reshape(-1)
+    slope, power = J.T @ (w * r), np.einsum("ip,i,ip->p", J, w, J)
+    return np.asarray(np.diag(-slope / np.maximum(power, 1e-300)))
 
 
 def _steps(linearisation: Linearisation) -> Array:
