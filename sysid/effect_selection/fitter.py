@@ -112,13 +112,17 @@ class Fitter:
         """Returns parameters (p,) that fit where the model begins with them.
 
         Effects on the sensor tell where steps begin, which tells the effects. Shapes
-        come last: what a wrong begin leaves may look like any of them.
+        come last: what a wrong begin leaves may look like any of them. A few rows tell
+        it where an evaluation takes seconds.
 
         Args:
             effects: of the model.
             theta: (p,) where to begin.
         """
-        model, _ = extended(self.base, effects, with_shapes=True)
+        base, few = self.base, self.settings.prescreen_rows
+        if base.costly:
+            base = base.thin(max(1, round(base.measurements.rows / few)))
+        model, _ = extended(base, effects, with_shapes=True)
         values = dict(by_name(model.parameters, theta))
         shapes = {p.name: values[p.name] for p in model.parameters if p.is_shape}
         if shapes:
