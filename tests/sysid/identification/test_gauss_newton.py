@@ -3,7 +3,10 @@
 import numpy as np
 
 from sysid.identification.gauss_newton import gauss_newton
+from sysid.models.base import Array, LogModel
+from sysid.models.measurements import Channel, Measurements
 from sysid.objective import Objective
+from sysid.parameters import Parameter
 from sysid.workers import Workers
 from tests.sysid.toys import Decay
 
@@ -24,3 +27,29 @@ def test_far_from_it_a_fit_still_arrives():
     u = np.array([0.9, 0.02, 0.9])
     found = gauss_newton(objective, u, 30, central=False)
     assert objective.value(found.residual) < 1.1
+
+
+class _BetweenWalls(LogModel):
+    """y = a x + |b| w: whichever way b goes, it makes a contact that is not there."""
+
+    def __init__(self) -> None:
+        phase = 2.0 * np.pi * np.arange(40) / 40.0
+        x, z = np.sin(phase), np.cos(phase)
+        self.x, self.w = x, 0.5 * x + 0.87 * z
+        self.parameters = tuple(Parameter(n, 0.0, -5.0, 5.0, "N") for n in "ab")
+        channels = [Channel("y", "N", noise=0.01)]
+        self.measurements = Measurements.of_array(0.3 * x - z, channels)
+
+    def predict(self, theta: Array, rows: slice) -> Array:
+        return (theta[0] * self.x + abs(theta[1]) * self.w)[rows]
+
+    def select_rows(self, mask):
+        return self.replace(x=self.x[mask], w=self.w[mask])
+
+
+def test_where_no_step_of_all_helps_each_parameter_is_tried_alone():
+    objective = Objective(_BetweenWalls(), Workers())
+    start = objective.start
+    found = gauss_newton(objective, start, 6, central=False)
+    a, b = objective.scaling.from_unit(found.u)
+    np.testing.assert_allclose([a, b], [0.3, 0.0], atol=0.01)
