@@ -336,9 +336,9 @@ def ties_by_fit(
 ) -> tuple[Evidence, ...]:
     """Returns rivals that could explain as much as the chosen effect's fit does.
 
-    Those that were fitted are judged by their fits, but for the row at which they are
-    worst in comparison: where a bolt jams, a millimetre decides. Others are judged by
-    the linear account: how much less they explain by it than the best does by the same.
+    Those that were fitted are judged by their fits, but for the row at which the two
+    differ most: where a bolt jams, micrometres decide. Others are judged by the linear
+    account: how much less they explain by it than the best does by the same.
     """
     limit = (1.0 + found.settings.refit_tie_margin) * found.loss
     others = sorted(confirmed, key=lambda trial: -trial[1].loss)

@@ -350,7 +350,7 @@ class SelectionSettings:
         3,
         "fits",
         "after each, steps begin where the wrench says without the sensor's effects as "
-        "they are by then; mostly the first already changes nothing any more",
+        "they are by then; at most, with shapes held and then with them",
     )
     bound_tolerance: float = _setting(
         1e-6,

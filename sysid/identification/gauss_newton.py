@@ -52,10 +52,7 @@ def gauss_newton(
         value = objective.value(linearisation.residual)
         if callback:
             callback(value)
-        points = np.clip(linearisation.u + _steps(linearisation), 0.0, 1.0)
-        batches = _batches(objective, linearisation, points, min_gain, central)
-        if len(u) > 1 and len(batches) > 1:
-            batches.append(np.clip(linearisation.u + _alone(linearisation), 0.0, 1.0))
+        batches = _batches(objective, linearisation, min_gain, central)
         point, residual = _best(objective, batches, value)
         reached = objective.value(residual)
         if reached >= value:
@@ -71,23 +68,26 @@ def gauss_newton(
 def _batches(
     objective: Objective,
     linearisation: Linearisation,
-    points: Array,
     min_gain: float,
     all_at_once: bool,
 ) -> list[Array]:
-    """Returns which of the points (d, p) are evaluated together, one batch after
-    the other as long as none is better.
+    """Returns the points (d, p) that are evaluated together, one batch after the other
+    as long as none is better.
 
     Damped steps promise less than the full one: where that promises less than is worth
-    another iteration, they are not tried.
+    another iteration, they are not tried; nor is each parameter alone.
     """
+    u = linearisation.u
+    points = np.clip(u + _steps(linearisation), 0.0, 1.0)
     if all_at_once:
         return [points]
-    change = linearisation.jacobian @ (points[0] - linearisation.u)
-    promised = objective.value(linearisation.residual + change)
+    promised = objective.value(
+        linearisation.residual + linearisation.jacobian @ (points[0] - u)
+    )
     if promised > (1.0 - min_gain) * objective.value(linearisation.residual):
         return [points[:1]]
-    return [points[:1], points[1:]]
+    alone = [np.clip(u + _alone(linearisation), 0.0, 1.0)] if len(u) > 1 else []
+    return [points[:1], points[1:], *alone]
 
 
 def _best(

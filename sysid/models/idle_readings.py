@@ -54,11 +54,10 @@ class IdleReadings:
         found = cls(is_free, p_SoBo_S, np.zeros((max(map(len, readings)), 6)))
         lever = np.cross(p_SoBo_S, np.diag(noise[:3]))  # of each force, in its row
         moment = np.sqrt(noise[3:] ** 2 + np.sum(lever**2, axis=0))
-        loads = np.zeros_like(found.loads)
         by_chance = _OFFSET * noise / np.sqrt(len(readings))
-        loads += np.where(np.abs(first) > by_chance, 0.0, first)
+        loads = found.loads + np.where(np.abs(first) > by_chance, 0.0, first)
         later, counts = found._moments(readings)
-        spread = _OFFSET * _OF_MEDIAN * moment / np.sqrt(np.maximum(counts, 1))[:, None]
+        spread = _OFFSET * _OF_MEDIAN * moment / np.sqrt(counts)[:, None]
         loads[:, 3:] += np.where(np.abs(later) > spread, 0.0, later)
         return dataclasses.replace(found, loads=loads)
 

@@ -17,6 +17,7 @@ from drake_disasm.cell.tool import Tool
 from drake_disasm.effects import (
     Effect,
     EnvironmentEffect,
+    SensorEffect,
     SensorMemoryEffect,
     motion_chain,
     pose_weights,
@@ -154,8 +155,8 @@ def rollout(
     memories = np.zeros((count, len(motion), 6))
     times = np.arange(1, size, dtype=np.float64) * scenario.task.period
     [zero] = replay.reading_at_zeroing
-    at_once = reading.read(sensor, clean[:, 0], zero, np.zeros(count))
-    states[:, 0, 6:] = at_once[:, 6:] + noise[:, 0]
+    states[:, 0] = _last_read(reading, sensor, clean[:, :1], zero, np.zeros(1))
+    states[:, 0, 6:] += noise[:, 0]
     for k in range(size - 1):
         in_G = at_bolt(states[:, k], reading.X_SB)
         for e in range(count):
@@ -167,13 +168,22 @@ def rollout(
         step = measured.steps(k, in_G, executed[:, k : k + 2])
         [after] = replay.transitions([step])
         clean[:, k + 1] = at_sensor(after, reading.X_SB)
-        for e in range(count):
-            so_far = clean[e, 1 : k + 2]
-            read = reading.read(sensor, so_far, zero, times[: k + 1])
-            states[e, k + 1] = read[-1]
+        so_far = clean[:, 1 : k + 2]
+        states[:, k + 1] = _last_read(reading, sensor, so_far, zero, times[: k + 1])
         states[:, k + 1, 6:] += noise[:, k + 1]
     readings = np.array([reading.raw(s, zero) for s in states])
     return Rollout(commanded, _reported(states, weights, reading), readings)
+
+
+def _last_read(
+    reading: SensorReading,
+    sensor: Sequence[SensorEffect],
+    states: Array,
+    zero: Array,
+    times: Array,
+) -> Array:
+    """Returns how the last states (E, 12) of episodes so far (E, k, 12) are read."""
+    return np.array([reading.read(sensor, own, zero, times)[-1] for own in states])
 
 
 def _reported(states: Array, weights: Array, reading: SensorReading) -> Array:
