@@ -25,6 +25,7 @@ from drake_disasm.impact import NO_BALANCE
 from drake_disasm.logs import Log
 from drake_disasm.logs.schema import WRENCH
 from drake_disasm.scenario import Scenario
+from drake_disasm.scenario.names import find_field
 from drake_disasm.task.replay import Steps
 from sysid.models.base import Array, PredictionError, even_chunks
 from sysid.models.commands import bolt_path, twin_coordinates
@@ -409,8 +410,11 @@ def _with_impact_as_stiff(scenario: Scenario) -> Scenario:
     logs of the cell that is near the best there is (docs/closing-the-loop.md).
     """
     contact, lock = scenario.contact, scenario.lock
-    stiffness = 2.0 * contact.head_modulus * lock.head_thickness
-    impact = dataclasses.replace(contact.impact, stiffness=stiffness * _N_PER_MM)
+    most = find_field(scenario, "contact.impact.stiffness").metadata["high"]
+    stiffness = 2.0 * contact.head_modulus * lock.head_thickness * _N_PER_MM
+    impact = dataclasses.replace(
+        contact.impact, stiffness=min(stiffness, most), exponent=1.0
+    )
     contact = dataclasses.replace(contact, model="impact", impact=impact)
     return dataclasses.replace(scenario, contact=contact)
 

@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.spatial import rotation_from_vector, shift_and_express
-from drake_disasm.scenario import load_scenario
+from drake_disasm.scenario import load_scenario, validate
 from drake_disasm.scenario.schema import ImpactConfig
 from drake_disasm.task.replay import TwinReplay
 from sysid.identification.gauss_newton import gauss_newton
@@ -209,6 +209,13 @@ def test_what_is_alike_is_as_stiff_as_the_head(log, turned):
         for m in (stiff, other)
     ]
     assert errors[0] < errors[1]
+
+
+def test_what_is_alike_to_a_hard_head_is_within_bounds(log):
+    scenario = load_scenario("removal", ["contact.head_modulus=1e11"])
+    surrogate = make(log, scenario).surrogate()
+    validate(surrogate.scenario)
+    assert surrogate.scenario.contact.impact.exponent == 1.0
 
 
 def test_what_is_alike_has_impact_unless_a_parameter_means_nothing_to_it(log, turned):
