@@ -12,6 +12,7 @@ each answer to out/cell_verdicts as it comes, and goes on from there.
 import argparse
 import copy
 import itertools
+import math
 from pathlib import Path
 
 import numpy as np
@@ -68,11 +69,11 @@ def draw(number: int, limits: list[list[object]]) -> Effect:
     return kind(**{str(field): float(size) * random.uniform(*_TIMES)}, **shapes)
 
 
-def answer(log: Log, scenario: Scenario) -> Answer:
-    """Returns what closing the loop says of a log."""
+def answer(log: Log, scenario: Scenario, time_budget: float = math.inf) -> Answer:
+    """Returns what closing the loop says of a log, within a time [s]."""
     model = model_of([log], ModelChoice(scenario=scenario, fixed=True))
     try:
-        closed = close_loop(model)
+        closed = close_loop(model, time_budget=time_budget)
     except DisasmError as error:
         return {"ending": "refused", "names": [], "ties": [], "text": str(error)}
     found = closed.verdict
@@ -81,6 +82,7 @@ def answer(log: Log, scenario: Scenario) -> Answer:
         "ending": found.ending,
         "names": list(found.names),
         "ties": [[tie.name for tie in ties] for ties in found.ties],
+        "provisional": closed.is_provisional,
         "text": closed.text,
         "rms": np.sqrt(np.mean(residual**2, axis=0)).round(2).tolist(),
         "limits": [
@@ -89,8 +91,10 @@ def answer(log: Log, scenario: Scenario) -> Answer:
     }
 
 
-def _case(kind: str, number: int, out: Path, scenario: Scenario) -> Answer:
-    """Returns the answer to a case, with what was put in."""
+def _case(
+    kind: str, number: int, out: Path, scenario: Scenario, time_budget: float
+) -> Answer:
+    """Returns the answer to a case, within a time [s], with what was put in."""
     real, hidden, name = copy.deepcopy(scenario), "", ""
     if kind == "effect":
         effect = draw(number, read_answers(out / "null.jsonl")[0]["limits"])
@@ -100,7 +104,7 @@ def _case(kind: str, number: int, out: Path, scenario: Scenario) -> Answer:
         log = record(out / f"{kind}_{number}", real, seed)
     except RuntimeError as error:
         return {"ending": "not recorded", "names": [], "ties": [], "text": str(error)}
-    return {"hidden": hidden, "kind": name} | answer(log, scenario)
+    return {"hidden": hidden, "kind": name} | answer(log, scenario, time_budget)
 
 
 def _summary(kind: str, answers: list[Answer]) -> str:
@@ -124,12 +128,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("kind", choices=sorted(_SEEDS))
     parser.add_argument("--logs", type=int, default=50)
+    parser.add_argument(
+        "--time-budget", type=float, default=math.inf, metavar="MIN", help="of a log"
+    )
     parser.add_argument("--out", type=Path, default=Path("out/cell_verdicts"))
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     scenario, path = load_scenario("removal"), args.out / f"{args.kind}.jsonl"
+    seconds = 60.0 * args.time_budget
     answers = complete(
-        path, args.logs, lambda number: _case(args.kind, number, args.out, scenario)
+        path,
+        args.logs,
+        lambda number: _case(args.kind, number, args.out, scenario, seconds),
     )
     print(_summary(args.kind, answers), flush=True)
 
