@@ -147,16 +147,15 @@ def rollout(
     reading = SensorReading(scenario, Tool.from_models(scenario))
     measured = _Measured(scenario, commanded)
     count, size, _ = commanded.shape
-    clean, states = np.zeros((2, count, size, 12))
     # A step begins under the load as the model knows it, see `Transitions.begun`.
     is_undone = not any(isinstance(e, SensorMemoryEffect) for e in sensor)
     noise_of_states = np.concatenate([np.zeros_like(noise), noise], axis=2)
+    clean, states = np.zeros_like(noise_of_states), noise_of_states.copy()
     executed = np.array(commanded)
     memories = np.zeros((count, len(motion), 6))
     times = np.arange(1, size, dtype=np.float64) * scenario.task.period
     [zero] = replay.reading_at_zeroing
-    states[:, 0] = _last_read(reading, sensor, clean[:, :1], zero, np.zeros(1))
-    states[:, 0, 6:] += noise[:, 0]
+    states[:, 0] += _last_read(reading, sensor, clean[:, :1], zero, np.zeros(1))
     for k in range(size - 1):
         in_G = at_bolt(states[:, k], reading.X_SB)
         for e in range(count):
@@ -169,8 +168,7 @@ def rollout(
         [after] = replay.transitions([step])
         clean[:, k + 1] = at_sensor(after, reading.X_SB)
         so_far = clean[:, 1 : k + 2]
-        states[:, k + 1] = _last_read(reading, sensor, so_far, zero, times[: k + 1])
-        states[:, k + 1, 6:] += noise[:, k + 1]
+        states[:, k + 1] += _last_read(reading, sensor, so_far, zero, times[: k + 1])
     readings = np.array([reading.raw(s, zero) for s in states])
     return Rollout(commanded, _reported(states, weights, reading), readings)
 

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from drake_disasm.common import options
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Effect
 from drake_disasm.logs import Log, read_log
@@ -129,7 +130,11 @@ def main() -> None:
     parser.add_argument("kind", choices=sorted(_SEEDS))
     parser.add_argument("--logs", type=int, default=50)
     parser.add_argument(
-        "--time-budget", type=float, default=math.inf, metavar="MIN", help="of a log"
+        "--time-budget",
+        type=options.above_zero_or_inf,
+        default=math.inf,
+        metavar="MIN",
+        help="of each log; its answer may be provisional, and stays (default: none)",
     )
     parser.add_argument("--out", type=Path, default=Path("out/cell_verdicts"))
     args = parser.parse_args()
