@@ -199,8 +199,8 @@ def plant_step(
     h, xp, c = arm.h, namespace(rate), conditions
     qd = state.qd + h * rate
     ahead = arm.ahead(state.arm, xp.concat([qd, rate], axis=1))
-    step = ImpactStep(conditions, h, state.q, state.v, ahead[:, :6], ahead[:, 6:])
-    _, outside, is_solved = step.attempt()
+    step = ImpactStep.of(conditions, h, state.q, state.v, ahead[:, :6], ahead[:, 6:])
+    outside = step.wrench
     outside[:, :3] += c.around.f_Gn
     # The contact foresees the plant's step with the inertia at zero; the plant has all.
     M, acting = body.dynamics(state.q, state.v)
@@ -210,4 +210,4 @@ def plant_step(
     v = xp.linalg.solve(A, force[..., None])[..., 0]
     q = state.q + h * v
     after = TwinState(arm.after(ahead, xp.concat([q, v], axis=1)), q, v, qd)
-    return PlantStep(after, state.q, (v - state.v) / h, outside, is_solved)
+    return PlantStep(after, state.q, (v - state.v) / h, outside, step.is_solved)

@@ -1,7 +1,7 @@
 """The thesis's contact law between bolt and groove, and the twin's step with it."""
 
 from drake_disasm.impact.law import ImpactLaw
-from drake_disasm.impact.shape import Contacts, LockShape
+from drake_disasm.impact.shape import LockShape
 from drake_disasm.impact.step import (
     NO_BALANCE,
     ImpactConditions,
@@ -12,7 +12,6 @@ from drake_disasm.impact.step import (
 
 __all__ = [
     "NO_BALANCE",
-    "Contacts",
     "ImpactConditions",
     "ImpactLaw",
     "ImpactStep",

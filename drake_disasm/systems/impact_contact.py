@@ -7,7 +7,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context, LeafSystem
 
-from drake_disasm.impact import ImpactConditions, ImpactStep
+from drake_disasm.impact import NO_BALANCE, ImpactConditions, ImpactStep
 
 
 class ImpactContact(LeafSystem):
@@ -74,13 +74,14 @@ class ImpactContact(LeafSystem):
 
     def _calc(self, context: Context, output: Value) -> None:
         state, desired = self._state.Eval(context), self._desired.Eval(context)
-        step = ImpactStep(
+        step = ImpactStep.of(
             self.conditions(context),
             self._h,
             *(part[None] for part in (state[:6], state[6:], desired[:6], desired[6:])),
         )
-        _, wrenches = step.solve()
-        f, t = wrenches[0, :3], wrenches[0, 3:]
+        if not step.is_solved[0]:
+            raise RuntimeError(NO_BALANCE)
+        f, t = step.wrench[0, :3], step.wrench[0, 3:]
         force = ExternallyAppliedSpatialForce()
         force.body_index = self._bolt
         force.F_Bq_W = SpatialForce(tau=self._R_WGn @ t, f=self._R_WGn @ f)

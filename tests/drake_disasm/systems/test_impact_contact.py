@@ -2,13 +2,22 @@
 
 import numpy as np
 import pytest
+from pydrake.math import RotationMatrix
+from pydrake.multibody.tree import BodyIndex
 
 from drake_disasm.cell.twin_parameters import bolt_stiffness
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.impact import ImpactLaw
+from drake_disasm.impact import (
+    ImpactConditions,
+    ImpactLaw,
+    LockShape,
+    Surroundings,
+)
+from drake_disasm.impact.equations import normal_force
 from drake_disasm.policies import make_policy
-from drake_disasm.scenario import load_scenario
+from drake_disasm.scenario import LockConfig, load_scenario
 from drake_disasm.stations import CellStation
+from drake_disasm.systems.impact_contact import ImpactContact
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.replay import TwinReplay
 from drake_disasm.task.simulation import TaskSimulation
@@ -46,7 +55,7 @@ def test_the_neck_rests_where_law_and_spring_balance(stiffness, exponent):
     depth, force, springs = pressed([f"contact.impact={text}", "contact.friction=0"])
     law = ImpactLaw(stiffness, exponent, 1.0, 0.1)
     assert force == pytest.approx(springs, rel=0.02)
-    expected = 2 * law.force(np.array([depth * 1e-3]), np.zeros(1))[0]
+    expected = 2 * normal_force(depth * 1e-3, 0.0, np.array(law.row))[0]
     assert force == pytest.approx(expected, rel=0.02)
 
 
@@ -90,3 +99,21 @@ def test_an_episode_ends_as_with_hydroelastic_contact():
 def test_it_is_of_the_twin_alone():
     with pytest.raises(DisasmError, match="on the twin only"):
         CellStation(load_scenario("removal", ["contact.model=impact"]))
+
+
+def test_a_step_without_a_balance_is_an_error():
+    conditions = ImpactConditions(
+        law=ImpactLaw(100.0, 1.5, 1.0, 0.1),
+        shape=LockShape.of(LockConfig()),
+        around=Surroundings(np.zeros(1), np.eye(3)[None], *np.zeros((2, 1, 3))),
+        M=np.eye(6),
+        K=np.ones(6),
+        D=np.ones(6),
+        p_BoTo_B=np.zeros(3),
+    )
+    system = ImpactContact(BodyIndex(1), RotationMatrix(), 0.005, conditions)
+    context = system.CreateDefaultContext()
+    system.GetInputPort("state").FixValue(context, np.zeros(12))
+    system.GetInputPort("desired_state").FixValue(context, np.full(12, np.inf))
+    with pytest.raises(RuntimeError, match="no force balances"):
+        system.get_output_port().Eval(context)
