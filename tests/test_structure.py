@@ -36,7 +36,7 @@ FLOORS = {
         {"objective"},
         {"identification", "data_checks"},
         {"effect_selection"},
-        {"validation", "report", "experiment_design"},
+        {"validation", "report", "experiment_design", "studies"},
     ),
 }
 #: What each part of the repository may import of the others.

@@ -37,11 +37,11 @@ class BaselineStudy(Study):
 
     def stages(self, folder: Path) -> Iterator[Stage]:
         """Yields the trainings, then the same episodes for every policy."""
-        treatments = self.treatments()
+        treatments = self.treatments(folder)
         yield Stage(treatments, self.options.seeds)
         yield Stage(tests=self._tests(treatments, folder))
 
-    def treatment(self, levels: dict[str, Level]) -> Treatment:
+    def treatment(self, levels: dict[str, Level], folder: Path) -> Treatment:
         """See Study."""
         return self.of_agent(levels, _SCENARIO)
 
@@ -72,7 +72,7 @@ class BaselineStudy(Study):
 
     def tables(self, folder: Path) -> list[Table]:
         """Returns one table for each imprecision."""
-        treatments = self.treatments()
+        treatments = self.treatments(folder)
         results = finished(treatments, self.options.seeds, folder)
         tables = []
         for psi in self.levels["psi"]:

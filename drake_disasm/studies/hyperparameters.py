@@ -64,9 +64,9 @@ class HyperparameterStudy(Study):
 
     def stages(self, folder: Path) -> Iterator[Stage]:
         """Yields all trainings at once."""
-        yield Stage(self.treatments(), self.options.seeds)
+        yield Stage(self.treatments(folder), self.options.seeds)
 
-    def treatment(self, levels: dict[str, Level]) -> Treatment:
+    def treatment(self, levels: dict[str, Level], folder: Path) -> Treatment:
         """See Study."""
         changes = [f"{name}={float(level):g}" for name, level in levels.items()]
         config = override(preset("chapter5", "ddpg"), changes)
@@ -75,7 +75,7 @@ class HyperparameterStudy(Study):
 
     def tables(self, folder: Path) -> list[Table]:
         """Returns averages, the analysis of variance, and the best combinations."""
-        results = finished(self.treatments(), self.options.seeds, folder)
+        results = finished(self.treatments(folder), self.options.seeds, folder)
         if not results:
             return []
         runs, thesis = _runs(results), self._thesis_runs()
@@ -98,7 +98,7 @@ class HyperparameterStudy(Study):
 
     def pictures(self, folder: Path) -> list[Picture]:
         """Returns plots of main effects and interactions."""
-        results = finished(self.treatments(), self.options.seeds, folder)
+        results = finished(self.treatments(folder), self.options.seeds, folder)
         if not results:
             return []
         sets = {"here": _runs(results)}

@@ -51,17 +51,17 @@ class PrecisionStudy(Study):
     def stages(self, folder: Path) -> Iterator[Stage]:
         """Yields the trainings, then learning from the pooled data of some."""
         seeds = self.options.seeds
-        yield Stage(self.treatments(), seeds)
+        yield Stage(self.treatments(folder), seeds)
         if pooled := self._pooled(folder):
             yield Stage([pooled], seeds)
 
-    def treatment(self, levels: dict[str, Level]) -> Treatment:
+    def treatment(self, levels: dict[str, Level], folder: Path) -> Treatment:
         """See Study."""
         return self.of_agent(levels, "chapter3")
 
     def _pooled(self, folder: Path) -> Treatment | None:
         """Returns learning from all data of the trainings without imprecision."""
-        sources = [t for t in self.treatments() if t.levels == _SOURCE]
+        sources = [t for t in self.treatments(folder) if t.levels == _SOURCE]
         results = finished(sources, self.options.seeds, folder)
         if not results:
             return None
@@ -75,7 +75,7 @@ class PrecisionStudy(Study):
 
     def tables(self, folder: Path) -> list[Table]:
         """Returns success, instability and force by imprecision, and the pooled one."""
-        results = finished(self.treatments(), self.options.seeds, folder)
+        results = finished(self.treatments(folder), self.options.seeds, folder)
         tables = [
             Table(
                 "Trainings in which at least one episode succeeds",
@@ -144,7 +144,7 @@ class PrecisionStudy(Study):
 
     def pictures(self, folder: Path) -> list[Picture]:
         """Returns learning curves of each agent, a line for each imprecision."""
-        results = finished(self.treatments(), self.options.seeds, folder)
+        results = finished(self.treatments(folder), self.options.seeds, folder)
         found = []
         for agent in self.levels["agent"]:
             own = [r for r in results if r.treatment.levels["agent"] == agent]

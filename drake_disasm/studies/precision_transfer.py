@@ -44,12 +44,12 @@ class PrecisionTransferStudy(Study):
 
     def stages(self, folder: Path) -> Iterator[Stage]:
         """Yields the trainings, then tests of their policies at each imprecision."""
-        treatments = self.treatments()
+        treatments = self.treatments(folder)
         yield Stage(treatments, self.options.seeds)
         results = finished(treatments, self.options.seeds, folder)
         yield Stage(tests=[self._test(r, psi) for r in results for psi in _PSI])
 
-    def treatment(self, levels: dict[str, Level]) -> Treatment:
+    def treatment(self, levels: dict[str, Level], folder: Path) -> Treatment:
         """See Study."""
         return self.of_agent(levels, "chapter3")
 
@@ -66,7 +66,7 @@ class PrecisionTransferStudy(Study):
 
     def tables(self, folder: Path) -> list[Table]:
         """Returns performance and success for each pair of imprecisions."""
-        treatments = self.treatments()
+        treatments = self.treatments(folder)
         results = finished(treatments, self.options.seeds, folder)
         return [
             Table(

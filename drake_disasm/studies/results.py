@@ -1,8 +1,9 @@
 """Cells of tables: rates, means and their intervals, as text."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy import stats
 
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.studies.runner import SeedResult
@@ -22,6 +23,20 @@ def mean_of(values: Sequence[float], digits: int = 1) -> str:
         return "-"
     mean, spread = np.mean(values), np.std(values, ddof=1) if len(values) > 1 else 0.0
     return f"{mean:.{digits}f} ± {spread:.{digits}f}"
+
+
+def paired_difference(one: Mapping[int, float], other: Mapping[int, float]) -> str:
+    """Returns the mean of one less the other, and its 95 % interval by Student's t.
+
+    Args:
+        one, other: figures by seed; those that both have are compared.
+    """
+    d = np.array([one[seed] - other[seed] for seed in one if seed in other])
+    if len(d) < 2:
+        return "-"
+    half = stats.t.ppf(0.975, len(d) - 1) * d.std(ddof=1) / np.sqrt(len(d))
+    mean = d.mean()
+    return f"{mean:+.2f} ({mean - half:+.2f} to {mean + half:+.2f}; {len(d)})"
 
 
 def aligned(cells: Sequence[Sequence[str]]) -> list[str]:

@@ -1,8 +1,9 @@
 """Does a study's work: resumable job by job, on whatever executor there is."""
 
 import dataclasses
+import functools
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,13 @@ from drake_disasm.learning.experiment import (
 )
 from drake_disasm.learning.jobs import SeedJob, seed_jobs, train_seeds
 from drake_disasm.policies import SCRIPTED, find_policy, load_policy, make_policy
-from drake_disasm.studies.study import PolicyTest, Stage, Study, Treatment
+from drake_disasm.studies.study import (
+    PolicyTest,
+    Preparation,
+    Stage,
+    Study,
+    Treatment,
+)
 from drake_disasm.systems.policy import Policy
 from drake_disasm.task.simulation import TaskSimulation
 
@@ -86,21 +93,39 @@ def run_study(
         progress: gets what is done of each stage.
     """
     for stage in study.stages(folder):
-        jobs = _jobs(stage, folder)
-        if jobs:
-            train_seeds(jobs, workers, progress, executor=executor, host=host)
-            for treatment in stage.treatments:
-                write_summary(folder / treatment.folder)
-        with WorkerPool(
+        todo = [each for each in stage.preparations if not each.is_finished]
+        tests = [test for test in stage.tests if not test.path.exists()]
+        pool = functools.partial(
+            WorkerPool,
             workers,
             executor=executor,
             host=host,
             process_per_job=True,
             progress=progress,
-        ) as pool:
-            tests = [test for test in stage.tests if not test.path.exists()]
-            for _ in pool.run(run_test, tests):
-                pass
+        )
+        _run_all(pool, prepare, todo)
+        jobs = _jobs(stage, folder)
+        if jobs:
+            train_seeds(jobs, workers, progress, executor=executor, host=host)
+            for treatment in stage.treatments:
+                write_summary(folder / treatment.folder)
+        _run_all(pool, run_test, tests)
+
+
+def _run_all(
+    make_pool: Callable[[], WorkerPool],
+    function: Callable[[Any, Progress], None],
+    jobs: Sequence[Any],
+) -> None:
+    """Does jobs in a pool of workers."""
+    with make_pool() as pool:
+        for _ in pool.run(function, jobs):
+            pass
+
+
+def prepare(job: Preparation, progress: Progress) -> None:
+    """Does a preparation."""
+    job(progress)
 
 
 def _jobs(stage: Stage, folder: Path) -> list[SeedJob]:

@@ -16,9 +16,10 @@ import dataclasses
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.progress import Progress
 from drake_disasm.common.quantity import closest
 from drake_disasm.learning.experiment import Experiment
 from drake_disasm.learning.hyperparameters import Hyperparameters, override, preset
@@ -103,6 +104,17 @@ class PolicyTest:
     seeds: tuple[int, ...]
 
 
+class Preparation(Protocol):
+    """Work of a kind of its own, as one job that other processes can be sent."""
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether its result is there."""
+
+    def __call__(self, progress: Progress) -> None:
+        """Does it, and writes its result last."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Stage:
     """Work that needs nothing but what stages before it have left.
@@ -111,11 +123,13 @@ class Stage:
         treatments: to be trained.
         seeds: of each.
         tests: after that.
+        preparations: before it.
     """
 
     treatments: Sequence[Treatment] = ()
     seeds: Sequence[int] = ()
     tests: Sequence[PolicyTest] = ()
+    preparations: Sequence[Preparation] = ()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -221,8 +235,8 @@ class Study(abc.ABC):
         }
 
     @abc.abstractmethod
-    def treatment(self, levels: dict[str, Level]) -> Treatment:
-        """Returns what a combination of levels means."""
+    def treatment(self, levels: dict[str, Level], folder: Path) -> Treatment:
+        """Returns what a combination of levels means, in a study's folder."""
 
     @abc.abstractmethod
     def stages(self, folder: Path) -> Iterator[Stage]:
@@ -241,9 +255,9 @@ class Study(abc.ABC):
         values = itertools.product(*self.levels.values())
         return [dict(zip(self.levels, each, strict=True)) for each in values]
 
-    def treatments(self) -> list[Treatment]:
+    def treatments(self, folder: Path) -> list[Treatment]:
         """Returns the treatments of all combinations of the chosen levels."""
-        return [self.treatment(levels) for levels in self.combinations()]
+        return [self.treatment(levels, folder) for levels in self.combinations()]
 
     def of_agent(self, levels: dict[str, Level], chapter: str) -> Treatment:
         """Returns the training of the agent "agent" at the imprecision "psi".

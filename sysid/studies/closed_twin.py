@@ -1,0 +1,160 @@
+"""Twins made from a log of the robot: identified, and with the loop closed."""
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+
+from drake_disasm.batch.twin import with_impact
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import make_folder, read_json, write_json, write_text
+from drake_disasm.common.progress import Progress
+from drake_disasm.effects import Effect
+from drake_disasm.logs import Log, read_log
+from drake_disasm.policies import Exploring, make_policy
+from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
+from drake_disasm.scenario.schema import Range
+from drake_disasm.task.recording import record_transitions
+from drake_disasm.task.simulation import TaskSimulation
+from sysid.effect_selection.close_loop import ClosedLoop, close_loop
+from sysid.identification.identify import identify
+from sysid.identification.settings import SearchSettings, Settings
+from sysid.models.from_logs import ModelChoice, model_of
+from sysid.scenario_parameters import Request
+
+_TRANSITIONS = 440  # of the log
+_EXPLORATION = 1.5e-4  # m, of `admittance` while it is recorded
+_PARAMETERS = (
+    "contact.friction",
+    "lock.clearance",
+    "contact.impact.stiffness",
+    "contact.impact.exponent",
+)
+_EVALUATIONS = 200
+_RESULT = {"found": "", "values": [{"name": "", "value": 0.0, "interval": [0.0]}]}
+
+
+@dataclass(frozen=True)
+class ClosedTwin:
+    """Records a log of the robot, and makes twins from it.
+
+    folder/
+      log/               of the robot, `admittance` with some exploration
+      identified.yaml    the nominal twin with what identification makes of the log
+      closed.yaml        the nominal twin with the effects that are found in it
+      intervals.yaml     the same, their values drawn from their intervals
+      result.json        what was found; written last
+
+    Attributes:
+        folder: for all of it.
+        nominal: the twin's scenario.
+        robot: the scenario of what stands for the robot, with effects that the
+            nominal one lacks.
+        station: that simulates it.
+        seed: of the log's first episode.
+        time_budget: of closing the loop [s].
+    """
+
+    folder: Path
+    nominal: Scenario
+    robot: Scenario
+    station: str
+    seed: int
+    time_budget: float
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether the twins are there."""
+        return (self.folder / "result.json").exists()
+
+    def __call__(self, progress: Progress) -> None:
+        """Makes the twins."""
+        make_folder(self.folder)
+        log = self._recorded(progress)
+        self._write("identified", self._identified(log, progress))
+        model = model_of([log], ModelChoice(scenario=self.nominal, fixed=True))
+        try:
+            closed = close_loop(
+                model,
+                progress=progress,
+                folder=self.folder / "fits",
+                time_budget=self.time_budget,
+            )
+        except DisasmError as error:
+            self._write("closed", self.nominal)
+            self._write("intervals", self.nominal)
+            self._write_result(f"refused: {error}", [])
+            return
+        scenario = closed.scenario or self.nominal
+        self._write("closed", scenario)
+        self._write("intervals", with_intervals(scenario, closed))
+        values = [
+            {"name": value.name, "value": value.value, "interval": list(value.interval)}
+            for value in closed.verdict.values
+        ]
+        self._write_result(closed.sentence, values)
+
+    def twin(self, name: str) -> Scenario:
+        """Returns one of the twins, by the name of its file; see the class."""
+        return load_scenario(str(self.folder / f"{name}.yaml"))
+
+    @property
+    def found(self) -> tuple[str, list[str]]:
+        """The verdict's sentence, and each parameter with its 95 % interval."""
+        result = read_json(
+            self.folder / "result.json", "delete it, and resume the study", _RESULT
+        )
+        values = [
+            "{name} {value:.4g} ({interval[0]:.4g} to {interval[1]:.4g})".format(**each)
+            for each in result["values"]
+        ]
+        return str(result["found"]), values
+
+    def _recorded(self, progress: Progress) -> Log:
+        folder, marker = self.folder / "log", self.folder / "recorded"
+        if not marker.exists():
+            base = make_policy("admittance", self.robot)
+            policy = Exploring(base, _EXPLORATION, self.seed)
+            simulation = TaskSimulation(self.robot, self.station, policy)
+            record_transitions(folder, simulation, _TRANSITIONS, self.seed, progress)
+            marker.touch()
+        return read_log(folder)
+
+    def _identified(self, log: Log, progress: Progress) -> Scenario:
+        """Returns the nominal twin with its parameters fitted to the log."""
+        requests = tuple(Request(name) for name in _PARAMETERS)
+        choice = ModelChoice(scenario=with_impact(self.nominal), requests=requests)
+        settings = Settings(
+            search=SearchSettings(evaluations=_EVALUATIONS), unidentifiable="freeze"
+        )
+        found = identify(model_of([log], choice), settings=settings, progress=progress)
+        return found.model.scenario_at(found.theta) or self.nominal
+
+    def _write(self, name: str, scenario: Scenario) -> None:
+        write_text(self.folder / f"{name}.yaml", dump_scenario(scenario))
+
+    def _write_result(self, sentence: str, values: list[dict[str, object]]) -> None:
+        write_json(self.folder / "result.json", {"found": sentence, "values": values})
+
+
+def with_intervals(scenario: Scenario, closed: ClosedLoop) -> Scenario:
+    """Returns a scenario whose effects are drawn from their 95 % intervals.
+
+    Args:
+        scenario: with the effects.
+        closed: what closing the loop found.
+    """
+    present = {type(effect).__name__ for effect in scenario.effects}
+    ranges = [
+        Range(value.name, *value.interval)
+        for value in closed.verdict.values
+        if value.name.partition(".")[0] in present
+        and value.interval[0] < value.interval[1]
+    ]
+    known = {each.parameter for each in ranges}
+    kept = [each for each in scenario.randomisation if each.parameter not in known]
+    return dataclasses.replace(scenario, randomisation=[*kept, *ranges])
+
+
+def with_effects(scenario: Scenario, effects: tuple[Effect, ...]) -> Scenario:
+    """Returns a scenario with further effects."""
+    return dataclasses.replace(scenario, effects=[*scenario.effects, *effects])

@@ -1,0 +1,132 @@
+"""The study of what closing the loop is worth: who trains where, and its tables."""
+
+import dataclasses
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from drake_disasm.common.files import write_text
+from drake_disasm.common.progress import ignore_progress
+from drake_disasm.effects import GroovePose, SensorBias
+from drake_disasm.learning.evaluation import Evaluation
+from drake_disasm.scenario import dump_scenario, load_scenario, validate
+from drake_disasm.studies.results import paired_difference
+from drake_disasm.studies.study import StudyOptions
+from sysid.studies.closed_twin import ClosedTwin, with_effects, with_intervals
+from sysid.studies.mismatches import MISMATCHES
+from sysid.studies.twin_transfer import TwinTransferStudy, _test_path
+
+NOMINAL = load_scenario("chapter3")
+
+
+def study(**levels: list[str]) -> TwinTransferStudy:
+    return TwinTransferStudy(StudyOptions(seeds=(0, 1, 2), levels=levels))
+
+
+def make_robot(folder: Path, name: str) -> None:
+    """Leaves behind what a finished `ClosedTwin` does."""
+    folder = folder / "robots" / name
+    folder.mkdir(parents=True)
+    for twin, rz in (("identified", 0.0), ("closed", 0.05), ("intervals", 0.06)):
+        scenario = with_effects(NOMINAL, (GroovePose(rz=rz),) if rz else ())
+        write_text(folder / f"{twin}.yaml", dump_scenario(scenario))
+    values = [{"name": "GroovePose.rz", "value": 0.05, "interval": [0.04, 0.06]}]
+    result = {"found": "The model lacks a groove that is turned.", "values": values}
+    (folder / "result.json").write_text(json.dumps(result))
+
+
+def test_robots_come_first_and_common_twins_are_trained_once(tmp_path: Path) -> None:
+    two = study(mismatch=["tilted", "biased"], agent=["ddpg", "best"])
+    stages = list(two.stages(tmp_path))
+    assert [each.folder.name for each in stages[0].preparations] == ["tilted", "biased"]
+    assert not stages[1].treatments  # nothing is known of the robots yet
+    make_robot(tmp_path, "tilted")
+    make_robot(tmp_path, "biased")
+    trainings = next(s for s in two.stages(tmp_path) if s.treatments).treatments
+    assert len(trainings) == 2 * (2 + 2 * 4)  # agents; common twins, and two robots'
+    by_folder = {each.folder: each.experiment for each in trainings}
+    assert len(by_folder) == len(trainings)
+    twin = by_folder["mismatch_tilted__agent_ddpg__branch_closed"].scenario
+    assert twin.effects == [GroovePose(rz=0.05)]
+    truth = by_folder["mismatch_biased__agent_ddpg__branch_truth"].scenario
+    assert truth.effects == [SensorBias(fx=3.0)]
+    nominal = by_folder["mismatch_any__agent_best__branch_nominal"].scenario
+    assert not nominal.effects and not nominal.randomisation
+    assert by_folder["mismatch_any__agent_best__branch_wide"].scenario.randomisation
+
+
+def test_every_twin_and_robot_is_within_bounds(tmp_path: Path) -> None:
+    for name, mismatch in MISMATCHES.items():
+        make_robot(tmp_path, name)
+        validate(with_effects(NOMINAL, mismatch.effects))
+    for each in study(agent=["ddpg"])._trainings(tmp_path):
+        validate(each.experiment.scenario)
+
+
+FIGURES = {f.name: 0.0 for f in dataclasses.fields(Evaluation)} | {"truly_out": 0}
+
+
+def leave_figures(
+    folder: Path, branch: str, seed: int, P: float, successes: int
+) -> None:
+    levels: dict[str, Any] = {"mismatch": "tilted", "agent": "ddpg", "branch": branch}
+    path = _test_path(folder, levels, seed)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figures = {"performance": P, "successes": successes, "episodes": 2}
+    path.write_text(json.dumps(FIGURES | figures))
+
+
+def test_tables_compare_seed_by_seed(tmp_path: Path) -> None:
+    make_robot(tmp_path, "tilted")
+    for seed, (before, after) in enumerate([(1.0, 4.0), (2.0, 4.0), (0.0, 4.0)]):
+        leave_figures(tmp_path, "nominal", seed, before, seed % 2)
+        leave_figures(tmp_path, "closed", seed, after, 2)
+    one = study(mismatch=["tilted"], agent=["ddpg"], branch=["nominal", "closed"])
+    found, success, reward, gain, more = one.tables(tmp_path)
+    assert "GroovePose.rz 0.05 (0.04 to 0.06)" in found.rows[0][2]
+    assert success.rows == [["tilted", "ddpg", "1/6 (3 to 56 %)", "6/6 (61 to 100 %)"]]
+    assert reward.rows[0][2:] == ["1.0", "4.0"]
+    assert gain.rows[0][2] == "+3.00 (+0.52 to +5.48; 3)"
+    assert more.rows[0][2].startswith("+0.83 (")
+
+
+def test_a_difference_needs_pairs() -> None:
+    assert paired_difference({0: 1.0, 1: 2.0}, {1: 1.0}) == "-"
+
+
+def test_intervals_become_ranges_of_the_effects_that_were_taken() -> None:
+    values = (
+        SimpleNamespace(name="GroovePose.rz", interval=(0.04, 0.06)),
+        SimpleNamespace(name="SensorBias.fx", interval=(1.0, 2.0)),
+        SimpleNamespace(name="GroovePose.ry", interval=(0.01, 0.01)),
+    )
+    closed: Any = SimpleNamespace(verdict=SimpleNamespace(values=values))
+    twin = with_intervals(with_effects(NOMINAL, (GroovePose(rz=0.05),)), closed)
+    assert [(r.parameter, r.low, r.high) for r in twin.randomisation] == [
+        ("GroovePose.rz", 0.04, 0.06)
+    ]
+    validate(twin)
+
+
+@pytest.mark.slow
+def test_a_robots_log_gives_twins_that_know_it(tmp_path: Path) -> None:
+    robot = ClosedTwin(
+        folder=tmp_path / "turned",
+        nominal=NOMINAL,
+        robot=with_effects(NOMINAL, (GroovePose(ry=0.1),)),
+        station="twin",
+        seed=0,
+        time_budget=600.0,
+    )
+    robot(ignore_progress)
+    assert robot.is_finished
+    sentence, values = robot.found
+    assert "turned" in sentence
+    assert any(value.startswith("GroovePose.ry 0.1") for value in values)
+    effects = robot.twin("closed").effects
+    assert any(type(effect) is GroovePose for effect in effects)
+    assert robot.twin("intervals").randomisation
+    assert robot.twin("identified").contact.model == "impact"
