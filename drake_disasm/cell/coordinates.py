@@ -22,7 +22,7 @@ from pydrake.solvers import Solve
 from drake_disasm.cell.arm_dynamics import add_frames, bolt_jacobian
 from drake_disasm.cell.parsing import add_arm
 from drake_disasm.common.arrays import Array, apply_matrix, namespace
-from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.errors import DisasmError, UnreachableError
 from drake_disasm.common.rotations import Pose, matrices_of_rpy, rpy_of_matrices
 from drake_disasm.common.spatial import rotation_vector
 from drake_disasm.scenario import ArmConfig
@@ -135,7 +135,7 @@ class ArmCoordinates(Coordinates):
         R = wanted.rotation().inverse() @ reached.rotation()
         turn = np.linalg.norm(rotation_vector(R))
         if miss > _TOLERANCE or turn > _TURN_TOLERANCE:
-            raise DisasmError(
+            raise UnreachableError(
                 f"the arm can't follow the command within its limits (off by "
                 f"{1e3 * miss:.2f} mm and {np.rad2deg(turn):.2f} degrees); "
                 "move the lock by placement.p_WG"

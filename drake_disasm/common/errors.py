@@ -1,4 +1,4 @@
-"""The one exception that users are meant to see, and the one kind of warning."""
+"""The exceptions that users are meant to see, and the one kind of warning."""
 
 
 class DisasmError(Exception):
@@ -7,6 +7,10 @@ class DisasmError(Exception):
     The programs in `tools/` print the message alone and exit with status 2;
     code that builds on the package can catch it like any other exception.
     """
+
+
+class UnreachableError(DisasmError):
+    """The arm can't go where it is told, within its limits."""
 
 
 class DisasmWarning(UserWarning):

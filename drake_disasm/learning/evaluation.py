@@ -63,7 +63,7 @@ def evaluate(
     """
     summaries = []
     for seed in seeds:
-        summaries.append(run_episode(simulation, seed, effects=effects))
+        summaries.append(run_episode(simulation, seed, effects=effects, is_judged=True))
         progress(ProgressUpdate("evaluating", len(summaries), len(seeds)))
     return summaries
 

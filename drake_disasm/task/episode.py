@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Protocol
 
+from drake_disasm.common.errors import UnreachableError
 from drake_disasm.common.progress import Progress, ProgressUpdate
 from drake_disasm.effects import Effect
 from drake_disasm.mdp import REWARD_TERMS, BoltState, Outcome
@@ -75,6 +76,7 @@ def run_episode(
     recorder: Recorder | None = None,
     progress: Progress | None = None,
     effects: Sequence[Effect] | None = None,
+    is_judged: bool = False,
 ) -> EpisodeSummary:
     """Runs one episode of a simulation that has a policy.
 
@@ -84,16 +86,25 @@ def run_episode(
         recorder: gets every row, if given; up to an error, too.
         progress: updated after each step; its value is the reward so far.
         effects: instead of the scenario's.
+        is_judged: whether a policy that leads the arm beyond its limits has left the
+            workspace, and that is its outcome.
 
     Raises:
         DisasmError: what the policy raised or returned.
+        UnreachableError: the arm can't follow, and the policy is not judged.
     """
     summary = EpisodeSummary(seed)
     simulation.reset(seed, effects)
     if recorder:
         recorder.measure()
     while summary.outcome is Outcome.RUNNING:
-        result = simulation.step()
+        try:
+            result = simulation.step()
+        except UnreachableError:
+            if not is_judged:
+                raise
+            summary.outcome = Outcome.WORKSPACE
+            break
         summary.add(result)
         if recorder:
             recorder.acted(result)

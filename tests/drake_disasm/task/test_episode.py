@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from drake_disasm.common.errors import UnreachableError
 from drake_disasm.mdp import Outcome
-from drake_disasm.task.episode import EpisodeSummary, summary_table
-from drake_disasm.task.simulation import StepResult
+from drake_disasm.policies import make_policy
+from drake_disasm.scenario import load_scenario
+from drake_disasm.task.episode import EpisodeSummary, run_episode, summary_table
+from drake_disasm.task.simulation import StepResult, TaskSimulation
 
 
 def _result(
@@ -58,3 +61,23 @@ def test_table_says_what_the_summary_does(summary: EpisodeSummary) -> None:
 def test_a_bolt_that_is_out_is_said(summary: EpisodeSummary) -> None:
     summary.bolt_is_out = True
     assert "(the bolt is out)" in summary_table([summary])
+
+
+def test_a_policy_that_leads_the_arm_beyond_its_limits_has_left_the_workspace(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scenario = load_scenario("removal")
+    simulation = TaskSimulation(scenario, "twin", make_policy("straight", scenario))
+    step, steps = simulation.step, iter(range(10))
+
+    def third_is_too_far() -> StepResult:
+        if next(steps) == 2:
+            raise UnreachableError("the arm can't follow the command")
+        return step()
+
+    monkeypatch.setattr(simulation, "step", third_is_too_far)
+    summary = run_episode(simulation, 0, is_judged=True)
+    assert (summary.outcome, summary.steps) == (Outcome.WORKSPACE, 2)
+    steps = iter(range(10))
+    with pytest.raises(UnreachableError):
+        run_episode(simulation, 0)
