@@ -51,11 +51,6 @@ def to_numpy(array: float | Array) -> np.ndarray:
     return np.asarray(array_api_compat.to_device(array, "cpu"))
 
 
-def array_device(array: Array) -> Any:
-    """Returns the device that holds an array, for the arrays made beside it."""
-    return array_api_compat.device(array)
-
-
 def last_axis(parts: Sequence[Any], like: Array) -> Array:
     """Returns numbers or arrays (...) side by side along a new last axis.
 
@@ -128,22 +123,3 @@ def matrix_of(rows: Sequence[Sequence[Array]]) -> Array:
     """Returns matrices (..., n, m) of their elements (...) by rows."""
     xp = namespace(rows[0][0])
     return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def segment_sums(parts: Array, segment: Array, count: int) -> Array:
-    """Returns for each of `count` segments the sum (count, k) of its parts (k, c).
-
-    Args:
-        parts: (k, c).
-        segment: (c,) of each part; ascends.
-        count: of segments.
-    """
-    if isinstance(parts, np.ndarray):
-        total = np.zeros((count, len(parts)))
-        if len(segment):
-            is_first = np.empty(len(segment), bool)
-            is_first[0], is_first[1:] = True, segment[1:] != segment[:-1]
-            first = np.flatnonzero(is_first)
-            total[segment[first]] = np.add.reduceat(parts, first, axis=1).T
-        return total
-    return parts.new_zeros((count, len(parts))).index_add_(0, segment, parts.T)

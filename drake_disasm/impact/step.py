@@ -116,8 +116,7 @@ class ImpactStep:
 
     Attributes:
         v: (n, 6) v+.
-        wrench: (n, 6) of contact and pull on the bolt at Bo, [f; tau]; without the
-            pull.
+        wrench: (n, 6) of the contact on the bolt at Bo, [f; tau].
         is_solved: (n,) whether there is a balance.
     """
 

@@ -1,5 +1,6 @@
 """Cells of tables: rates, means and their intervals, as text."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -25,18 +26,25 @@ def mean_of(values: Sequence[float], digits: int = 1) -> str:
     return f"{mean:.{digits}f} ± {spread:.{digits}f}"
 
 
+def mean_interval(values: Sequence[float]) -> tuple[float, tuple[float, float]]:
+    """Returns the mean of two values or more, and its 95 % interval by Student's t."""
+    mean, count = float(np.mean(values)), len(values)
+    half = float(stats.t.ppf(0.975, count - 1) * np.std(values, ddof=1))
+    half /= math.sqrt(count)
+    return mean, (mean - half, mean + half)
+
+
 def paired_difference(one: Mapping[int, float], other: Mapping[int, float]) -> str:
     """Returns the mean of one less the other, and its 95 % interval by Student's t.
 
     Args:
         one, other: figures by seed; those that both have are compared.
     """
-    d = np.array([one[seed] - other[seed] for seed in one if seed in other])
+    d = [one[seed] - other[seed] for seed in one if seed in other]
     if len(d) < 2:
         return "-"
-    half = stats.t.ppf(0.975, len(d) - 1) * d.std(ddof=1) / np.sqrt(len(d))
-    mean = d.mean()
-    return f"{mean:+.2f} ({mean - half:+.2f} to {mean + half:+.2f}; {len(d)})"
+    mean, (low, high) = mean_interval(d)
+    return f"{mean:+.2f} ({low:+.2f} to {high:+.2f}; {len(d)})"
 
 
 def aligned(cells: Sequence[Sequence[str]]) -> list[str]:

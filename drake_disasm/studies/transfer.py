@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from drake_disasm.common.files import write_json
 from drake_disasm.common.progress import Progress
@@ -33,7 +32,7 @@ from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.training import Purpose, seed_for
 from drake_disasm.policies import load_policy
 from drake_disasm.scenario import Scenario
-from drake_disasm.studies.results import aligned
+from drake_disasm.studies.results import aligned, mean_interval
 from drake_disasm.task.simulation import TaskSimulation
 
 
@@ -259,10 +258,7 @@ def paired_differences(rows: Sequence[dict[str, Any]]) -> list[PairedDifference]
         seeds = tuple(seed for seed in of_closed if seed in others)
         if len(seeds) < 2:
             continue
-        d = np.array([of_closed[seed] - others[seed] for seed in seeds])
-        half = stats.t.ppf(0.975, len(d) - 1) * d.std(ddof=1) / np.sqrt(len(d))
-        mean = float(d.mean())
-        interval = (mean - float(half), mean + float(half))
+        mean, interval = mean_interval([of_closed[s] - others[s] for s in seeds])
         found.append(PairedDifference(row["label"], seeds, mean, interval))
     return found
 

@@ -5,12 +5,13 @@ on twins that know more or less of it (_BRANCHES), and act on the robot without 
 seen it; the cell stands for the robot, and is simulated, too::
 
     folder/
-      robots/MISMATCH/                    a log of the robot, and twins from it
-      AGENT__BRANCH[__MISMATCH]/          trainings on a twin
-      tests/MISMATCH/AGENT__BRANCH/       greedy episodes on the robot, a file per seed
+      robots/MISMATCH/                 a log of the robot, and twins from it
+      mismatch_M__agent_A__branch_B/   trainings on a twin; "any" for a common one
+      tests/MISMATCH/AGENT__BRANCH/    greedy episodes on the robot, a file per seed
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -93,7 +94,7 @@ class TwinTransferStudy(Study):
         yield Stage(tests=self._tests(folder))
 
     def _robot(self, mismatch: str, folder: Path) -> ClosedTwin:
-        nominal = self._nominal()
+        nominal = self._nominal
         return ClosedTwin(
             folder=folder / "robots" / mismatch,
             nominal=nominal,
@@ -103,12 +104,13 @@ class TwinTransferStudy(Study):
             time_budget=_TIME_BUDGET,
         )
 
+    @functools.cached_property
     def _nominal(self) -> Scenario:
         return load_scenario(_SCENARIO, self.options.overrides)
 
     def _twin(self, levels: dict[str, Level], folder: Path) -> Scenario:
         """Returns the scenario on which an agent is trained."""
-        branch, nominal = levels["branch"], self._nominal()
+        branch, nominal = levels["branch"], self._nominal
         if branch == _NOMINAL:
             return nominal
         if branch == _WIDE_NAME:
@@ -123,6 +125,7 @@ class TwinTransferStudy(Study):
         known = levels | ({"mismatch": "any"} if levels["branch"] in _COMMON else {})
         config, preset_name = self._agent(str(levels["agent"]))
         experiment = self.experiment(_SCENARIO, config, preset_name)
+        # One episode on its own twin: it is judged on the robots.
         experiment = dataclasses.replace(
             experiment, scenario=self._twin(levels, folder), validation=1
         )

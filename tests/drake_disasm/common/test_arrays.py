@@ -13,7 +13,6 @@ from drake_disasm.common.arrays import (
     cross,
     exponential,
     last_axis,
-    segment_sums,
     to_numpy,
 )
 
@@ -30,16 +29,6 @@ def test_products_are_numpys(like):
     np.testing.assert_allclose(cross(*given[1:]), np.cross(a, b))
     expected = np.einsum("nij,nj->ni", A, a)
     np.testing.assert_allclose(apply_matrix(*given[:2]), expected)
-
-
-@both
-def test_sums_of_segments_leave_zeros_where_there_are_none(like):
-    parts = RANDOM.normal(size=(2, 5))
-    segment = array_like(np.array([0.0, 0.0, 2.0, 3.0, 3.0]), like)
-    index = segment.astype(int) if isinstance(like, np.ndarray) else segment.long()
-    found = to_numpy(segment_sums(array_like(parts, like), index, 5))
-    expected = [parts[:, :2].sum(1), [0, 0], parts[:, 2], parts[:, 3:].sum(1), [0, 0]]
-    np.testing.assert_allclose(found, expected)
 
 
 @both

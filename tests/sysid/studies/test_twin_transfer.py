@@ -62,8 +62,10 @@ def test_every_twin_and_robot_is_within_bounds(tmp_path: Path) -> None:
     for name, mismatch in MISMATCHES.items():
         make_robot(tmp_path, name)
         validate(with_effects(NOMINAL, mismatch.effects))
-    for each in study(agent=["ddpg"])._trainings(tmp_path):
-        validate(each.experiment.scenario)
+    trainings = study(agent=["ddpg"])._trainings(tmp_path)
+    for each in trainings:
+        validate(each.experiment.scenario)  # raises
+    assert len(trainings) == 2 + 4 * len(MISMATCHES)
 
 
 FIGURES = {f.name: 0.0 for f in dataclasses.fields(Evaluation)} | {"truly_out": 0}
