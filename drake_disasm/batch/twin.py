@@ -125,14 +125,18 @@ class BatchedTwin:
         It takes as long as some steps of the task; for many at once little more than
         for one. Where nothing is drawn from ranges it takes no time.
         """
-        if self._starts is not None:
-            return rows_of(self._starts, self._start_of[rows])
-        drawn = [draw(self.scenarios[i], s) for i, s in zip(rows, seeds, strict=True)]
+        drawn = [k for k, i in enumerate(rows) if self.scenarios[i].randomisation]
+        own = [int(rows[k]) for k in drawn]
         scenarios = [
-            with_values(self.scenarios[i], values)
-            for i, values in zip(rows, drawn, strict=True)
+            with_values(self.scenarios[i], draw(self.scenarios[i], seeds[k]))
+            for i, k in zip(own, drawn, strict=True)
         ]
-        return self._batch.begin([int(i) for i in rows], scenarios)
+        if len(own) == len(rows):
+            return self._batch.begin(own, scenarios)
+        begun = rows_of(self._starts, self._start_of[rows])
+        if own:
+            put_rows(begun, drawn, self._batch.begin(own, scenarios))
+        return begun
 
     def start(
         self, rows: np.ndarray, seeds: Sequence[int], beginning: Episodes
@@ -250,12 +254,12 @@ class BatchedTwin:
     def _common_starts(self) -> tuple[Episodes | None, np.ndarray]:
         """Returns the starts (k, ...) of k scenarios, and which one each row has (n,).
 
-        None where something is drawn for each episode, which makes starts differ.
+        Of scenarios of which nothing is drawn for each episode, which makes starts
+        differ; None if there is no such scenario. Other rows have the first.
         """
-        number: dict[int, int] = {}
-        own = [number.setdefault(id(s), len(number)) for s in self.scenarios]
-        if any(s.randomisation for s in self.scenarios):
-            return None, np.array(own)
-        first = [own.index(k) for k in range(len(number))]
-        starts = self._batch.begin(first, [self.scenarios[i] for i in first])
-        return starts, np.array(own)
+        fixed = {id(s): i for i, s in enumerate(self.scenarios) if not s.randomisation}
+        if not fixed:
+            return None, np.zeros(self.count, int)
+        rows, number = list(fixed.values()), {key: k for k, key in enumerate(fixed)}
+        starts = self._batch.begin(rows, [self.scenarios[i] for i in rows])
+        return starts, np.array([number.get(id(s), 0) for s in self.scenarios])

@@ -1,6 +1,7 @@
 """Twins made from a log of the robot: identified, and with the loop closed."""
 
 import dataclasses
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,7 +31,11 @@ _PARAMETERS = (
     "contact.impact.exponent",
 )
 _EVALUATIONS = 200
-_RESULT = {"found": "", "values": [{"name": "", "value": 0.0, "interval": [0.0]}]}
+_RESULT = {
+    "found": "",
+    "is_provisional": False,
+    "values": [{"name": "", "value": 0.0, "interval": [0.0]}],
+}
 
 
 @dataclass(frozen=True)
@@ -69,20 +74,20 @@ class ClosedTwin:
     def __call__(self, progress: Progress) -> None:
         """Makes the twins."""
         make_folder(self.folder)
-        log = self._recorded(progress)
+        log, fits = self._recorded(progress), self.folder / "fits"
         self._write("identified", self._identified(log, progress))
         model = model_of([log], ModelChoice(scenario=self.nominal, fixed=True))
         try:
             closed = close_loop(
                 model,
                 progress=progress,
-                folder=self.folder / "fits",
+                folder=fits,
                 time_budget=self.time_budget,
             )
         except DisasmError as error:
             self._write("closed", self.nominal)
             self._write("intervals", self.nominal)
-            self._write_result(f"refused: {error}", [])
+            self._write_result(f"refused: {error}", False, [])
             return
         scenario = closed.scenario or self.nominal
         self._write("closed", scenario)
@@ -91,7 +96,8 @@ class ClosedTwin:
             {"name": value.name, "value": value.value, "interval": list(value.interval)}
             for value in closed.verdict.values
         ]
-        self._write_result(closed.sentence, values)
+        self._write_result(closed.sentence, closed.is_provisional, values)
+        shutil.rmtree(fits, ignore_errors=True)
 
     def twin(self, name: str) -> Scenario:
         """Returns one of the twins, by the name of its file; see the class."""
@@ -107,7 +113,8 @@ class ClosedTwin:
             "{name} {value:.4g} ({interval[0]:.4g} to {interval[1]:.4g})".format(**each)
             for each in result["values"]
         ]
-        return str(result["found"]), values
+        provisional = "provisional: " if result["is_provisional"] else ""
+        return f"{provisional}{result['found']}", values
 
     def _recorded(self, progress: Progress) -> Log:
         folder, marker = self.folder / "log", self.folder / "recorded"
@@ -132,8 +139,13 @@ class ClosedTwin:
     def _write(self, name: str, scenario: Scenario) -> None:
         write_text(self.folder / f"{name}.yaml", dump_scenario(scenario))
 
-    def _write_result(self, sentence: str, values: list[dict[str, object]]) -> None:
-        write_json(self.folder / "result.json", {"found": sentence, "values": values})
+    def _write_result(
+        self, sentence: str, is_provisional: bool, values: list[dict[str, object]]
+    ) -> None:
+        write_json(
+            self.folder / "result.json",
+            {"found": sentence, "is_provisional": is_provisional, "values": values},
+        )
 
 
 def with_intervals(scenario: Scenario, closed: ClosedLoop) -> Scenario:

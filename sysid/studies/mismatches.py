@@ -37,6 +37,14 @@ MISMATCHES = {
         "the groove's far end stands up by 3 degrees",
         (GroovePose(rz=math.radians(3.0)),),
     ),
+    "sunk": Mismatch(
+        "the groove's far end is down by 6 degrees",
+        (GroovePose(rz=math.radians(-6.0)),),
+    ),
+    "rolled": Mismatch(
+        "the groove is rolled by -5 degrees about its axis",
+        (GroovePose(rx=math.radians(-5.0)),),
+    ),
     "biased": Mismatch(
         "the sensor has an offset of 3 N along x_S since it was zeroed",
         (SensorBias(fx=3.0),),

@@ -126,6 +126,24 @@ def test_effects_in_other_orders_share_a_batch():
     np.testing.assert_allclose(states[:, 2], alone[:, 0], atol=1e-9)
 
 
+def test_fixed_scenarios_share_their_starts_beside_randomised_ones(monkeypatch):
+    fixed = _with()
+    drawn = _with(randomisation=[Range("GroovePose.ry", 0.02, 0.06)])
+    twin = BatchedTwin([drawn, fixed, drawn, fixed], device="numpy")
+    begun = []
+
+    def begin(rows, scenarios, own=twin._batch.begin):
+        begun.append(rows)
+        return own(rows, scenarios)
+
+    monkeypatch.setattr(twin._batch, "begin", begin)
+    states = _run(twin, [5, 6, 7, 8])
+    assert begun == [[0, 2]]
+    for row, scenario in enumerate(twin.scenarios):
+        alone = _run(BatchedTwin([scenario], device="numpy"), [5 + row])
+        np.testing.assert_allclose(states[:, row], alone[:, 0], atol=1e-9)
+
+
 @dataclasses.dataclass
 class OneAtATime(EnvironmentEffect):
     """Friction by a table, which takes no arrays.
