@@ -131,7 +131,7 @@ class BatchedTwin:
             with_values(self.scenarios[i], draw(self.scenarios[i], seeds[k]))
             for i, k in zip(own, drawn, strict=True)
         ]
-        if len(own) == len(rows):
+        if self._starts is None or len(own) == len(rows):
             return self._batch.begin(own, scenarios)
         begun = rows_of(self._starts, self._start_of[rows])
         if own:
