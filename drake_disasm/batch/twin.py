@@ -19,6 +19,7 @@ from drake_disasm.systems.imprecision import clamped
 from drake_disasm.systems.pose_target import executed_pose, moved_poses
 
 _NOISE_STREAM = 0x4E4F4953  # apart from that of the ranges
+_FAR = 1.0  # m, from where an episode starts: no arm takes a bolt there in a step
 
 
 def with_impact(scenario: Scenario) -> Scenario:
@@ -178,24 +179,34 @@ class BatchedTwin:
             action = numbers.imprecise.action(action, noise)
         self.action_executed = action
         goal = self._goal(action)
-        is_solved = self._batch.advance(episodes, goal, action[:, :3] / self.period)
-        episodes.steps = episodes.steps + 1.0
-        found = self._observed()
-        has_failed = ~(is_finite & is_solved & xp.all(xp.isfinite(found), axis=1))
+        # An environment that fails may overflow; what fails is named below.
+        with np.errstate(over="ignore", invalid="ignore"):
+            is_solved = self._batch.advance(episodes, goal, action[:, :3] / self.period)
+            episodes.steps = episodes.steps + 1.0
+            found = self._observed()
+        is_solved = is_solved & xp.all(xp.isfinite(found), axis=1)
+        is_near = xp.all(xp.abs(found[:, :3]) < _FAR, axis=1)
+        has_failed = ~(is_finite & is_solved & is_near)
         after = self.observation = xp.where(has_failed[:, None], before, found)
         states = BoltState.from_vector(before), BoltState.from_vector(after)
         terms = reward_terms(*states, numbers.task, numbers.geometry)
         terms = {name: xp.where(has_failed, 0.0, term) for name, term in terms.items()}
         ends = outcomes(states[1], episodes.steps, numbers.task, numbers.geometry)
-        return BatchResult(after, terms, ends, self._reasons(has_failed, is_finite))
+        reasons = self._reasons(has_failed, is_finite, is_solved)
+        return BatchResult(after, terms, ends, reasons)
 
-    def _reasons(self, has_failed: Array, is_finite: Array) -> list[str]:
+    def _reasons(
+        self, has_failed: Array, is_finite: Array, is_solved: Array
+    ) -> list[str]:
         """Returns why environments failed (n)."""
-        reasons, fine = [""] * self.count, to_numpy(is_finite)
+        reasons = [""] * self.count
+        fine, solved = to_numpy(is_finite), to_numpy(is_solved)
         for row in np.flatnonzero(to_numpy(has_failed)):
-            reason = "no contact force balances its step"
+            reason = "contact has thrown the bolt away; its stiffness can't be right"
             if not fine[row]:
                 reason = "its action is not finite"
+            elif not solved[row]:
+                reason = "no contact force balances its step"
             reasons[row] = f"environment {row}: {reason}; its episode ends"
         return reasons
 

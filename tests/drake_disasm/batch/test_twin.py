@@ -144,6 +144,26 @@ def test_fixed_scenarios_share_their_starts_beside_randomised_ones(monkeypatch):
         np.testing.assert_allclose(states[:, row], alone[:, 0], atol=1e-9)
 
 
+def test_a_bolt_that_contact_throws_away_ends_its_episode_alone():
+    """Its stiffness grows with the fifth power: no step of time can follow that."""
+    law = ["contact.impact.stiffness=30690", "contact.impact.exponent=4.99"]
+    steep = load_scenario("chapter3", [*IMPACT, *law, "contact.friction=1.6"])
+    usual = load_scenario("chapter3", IMPACT)
+    twin = BatchedTwin([steep] * 200 + [usual], device="numpy")
+    twin.reset(range(201))
+    random, bounds = np.random.default_rng(0), np.array([3e-3] * 3 + [1e-2] * 3)
+    for _ in range(20):
+        moves = np.zeros((201, 6))
+        moves[:200] = random.uniform(-1.0, 1.0, (200, 6)) * bounds
+        result = twin.step(moves)
+        assert np.abs(result.observation[:, :3]).max() < 1.0
+        assert not result.failure[200]
+        thrown = [row for row, why in enumerate(result.failure) if "thrown" in why]
+        if thrown:
+            break
+    assert thrown and result.reward[thrown[0]] == 0.0
+
+
 @dataclasses.dataclass
 class OneAtATime(EnvironmentEffect):
     """Friction by a table, which takes no arrays.
