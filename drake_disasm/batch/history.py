@@ -69,7 +69,11 @@ class BatchHistory:
             "action_executed": self._twin.action_executed,
         } | terms
         self._steps.append({name: _copied(value) for name, value in step.items()})
-        self._measured.append(self._measure(to_numpy(result.outcome)))
+        measured = self._measure(to_numpy(result.outcome))
+        failed = [row for row, why in enumerate(result.failure) if why]
+        for name, values in measured.items():  # a failed simulation stays as it was
+            values[failed] = self._measured[-1][name][failed]
+        self._measured.append(measured)
 
     def episode(self, row: int, steps: int) -> RecordedEpisode:
         """Returns the episode of an environment.
@@ -95,7 +99,7 @@ class BatchHistory:
 
     def _measure(self, outcome: np.ndarray) -> dict[str, np.ndarray]:
         twin = self._twin
-        found = {
+        return {
             "X_GB_measured": _pose_vectors(twin.pose_measured()),
             "X_GB_commanded": _pose_vectors(twin.episodes.commanded),
             "wrench": _copied(twin.observation[:, 6:]),
@@ -103,11 +107,6 @@ class BatchHistory:
             "terminated": _TERMINATED[outcome],
             "truncated": _TRUNCATED[outcome],
         }
-        for name, values in found.items():  # a failed simulation stays as it was
-            broken = ~np.isfinite(values.reshape(twin.count, -1)).all(axis=1)
-            if broken.any():
-                values[broken] = self._measured[-1][name][broken]
-        return found
 
 
 def _copied(values: Any) -> np.ndarray:

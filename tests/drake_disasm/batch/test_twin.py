@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from drake_disasm.batch.history import BatchHistory
 from drake_disasm.batch.starts import NextEpisodes
 from drake_disasm.batch.twin import BatchedTwin
 from drake_disasm.common.errors import DisasmError
@@ -151,17 +152,21 @@ def test_a_bolt_that_contact_throws_away_ends_its_episode_alone():
     usual = load_scenario("chapter3", IMPACT)
     twin = BatchedTwin([steep] * 200 + [usual], device="numpy")
     twin.reset(range(201))
+    history = BatchHistory(twin)
     random, bounds = np.random.default_rng(0), np.array([3e-3] * 3 + [1e-2] * 3)
-    for _ in range(20):
+    for steps in range(1, 20):
         moves = np.zeros((201, 6))
         moves[:200] = random.uniform(-1.0, 1.0, (200, 6)) * bounds
         result = twin.step(moves)
+        history.add(result)
         assert np.abs(result.observation[:, :3]).max() < 1.0
         assert not result.failure[200]
         thrown = [row for row, why in enumerate(result.failure) if "thrown" in why]
         if thrown:
             break
     assert thrown and result.reward[thrown[0]] == 0.0
+    recorded = history.episode(thrown[0], steps).columns()
+    assert np.abs(recorded["X_GB_measured"]).max() < 2.0
 
 
 @dataclasses.dataclass
