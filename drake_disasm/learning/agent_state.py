@@ -36,7 +36,12 @@ class AgentState(NamedTuple):
 
 
 def make_state(config: Hyperparameters, seed: int) -> AgentState:
-    """Returns a fresh agent; the same seed gives the same bits."""
+    """Returns a fresh agent; the same seed gives the same bits.
+
+    No two of its tensors are one, as in any later state: torch would compile the first
+    update for itself, and where another agent has more networks it fails to say why
+    (its issue 176211).
+    """
     generator = torch.Generator().manual_seed(seed)
     soft = config.algorithm == "sac"
     outputs = 2 * _ACTIONS if soft else _ACTIONS
@@ -48,7 +53,7 @@ def make_state(config: Hyperparameters, seed: int) -> AgentState:
         make_layers(sizes, generator, config.layer_norm) for _ in range(config.critics)
     )
     log_entropy = torch.tensor(config.entropy).log()
-    return AgentState(
+    state = AgentState(
         actor,
         critics,
         () if soft else actor,
@@ -58,6 +63,8 @@ def make_state(config: Hyperparameters, seed: int) -> AgentState:
         no_moments(critics),
         no_moments(log_entropy),
     )
+    copied: AgentState = tree_map(torch.clone, state)
+    return copied
 
 
 def _quiet(actor: Layers, log_sigma: float) -> Layers:

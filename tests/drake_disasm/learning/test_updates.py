@@ -9,6 +9,7 @@ import pytest
 import torch
 from stable_baselines3 import DDPG, SAC, TD3
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
+from torch.utils._pytree import tree_leaves
 
 from drake_disasm.learning.agent import Agent
 from drake_disasm.learning.agent_state import AgentState
@@ -239,3 +240,14 @@ def test_merged_draws_give_the_gradient_of_the_repeated_ones(algorithm: str) -> 
         agents.append(torch.utils._pytree.tree_leaves(agent.state))
     for one, other in zip(*agents, strict=True):
         torch.testing.assert_close(one, other, rtol=1e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize("algorithm", ["ddpg", "td3", "sac"])
+def test_no_two_tensors_of_a_state_are_one(algorithm: str) -> None:
+    """Fresh or later: torch compiles one graph, and can tell agents apart."""
+    agent = Agent(preset("chapter3", algorithm), 0, compiled=False)
+    generator = np.random.default_rng(0)
+    for rows in _batches(2):
+        tensors = [t for t in tree_leaves(agent.state) if isinstance(t, torch.Tensor)]
+        assert len({t.data_ptr() for t in tensors}) == len(tensors)
+        agent.learn(rows, generator)
