@@ -76,12 +76,9 @@ class MeshcatView:
         station, stopwatch = systems.station, Stopwatch()
         station.register_part("view", stopwatch)
         builder.AddNamedSystem("view_begins", EachFrame(stopwatch.start))
-        if station.HasOutputPort("query_object"):
-            query = station.GetOutputPort("query_object")
+        query = add_cell_view(builder, station, self.meshcat, self._close_up)
+        if station.HasOutputPort("contact_results"):
             self._add_contact(builder, station.GetOutputPort("contact_results"), query)
-        else:
-            query = _measured_geometry(builder, station)
-        _add_geometry(builder, query, self.meshcat)
         self.wrench = builder.AddNamedSystem(
             "wrench_visualizer", WrenchVisualizer(self.meshcat, station.X_WG)
         )
@@ -90,7 +87,6 @@ class MeshcatView:
                 systems.processor.GetOutputPort(port), self.wrench.GetInputPort(port)
             )
         builder.AddNamedSystem("view_ends", EachFrame(stopwatch.stop))
-        _look_at(self.meshcat, station.X_WG, self._close_up)
 
     def _add_contact(
         self, builder: DiagramBuilder, results: OutputPort, query: OutputPort
@@ -167,6 +163,29 @@ class MeasuredView:
         for name, value in zip(MEASURED_PORTS, values, strict=True):
             self._cell.GetInputPort(name).FixValue(cell_context, value)
         self._diagram.ForcedPublish(self._context)
+
+
+def add_cell_view(
+    builder: DiagramBuilder, station: Station, meshcat: Meshcat, close_up: bool = False
+) -> OutputPort:
+    """Shows a station's cell in Meshcat, a real one as its devices measure it.
+
+    Args:
+        builder: of the diagram that holds the station.
+        station: whose cell it is.
+        meshcat: the server.
+        close_up: whether to look at the groove rather than at the whole cell.
+
+    Returns:
+        The query port of what is shown.
+    """
+    if station.HasOutputPort("query_object"):
+        query = station.GetOutputPort("query_object")
+    else:
+        query = _measured_geometry(builder, station)
+    _add_geometry(builder, query, meshcat)
+    _look_at(meshcat, station.X_WG, close_up)
+    return query
 
 
 def _measured_geometry(builder: DiagramBuilder, station: Station) -> OutputPort:

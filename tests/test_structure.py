@@ -24,7 +24,7 @@ FLOORS = {
         {"safety"},
         {"systems"},
         {"stations", "policies"},
-        {"task", "batch"},
+        {"task", "batch", "free_motion"},
         {"visualization", "learning", "fakes"},
         {"studies"},
     ),

@@ -11,7 +11,9 @@ give wider ones.
 """
 
 import argparse
-from collections.abc import Callable, Sequence
+import contextlib
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,15 +21,21 @@ import numpy as np
 from drake_disasm.cell.parsing import movable_joints
 from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import write_text
+from drake_disasm.free_motion.cell_urdf import cell_urdf
+from drake_disasm.scenario import load_scenario
 from sysid.experiment_design.arm_limits import JointLimits, Workspace
 from sysid.experiment_design.design import DesignSettings, design_motion
 from sysid.experiment_design.information import ArmExperiment, arm_effects
 from sysid.experiment_design.output import TABLE, summary, write_design
 
+_URDF = "arm.urdf"  # of a cell, beside the motion
 _EXAMPLES = """examples:
   python tools/excite.py --urdf arm.urdf --out out/motion
   python tools/excite.py --urdf package://disasm_models/iiwa14/iiwa14.urdf \\
       --floor 0.1 --show JointCoulombFriction JointViscousFriction --out out/motion
+  python tools/excite.py --scenario removal --out out/cell_motion
+                                  for the cell: see tools/play_motion.py
   python tools/excite.py --urdf arm.urdf --duration 10 --harmonics 8 --margin 0.3 \\
       --out out/motion                     shorter, livelier, farther from limits
 """
@@ -37,7 +45,14 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
     parser = program.argument_parser("excite", __doc__, _EXAMPLES)
     add = parser.add_argument
-    add("--urdf", required=True, metavar="FILE", help="that describes the arm")
+    arm = parser.add_mutually_exclusive_group(required=True)
+    arm.add_argument("--urdf", metavar="FILE", help="that describes the arm")
+    arm.add_argument(
+        "--scenario",
+        metavar="NAME|FILE",
+        help="the cell's arm instead, with its tool, which keeps off the bench; its "
+        "URDF is written beside the motion",
+    )
     add("--out", type=Path, required=True, metavar="DIR", help="folder for the motion")
     add(
         "--joints",
@@ -137,13 +152,20 @@ def main(arguments: Sequence[str]) -> int:
         )
     if args.margin >= 0.5:
         raise DisasmError("--margin: 0.5 leaves nothing at either end; give less")
-    joints = tuple(args.joints or movable_joints(args.urdf))
-    limits = JointLimits.of_urdf(args.urdf, joints, args.acceleration, args.margin)
-    workspace = Workspace(args.urdf, joints, limits)
+    with _arm(args) as urdf:
+        _design(args, arguments, urdf)
+    return 0
+
+
+def _design(args: argparse.Namespace, arguments: Sequence[str], urdf: str) -> None:
+    """Designs the motion of a URDF's arm, and writes it."""
+    joints = tuple(args.joints or movable_joints(urdf))
+    limits = JointLimits.of_urdf(urdf, joints, args.acceleration, args.margin)
+    workspace = Workspace(urdf, joints, limits)
     if not workspace.has_geometry:
         print("the URDF has no collision geometry: collisions are not looked for")
     noise = args.noise * np.array(limits.effort)
-    experiment = ArmExperiment(args.urdf, joints, args.show, noise, args.duration)
+    experiment = ArmExperiment(urdf, joints, args.show, noise, args.duration)
     settings = DesignSettings(
         duration=args.duration,
         harmonics=args.harmonics,
@@ -157,9 +179,23 @@ def main(arguments: Sequence[str]) -> int:
         design = design_motion(experiment, limits, workspace, settings, progress)
     provenance = program.provenance("excite", arguments, args.seed)
     write_design(design, experiment, limits, args.rate, args.out, provenance)
+    if args.scenario:
+        write_text(args.out / _URDF, Path(urdf).read_text())
     print("\n".join(summary(design, experiment)))
     print(f"motion: {args.out / TABLE}")
-    return 0
+
+
+@contextlib.contextmanager
+def _arm(args: argparse.Namespace) -> Iterator[str]:
+    """Yields the URDF of the arm; that of a cell is a file for as long as it takes."""
+    if args.urdf:
+        yield args.urdf
+        return
+    text = cell_urdf(load_scenario(args.scenario))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / _URDF
+        write_text(path, text)
+        yield str(path)
 
 
 if __name__ == "__main__":

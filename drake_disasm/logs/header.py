@@ -42,7 +42,8 @@ class LogHeader:
             joint motion that was not sampled evenly.
         joints: names of the joints, in the order of the columns `q.0`, `q.1`, ...
         urdf: the URDF that describes the arm, as `package://` or a path.
-        drive: what is known of the joints' drives: `limit`, `gravity_compensation`.
+        drive: what is known of the joints' drives: `limit`, `gravity_compensation`,
+            `velocity_feedforward`.
         scenario: the scenario, as plain data, so that a log describes itself.
         notes: what is to be known of single episodes, by their numbers: `cut_off`
             says why one was ended from outside; else free.

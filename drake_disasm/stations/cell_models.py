@@ -9,8 +9,8 @@ from pydrake.multibody.tree import FixedOffsetFrame, Frame, ModelInstanceIndex
 
 from drake_disasm.cell.grip import Springs
 from drake_disasm.cell.lock import Lock, add_lock
-from drake_disasm.cell.lock_dimensions import plate_bottom
 from drake_disasm.cell.parsing import add_arm, add_model
+from drake_disasm.cell.placement import bench_top
 from drake_disasm.cell.tool import ToolModels, add_tool, grasp_pose, grasp_rotation
 from drake_disasm.effects import Environment
 from drake_disasm.scenario import Scenario
@@ -91,6 +91,6 @@ def add_cell(
 def _add_bench(plant: MultibodyPlant, frame_Gn: Frame, scenario: Scenario) -> None:
     """Puts the bench's top under the plate, level whatever the groove's yaw."""
     bench = add_model(plant, _BENCH)
-    X_WG = frame_Gn.GetFixedPoseInBodyFrame()
-    X_WTop = RigidTransform(X_WG @ np.array([0.02, plate_bottom(scenario.lock), 0.0]))
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("top", bench), X_WTop)
+    p_WTop = bench_top(frame_Gn.GetFixedPoseInBodyFrame(), scenario.lock)
+    top = plant.GetFrameByName("top", bench)
+    plant.WeldFrames(plant.world_frame(), top, RigidTransform(p_WTop))

@@ -22,7 +22,7 @@ def spike_findings(subject: Subject, expected: Expectation) -> list[DataFinding]
     errors = _errors(subject, expected)
     found = []
     for number, name in enumerate(subject.column_names):
-        alone = _alone(errors[:, number], measured.episode)
+        alone = _alone(errors[:, number], subject.model.piece)
         limit, usual = tail_limit(alone, settings.spike_alpha)
         unit = measured.channels[number].unit
         noise = [
@@ -49,11 +49,16 @@ def _errors(subject: Subject, expected: Expectation) -> Array:
     return table.of(measured.values) - table.of(explained)
 
 
-def _alone(r: Array, episode: NDArray[np.int64]) -> Array:
-    """Returns by how much rows of a residual (n,) are off the median of four around."""
+def _alone(r: Array, piece: NDArray[np.int64]) -> Array:
+    """Returns by how much rows of a residual (n,) are off the median of four around.
+
+    Args:
+        r: the residual.
+        piece: of each row; a residual may jump between two pieces.
+    """
     found = np.zeros(len(r))
-    for number in np.unique(episode):
-        own = np.flatnonzero(episode == number)
+    for number in np.unique(piece):
+        own = np.flatnonzero(piece == number)
         if len(own) > 2:
             padded = np.pad(r[own], 2, mode="reflect")
             windows = np.lib.stride_tricks.sliding_window_view(padded, 5)

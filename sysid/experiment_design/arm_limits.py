@@ -133,8 +133,8 @@ class Workspace:
     """Clearance of an arm's links from each other, and their height over a floor.
 
     By the collision geometry of its URDF, whatever pairs that filters; links that a
-    joint connects are left out, and pairs that overlap in almost all postures: they do
-    so by their models.
+    joint connects are left out, links that are fixed to each other, and pairs that
+    overlap in almost all postures: they do so by their models.
 
     Attributes:
         has_geometry: whether there is any, so that clearance means something.
@@ -228,19 +228,20 @@ class Workspace:
 
 
 def _allow_all_but_neighbours(plant: MultibodyPlant, scene: SceneGraph) -> None:
-    """Filters collisions of links that a joint connects, and no others."""
+    """Filters collisions of links that a joint connects or fixes, and no others."""
 
-    def geometry_of(body: RigidBody) -> GeometrySet:
-        """Returns the collision geometry of a link."""
-        return GeometrySet(plant.GetCollisionGeometriesForBody(body))
+    def geometry_of(*bodies: RigidBody) -> GeometrySet:
+        """Returns the collision geometry of links."""
+        own = map(plant.GetCollisionGeometriesForBody, bodies)
+        return GeometrySet([geometry for found in own for geometry in found])
 
     filters = scene.collision_filter_manager()
     bodies = [plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies())]
     every = [g for b in bodies for g in plant.GetCollisionGeometriesForBody(b)]
     filters.Apply(CollisionFilterDeclaration().AllowWithin(GeometrySet(every)))
     for body in bodies:
-        own = CollisionFilterDeclaration().ExcludeWithin(geometry_of(body))
-        filters.Apply(own)
+        rigid = geometry_of(*plant.GetBodiesWeldedTo(body))
+        filters.Apply(CollisionFilterDeclaration().ExcludeWithin(rigid))
     for index in plant.GetJointIndices():
         joint = plant.get_joint(index)
         pair = geometry_of(joint.parent_body()), geometry_of(joint.child_body())

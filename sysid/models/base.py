@@ -133,6 +133,11 @@ class LogModel(abc.ABC):
         return {}
 
     @property
+    def piece(self) -> NDArray[np.int64]:
+        """Of each row (rows,) its piece: predictions may jump between two; episodes."""
+        return self.measurements.episode
+
+    @property
     def one_way(self) -> tuple[str, ...]:
         """Joints that move one way only; by default none is known."""
         return ()

@@ -48,3 +48,14 @@ def test_bad_input_is_one_line_before_any_work(arguments, message, tmp_path):
 def test_an_urdf_that_is_not_there_is_one_line(tmp_path):
     run = run_program("excite", "--urdf=none.urdf", "--out", str(tmp_path / "motion"))
     assert run.returncode != 0 and "none.urdf" in run.stderr
+
+
+def test_a_scenarios_arm_keeps_its_tool_off_the_bench(tmp_path):
+    run = run_program(
+        "excite", "--scenario=removal", "--joints", "iiwa_joint_6", "iiwa_joint_7",
+        "--iterations=1", "--rate=50", "--duration=6", "--out", str(tmp_path / "motion"),
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    assert '<link name="bench">' in (tmp_path / "motion/arm.urdf").read_text()
+    data = json.loads((tmp_path / "motion/design.json").read_text())
+    assert data["clearance"] > 0.0

@@ -11,7 +11,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from sysid.models.base import Array
 
-_KEYS = ("limit", "gravity_compensation")
+_KEYS = ("limit", "gravity_compensation", "velocity_feedforward")
 
 
 @dataclass(frozen=True)
@@ -23,10 +23,13 @@ class DriveSettings:
             if it doesn't.
         gravity_compensation: whether the controller adds what gravity takes, by the
             URDF, as an arm in impedance control does.
+        velocity_feedforward: whether the damping acts on the error of the velocity,
+            not on the velocity.
     """
 
     limit: float = np.inf
     gravity_compensation: bool = False
+    velocity_feedforward: bool = False
 
     @classmethod
     def of(cls, mapping: Mapping[str, Any], where: str) -> Self:
@@ -49,13 +52,13 @@ class DriveSettings:
                 f"{where}: key 'drive.limit' is {limit!r}; give a number above zero, "
                 "the gain times error at which the amplifier saturates"
             )
-        compensates = mapping.get("gravity_compensation", False)
-        if not isinstance(compensates, bool):
-            raise DisasmError(
-                f"{where}: key 'drive.gravity_compensation' is {compensates!r}; "
-                "give true or false"
-            )
-        return cls(float(limit), compensates)
+        switches = {name: mapping.get(name, False) for name in _KEYS[1:]}
+        for name, value in switches.items():
+            if not isinstance(value, bool):
+                raise DisasmError(
+                    f"{where}: key 'drive.{name}' is {value!r}; give true or false"
+                )
+        return cls(float(limit), **switches)
 
 
 @dataclass(frozen=True)
@@ -64,12 +67,15 @@ class Inputs:
 
     Attributes:
         goal: q_d(t - T), commanded positions [rad].
+        rate: v_d(t - T), their rate, which the damping allows for [rad/s]; 0 if the
+            controller does not.
         gain: g, of the position controller, in its own unit; 1 if none is logged.
         supply: U, the amplifier's voltage [V]; 1 if none is logged.
         enabled: whether the drive is on, 1 or 0.
     """
 
     goal: Array
+    rate: Array
     gain: Array
     supply: Array
     enabled: Array
@@ -84,8 +90,9 @@ class Inputs:
 class Drive:
     """Drives of all joints, for one lane or for many.
 
-    Equation: tau = k U clip(g (q_d(t - T) - q), -c, c) - d v while the drive is on,
-    else 0, and, if it compensates gravity, what that takes. With g = U = 1 this is
+    Equation: tau = k U clip(g (q_d(t - T) - q), -c, c) + d (v_d(t - T) - v) while the
+    drive is on, else 0, and, if it compensates gravity, what that takes; v_d = 0
+    without `velocity_feedforward`. With g = U = 1 this is
     proportional-derivative or joint impedance control. Of a DC motor behind a gear of
     ratio N whose voltage is U times a duty cycle g e, it is k = N k_t / R and
     d = N^2 k_t^2 / R (Duclusaud, Passault, Padois and Ly 2025).
@@ -102,8 +109,8 @@ class Drive:
 
     def torque(self, q: Array, v: Array, inputs: Inputs) -> Array:
         """Returns torques (..., joints) at positions and velocities (..., joints)."""
-        pull = self.pull(q, inputs)
-        return np.asarray(self.stiffness * pull - self.damping * inputs.enabled * v)
+        pull, drag = self.pull(q, inputs), inputs.enabled * (inputs.rate - v)
+        return np.asarray(self.stiffness * pull + self.damping * drag)
 
     def pull(self, q: Array, inputs: Inputs) -> Array:
         """Returns what the stiffness multiplies (..., joints)."""

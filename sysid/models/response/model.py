@@ -121,7 +121,7 @@ class JointResponseModel(LogModel):
         segments: list[Segment] = []
         numbers = []
         for episode in episodes:
-            own, number = segments_of(episode, length, reach)
+            own, number = segments_of(episode, self._settings, length, reach)
             numbers.append(number + len(segments))
             segments += own
         self._segments = tuple(segments)
@@ -141,7 +141,7 @@ class JointResponseModel(LogModel):
             time = episode["time"]
             fit = local_fit(time, episode["q"], time[::every], reach)
             motions.append(np.stack([fit.q, fit.v, fit.vd]))
-            given = inputs_of(episode)
+            given = inputs_of(episode, self._settings)
             inputs.append(given.at(np.s_[::every]))
             velocity = interpolated(time[::every], fit.v, time)
             states.append(np.stack([given.goal, velocity]))
@@ -166,7 +166,7 @@ class JointResponseModel(LogModel):
         has_gain = any("gain" in e for e in episodes)
         has_supply = any("supply" in e for e in episodes)
         per = " per V" * has_supply + " per unit of gain" * has_gain
-        inputs = [inputs_of(episode) for episode in episodes]
+        inputs = [inputs_of(episode, self._settings) for episode in episodes]
         usual = np.median(np.concatenate([i.gain * i.supply for i in inputs]), axis=0)
         found = []
         for i, joint in enumerate(self._joints):
@@ -240,6 +240,11 @@ class JointResponseModel(LogModel):
     def travel(self) -> dict[str, float]:
         """See LogModel."""
         return travel_of(self._joints, self.measurements.values)
+
+    @property
+    def piece(self) -> NDArray[np.int64]:
+        """See LogModel: a segment begins where the arm was measured."""
+        return self._segment
 
     @property
     def one_way(self) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from drake_disasm.importing.signals import chosen_cutoff, even_times, quantum, resample
 from drake_disasm.logs import Episode
 from sysid.models.base import Array
-from sysid.models.response.drive import Inputs
+from sysid.models.response.drive import DriveSettings, Inputs
 
 _LEAST_NOISE = 1e-6  # rad, or m: no encoder is better
 _INNER, _INNER_SHARE = 0.95, 0.87  # of normal noise: rms of those below a quantile
@@ -109,8 +109,8 @@ class Segment:
     def inputs_at(self, times: Array, delay: float) -> Inputs:
         """Returns what goes into the drives at times (..., ), with a late goal.
 
-        Goals and supplies are interpolated; gains and switches hold until the next
-        row.
+        Goals, their rates and supplies are interpolated; gains and switches hold until
+        the next row.
 
         Args:
             times: of the episode [s]; beyond its ends, what is there.
@@ -121,6 +121,7 @@ class Segment:
         return dataclasses.replace(
             self.inputs.at(before),
             goal=interpolated(self.time, self.inputs.goal, times - delay),
+            rate=interpolated(self.time, self.inputs.rate, times - delay),
             supply=interpolated(self.time, self.inputs.supply, times),
         )
 
@@ -130,24 +131,32 @@ def interpolated(time: Array, values: Array, at: Array) -> Array:
     return np.stack([np.interp(at, time, column) for column in values.T], axis=-1)
 
 
-def inputs_of(episode: Episode) -> Inputs:
-    """Returns what goes into the drives in an episode, row by row (n, joints)."""
+def inputs_of(episode: Episode, settings: DriveSettings) -> Inputs:
+    """Returns what goes into the drives in an episode, row by row (n, joints).
+
+    Args:
+        episode: of a log of kind `joint_response`.
+        settings: what is known of the drives.
+    """
     goal = episode["q_commanded"]
+    rate = np.zeros_like(goal)
+    if settings.velocity_feedforward:
+        rate = np.gradient(goal, episode["time"], axis=0)
 
     def or_ones(name: str) -> Array:
         """Returns a quantity, or ones if the log lacks it."""
         return episode[name] if name in episode else np.ones_like(goal)
 
-    return Inputs(goal, or_ones("gain"), or_ones("supply"), or_ones("enabled"))
+    return Inputs(goal, rate, or_ones("gain"), or_ones("supply"), or_ones("enabled"))
 
 
 def segments_of(
-    episode: Episode, length: float, reach: float
+    episode: Episode, settings: DriveSettings, length: float, reach: float
 ) -> tuple[list[Segment], NDArray[np.int64]]:
     """Returns an episode's segments, and the number of each row's (n,).
 
     Args:
-        episode: of a log of kind `joint_response`.
+        episode, settings: see `inputs_of`.
         length: of a segment at least, the episode's if that is shorter [s].
         reach: see `local_fit`.
     """
@@ -157,7 +166,7 @@ def segments_of(
     starts = time[0] + duration / count * np.arange(count)
     number = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, None)
     state = local_fit(time, episode["q"], starts, reach)
-    inputs = inputs_of(episode)
+    inputs = inputs_of(episode, settings)
     segments = [
         Segment(float(start), state.q[i], state.v[i], time, inputs)
         for i, start in enumerate(starts)

@@ -38,7 +38,7 @@ def guessed_drives(
     pull = Drive(none, none, limit).pull(q, inputs)
     found = []
     for i in range(q.shape[1]):
-        on = -inputs.enabled[:, i] * v[:, i]
+        on = inputs.enabled[:, i] * (inputs.rate[:, i] - v[:, i])
         rest = [-np.tanh(v[:, i] / _CREEP), -vd[:, i]]
         A = np.stack([pull[:, i], on, *rest], axis=1)
         scale = np.maximum(np.linalg.norm(A, axis=0), 1e-300)

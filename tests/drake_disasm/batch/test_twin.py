@@ -154,7 +154,9 @@ def test_a_bolt_that_contact_throws_away_ends_its_episode_alone():
     twin.reset(range(201))
     history = BatchHistory(twin)
     random, bounds = np.random.default_rng(0), np.array([3e-3] * 3 + [1e-2] * 3)
-    for steps in range(1, 20):
+    thrown, steps = [], 0
+    while not thrown and steps < 20:
+        steps += 1
         moves = np.zeros((201, 6))
         moves[:200] = random.uniform(-1.0, 1.0, (200, 6)) * bounds
         result = twin.step(moves)
@@ -162,8 +164,6 @@ def test_a_bolt_that_contact_throws_away_ends_its_episode_alone():
         assert np.abs(result.observation[:, :3]).max() < 1.0
         assert not result.failure[200]
         thrown = [row for row, why in enumerate(result.failure) if "thrown" in why]
-        if thrown:
-            break
     assert thrown and result.reward[thrown[0]] == 0.0
     recorded = history.episode(thrown[0], steps).columns()
     assert np.abs(recorded["X_GB_measured"]).max() < 2.0

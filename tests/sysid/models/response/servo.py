@@ -55,7 +55,7 @@ def write_response(folder: Path, *effects, episodes=2, duration=6.0, **columns) 
         for number in range(episodes):
             goal = goals(time, number)
             on = columns.get("enabled", one)
-            inputs = Inputs(goal, columns.get("gain", one), one, on)
+            inputs = Inputs(goal, 0.0 * goal, columns.get("gain", one), one, on)
             segment = Segment(0.0, np.zeros(1), np.zeros(1), time, inputs)
             motion = simulate(arm, [parameters], [segment], 5 * (len(time) - 1), 0.001)
             q = np.round(motion.q[::5, 0, 0] / QUANTUM) * QUANTUM

@@ -1,5 +1,7 @@
 import dataclasses
+import itertools
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +15,9 @@ from drake_disasm.effects import (
 )
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from sysid.data_checks.check import check_data
+from sysid.data_checks.settings import DataSettings
+from sysid.data_checks.spikes import spike_findings
+from sysid.data_checks.subject import Subject
 from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.fitter import Fitter
@@ -165,6 +170,7 @@ def test_degrees_and_a_wrong_sign_are_found(log, tmp_path):
         ({"limit": -1.0}, "give a number above zero"),
         ({"limit": True}, "give a number above zero"),
         ({"gravity_compensation": "yes"}, "give true or false"),
+        ({"velocity_feedforward": 1}, "give true or false"),
     ],
 )
 def test_a_drive_that_can_not_be_is_refused(log, tmp_path, drive, why):
@@ -197,3 +203,16 @@ def test_the_loop_names_a_hidden_friction(tmp_path, hidden):
     log = write_response(tmp_path / "log", hidden)
     closed = close_loop(JointResponseModel([log]))
     assert closed.verdict.names[0].startswith(type(hidden).__name__)
+
+
+def test_where_a_segment_begins_anew_is_no_spike(log):
+    """The arm of another mass drifts away over a segment, and back at its end."""
+    model = JointResponseModel([log])
+    drift = np.zeros_like(model.measurements.values)
+    begins = np.flatnonzero(np.diff(model.piece, prepend=-1))
+    for begin, end in itertools.pairwise([*begins, len(drift)]):
+        drift[begin:end, 0] = 0.05 * np.linspace(0.0, 1.0, end - begin) ** 2
+    noise = model.measurements.noise
+    subject = Subject([log], model, DataSettings())
+    expected = SimpleNamespace(scale=noise, all_residuals=lambda: drift / noise)
+    assert not spike_findings(subject, expected)

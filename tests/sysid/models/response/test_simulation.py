@@ -11,9 +11,9 @@ from drake_disasm.effects import (
     RotorInertia,
 )
 from sysid.models.regressor import ArmDynamics
-from sysid.models.response.drive import Drive, Inputs
+from sysid.models.response.drive import Drive, DriveSettings, Inputs
 from sysid.models.response.rigid_bodies import RigidBodies
-from sysid.models.response.segments import Segment
+from sysid.models.response.segments import Segment, inputs_of
 from sysid.models.response.simulation import Arm, ParameterSet, simulate
 from tests.sysid.models.arm import JOINTS, write_two_link_arm
 
@@ -33,7 +33,8 @@ def goal(t):
 
 def segment(enabled=1.0, gain=1.0, supply=1.0, at=(0.1, 0.3), command=goal):
     one = np.ones((len(TIMES), 2))
-    inputs = Inputs(command(TIMES), gain * one, supply * one, enabled * one)
+    goal, none = command(TIMES), 0.0 * one
+    inputs = Inputs(goal, none, gain * one, supply * one, enabled * one)
     return Segment(0.0, np.array(at), np.zeros(2), TIMES, inputs)
 
 
@@ -134,9 +135,22 @@ def test_gain_times_supply_times_stiffness_is_what_counts(arm):
 def test_a_saturated_drive_pulls_with_its_limit():
     drive = Drive(np.array([2.0]), np.array([0.5]), 0.1)
     one = np.ones((3, 1))
-    inputs = Inputs(np.array([[0.05], [1.0], [-1.0]]), one, one, one)
+    goal = np.array([[0.05], [1.0], [-1.0]])
+    inputs = Inputs(goal, 0.0 * one, one, one, one)
     torque = drive.torque(np.zeros((3, 1)), np.zeros((3, 1)), inputs)
     np.testing.assert_allclose(torque[:, 0], [0.1, 0.2, -0.2])
+
+
+def test_damping_acts_on_the_error_of_the_velocity_if_the_drive_allows_for_it():
+    episode = {"time": TIMES, "q_commanded": goal(TIMES)}
+    drive, v = Drive(K, D, np.inf), np.full((len(TIMES), 2), 0.3)
+    plain = inputs_of(episode, DriveSettings())
+    forward = inputs_of(episode, DriveSettings(velocity_feedforward=True))
+    added = drive.torque(0.0 * v, v, forward) - drive.torque(0.0 * v, v, plain)
+    rate = [1.5 * np.cos(3.0 * TIMES), -0.8 * np.sin(2.0 * TIMES)]
+    np.testing.assert_allclose(added / D, np.stack(rate, axis=1), atol=0.02)
+    late = Segment(0.0, v[0], v[0], TIMES, forward).inputs_at(np.array([1.0]), 0.1)
+    assert late.rate[0, 0] == pytest.approx(1.5 * np.cos(2.7), abs=1e-3)
 
 
 def test_lanes_do_not_see_each_other(arm):

@@ -1,0 +1,11 @@
+"""Motions of the arm away from the lock, played on the cell, simulated or real.
+
+From `motion.csv` of tools/excite.py to a log of kind `joint_response`: the bolt is
+taken out of the groove, the arm goes to where the motion begins, and plays it.
+
+Modules:
+    table     a motion as a table of joint positions, checked against the arm's limits
+    way       from the start of the task to where a motion begins
+    playing   the diagram that plays it, and what was commanded and measured
+    cell_urdf the URDF of arm and tool, which a log of the motion names
+"""

@@ -1,0 +1,122 @@
+"""The diagram that plays a motion of the joints on the cell, and records it."""
+
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    TrajectorySource,
+    VectorLogSink,
+)
+from pydrake.trajectories import PiecewisePolynomial
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
+from drake_disasm.free_motion.table import MotionTable
+from drake_disasm.free_motion.way import with_way
+from drake_disasm.stations import Station
+
+#: Columns of a log of kind `joint_response`, and the ports that they are read from.
+_PORTS = {
+    "q_commanded": "iiwa.position_commanded",
+    "q": "iiwa.position_measured",
+    "v": "iiwa.velocity_estimated",
+    "tau": "iiwa.torque_measured",
+}
+_SLICE = 0.1  # s, between two updates of the progress
+
+
+class MotionPlayer:
+    """Plays a motion on a station of the cell, simulated or real.
+
+    Attributes:
+        station: that moves.
+        simulator: of the whole diagram.
+        begin: when the motion itself begins, after the way to it [s].
+        end: when it has been played [s].
+        period: of what is recorded, the arm's control period [s].
+
+    Args:
+        station: "cell" or "hardware", from `make_station`, its arm at the start of
+            the task.
+        motion: of its joints.
+        add_view: adds to the diagram what shows the station, if anything does.
+
+    Raises:
+        DisasmError: the station has no arm, or it can't go to where the motion begins.
+    """
+
+    def __init__(
+        self,
+        station: Station,
+        motion: MotionTable,
+        add_view: Callable[[DiagramBuilder, Station], object] | None = None,
+    ) -> None:
+        if station.arm != "iiwa":
+            raise DisasmError("the twin has no arm to move; use --station cell")
+        self.station, self.period = station, station.control_period
+        whole, self.begin = with_way(station, motion)
+        self.end = float(whole.time[-1])
+        path = PiecewisePolynomial.CubicShapePreserving(
+            whole.time, whole.q.T, zero_end_point_derivatives=True
+        )
+        builder = DiagramBuilder()
+        builder.AddSystem(station)
+        source = builder.AddNamedSystem("motion", TrajectorySource(path))
+        command = station.GetInputPort("iiwa.position")
+        builder.Connect(source.get_output_port(), command)
+        assert station.grip_command is not None  # every arm here has a gripper
+        grip = builder.AddNamedSystem(
+            "grip", ConstantVectorSource([station.grip_command])
+        )
+        opening = station.GetInputPort("gripper.position")
+        builder.Connect(grip.get_output_port(), opening)
+        self._sinks = {}
+        for name, port in _PORTS.items():
+            sink = builder.AddNamedSystem(
+                f"log_{name}", VectorLogSink(len(station.start), self.period)
+            )
+            builder.Connect(station.GetOutputPort(port), sink.get_input_port())
+            self._sinks[name] = sink
+        if add_view:
+            add_view(builder, station)
+        self.simulator = Simulator(builder.Build())
+        self._context = self.simulator.get_mutable_context()
+
+    def play(
+        self, realtime_rate: float = 0.0, progress: Progress = ignore_progress
+    ) -> None:
+        """Goes to where the motion begins, and plays it.
+
+        Args:
+            realtime_rate: 1 for real time, 0 for full speed.
+            progress: gets the seconds that are done; it may raise to stop the arm
+                where it is.
+
+        Raises:
+            DisasmError: the station can't begin, or holds the robot.
+        """
+        station, simulator = self.station, self.simulator
+        station.begin(station.GetMyMutableContextFromRoot(self._context))
+        station.attach(simulator)
+        simulator.set_target_realtime_rate(realtime_rate)
+        simulator.Initialize()
+        for i in range(1, int(np.ceil(self.end / _SLICE)) + 1):
+            simulator.AdvanceTo(min(i * _SLICE, self.end))
+            station.check()
+            done, total = round(self._context.get_time()), round(self.end)
+            progress(ProgressUpdate("playing the motion", done, total))
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Returns what was recorded of the motion so far, by the log's columns.
+
+        Time begins with the motion. Where `play` was stopped on the way to it, there
+        are no rows.
+        """
+        logs = {name: sink.FindLog(self._context) for name, sink in self._sinks.items()}
+        time = logs["q"].sample_times()
+        kept = time >= self.begin - 0.5 * self.period
+        columns = {name: log.data().T[kept] for name, log in logs.items()}
+        return {"time": time[kept] - self.begin} | columns

@@ -1,0 +1,60 @@
+"""From the start of the task to where a motion begins."""
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from drake_disasm.free_motion.table import MotionTable
+from drake_disasm.stations import Station
+
+_PULL, _LIFT = 0.02, 0.05  # m/s, in the groove and above it
+_HEIGHT = 0.15  # m, above the groove
+_TURN = 0.3  # rad/s, of the fastest joint from there to the motion's begin
+_REST = 0.5  # s, before the motion
+_STEP = 0.02  # s, of the table
+_PEAK = 1.875  # of a quintic's rate, over its mean
+
+
+def with_way(station: Station, motion: MotionTable) -> tuple[MotionTable, float]:
+    """Returns a motion with the way to it, and when the motion itself begins [s].
+
+    The bolt is pulled along the groove to its end and lifted out; from there all
+    joints go straight to where the motion begins. Each part begins and ends at rest.
+    Only the way out of the groove knows of anything to run into.
+
+    Args:
+        station: whose arm stands at the start of the task.
+        motion: to be played afterwards.
+
+    Raises:
+        DisasmError: the arm can't go that way.
+    """
+    end = station.scenario.lock.end
+    corners = np.array([[0.0, 0.0, 0.0], [end, 0.0, 0.0], [end, _HEIGHT, 0.0]])
+    q = [station.start]
+    for begin, target, speed in zip(corners, corners[1:], (_PULL, _LIFT), strict=False):
+        for share in _shares(float(np.linalg.norm(target - begin)), speed):
+            p = begin + share * (target - begin)
+            q.append(station.coordinates.solve(RigidTransform(p), q[-1]))
+    last, first = q[-1], motion.q[0]
+    turn = float(np.abs(first - last).max())
+    q += [last + share * (first - last) for share in _shares(turn, _TURN)]
+    rows = round(_REST / _STEP)
+    q += [first] * rows
+    time = _STEP * np.arange(len(q))
+    joined = MotionTable(
+        np.concatenate([time, time[-1] + motion.time[1:]]),
+        np.concatenate([q, motion.q[1:]]),
+    )
+    return joined, float(time[-1])
+
+
+def _shares(length: float, speed: float) -> np.ndarray:
+    """Returns the shares (n,) of a way that are done, by a quintic from rest to rest.
+
+    Args:
+        length: of the way.
+        speed: greatest.
+    """
+    rows = max(1, int(np.ceil(_PEAK * length / speed / _STEP)))
+    s = np.arange(1, rows + 1) / rows
+    return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))

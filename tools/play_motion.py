@@ -1,0 +1,193 @@
+"""Plays a motion of the joints on the cell, simulated or real, and records it.
+
+MOTION is a table as tools/excite.py writes it: time, q.0, q.1, ... in SI. The bolt is
+taken out of the groove, the arm goes to where the motion begins and plays it once. What
+was commanded and measured becomes a log of kind `joint_response`, with the URDF of arm
+and tool beside it: tools/close_loop.py finds the arm's friction and payload in it.
+
+Nothing looks out for what the arm could run into: watch the motion in the simulated
+cell first. The arm stays where the motion ends.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
+from pathlib import Path
+
+import cli
+import hardware
+
+from drake_disasm.common import options, program
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import write_text
+from drake_disasm.free_motion.cell_urdf import cell_urdf
+from drake_disasm.free_motion.playing import MotionPlayer
+from drake_disasm.free_motion.table import read_motion, refuse_beyond_limits
+from drake_disasm.logs import LogHeader, LogWriter, flat_columns
+from drake_disasm.scenario import Scenario, load_scenario, scenario_to_mapping
+from drake_disasm.stations import Station, make_station
+from drake_disasm.visualization import add_cell_view, start_meshcat
+
+_JOINTS = tuple(f"iiwa_joint_{i}" for i in range(1, 8))
+_URDF = "arm.urdf"
+#: What is known of the drives: of the simulated ones all, of KUKA's this.
+_SIMULATED = {"gravity_compensation": True, "velocity_feedforward": True}
+_REAL = {"gravity_compensation": True}
+_EXAMPLES = """examples:
+  python tools/excite.py --urdf package://disasm_models/iiwa14/iiwa14.urdf \\
+      --floor 0.1 --out out/motion                       a motion that shows friction
+  python tools/play_motion.py out/motion/motion.csv       watch it in Meshcat
+  python tools/play_motion.py out/motion/motion.csv --no-meshcat --record out/arm_log \\
+      --hidden arm.yaml        a log that states removal and measured another arm
+  python tools/close_loop.py --log out/arm_log --out out/arm_closed
+"""
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    parser = program.argument_parser("play_motion", __doc__, _EXAMPLES)
+    add = parser.add_argument
+    add("motion", type=Path, metavar="MOTION", help="CSV file")
+    cli.add_scenario_arguments(parser)
+    cli.add_station_argument(
+        add,
+        "cell",
+        "the simulated cell, or the hardware, which are the devices of "
+        "--hardware-config",
+        hardware=True,
+    )
+    add(
+        "--hardware-config",
+        type=Path,
+        metavar="FILE",
+        help="where the devices are, and limits; see models/hardware/cell.yaml",
+    )
+    add("--record", type=Path, metavar="DIR", help="write a log into an empty folder")
+    add(
+        "--hidden",
+        metavar="NAME|FILE",
+        help="simulate this scenario instead, while the log states --scenario: an arm "
+        "with effects that nobody declared (--set applies to both)",
+    )
+    add("--no-meshcat", action="store_true", help="run without a view, at full speed")
+    add(
+        "--meshcat-host",
+        default="localhost",
+        metavar="HOST",
+        help="address that the page listens on; '*' for all (default: localhost)",
+    )
+    add(
+        "--realtime-rate",
+        type=options.nonnegative,
+        metavar="X",
+        help="1 is real time, 0 full speed (default: 1 if somebody watches, else 0)",
+    )
+    return parser.parse_args(arguments)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the program; returns its exit status."""
+    args = parse(arguments)
+    _refuse_contradictions(args)
+    scenario = load_scenario(args.scenario, args.overrides)
+    motion = read_motion(args.motion, len(_JOINTS))
+    refuse_beyond_limits(motion, scenario.arm.model, args.motion)
+    writer = _open_log(args, arguments, scenario) if args.record else None
+    with _station(args, scenario) as station:
+        player = MotionPlayer(station, motion, _view(args))
+        print(
+            f"{player.begin:.1f} s to where the motion begins, then "
+            f"{player.end - player.begin:.1f} s",
+            flush=True,
+        )
+        try:
+            with program.ProgressBar("s") as progress:
+                player.play(_rate(args), progress)
+        finally:
+            if writer:
+                _keep(writer, player, scenario)
+    return 0
+
+
+def _refuse_contradictions(args: argparse.Namespace) -> None:
+    """Refuses options that do not go together.
+
+    Raises:
+        DisasmError: names the first.
+    """
+    if args.station == "twin":
+        raise DisasmError("--station twin: has no arm; use cell or hardware")
+    if args.station != "hardware":
+        if args.hardware_config:
+            raise DisasmError("--hardware-config: is for --station hardware")
+        return
+    for name in ("hidden", "realtime_rate"):
+        if getattr(args, name) is not None:
+            option = name.replace("_", "-")
+            raise DisasmError(f"--{option}: hardware can't do that; leave it out")
+
+
+def _station(
+    args: argparse.Namespace, scenario: Scenario
+) -> AbstractContextManager[Station]:
+    if args.station == "hardware":
+        return hardware.open_station(scenario, args.hardware_config, False)
+    real = load_scenario(args.hidden, args.overrides) if args.hidden else scenario
+    return nullcontext(make_station(args.station, real))
+
+
+def _view(args: argparse.Namespace) -> Callable[..., object] | None:
+    if args.no_meshcat:
+        return None
+    meshcat = start_meshcat(args.meshcat_host)
+    print(f"watch at {meshcat.web_url()}", flush=True)
+    return partial(add_cell_view, meshcat=meshcat)
+
+
+def _rate(args: argparse.Namespace) -> float:
+    if args.station == "hardware":
+        return 1.0
+    if args.realtime_rate is not None:
+        return float(args.realtime_rate)
+    return 0.0 if args.no_meshcat or not sys.stdout.isatty() else 1.0
+
+
+def _open_log(
+    args: argparse.Namespace, arguments: Sequence[str], scenario: Scenario
+) -> LogWriter:
+    is_real = args.station == "hardware"
+    provenance = program.provenance("play_motion", arguments, 0) | {
+        "motion": str(args.motion),
+        "hidden": bool(args.hidden),
+        "simulated": not is_real,
+        "station": args.station,
+    }
+    header = LogHeader(
+        kind="joint_response",
+        task="free motion",
+        provenance=provenance,
+        period=scenario.arm.control_period,
+        joints=_JOINTS,
+        urdf=str((args.record / _URDF).absolute()),
+        drive=_REAL if is_real else _SIMULATED,
+        scenario=scenario_to_mapping(scenario),
+    )
+    return LogWriter(args.record, header)
+
+
+def _keep(writer: LogWriter, player: MotionPlayer, scenario: Scenario) -> None:
+    """Writes what was recorded, all of the motion or what was played of it."""
+    columns = player.columns()
+    if len(columns["time"]) < 2:
+        print("log: the motion had not begun; nothing was recorded")
+        return
+    with writer:
+        write_text(writer.folder / _URDF, cell_urdf(scenario))
+        writer.write_episode(flat_columns("joint_response", columns))
+    print(f"log: {writer.folder}")
+
+
+if __name__ == "__main__":
+    program.run(main)
