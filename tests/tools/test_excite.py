@@ -53,7 +53,7 @@ def test_an_urdf_that_is_not_there_is_one_line(tmp_path):
 def test_a_scenarios_arm_keeps_its_tool_off_the_bench(tmp_path):
     run = run_program(
         "excite", "--scenario=removal", "--joints", "iiwa_joint_6", "iiwa_joint_7",
-        "--iterations=1", "--rate=50", "--duration=6", "--out", str(tmp_path / "motion"),
+        "--iterations=1", "--rate=50", "--duration=6", "--out", tmp_path / "motion",
     )  # fmt: skip
     assert run.returncode == 0, run.stderr
     assert '<link name="bench">' in (tmp_path / "motion/arm.urdf").read_text()

@@ -1,7 +1,7 @@
 """The drive of each joint: a position controller, its amplifier and its motor."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -84,6 +84,12 @@ class Inputs:
         """Returns the inputs at an index of the leading axes."""
         names = [f.name for f in dataclasses.fields(self)]
         return Inputs(*(getattr(self, name)[index] for name in names))
+
+
+def joined(parts: Sequence[Inputs]) -> Inputs:
+    """Returns the inputs of several parts, one after the other."""
+    names = [f.name for f in dataclasses.fields(Inputs)]
+    return Inputs(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
 
 
 @dataclass(frozen=True)

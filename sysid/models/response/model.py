@@ -19,7 +19,7 @@ from sysid.models.base import Array, LogModel
 from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints, prismatic_unit
 from sysid.models.measurements import Channel, Measurements
-from sysid.models.response.drive import Drive, DriveSettings, Inputs
+from sysid.models.response.drive import Drive, DriveSettings, joined
 from sysid.models.response.rigid_bodies import RigidBodies
 from sysid.models.response.segments import (
     Segment,
@@ -48,6 +48,7 @@ _FEWEST = 24  # of a thinned model, if there are so many
 _REACH = 30.0  # times what was guessed, on either side
 _LONGEST = 0.3  # s, of damping over stiffness: slower is no servo
 _LATEST = 0.05  # s, of a goal
+_TRIED = 21  # delays of the goal, evenly spaced, that the guess is made of
 _MANY = 5.0  # times the greatest torque of the rigid bodies, at most, by any effect
 _MOST_ROWS = 2000  # that the guess is made of
 
@@ -136,13 +137,15 @@ class JointResponseModel(LogModel):
         Keeps each row's goal and velocity.
         """
         every = max(1, len(self._time) // _MOST_ROWS)
+        delays = np.linspace(0.0, _LATEST, _TRIED).tolist()
         motions, inputs, states = [], [], []
         for episode in episodes:
             time = episode["time"]
             fit = local_fit(time, episode["q"], time[::every], reach)
             motions.append(np.stack([fit.q, fit.v, fit.vd]))
             given = inputs_of(episode, self._settings)
-            inputs.append(given.at(np.s_[::every]))
+            whole = Segment(0.0, fit.q[0], fit.v[0], time, given)
+            inputs.append([whole.inputs_at(time[::every], t) for t in delays])
             velocity = interpolated(time[::every], fit.v, time)
             states.append(np.stack([given.goal, velocity]))
         self._state = np.concatenate(states, axis=1)
@@ -151,13 +154,8 @@ class JointResponseModel(LogModel):
         self._most = _largest(load, v, vd)
         if self._settings.gravity_compensation:
             load = load - self._bodies.holding(q)
-        joined = Inputs(
-            *(
-                np.concatenate([getattr(i, f.name) for i in inputs])
-                for f in dataclasses.fields(Inputs)
-            )
-        )
-        return guessed_drives(load, q, v, vd, joined, self._settings.limit)
+        by_delay = {t: joined(own) for t, *own in zip(delays, *inputs, strict=True)}
+        return guessed_drives(load, q, v, vd, by_delay, self._settings.limit)
 
     def _drive_parameters(
         self, guess: Guess, episodes: Sequence[Episode], logs: Sequence[Log]
@@ -194,7 +192,9 @@ class JointResponseModel(LogModel):
                 ),
                 Parameter(f"{joint}.damping", d, 0.0, most, of_damping, "of the drive"),
             ]
-        delay = Parameter("delay", 0.0, 0.0, _LATEST, "s", "of what is commanded")
+        delay = Parameter(
+            "delay", guess.delay, 0.0, _LATEST, "s", "of what is commanded"
+        )
         return (*found, delay)
 
     # Effects.
