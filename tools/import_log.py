@@ -20,6 +20,7 @@ from drake_disasm.cell.parsing import movable_joints
 from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_text
+from drake_disasm.common.resources import model_path
 from drake_disasm.importing import (
     FieldMap,
     Processing,
@@ -160,6 +161,8 @@ def main(arguments: Sequence[str]) -> int:
 
 def _fields(args: argparse.Namespace, sources: Sequence[Source]) -> FieldMap:
     """Returns the map that is given, or guessed; the command line comes first."""
+    if args.urdf:
+        model_path(args.urdf, "give a file that is there by --urdf")
     joints = args.joints or (movable_joints(args.urdf) if args.urdf else [])
     if args.map:
         fields = read_map(args.map)

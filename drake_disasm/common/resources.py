@@ -34,8 +34,12 @@ def package_map() -> PackageMap:
     return packages
 
 
-def model_path(url: str) -> Path:
+def model_path(url: str, remedy: str = "check the `model` key in the scenario") -> Path:
     """Returns the file of a `package://disasm_models/...` URL or a plain path.
+
+    Args:
+        url: of the file.
+        remedy: what to do if it is missing.
 
     Raises:
         DisasmError: there is no such file.
@@ -43,8 +47,5 @@ def model_path(url: str) -> Path:
     prefix = f"package://{MODELS_PACKAGE}/"
     path = models_dir() / url.removeprefix(prefix) if url.startswith(prefix) else url
     if not os.path.isfile(path):  # pathlib's raises on a name that is too long
-        raise DisasmError(
-            f"model file {url} is missing (looked at {path}); "
-            "check the `model` key in the scenario"
-        )
+        raise DisasmError(f"model file {url} is missing (looked at {path}); {remedy}")
     return Path(path)

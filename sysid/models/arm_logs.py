@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
+from drake_disasm.common.resources import model_path
 from drake_disasm.effects import Effect
 from drake_disasm.logs import Log
 from drake_disasm.logs.refusal import refusal
@@ -15,13 +16,11 @@ def arm_urdf(logs: Sequence[Log], urdf: str | None) -> str:
     Raises:
         DisasmError: there is none.
     """
-    urdf = urdf or logs[0].header.urdf
-    if urdf is None:
-        raise refusal(
-            logs[0].folder / "log.yaml",
-            "no 'urdf'",
-            "give the arm's URDF by --urdf FILE",
-        )
+    where, remedy = logs[0].folder / "log.yaml", "give the arm's URDF by --urdf FILE"
+    if not urdf and logs[0].header.urdf is None:
+        raise refusal(where, "no 'urdf'", remedy)
+    urdf = str(urdf or logs[0].header.urdf)
+    model_path(urdf, f"{remedy}, or correct {where}")
     return urdf
 
 

@@ -54,6 +54,7 @@ def test_a_recording_becomes_a_log(table: Path, tmp_path: Path) -> None:
         (["TABLE", "--out", "x", "--joints", "a"], "q has 2 channels, not 1"),
         (["TABLE", "--out", "x", "--cutoff", "-3"], "--cutoff"),
         (["TABLE", "--out", "x", "--urdf", "none.urdf"], "none.urdf"),
+        (["TABLE", "--out", "x", "--urdf", "none.urdf", "--joints", "a"], "none.urdf"),
     ],
 )
 def test_bad_input_is_one_line(

@@ -180,6 +180,18 @@ def test_a_drive_that_can_not_be_is_refused(log, tmp_path, drive, why):
         JointResponseModel([other])
 
 
+def test_an_arm_whose_urdf_is_gone_is_one_line_with_the_remedy(log, tmp_path):
+    header = dataclasses.replace(log.header, urdf=str(tmp_path / "gone.urdf"))
+    other = rewritten(log, tmp_path / "other", header)
+    with pytest.raises(
+        DisasmError, match=r"gone\.urdf.*--urdf FILE.*log\.yaml"
+    ) as caught:
+        JointResponseModel([other])
+    assert "\n" not in str(caught.value)
+    model = JointResponseModel([other], urdf=log.header.urdf)
+    assert model.joints == log.header.joints
+
+
 def test_no_candidate_fails_where_its_derivative_is_taken(log):
     model = JointResponseModel([log])
     fitter = Fitter.of(model, Workers(), model.default_huber_delta, DEFAULT_SETTINGS)
