@@ -105,6 +105,34 @@ def _former_model(name: str) -> str:
     raise DisasmError(f"--model {name}: is --station {name} now")
 
 
+def add_view_arguments(add: Callable[..., Any]) -> None:
+    """Adds --no-meshcat, --meshcat-host and --realtime-rate.
+
+    Args:
+        add: a parser's `add_argument`.
+    """
+    add("--no-meshcat", action="store_true", help="run without a view, at full speed")
+    add(
+        "--meshcat-host",
+        default="localhost",
+        metavar="HOST",
+        help="address that the page listens on; '*' for all (default: localhost)",
+    )
+    add(
+        "--realtime-rate",
+        type=options.nonnegative,
+        metavar="X",
+        help="1 is real time, 0 full speed (default: 1 if somebody watches, else 0)",
+    )
+
+
+def realtime_rate(args: argparse.Namespace) -> float:
+    """Returns the rate at which to simulate: 1 is real time, 0 full speed."""
+    if args.realtime_rate is not None:
+        return float(args.realtime_rate)
+    return 0.0 if args.no_meshcat or not sys.stdout.isatty() else 1.0
+
+
 def add_workers_argument(parser: argparse.ArgumentParser, more: str = "") -> None:
     """Adds --workers, with more to say about it."""
     parser.add_argument(

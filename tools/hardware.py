@@ -1,7 +1,8 @@
-"""What simulate.py does with --station hardware."""
+"""What simulate.py and play_motion.py do with --station hardware."""
 
 import dataclasses
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from drake_disasm.common import program
@@ -16,6 +17,20 @@ from drake_disasm.visualization import MeasuredView
 _EVERY = 0.5  # s, between two looks of a dry run
 _FRAMES = 10  # of the view, in that time
 _POLL = 0.001  # s: LCM keeps one message of a channel and drops later ones
+
+
+def add_config_argument(add: Callable[..., object]) -> None:
+    """Adds --hardware-config.
+
+    Args:
+        add: a parser's `add_argument`.
+    """
+    add(
+        "--hardware-config",
+        type=Path,
+        metavar="FILE",
+        help="where the devices are, and limits; see models/hardware/cell.yaml",
+    )
 
 
 def open_station(

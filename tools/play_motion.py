@@ -10,7 +10,6 @@ cell first. The arm stays where the motion ends.
 """
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
@@ -19,7 +18,7 @@ from pathlib import Path
 import cli
 import hardware
 
-from drake_disasm.common import options, program
+from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_text
 from drake_disasm.free_motion.cell_urdf import cell_urdf
@@ -58,12 +57,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         "--hardware-config",
         hardware=True,
     )
-    add(
-        "--hardware-config",
-        type=Path,
-        metavar="FILE",
-        help="where the devices are, and limits; see models/hardware/cell.yaml",
-    )
+    hardware.add_config_argument(add)
     add("--record", type=Path, metavar="DIR", help="write a log into an empty folder")
     add(
         "--hidden",
@@ -71,19 +65,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         help="simulate this scenario instead, while the log states --scenario: an arm "
         "with effects that nobody declared (--set applies to both)",
     )
-    add("--no-meshcat", action="store_true", help="run without a view, at full speed")
-    add(
-        "--meshcat-host",
-        default="localhost",
-        metavar="HOST",
-        help="address that the page listens on; '*' for all (default: localhost)",
-    )
-    add(
-        "--realtime-rate",
-        type=options.nonnegative,
-        metavar="X",
-        help="1 is real time, 0 full speed (default: 1 if somebody watches, else 0)",
-    )
+    cli.add_view_arguments(add)
     return parser.parse_args(arguments)
 
 
@@ -95,6 +77,7 @@ def main(arguments: Sequence[str]) -> int:
     motion = read_motion(args.motion, len(_JOINTS))
     refuse_beyond_limits(motion, scenario.arm.model, args.motion)
     writer = _open_log(args, arguments, scenario) if args.record else None
+    rate = 1.0 if args.station == "hardware" else cli.realtime_rate(args)
     with _station(args, scenario) as station:
         player = MotionPlayer(station, motion, _view(args))
         print(
@@ -104,7 +87,7 @@ def main(arguments: Sequence[str]) -> int:
         )
         try:
             with program.ProgressBar("s") as progress:
-                player.play(_rate(args), progress)
+                player.play(rate, progress)
         finally:
             if writer:
                 _keep(writer, player, scenario)
@@ -144,14 +127,6 @@ def _view(args: argparse.Namespace) -> Callable[..., object] | None:
     meshcat = start_meshcat(args.meshcat_host)
     print(f"watch at {meshcat.web_url()}", flush=True)
     return partial(add_cell_view, meshcat=meshcat)
-
-
-def _rate(args: argparse.Namespace) -> float:
-    if args.station == "hardware":
-        return 1.0
-    if args.realtime_rate is not None:
-        return float(args.realtime_rate)
-    return 0.0 if args.no_meshcat or not sys.stdout.isatty() else 1.0
 
 
 def _open_log(

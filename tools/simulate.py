@@ -85,12 +85,7 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
 
 
 def _add_hardware_arguments(add: Callable[..., object]) -> None:
-    add(
-        "--hardware-config",
-        type=Path,
-        metavar="FILE",
-        help="where the devices are, and limits; see models/hardware/cell.yaml",
-    )
+    hardware.add_config_argument(add)
     add(
         "--dry-run",
         action="store_true",
@@ -129,20 +124,8 @@ def _add_view_arguments(add: Callable[..., object]) -> None:
         metavar="FILE",
         help="save the last episode as a page that plays offline",
     )
-    add("--no-meshcat", action="store_true", help="run without a view, at full speed")
     add("--close-up", action="store_true", help="look at the groove, not at the cell")
-    add(
-        "--meshcat-host",
-        default="localhost",
-        metavar="HOST",
-        help="address that the page listens on; '*' for all (default: localhost)",
-    )
-    add(
-        "--realtime-rate",
-        type=options.nonnegative,
-        metavar="X",
-        help="1 is real time, 0 full speed (default: 1 if somebody watches, else 0)",
-    )
+    cli.add_view_arguments(add)
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -162,7 +145,7 @@ def main(arguments: Sequence[str]) -> int:
         make_folder(args.html.parent)
     view = _open_view(args)
     simulation = TaskSimulation(real, args.station, policy, [view] if view else [])
-    simulation.set_target_realtime_rate(_rate(args))
+    simulation.set_target_realtime_rate(cli.realtime_rate(args))
     summaries: list[EpisodeSummary] = []
     try:
         for seed in range(args.seed + done, args.seed + args.episodes):
@@ -312,12 +295,6 @@ def _open_measured_view(
     meshcat = start_meshcat(args.meshcat_host)
     print(f"watch at {meshcat.web_url()}", flush=True)
     return MeasuredView(meshcat, station, args.close_up)
-
-
-def _rate(args: argparse.Namespace) -> float:
-    if args.realtime_rate is not None:
-        return args.realtime_rate
-    return 0.0 if args.no_meshcat or not sys.stdout.isatty() else 1.0
 
 
 def _finish(args: argparse.Namespace, view: MeshcatView | None) -> None:
