@@ -254,8 +254,8 @@ class SimulatedStation(Station):
     def settled(self, effects: Sequence[Effect]) -> Context:
         """Returns a Context of this station alone: bolt gripped at A, at rest."""
         simulator = self._unsettled_simulator(effects)
-        self._in_force.note_at_rest(simulator)
-        simulator.Initialize()
+        with self._in_force.at_rest():
+            simulator.Initialize()
         simulator.AdvanceTo(self.settling_time)
         return simulator.get_mutable_context()
 

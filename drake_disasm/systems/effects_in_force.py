@@ -1,7 +1,8 @@
 """The effects that a station simulates, and a check that each of them can act."""
 
+import contextlib
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
@@ -36,7 +37,7 @@ class EffectsInForce(LeafSystem):
         super().__init__()
         self.motion_is_applied = False
         self._updated: weakref.WeakSet[Simulator] = weakref.WeakSet()
-        self._at_rest: weakref.WeakSet[Simulator] = weakref.WeakSet()
+        self._is_at_rest = False
         self._effects = self.DeclareAbstractParameter(Value[object](tuple(effects)))
         self.DeclareInitializationUnrestrictedUpdateEvent(self._check)
 
@@ -53,12 +54,21 @@ class EffectsInForce(LeafSystem):
         """Registers a simulator whose motion-dependent effects are updated."""
         self._updated.add(simulator)
 
-    def note_at_rest(self, simulator: Simulator) -> None:
-        """Registers a simulator of the bolt at rest at A, which needs no updates."""
-        self._at_rest.add(simulator)
+    @contextlib.contextmanager
+    def at_rest(self) -> Iterator[None]:
+        """Lets simulations of the bolt at rest at A begin, which need no updates.
+
+        Whatever diagram the station has joined meanwhile: such a simulation is of the
+        station alone, whose Context a larger diagram does not know.
+        """
+        self._is_at_rest = True
+        try:
+            yield
+        finally:
+            self._is_at_rest = False
 
     def _check(self, context: Context, state: State) -> EventStatus:
-        if not self._is_of(context, self._at_rest):
+        if not self._is_at_rest:
             updated = self._is_of(context, self._updated)
             for effect in self.get(context):
                 self._refuse(effect, updated)

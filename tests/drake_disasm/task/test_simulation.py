@@ -8,16 +8,17 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import LeafSystem
 
 from drake_disasm.common.timing import POLICY_DELAY, boundary
-from drake_disasm.effects import GroovePose, SensorBias
+from drake_disasm.effects import ChainPull, GroovePose, SensorBias
 from drake_disasm.mdp import BoltState, Outcome, TaskGeometry
 from drake_disasm.policies import make_policy
-from drake_disasm.scenario import load_scenario
+from drake_disasm.scenario import Range, load_scenario
 from drake_disasm.task.diagram import LoadAtStartWarning
 from drake_disasm.task.episode import run_episode, summary_table
 from drake_disasm.task.recording import EpisodeRecorder
 from drake_disasm.task.simulation import TaskSimulation
 
 TURNED = [GroovePose(ry=0.03)]
+IMPACT = ["contact.model=impact", "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"]
 
 
 @pytest.fixture(scope="module", params=["cell", "twin"])
@@ -172,3 +173,22 @@ def test_a_start_in_contact_is_said(compliance: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         simulation.reset(2, [GroovePose(x=0.002)])  # the same start again
+
+
+def test_effects_on_the_bolts_motion_may_come_with_an_episode() -> None:
+    """Given for it, or drawn from a range: the diagram was built without them."""
+    given = TaskSimulation(load_scenario("chapter3", IMPACT), "twin")
+    given.reset(0, [ChainPull(k=400.0)])
+    ranged = load_scenario("chapter3", IMPACT)
+    ranged.randomisation = [Range("ChainPull.k", 400.0, 400.0)]
+    drawn = TaskSimulation(ranged, "twin")
+    drawn.reset(0)
+    free = TaskSimulation(load_scenario("chapter3", IMPACT), "twin")
+    free.reset(0)
+    pull = np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    pulled, same, loose = (
+        [simulation.step(pull).observation for _ in range(10)][-1]
+        for simulation in (given, drawn, free)
+    )
+    assert np.array_equal(pulled, same)
+    assert loose[6] - pulled[6] > 2.0  # N, of 4 by then
