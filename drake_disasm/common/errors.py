@@ -13,5 +13,9 @@ class UnreachableError(DisasmError):
     """The arm can't go where it is told, within its limits."""
 
 
+class DivergedError(DisasmError):
+    """The states of a simulation are no numbers any more."""
+
+
 class DisasmWarning(UserWarning):
     """Something that works and may surprise, said in one line, with the remedy."""

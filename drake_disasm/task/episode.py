@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Protocol
 
-from drake_disasm.common.errors import UnreachableError
+from drake_disasm.common.errors import DivergedError, UnreachableError
 from drake_disasm.common.progress import Progress, ProgressUpdate
 from drake_disasm.effects import Effect
 from drake_disasm.mdp import REWARD_TERMS, BoltState, Outcome
@@ -86,12 +86,13 @@ def run_episode(
         recorder: gets every row, if given; up to an error, too.
         progress: updated after each step; its value is the reward so far.
         effects: instead of the scenario's.
-        is_judged: whether a policy that leads the arm beyond its limits has left the
-            workspace, and that is its outcome.
+        is_judged: whether a policy that leads the arm beyond its limits, or has the
+            simulation diverge, has left the workspace, and that is its outcome.
 
     Raises:
         DisasmError: what the policy raised or returned.
         UnreachableError: the arm can't follow, and the policy is not judged.
+        DivergedError: the simulation has diverged, and the policy is not judged.
     """
     summary = EpisodeSummary(seed)
     simulation.reset(seed, effects)
@@ -100,10 +101,12 @@ def run_episode(
     while summary.outcome is Outcome.RUNNING:
         try:
             result = simulation.step()
-        except UnreachableError:
+        except (UnreachableError, DivergedError) as error:
             if not is_judged:
                 raise
             summary.outcome = Outcome.WORKSPACE
+            if isinstance(error, DivergedError):
+                return summary  # nobody can say where the bolt is
             break
         summary.add(result)
         if recorder:

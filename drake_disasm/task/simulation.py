@@ -17,7 +17,7 @@ from pydrake.systems.framework import (
     System,
 )
 
-from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.errors import DisasmError, DivergedError
 from drake_disasm.common.timing import MOTION_DELAY, POLICY_DELAY, boundary
 from drake_disasm.effects import BoltMotion, Effect, is_local
 from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
@@ -27,6 +27,8 @@ from drake_disasm.systems.imprecision import clamped
 from drake_disasm.systems.policy import Policy
 from drake_disasm.task.diagram import TaskSystems, add_task
 
+#: By which Drake's messages say that a state is no number.
+_NO_NUMBER = ("NaN", "non-finite", "not finite")
 #: Makes the station of a scenario, in place of one of the stations' names.
 StationFactory = Callable[[Scenario], Station]
 
@@ -191,17 +193,37 @@ class TaskSimulation:
 
         Args:
             action: (6,) for a diagram without a policy; clipped to the bounds.
+
+        Raises:
+            DivergedError: the simulation's states are no numbers any more; `reset`
+                begins anew.
         """
         if action is not None:
             self._set_action(action)
         self._update_local_effects()
         self.steps += 1
-        self.simulator.AdvanceTo(boundary(self.steps, self.scenario.task.period))
+        self._advance(boundary(self.steps, self.scenario.task.period))
         self.station.check()
         terms = self.evaluate(self.systems.monitor, "reward_terms")
         code = self.evaluate(self.systems.monitor, "outcome")
         named = dict(zip(REWARD_TERMS, terms.tolist(), strict=True))
         return StepResult(self.observation(), named, Outcome(int(code[0])))
+
+    def _advance(self, end: float) -> None:
+        """Simulates until a time [s].
+
+        Raises:
+            DivergedError: Drake met numbers that are none.
+        """
+        try:
+            self.simulator.AdvanceTo(end)
+        except RuntimeError as error:
+            if not any(word in str(error) for word in _NO_NUMBER):
+                raise
+            raise DivergedError(
+                f"the simulation of the {self.station_name} has diverged before "
+                f"{end:.2f} s: its contact, an effect or the time step can't be right"
+            ) from error
 
     def _set_action(self, action: np.ndarray) -> None:
         source = self.systems.action_source

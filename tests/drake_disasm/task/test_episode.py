@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from drake_disasm.common.errors import UnreachableError
+from drake_disasm.common.errors import (
+    DisasmError,
+    DivergedError,
+    UnreachableError,
+)
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
@@ -63,8 +67,9 @@ def test_a_bolt_that_is_out_is_said(summary: EpisodeSummary) -> None:
     assert "(the bolt is out)" in summary_table([summary])
 
 
-def test_a_policy_that_leads_the_arm_beyond_its_limits_has_left_the_workspace(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("failure", [UnreachableError, DivergedError])
+def test_a_policy_that_leads_beyond_what_there_is_has_left_the_workspace(
+    failure: type[DisasmError], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scenario = load_scenario("removal")
     simulation = TaskSimulation(scenario, "twin", make_policy("straight", scenario))
@@ -72,12 +77,25 @@ def test_a_policy_that_leads_the_arm_beyond_its_limits_has_left_the_workspace(
 
     def third_is_too_far() -> StepResult:
         if next(steps) == 2:
-            raise UnreachableError("the arm can't follow the command")
+            raise failure("too far")
         return step()
 
     monkeypatch.setattr(simulation, "step", third_is_too_far)
     summary = run_episode(simulation, 0, is_judged=True)
     assert (summary.outcome, summary.steps) == (Outcome.WORKSPACE, 2)
     steps = iter(range(10))
-    with pytest.raises(UnreachableError):
+    with pytest.raises(failure):
         run_episode(simulation, 0)
+
+
+def test_a_simulation_that_diverges_says_so_and_may_be_reset() -> None:
+    scenario = load_scenario("removal")
+    simulation = TaskSimulation(scenario, "twin", make_policy("straight", scenario))
+    simulation.reset(0)
+    plant = simulation.station.plant
+    context = plant.GetMyMutableContextFromRoot(simulation.context)
+    plant.SetVelocities(context, np.full(plant.num_velocities(), 1e200))
+    with pytest.raises(DivergedError, match=r"twin has diverged before 0\.1"):
+        simulation.step()
+    simulation.reset(0)
+    assert np.isfinite(simulation.step().observation).all()
