@@ -14,7 +14,7 @@ class UnreachableError(DisasmError):
 
 
 class DivergedError(DisasmError):
-    """The states of a simulation are no numbers any more."""
+    """A simulation has no next state, or one of no numbers."""
 
 
 class DisasmWarning(UserWarning):

@@ -20,6 +20,7 @@ from pydrake.systems.framework import (
 from drake_disasm.common.errors import DisasmError, DivergedError
 from drake_disasm.common.timing import MOTION_DELAY, POLICY_DELAY, boundary
 from drake_disasm.effects import BoltMotion, Effect, is_local
+from drake_disasm.impact import NO_BALANCE
 from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
 from drake_disasm.scenario import Scenario, draw, with_values
 from drake_disasm.stations import SimulatedStation, Station, make_station
@@ -27,8 +28,8 @@ from drake_disasm.systems.imprecision import clamped
 from drake_disasm.systems.policy import Policy
 from drake_disasm.task.diagram import TaskSystems, add_task
 
-#: By which Drake's messages say that a state is no number.
-_NO_NUMBER = ("NaN", "non-finite", "not finite")
+#: By which Drake's messages, and ours, say that there is no next state.
+_DIVERGED = ("NaN", "non-finite", "not finite", NO_BALANCE)
 #: Makes the station of a scenario, in place of one of the stations' names.
 StationFactory = Callable[[Scenario], Station]
 
@@ -195,8 +196,7 @@ class TaskSimulation:
             action: (6,) for a diagram without a policy; clipped to the bounds.
 
         Raises:
-            DivergedError: the simulation's states are no numbers any more; `reset`
-                begins anew.
+            DivergedError: there is no next state; `reset` begins anew.
         """
         if action is not None:
             self._set_action(action)
@@ -213,12 +213,12 @@ class TaskSimulation:
         """Simulates until a time [s].
 
         Raises:
-            DivergedError: Drake met numbers that are none.
+            DivergedError: there is no next state, or one of no numbers.
         """
         try:
             self.simulator.AdvanceTo(end)
         except RuntimeError as error:
-            if not any(word in str(error) for word in _NO_NUMBER):
+            if not any(word in str(error) for word in _DIVERGED):
                 raise
             raise DivergedError(
                 f"the simulation of the {self.station_name} has diverged before "

@@ -88,8 +88,9 @@ def test_a_policy_that_leads_beyond_what_there_is_has_left_the_workspace(
         run_episode(simulation, 0)
 
 
-def test_a_simulation_that_diverges_says_so_and_may_be_reset() -> None:
-    scenario = load_scenario("removal")
+@pytest.mark.parametrize("contact", ["hydroelastic", "impact"])
+def test_a_simulation_that_diverges_says_so_and_may_be_reset(contact: str) -> None:
+    scenario = load_scenario("removal", [f"contact.model={contact}"])
     simulation = TaskSimulation(scenario, "twin", make_policy("straight", scenario))
     simulation.reset(0)
     plant = simulation.station.plant
