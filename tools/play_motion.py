@@ -60,6 +60,11 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     hardware.add_config_argument(add)
     add("--record", type=Path, metavar="DIR", help="write a log into an empty folder")
     add(
+        "--resume",
+        action="store_true",
+        help="with --record: add an episode to the log in the folder",
+    )
+    add(
         "--hidden",
         metavar="NAME|FILE",
         help="simulate this scenario instead, while the log states --scenario: an arm "
@@ -100,6 +105,8 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
     Raises:
         DisasmError: names the first.
     """
+    if args.resume and not args.record:
+        raise DisasmError("--resume: say which log by --record DIR")
     if args.station == "twin":
         raise DisasmError("--station twin: has no arm; use cell or hardware")
     if args.station != "hardware":
@@ -149,14 +156,14 @@ def _open_log(
         drive=_REAL if is_real else _SIMULATED,
         scenario=scenario_to_mapping(scenario),
     )
-    return LogWriter(args.record, header)
+    return LogWriter(args.record, header, resume=args.resume)
 
 
 def _keep(writer: LogWriter, player: MotionPlayer, scenario: Scenario) -> None:
     """Writes what was recorded, all of the motion or what was played of it."""
     columns = player.columns()
     if len(columns["time"]) < 2:
-        print("log: the motion had not begun; nothing was recorded")
+        print("log: the motion had not begun; nothing recorded, go on by --resume")
         return
     with writer:
         write_text(writer.folder / _URDF, cell_urdf(scenario))

@@ -36,10 +36,10 @@ def test_a_hidden_friction_is_in_the_log_and_not_in_what_it_states(
     hidden.write_text(
         "effects: [!JointViscousFriction {joint: iiwa_joint_4, coefficient: 9.0}]\n"
     )
-    run = run_program(
-        "play_motion", motion, "--no-meshcat", "--record", tmp_path / "log",
-        "--hidden", hidden,
+    arguments = (
+        motion, "--no-meshcat", "--record", tmp_path / "log", "--hidden", hidden,
     )  # fmt: skip
+    run = run_program("play_motion", *arguments)
     assert run.returncode == 0, run.stderr
     assert "s to where the motion begins" in run.stdout
     log = read_log(tmp_path / "log")
@@ -50,6 +50,11 @@ def test_a_hidden_friction_is_in_the_log_and_not_in_what_it_states(
     assert np.abs(episode["q"] - episode["q_commanded"]).max() < 0.02
     model = model_of([log], ModelChoice())  # the URDF beside the log is the arm's
     assert len(model.joints) == _JOINTS
+    again = run_program("play_motion", *arguments)
+    assert again.returncode == 2 and "not empty" in again.stderr
+    more = run_program("play_motion", *arguments, "--resume")
+    assert more.returncode == 0, more.stderr
+    assert len(read_log(tmp_path / "log").episodes) == 2
 
 
 def test_a_motion_that_can_not_be_played_is_refused_before_anything_moves(
@@ -66,6 +71,7 @@ def test_a_motion_that_can_not_be_played_is_refused_before_anything_moves(
     ("arguments", "words"),
     [
         (("--station", "twin"), "--station twin: has no arm"),
+        (("--resume",), "--record DIR"),
         (("--hardware-config", "cell.yaml"), "is for --station hardware"),
         (("--station", "hardware", "--hidden", "removal"), "--hidden: hardware"),
         (("--station", "hardware", "--no-meshcat"), "--hardware-config FILE"),
