@@ -62,6 +62,12 @@ def test_a_fit_finds_the_drive(log):
     np.testing.assert_allclose(theta, true_parameters(), rtol=0.05)
 
 
+def test_a_fit_begins_near_the_drive_and_its_delay(log):
+    nominal = {p.name: p.nominal for p in JointResponseModel([log]).parameters}
+    assert nominal["delay"] == pytest.approx(DELAY, abs=0.0026)
+    assert nominal["servo.stiffness"] == pytest.approx(STIFFNESS, rel=0.2)
+
+
 def test_a_whole_episode_is_one_segment_if_asked(log):
     model = JointResponseModel([log], segment=math.inf)
     error = model.predictions(true_parameters()) - model.measurements.values
