@@ -1,8 +1,9 @@
 """What simulate.py and play_motion.py do with --station hardware."""
 
+import argparse
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from drake_disasm.common import program
@@ -31,6 +32,33 @@ def add_config_argument(add: Callable[..., object]) -> None:
         metavar="FILE",
         help="where the devices are, and limits; see models/hardware/cell.yaml",
     )
+
+
+def refuse_contradictions(
+    args: argparse.Namespace, of_hardware: Sequence[str], usual: Mapping[str, object]
+) -> None:
+    """Refuses options that do not go together with --station.
+
+    Args:
+        args: the parsed command line.
+        of_hardware: names of options that are for hardware alone.
+        usual: the only values that others may have there.
+
+    Raises:
+        DisasmError: names the first.
+    """
+    if args.station != "hardware":
+        for name in of_hardware:
+            if getattr(args, name):
+                raise DisasmError(f"{_option(name)}: is for --station hardware")
+        return
+    for name, only in usual.items():
+        if getattr(args, name) != only:
+            raise DisasmError(f"{_option(name)}: hardware can't do that; leave it out")
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def open_station(

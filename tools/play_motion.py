@@ -3,10 +3,11 @@
 MOTION is a table as tools/excite.py writes it: time, q.0, q.1, ... in SI. The bolt is
 taken out of the groove, the arm goes to where the motion begins and plays it once. What
 was commanded and measured becomes a log of kind `joint_response`, with the URDF of arm
-and tool beside it: tools/close_loop.py finds the arm's friction and payload in it.
+and tool beside it. Torques are in it, too: import it as `joint_motion`, and
+tools/close_loop.py finds the arm's friction in a minute.
 
-Nothing looks out for what the arm could run into: watch the motion in the simulated
-cell first. The arm stays where the motion ends.
+Nothing looks out for what the arm could run into: design the motion by --scenario, and
+watch it in the simulated cell first. The arm stays where the motion ends.
 """
 
 import argparse
@@ -18,6 +19,7 @@ from pathlib import Path
 import cli
 import hardware
 
+from drake_disasm.cell.parsing import movable_joints
 from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_text
@@ -29,18 +31,19 @@ from drake_disasm.scenario import Scenario, load_scenario, scenario_to_mapping
 from drake_disasm.stations import Station, make_station
 from drake_disasm.visualization import add_cell_view, start_meshcat
 
-_JOINTS = tuple(f"iiwa_joint_{i}" for i in range(1, 8))
 _URDF = "arm.urdf"
 #: What is known of the drives: of the simulated ones all, of KUKA's this.
 _SIMULATED = {"gravity_compensation": True, "velocity_feedforward": True}
 _REAL = {"gravity_compensation": True}
 _EXAMPLES = """examples:
-  python tools/excite.py --urdf package://disasm_models/iiwa14/iiwa14.urdf \\
-      --floor 0.1 --out out/motion                       a motion that shows friction
+  python tools/excite.py --scenario removal --floor 0.05 --out out/motion
+                                  a motion that shows friction, off the bench
   python tools/play_motion.py out/motion/motion.csv       watch it in Meshcat
   python tools/play_motion.py out/motion/motion.csv --no-meshcat --record out/arm_log \\
       --hidden arm.yaml        a log that states removal and measured another arm
-  python tools/close_loop.py --log out/arm_log --out out/arm_closed
+  python tools/import_log.py out/arm_log/episode_0000.parquet --kind joint_motion \\
+      --urdf out/arm_log/arm.urdf --out out/arm_torques
+  python tools/close_loop.py --log out/arm_torques --out out/arm_closed
 """
 
 
@@ -79,7 +82,8 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     _refuse_contradictions(args)
     scenario = load_scenario(args.scenario, args.overrides)
-    motion = read_motion(args.motion, len(_JOINTS))
+    joints = movable_joints(scenario.arm.model)
+    motion = read_motion(args.motion, len(joints))
     refuse_beyond_limits(motion, scenario.arm.model, args.motion)
     writer = _open_log(args, arguments, scenario) if args.record else None
     rate = 1.0 if args.station == "hardware" else cli.realtime_rate(args)
@@ -109,14 +113,8 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
         raise DisasmError("--resume: say which log by --record DIR")
     if args.station == "twin":
         raise DisasmError("--station twin: has no arm; use cell or hardware")
-    if args.station != "hardware":
-        if args.hardware_config:
-            raise DisasmError("--hardware-config: is for --station hardware")
-        return
-    for name in ("hidden", "realtime_rate"):
-        if getattr(args, name) is not None:
-            option = name.replace("_", "-")
-            raise DisasmError(f"--{option}: hardware can't do that; leave it out")
+    usual = {"hidden": None, "realtime_rate": None}
+    hardware.refuse_contradictions(args, ["hardware_config"], usual)
 
 
 def _station(
@@ -151,7 +149,7 @@ def _open_log(
         task="free motion",
         provenance=provenance,
         period=scenario.arm.control_period,
-        joints=_JOINTS,
+        joints=movable_joints(scenario.arm.model),
         urdf=str((args.record / _URDF).absolute()),
         drive=_REAL if is_real else _SIMULATED,
         scenario=scenario_to_mapping(scenario),

@@ -193,18 +193,8 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
     """
     if args.resume and not args.record:
         raise DisasmError("--resume: say which log by --record DIR")
-    if args.station != "hardware":
-        for name in ("hardware_config", "dry_run"):
-            if getattr(args, name):
-                option = name.replace("_", "-")
-                raise DisasmError(f"--{option}: is for --station hardware")
-        return
-    fixed = {"episodes": 1, "realtime_rate": None, "hidden": None}
-    for name, only in fixed.items():
-        if getattr(args, name) != only:
-            option = name.replace("_", "-")
-            raise DisasmError(f"--{option}: hardware can't do that; leave it out")
-
+    usual = {"episodes": 1, "realtime_rate": None, "hidden": None}
+    hardware.refuse_contradictions(args, ["hardware_config", "dry_run"], usual)
     for name in ("record", "html"):
         if args.dry_run and getattr(args, name):
             raise DisasmError(f"--{name}: a dry run keeps nothing; leave one out")

@@ -69,11 +69,8 @@ class BatchHistory:
             "action_executed": self._twin.action_executed,
         } | terms
         self._steps.append({name: _copied(value) for name, value in step.items()})
-        measured = self._measure(to_numpy(result.outcome))
-        failed = [row for row, why in enumerate(result.failure) if why]
-        for name, values in measured.items():  # a failed simulation stays as it was
-            values[failed] = self._measured[-1][name][failed]
-        self._measured.append(measured)
+        failed = np.array([bool(why) for why in result.failure])
+        self._measured.append(self._measure(to_numpy(result.outcome), failed))
 
     def episode(self, row: int, steps: int) -> RecordedEpisode:
         """Returns the episode of an environment.
@@ -97,9 +94,11 @@ class BatchHistory:
             rows[f"extra.{parameter}"] = np.full(count, value)
         return RecordedEpisode(rows)
 
-    def _measure(self, outcome: np.ndarray) -> dict[str, np.ndarray]:
+    def _measure(
+        self, outcome: np.ndarray, failed: np.ndarray | bool = False
+    ) -> dict[str, np.ndarray]:
         twin = self._twin
-        return {
+        found = {
             "X_GB_measured": _pose_vectors(twin.pose_measured()),
             "X_GB_commanded": _pose_vectors(twin.episodes.commanded),
             "wrench": _copied(twin.observation[:, 6:]),
@@ -107,6 +106,11 @@ class BatchHistory:
             "terminated": _TERMINATED[outcome],
             "truncated": _TRUNCATED[outcome],
         }
+        for name, values in found.items():  # a failed simulation stays as it was
+            broken = ~np.isfinite(values.reshape(twin.count, -1)).all(axis=1) | failed
+            if broken.any():
+                values[broken] = self._measured[-1][name][broken]
+        return found
 
 
 def _copied(values: Any) -> np.ndarray:

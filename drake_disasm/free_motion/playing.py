@@ -17,6 +17,7 @@ from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progre
 from drake_disasm.free_motion.table import MotionTable
 from drake_disasm.free_motion.way import with_way
 from drake_disasm.stations import Station
+from drake_disasm.stations.advance import advance
 
 #: Columns of a log of kind `joint_response`, and the ports that they are read from.
 _PORTS = {
@@ -97,6 +98,7 @@ class MotionPlayer:
 
         Raises:
             DisasmError: the station can't begin, or holds the robot.
+            DivergedError: the arm has run into something, most likely.
         """
         station, simulator = self.station, self.simulator
         station.begin(station.GetMyMutableContextFromRoot(self._context))
@@ -104,7 +106,7 @@ class MotionPlayer:
         simulator.set_target_realtime_rate(realtime_rate)
         simulator.Initialize()
         for i in range(1, int(np.ceil(self.end / _SLICE)) + 1):
-            simulator.AdvanceTo(min(i * _SLICE, self.end))
+            advance(simulator, min(i * _SLICE, self.end), "cell")
             station.check()
             done, total = round(self._context.get_time()), round(self.end)
             progress(ProgressUpdate("playing the motion", done, total))

@@ -17,19 +17,17 @@ from pydrake.systems.framework import (
     System,
 )
 
-from drake_disasm.common.errors import DisasmError, DivergedError
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.timing import MOTION_DELAY, POLICY_DELAY, boundary
 from drake_disasm.effects import BoltMotion, Effect, is_local
-from drake_disasm.impact import NO_BALANCE
 from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
 from drake_disasm.scenario import Scenario, draw, with_values
 from drake_disasm.stations import SimulatedStation, Station, make_station
+from drake_disasm.stations.advance import advance
 from drake_disasm.systems.imprecision import clamped
 from drake_disasm.systems.policy import Policy
 from drake_disasm.task.diagram import TaskSystems, add_task
 
-#: By which Drake's messages, and ours, say that there is no next state.
-_DIVERGED = ("NaN", "non-finite", "not finite", NO_BALANCE)
 #: Makes the station of a scenario, in place of one of the stations' names.
 StationFactory = Callable[[Scenario], Station]
 
@@ -202,28 +200,13 @@ class TaskSimulation:
             self._set_action(action)
         self._update_local_effects()
         self.steps += 1
-        self._advance(boundary(self.steps, self.scenario.task.period))
+        end = boundary(self.steps, self.scenario.task.period)
+        advance(self.simulator, end, self.station_name)
         self.station.check()
         terms = self.evaluate(self.systems.monitor, "reward_terms")
         code = self.evaluate(self.systems.monitor, "outcome")
         named = dict(zip(REWARD_TERMS, terms.tolist(), strict=True))
         return StepResult(self.observation(), named, Outcome(int(code[0])))
-
-    def _advance(self, end: float) -> None:
-        """Simulates until a time [s].
-
-        Raises:
-            DivergedError: there is no next state, or one of no numbers.
-        """
-        try:
-            self.simulator.AdvanceTo(end)
-        except RuntimeError as error:
-            if not any(word in str(error) for word in _DIVERGED):
-                raise
-            raise DivergedError(
-                f"the simulation of the {self.station_name} has diverged before "
-                f"{end:.2f} s: its contact, an effect or the time step can't be right"
-            ) from error
 
     def _set_action(self, action: np.ndarray) -> None:
         source = self.systems.action_source

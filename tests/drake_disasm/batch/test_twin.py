@@ -169,6 +169,16 @@ def test_a_bolt_that_contact_throws_away_ends_its_episode_alone():
     assert np.abs(recorded["X_GB_measured"]).max() < 2.0
 
 
+def test_an_episode_whose_start_has_failed_is_recorded_in_numbers():
+    twin = BatchedTwin(_with(), 2, "numpy")
+    twin.reset([1, 2])
+    history = BatchHistory(twin)
+    twin.episodes.commanded.p[1] = np.nan
+    history.begin(np.array([1]))
+    history.add(twin.step(np.zeros((2, 6))))
+    assert np.isfinite(history.episode(1, 1).columns()["X_GB_commanded"]).all()
+
+
 @dataclasses.dataclass
 class OneAtATime(EnvironmentEffect):
     """Friction by a table, which takes no arrays.
