@@ -47,8 +47,8 @@ from sysid.models.base import LogModel
 from sysid.workers import Workers
 
 _PROVISIONAL = (
-    "provisional: the time was over; the same command without a budget, or with "
-    "another, goes on from here"
+    "provisional: the time was over{untested}; the same command without a budget, or "
+    "with another, goes on from here"
 )
 
 
@@ -63,7 +63,6 @@ class ClosedLoop:
         rounds: how the effects were chosen.
         begin, end: evidence for each candidate at the first and at the last fit.
         scatter: about the commands, if the arm has that.
-        is_provisional: whether the time was over before the search was.
     """
 
     verdict: Verdict
@@ -74,7 +73,11 @@ class ClosedLoop:
     begin: Survey
     end: Survey
     scatter: CommandScatter | None
-    is_provisional: bool = False
+
+    @property
+    def is_provisional(self) -> bool:
+        """Whether the time was over before the search was."""
+        return self.verdict.is_provisional
 
     @property
     def sentence(self) -> str:
@@ -94,7 +97,11 @@ class ClosedLoop:
         """
         most = self.last.settings.max_listed
         text = verdict_text(self.verdict, self.errors, most)
-        return f"{_PROVISIONAL}\n{text}" if self.is_provisional else text
+        if not self.is_provisional:
+            return text
+        count = len(self.end.untested)
+        untested = f" before {count} candidate effects were tested" if count else ""
+        return f"{_PROVISIONAL.format(untested=untested)}\n{text}"
 
     @property
     def scenario(self) -> Scenario | None:
@@ -153,7 +160,8 @@ def close_loop(
         progress: gets a line after each step; may raise to stop.
         folder: of a cache of fits: the same call, stopped and made again, resumes.
         time_budget: after which the search ends with what it has [s]; a fit that runs
-            is finished.
+            is finished, candidates whose turn has not come are not tested, and the
+            errors on held-out rows are still found.
 
     Raises:
         DisasmError: the log is too short to decide anything, or no effect of the
@@ -236,6 +244,7 @@ def _judged(
     verdict = judge(
         first, last, end, found.rounds, against, scatter, limits, left, model
     )
+    verdict = dataclasses.replace(verdict, is_provisional=not found.is_complete)
     return ClosedLoop(
         verdict,
         errors,
@@ -245,7 +254,6 @@ def _judged(
         found.begin,
         end,
         scatter,
-        not found.is_complete,
     )
 
 

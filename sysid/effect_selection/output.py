@@ -124,6 +124,7 @@ def _round(each: SelectionRound) -> dict[str, Any]:
 def _survey(survey: Survey) -> dict[str, Any]:
     return {
         "blocks": survey.blocks,
+        "untested": list(survey.untested),
         "candidates": [_evidence(e) for e in survey.effects],
         "dependences": [_evidence(e) for e in survey.dependences[:_DEPENDENCES]],
     }

@@ -6,6 +6,8 @@ explain.
 """
 
 import dataclasses
+import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,23 +20,36 @@ from sysid.models.base import LogModel
 from sysid.objective import Objective
 from sysid.workers import Workers
 
+_BETWEEN_LOOKS = 16  # fits that are made before the time is looked at
+
 
 def prescreening_fits(
-    fitter: Fitter, fit: Fit, sets: Sequence[tuple[Candidate, ...]]
+    fitter: Fitter,
+    fit: Fit,
+    sets: Sequence[tuple[Candidate, ...]],
+    deadline: float = math.inf,
 ) -> tuple[Fit, list[Fit]]:
     """Returns a fit to a few rows, and such fits with more effects each.
 
     Args:
         fitter: of all rows; its workers make the fits.
         fit: to all rows, where they begin.
-        sets: effects that are added, each set in a fit of its own.
+        sets: effects that are added, each set in a fit of its own; those whose turn
+            comes after a deadline have none.
+        deadline: by `time.monotonic` [s].
     """
     base = fitter.base.surrogate()
     every = max(1, round(base.measurements.rows / fitter.settings.prescreen_rows))
     small = dataclasses.replace(fitter, base=base.thin(every), workers=Workers())
     before = small.fit(fit.effects, fit)
     jobs = [_PrescreeningFit(small, before, effects) for effects in sets]
-    return before, fitter.workers.map(_PrescreeningFit.run, jobs)
+    size = _BETWEEN_LOOKS if deadline < math.inf else max(1, len(jobs))
+    found: list[Fit] = []
+    for begin in range(0, len(jobs), size):
+        found += fitter.workers.map(_PrescreeningFit.run, jobs[begin : begin + size])
+        if time.monotonic() > deadline:
+            break
+    return before, found
 
 
 @dataclass(frozen=True)

@@ -147,9 +147,10 @@ class RefitSearch(ForwardSearch):
         Starts are those alone whose loss is near the least.
         """
         each = list({e.effects: e for e in reversed(survey.effects)}.values())
-        before, fits = prescreening_fits(self.fitter, fit, [e.candidates for e in each])
+        sets = [e.candidates for e in each]
+        before, fits = prescreening_fits(self.fitter, fit, sets, self.deadline)
         limit = self._settings.prescreen_max_loss_ratio * min(f.loss for f in fits)
-        pairs = list(zip(each, fits, strict=True))
+        pairs = list(zip(each, fits, strict=False))  # the time may not be enough
         found = [
             measured_evidence(before, after, e, tests=len(each)) for e, after in pairs
         ]

@@ -61,7 +61,8 @@ class ForwardSearch(abc.ABC):
         fitter: fits the model with chosen effects.
         library: candidates.
         progress: gets a line after each step.
-        deadline: when to stop, by `time.monotonic` [s]; a fit that runs is finished.
+        deadline: when to stop, by `time.monotonic` [s]; a fit that runs is finished,
+            and candidates whose turn has not come are not tested.
     """
 
     stage: ClassVar[str] = "selecting effects"
@@ -105,7 +106,7 @@ class ForwardSearch(abc.ABC):
 
     def _survey(self, fit: Fit) -> Survey:
         """Returns the evidence for each candidate that a fit does not have."""
-        return survey_candidates(self.fitter, fit, self.library)
+        return survey_candidates(self.fitter, fit, self.library, self.deadline)
 
     @abc.abstractmethod
     def _next(self, fit: Fit, survey: Survey) -> Fit | None:

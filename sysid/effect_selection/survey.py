@@ -5,6 +5,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.prewhitening import Prewhitening
 from sysid.effect_selection.residual_curves import Dependence, dependence_curves
 from sysid.identification.linearisation import Linearisation, extend
+from sysid.models.base import LogModel
 from sysid.objective import huber_weights
 from sysid.parameters import Parameter, nominal_values
 
@@ -157,12 +159,14 @@ class Survey:
         effects, dependences: the best first.
         blocks: number of blocks.
         linear: what it was made of; None in a survey that is kept as a record.
+        untested: candidates, as text, for which the time was not enough.
     """
 
     effects: list[Evidence]
     dependences: list[Evidence]
     blocks: int
     linear: LinearSurvey | None
+    untested: tuple[str, ...] = ()
 
     @property
     def linearised(self) -> LinearSurvey:
@@ -180,33 +184,72 @@ class Survey:
         return dataclasses.replace(self, linear=None)
 
 
-def survey_candidates(fitter: Fitter, fit: Fit, library: Sequence[Candidate]) -> Survey:
+def survey_candidates(
+    fitter: Fitter,
+    fit: Fit,
+    library: Sequence[Candidate],
+    deadline: float = math.inf,
+) -> Survey:
     """Returns the evidence for each candidate of a library that a fit does not have.
 
-    Costs one evaluation of the model for each amplitude of each candidate.
+    Costs one evaluation of the model for each amplitude of each candidate. Those whose
+    turn comes after a deadline, by `time.monotonic` [s], are not tested.
     """
     names = {candidate.name for candidate in fit.effects}
     rest = [c for c in library if c.name not in names]
-    linear = _linear_survey(fitter, fit, rest)
-    effects, dependences = linear.rank([(c,) for c in rest] + joint_groups(rest))
-    return Survey(effects, dependences, len(linear.regression.begins), linear)
+    tested = _Tested.of(fitter, fit, rest, deadline)
+    linear = _linear_survey(fitter, fit, tested)
+    sets = [(c,) for c in tested.candidates] + joint_groups(tested.candidates)
+    effects, dependences = linear.rank(sets)
+    blocks = len(linear.regression.begins)
+    untested = tuple(c.text for c in rest[len(tested.candidates) :])
+    return Survey(effects, dependences, blocks, linear, untested)
 
 
-def _linear_survey(
-    fitter: Fitter, fit: Fit, library: Sequence[Candidate]
-) -> LinearSurvey:
-    """Returns the linearisation at a fit with candidates at null."""
-    model, groups = extended(fit.model, library)
+@dataclass(frozen=True)
+class _Tested:
+    """Candidates for which the time was enough, and a fit linearised with them.
+
+    Attributes:
+        candidates: the first of a library, if not all.
+        model: the fit's with the candidates at null.
+        groups: columns of each.
+        linearisation: at the fit, of the model's parameters.
+    """
+
+    candidates: Sequence[Candidate]
+    model: LogModel
+    groups: Sequence[range]
+    linearisation: Linearisation
+
+    @classmethod
+    def of(
+        cls, fitter: Fitter, fit: Fit, library: Sequence[Candidate], deadline: float
+    ) -> Self:
+        """Returns as many of a library as are tested by a deadline."""
+        model, groups = extended(fit.model, library)
+        objective = fitter.objective(model)
+        rest = nominal_values(model.parameters)[len(fit.theta) :]
+        u = objective.scaling.to_unit(np.concatenate([fit.theta, rest]))
+        found = extend(fit.linearisation, objective, u, deadline=deadline)
+        if len(found.u) < len(u):
+            count = sum(group.stop <= len(found.u) for group in groups)
+            library = library[:count]
+            model, groups = extended(fit.model, library)
+            found = found.of_first(len(model.parameters))
+        return cls(library, model, groups, found)
+
+
+def _linear_survey(fitter: Fitter, fit: Fit, tested: _Tested) -> LinearSurvey:
+    """Returns the normal equations of a fit and of what was tested at null."""
+    model, linearisation = tested.model, tested.linearisation
+    library = tested.candidates
     count, begin = len(fit.theta), len(model.parameters)
-    objective = fitter.objective(model)
-    rest = nominal_values(model.parameters)[count:]
-    u = objective.scaling.to_unit(np.concatenate([fit.theta, rest]))
-    linearisation = extend(fit.linearisation, objective, u)
     episode = model.measurements.episode
     curves, dependences = dependence_curves(model, fitter.settings)
     blocks = blocks_of(linearisation.residual, episode, fitter.settings)
     raw = BlockRegression.of(linearisation, blocks, fitter.settings, curves)
-    columns = _distinct(library, groups, linearisation.jacobian)
+    columns = _distinct(library, tested.groups, linearisation.jacobian)
     of_curves = [(d, begin + np.array(d.columns, np.int64)) for d in dependences]
     regression = raw.project_out(np.arange(count))
     sets = [columns[c.text] for c in library] + [c for _, c in of_curves]

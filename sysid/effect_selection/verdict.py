@@ -107,6 +107,8 @@ class Verdict:
         residual_model: learned in their place; not physical. None if it gains little.
         single_strokes: joints of effects with ties that make a single stroke.
         undecided: more effects that may be there; the log is too short to tell.
+        is_provisional: whether the time was over before the search was: effects that
+            would explain more may not have been tried.
     """
 
     ending: Ending
@@ -124,6 +126,7 @@ class Verdict:
     residual_model: ResidualModel | None = None
     single_strokes: tuple[str, ...] = ()
     undecided: tuple[Undecided, ...] = ()
+    is_provisional: bool = False
 
 
 def judge(

@@ -58,7 +58,8 @@ def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
     if verdict.ending == "unexplained":
         nearest = f"; the nearest is {effects}, with which {improved}"
         why = f", since {left}" if left else ""
-        text = f"The model lacks something that no effect of the library explains{why}"
+        tried = "tried so far" if verdict.is_provisional else "of the library"
+        text = f"The model lacks something that no effect {tried} explains{why}"
         return f"{text}{nearest if effects else ''}."
     rest = f", but not all is explained: {left}" if left else ""
     return f"The model lacks {effects}; with {them} {improved}{rest}."
@@ -232,6 +233,8 @@ def undecided_text(found: Sequence[Undecided]) -> str:
 
 def _nothing(verdict: Verdict) -> str:
     """Returns that nothing is missing, and what would have been found."""
+    if verdict.is_provisional:
+        return "So far nothing was found that the model lacks"
     text = "This log shows nothing that the model lacks: the residual is noise"
     kinds = by_kind([limit.effect for limit in verdict.limits])
     seen = by_kind([x.effect for x in verdict.limits if x.amplitude is not None])

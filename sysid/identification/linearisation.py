@@ -1,6 +1,9 @@
 """The objective's residuals and their derivatives at a point."""
 
 import dataclasses
+import math
+import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +18,7 @@ _LEAST_STEP = 1e-6
 #: For a parameter that hardly matters: over less, the solver's own noise shows.
 WIDE_STEP = 0.03
 _NOTICEABLE = 3.0  # standard deviations that a step should move the residuals by
+_BETWEEN_LOOKS = 8  # evaluations, or as many as a model takes together
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,11 @@ class Linearisation:
     def effect(self) -> Array:
         """How much each parameter moves the residuals over its range, rms (p,)."""
         return np.sqrt(np.mean(self.flat_jacobian**2, axis=0))
+
+    def of_first(self, count: int) -> "Linearisation":
+        """Returns the same of the first parameters alone."""
+        jacobian = self.jacobian[..., :count]
+        return dataclasses.replace(self, u=self.u[:count], jacobian=jacobian)
 
 
 def linearise(
@@ -91,6 +100,7 @@ def extend(
     objective: Objective,
     u: Array,
     steps: Array | None = None,
+    deadline: float = math.inf,
 ) -> Linearisation:
     """Returns a linearisation with more parameters, one evaluation for each.
 
@@ -100,6 +110,8 @@ def extend(
         u: (p,) the point.
         steps: (k,) of the one-sided differences by the new ones, away from the bound
             that is nearer.
+        deadline: by `time.monotonic` [s]: parameters whose turn comes later are left
+            out; the first few never are.
     """
     known = len(linearisation.u)
     steps = np.full(len(u) - known, FIRST_STEP) if steps is None else steps
@@ -109,16 +121,29 @@ def extend(
     points = np.tile(u, (len(way), 1))
     points[:, known:] += np.diag(way)
     source, origin = objective.differences, linearisation.residual
-    if source is not objective:
-        points = np.vstack([points, u])
-    found = source.residuals(objective.scaling.from_unit(points))
-    if source is not objective:
-        origin = found.pop()
-    columns = [(r - origin) / w for r, w in zip(found, way, strict=True)]
+    at_origin = u[None] if source is not objective else u[None][:0]
+    found: list[Array] = []
+    for part in _parts(len(points), source, deadline):
+        together = np.vstack([points[part], at_origin])
+        found += source.residuals(objective.scaling.from_unit(together))
+        if len(at_origin):
+            origin = found.pop()
+    columns = [(r - origin) / w for r, w in zip(found, way, strict=False)]
     jacobian = np.concatenate(
         [linearisation.jacobian, np.stack(columns, axis=-1)], axis=-1
     )
+    u = u[: known + len(columns)]
     return dataclasses.replace(linearisation, u=u, jacobian=jacobian)
+
+
+def _parts(count: int, source: Objective, deadline: float) -> Iterator[slice]:
+    """Yields which points are evaluated together, until the time is over."""
+    most = max(_BETWEEN_LOOKS, source.model.together)
+    size = most if deadline < math.inf else count
+    for begin in range(0, count, size):
+        yield slice(begin, begin + size)
+        if time.monotonic() > deadline:
+            return
 
 
 def _at(objective: Objective, u: Array, residual: Array | None) -> Linearisation:

@@ -3,11 +3,13 @@
 import pytest
 
 import sysid.effect_selection.fitter as selection
-from drake_disasm.effects import CommandGain, SensorBias
+from drake_disasm.effects import CommandGain, SensorBias, registered_effects
 from drake_disasm.logs import read_log
+from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.output import to_mapping
 from sysid.models.twin import TwinModel
+from sysid.report import closing_page
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
 
@@ -64,3 +66,17 @@ def test_a_budget_of_time_ends_in_a_provisional_verdict_that_goes_on(tmp_path):
     found = close_loop(model, **options)
     assert not found.is_provisional and found.verdict.names == ("CommandGain",)
     assert "missing: CommandGain" in found.text
+
+
+def test_candidates_that_the_time_was_not_enough_for_are_counted(tmp_path):
+    """A verdict may not say that no effect explains what it hasn't tried."""
+    transitions_log(tmp_path / "log", nominal(), [SensorBias(fy=2.0)], 0, 4, 8)
+    model = TwinModel([read_log(tmp_path / "log")], nominal(), ())
+    found = close_loop(model, test=[3], time_budget=0.0)
+    count = len(found.end.untested)
+    assert 0 < count < len(candidates(model, registered_effects()))
+    assert f"the time was over before {count} candidate effects were" in found.text
+    assert "no effect tried so far explains" in found.sentence
+    assert to_mapping(found)["end"]["untested"] == list(found.end.untested)
+    page = closing_page(found, {})
+    assert f"{count} candidate effects were not tested" in page
