@@ -347,8 +347,8 @@ class JointSamples:
     """Samples of one joint's motion: what an arm's effect may depend on.
 
     Attributes:
-        q, v, vd: (n,) position, velocity and acceleration [rad, rad/s, rad/s^2].
-        load: (n,) torque that the rigid bodies need there [N m].
+        q, v, vd: (..., n) position, velocity and acceleration [rad, rad/s, rad/s^2].
+        load: (..., n) torque that the rigid bodies need there [N m].
     """
 
     q: np.ndarray
@@ -363,9 +363,9 @@ class ArmSamples:
 
     Attributes:
         joints: their names.
-        q, v, vd: (n, joints) [rad, rad/s, rad/s^2]; m instead of rad for a prismatic
-            joint.
-        load: (n, joints) torques that the rigid bodies need [N m], or forces [N].
+        q, v, vd: (..., n, joints) [rad, rad/s, rad/s^2]; m instead of rad for a
+            prismatic joint.
+        load: (..., n, joints) torques that the rigid bodies need [N m], or forces [N].
     """
 
     joints: tuple[str, ...]
@@ -377,7 +377,7 @@ class ArmSamples:
     def of(self, joint: str) -> JointSamples:
         """Returns the samples of one joint."""
         i = self.joints.index(joint)
-        motion = (a[:, i] for a in (self.q, self.v, self.vd, self.load))
+        motion = (a[..., i] for a in (self.q, self.v, self.vd, self.load))
         return JointSamples(*motion)
 
 
@@ -408,7 +408,7 @@ class ArmTorqueEffect(ArmEffect, abc.ABC):
 
     @abc.abstractmethod
     def torques(self, samples: ArmSamples) -> np.ndarray:
-        """Returns what it adds to the torques of the rigid bodies, (n, joints)."""
+        """Returns what it adds to the torques of the rigid bodies, (..., n, joints)."""
 
 
 class DelayEffect(ArmEffect):
@@ -442,12 +442,12 @@ class JointEffect(ArmTorqueEffect):
         """See ArmTorqueEffect."""
         added = np.zeros_like(samples.load)
         own = samples.joints.index(self.joint)
-        added[:, own] = self.torque(samples.of(self.joint))
+        added[..., own] = self.torque(samples.of(self.joint))
         return added
 
     @abc.abstractmethod
     def torque(self, samples: JointSamples) -> np.ndarray:
-        """Returns what it adds to the torque of the rigid bodies, (n,) [N m]."""
+        """Returns what it adds to the torque of the rigid bodies, (..., n) [N m]."""
 
     @classmethod
     def least_shapes(cls, travel: float) -> dict[str, float]:

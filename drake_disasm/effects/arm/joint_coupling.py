@@ -44,10 +44,10 @@ class JointCoupling(ArmTorqueEffect):
         added = np.zeros_like(samples.load)
         i = samples.joints.index(self.joint)
         pair = slice(i, i + 2)
-        v, vd = samples.v[:, pair], samples.vd[:, pair]
-        both = v.sum(axis=1, keepdims=True)
+        v, vd = samples.v[..., pair], samples.vd[..., pair]
+        both = v.sum(axis=-1, keepdims=True)
         dry = self.column("dry") * np.tanh(both / self.column("creep"))
-        other = self.column("inertia") * vd[:, ::-1]
-        other = other + self.column("viscous") * v[:, ::-1]
-        added[:, pair] = other + dry if v.shape[1] == 2 else 0.0
+        other = self.column("inertia") * vd[..., ::-1]
+        other = other + self.column("viscous") * v[..., ::-1]
+        added[..., pair] = other + dry if v.shape[-1] == 2 else 0.0
         return added

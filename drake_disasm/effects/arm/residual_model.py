@@ -39,11 +39,12 @@ class ArmResidualModel(ArmTorqueEffect):
         functions = learned_functions(self.file, self.inputs)
         for joint, function in functions.outputs.items():
             inputs = self.inputs_of(samples, joint)
-            added[:, samples.joints.index(joint)] = function(inputs)
+            found = function(inputs.reshape(-1, inputs.shape[-1]))
+            added[..., samples.joints.index(joint)] = found.reshape(inputs.shape[:-1])
         return self.share * added
 
     @staticmethod
     def inputs_of(samples: ArmSamples, joint: str) -> np.ndarray:
-        """Returns what the function of a joint takes, (n, 4)."""
+        """Returns what the function of a joint takes, (..., n, 4)."""
         own = samples.of(joint)
-        return np.column_stack([own.q, own.v, own.vd, own.load])
+        return np.stack([own.q, own.v, own.vd, own.load], axis=-1)

@@ -41,7 +41,7 @@ def integrate(
     v: Array,
     steps: int,
     h: float,
-    terms: Callable[[Array, Array], Terms],
+    terms: Callable[[Array, Array, int], Terms],
     missing: Callable[[Array, Array, Array, Terms, int, int], Array],
 ) -> Motion:
     """Returns how lanes move from where they begin; NaN where no step was found.
@@ -50,15 +50,16 @@ def integrate(
         q, v: (lanes, joints) at the begin [rad, rad/s].
         steps: how many.
         h: of a step [s].
-        terms: rigid bodies at (lanes, joints) positions and velocities.
-        missing: load and friction minus the drives' torque (lanes, joints), at
+        terms: rigid bodies at (lanes, joints) positions and velocities, of a step.
+        missing: load and friction minus the drives' torque (..., lanes, joints), at
             positions, velocities and accelerations, with these terms, in a step's
             stage.
     """
     a = np.zeros_like(q)
     path_q, path_v = [q], [v]
     for step in range(steps):
-        of_step = terms(q + 0.5 * h * v + 0.125 * h * h * a, v + 0.5 * h * a)
+        middle = (q + 0.5 * h * v + 0.125 * h * h * a, v + 0.5 * h * a)
+        of_step = terms(*middle, step)
         first = _stage(q, v, a, _GAMMA * h, of_step, missing, step, 0)
         v_1 = v + _GAMMA * h * first
         rest = (1.0 - _GAMMA) * h
@@ -98,7 +99,7 @@ def _stage(
     """
 
     def short(a: Array) -> Array:
-        """Returns what is missing (lanes, joints) for accelerations."""
+        """Returns what is missing (..., lanes, joints) for accelerations."""
         end = v + dt * a
         return missing(q + dt * end, end, a, terms, step, stage)
 
@@ -138,12 +139,8 @@ def _descent(
 
 def _slope(short: Callable[[Array], Array], a: Array, r: Array, dt: float) -> Array:
     """Returns derivatives (lanes, joints, joints) of what is short, by differences."""
-    lanes, joints = a.shape
-    J: NDArray[np.float64] = np.empty((lanes, joints, joints))
     change = _CHANGE / dt
-    for i in range(joints):
-        moved = a.copy()
-        moved[:, i] += change
-        J[:, :, i] = (short(moved) - r) / change
+    moved = a + change * np.eye(a.shape[1])[:, None, :]
+    J: NDArray[np.float64] = np.moveaxis((short(moved) - r) / change, 0, -1)
     J[np.linalg.det(J) == 0.0] = np.nan  # that lane has failed, no other
     return J

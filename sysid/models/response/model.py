@@ -20,8 +20,10 @@ from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints, prismatic_unit
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.response.drive import Drive, DriveSettings, joined
+from sysid.models.response.near_motion import MOST_KEPT, Bodies
 from sysid.models.response.rigid_bodies import RigidBodies
 from sysid.models.response.segments import (
+    LocalFit,
     Segment,
     inputs_of,
     interpolated,
@@ -97,11 +99,12 @@ class JointResponseModel(LogModel):
         )
         episodes = [episode for log in logs for episode in log.episodes]
         reach = reach_of(episodes)
-        self._cut(episodes, segment, reach)
+        smoothed = _smoothed(episodes, reach)
+        self._cut(episodes, smoothed, segment, reach)
         self.measurements = Measurements.of_logs(
             logs, self._channels(episodes), lambda _, episode: episode["q"]
         )
-        guess = self._guess(episodes, reach)
+        guess = self._guess(episodes, smoothed)
         self.parameters = self._drive_parameters(guess, episodes, logs)
 
     def _channels(self, episodes: Sequence[Episode]) -> tuple[Channel, ...]:
@@ -117,37 +120,43 @@ class JointResponseModel(LogModel):
             for joint, noise in noises
         )
 
-    def _cut(self, episodes: Sequence[Episode], length: float, reach: float) -> None:
+    def _cut(
+        self,
+        episodes: Sequence[Episode],
+        smoothed: Sequence[tuple[Array, LocalFit]],
+        length: float,
+        reach: float,
+    ) -> None:
         """Cuts episodes into segments, and numbers them for each row."""
         segments: list[Segment] = []
         numbers = []
-        for episode in episodes:
+        for episode, (at, fit) in zip(episodes, smoothed, strict=True):
             own, number = segments_of(episode, self._settings, length, reach)
+            measured = episode["q"], interpolated(at, fit.v, episode["time"])
             numbers.append(number + len(segments))
-            segments += own
+            segments += [dataclasses.replace(s, measured=measured) for s in own]
         self._segments = tuple(segments)
         self._segment = np.concatenate(numbers)
         self._time = np.concatenate([episode["time"] for episode in episodes])
 
     # Parameters.
 
-    def _guess(self, episodes: Sequence[Episode], reach: float) -> Guess:
+    def _guess(
+        self, episodes: Sequence[Episode], smoothed: Sequence[tuple[Array, LocalFit]]
+    ) -> Guess:
         """Returns about what the drives are, by inverse dynamics of some rows.
 
         Keeps each row's goal and velocity.
         """
-        every = max(1, len(self._time) // _MOST_ROWS)
         delays = np.linspace(0.0, _LATEST, _TRIED).tolist()
         motions, inputs, states = [], [], []
-        for episode in episodes:
+        for episode, (at, fit) in zip(episodes, smoothed, strict=True):
             time = episode["time"]
-            fit = local_fit(time, episode["q"], time[::every], reach)
             motions.append(np.stack([fit.q, fit.v, fit.vd]))
             given = inputs_of(episode, self._settings)
             whole = Segment(0.0, fit.q[0], fit.v[0], time, given)
-            inputs.append([whole.inputs_at(time[::every], t) for t in delays])
-            velocity = interpolated(time[::every], fit.v, time)
-            states.append(np.stack([given.goal, velocity]))
+            inputs.append([whole.inputs_at(at, t) for t in delays])
+            states.append(np.stack([given.goal, interpolated(at, fit.v, time)]))
         self._state = np.concatenate(states, axis=1)
         q, v, vd = np.concatenate(motions, axis=1)
         load = self._bodies.terms(q, v, ()).load(vd)
@@ -309,9 +318,12 @@ class JointResponseModel(LogModel):
         """Returns positions (k, rows, joints) of parameter sets (k, all)."""
         numbers, segment = np.unique(self._segment[rows], return_inverse=True)
         segments = [self._segments[number] for number in numbers]
+        if len(np.unique(self._segment)) > MOST_KEPT:
+            segments = [dataclasses.replace(s, measured=None) for s in segments]
         after = self._time[rows] - np.array([s.start for s in segments])[segment]
         steps = max(1, int(np.ceil(float(after.max()) / _STEP - 1e-9)))
-        arm = Arm(self._joints, self._bodies, self._settings.gravity_compensation)
+        bodies = Bodies(self._bodies, self._settings.gravity_compensation)
+        arm = Arm(self._joints, bodies)
         sets = [self._parameter_set(theta) for theta in thetas]
         motion = simulate(arm, sets, segments, steps, _STEP)
         return positions_at(motion, _STEP, after, segment)
@@ -332,6 +344,18 @@ class JointResponseModel(LogModel):
 @functools.lru_cache(maxsize=4)
 def _rigid_bodies(urdf: str, joints: tuple[str, ...]) -> RigidBodies:
     return RigidBodies(urdf, joints)
+
+
+def _smoothed(
+    episodes: Sequence[Episode], reach: float
+) -> list[tuple[Array, LocalFit]]:
+    """Returns times [s] of some rows of each episode, and the motion there."""
+    every = max(1, sum(len(e["time"]) for e in episodes) // _MOST_ROWS)
+    times = [episode["time"][::every] for episode in episodes]
+    return [
+        (at, local_fit(episode["time"], episode["q"], at, reach))
+        for episode, at in zip(episodes, times, strict=True)
+    ]
 
 
 def _largest(load: Array, v: Array, vd: Array) -> dict[str, float]:

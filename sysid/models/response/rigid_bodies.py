@@ -24,8 +24,8 @@ class RigidBodyTerms:
     bias: Array
 
     def load(self, vd: Array) -> Array:
-        """Returns the torques (n, joints) that accelerations (n, joints) take."""
-        return np.asarray(np.einsum("nij,nj->ni", self.M, vd) + self.bias)
+        """Returns the torques (..., n, joints) that accelerations so many take."""
+        return np.asarray((self.M @ vd[..., None])[..., 0] + self.bias)
 
 
 class RigidBodies:

@@ -98,6 +98,8 @@ class Segment:
         q, v: (joints,) there.
         time: (n,) of the episode [s].
         inputs: of the drives in the episode, row by row (n, joints).
+        measured: positions and velocities of the episode, row by row, (n, joints)
+            each, which simulated ones should be near; None: not known.
     """
 
     start: float
@@ -105,6 +107,7 @@ class Segment:
     v: Array
     time: Array
     inputs: Inputs
+    measured: tuple[Array, Array] | None = None
 
     def inputs_at(self, times: Array, delay: float) -> Inputs:
         """Returns what goes into the drives at times (..., ), with a late goal.
@@ -124,6 +127,13 @@ class Segment:
             rate=interpolated(self.time, self.inputs.rate, times - delay),
             supply=interpolated(self.time, self.inputs.supply, times),
         )
+
+    def measured_at(self, times: Array) -> tuple[Array, Array] | None:
+        """Returns positions and velocities (n, joints) at times (n,), if measured."""
+        if self.measured is None:
+            return None
+        q, v = self.measured
+        return interpolated(self.time, q, times), interpolated(self.time, v, times)
 
 
 def interpolated(time: Array, values: Array, at: Array) -> Array:

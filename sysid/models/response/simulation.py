@@ -17,7 +17,7 @@ from drake_disasm.effects import (
 from sysid.models.base import Array
 from sysid.models.response.drive import Drive, Inputs
 from sysid.models.response.integrator import STAGES, Motion, integrate
-from sysid.models.response.rigid_bodies import RigidBodies, RigidBodyTerms
+from sysid.models.response.near_motion import Bodies, BodyTerms, Expansion
 from sysid.models.response.segments import Segment
 
 #: Effects that change the rigid bodies themselves.
@@ -30,13 +30,11 @@ class Arm:
 
     Attributes:
         joints: their names.
-        bodies: by the URDF.
-        compensates: whether the controller adds what gravity takes.
+        bodies: of the URDF.
     """
 
     joints: tuple[str, ...]
-    bodies: RigidBodies
-    compensates: bool
+    bodies: Bodies
 
 
 @dataclass(frozen=True)
@@ -52,13 +50,6 @@ class ParameterSet:
     drive: Drive
     delay: float
     effects: tuple[ArmEffect, ...]
-
-
-@dataclass(frozen=True)
-class _Terms(RigidBodyTerms):
-    """Rigid bodies, and what the controller adds (lanes, joints)."""
-
-    added: Array
 
 
 def simulate(
@@ -84,33 +75,54 @@ def simulate(
         )
         for name in ("q", "v")
     )
-    motion = integrate(
-        q, v, steps, h, _terms(arm, sets), _missing(arm, sets, segments, steps, h)
-    )
+    of_lanes = (arm, sets, segments, steps, h)
+    motion = integrate(q, v, steps, h, _terms(*of_lanes), _missing(*of_lanes))
     return Motion(*(a.reshape(steps + 1, *shape) for a in (motion.q, motion.v)))
 
 
-def _terms(arm: Arm, sets: Sequence[ParameterSet]) -> Callable[[Array, Array], _Terms]:
+def _terms(
+    arm: Arm,
+    sets: Sequence[ParameterSet],
+    segments: Sequence[Segment],
+    steps: int,
+    h: float,
+) -> Callable[[Array, Array, int], BodyTerms]:
     """Returns what gives the rigid bodies of all lanes (sets segments, joints)."""
-    on_bodies = [[e for e in s.effects if isinstance(e, ON_BODIES)] for s in sets]
-    groups = on_bodies if any(on_bodies) else [[]]
+    shape = (len(sets), len(segments), len(arm.joints))
+    expansion = _expansion(arm.bodies, segments, steps, h)
+    on_bodies = [
+        [e for e in s.effects if isinstance(e, ON_BODIES) and not e.is_null]
+        for s in sets
+    ]
+    is_loaded = np.array([bool(effects) for effects in on_bodies])[:, None]
 
-    def terms(q: Array, v: Array) -> _Terms:
-        """Returns those of positions and velocities (lanes, joints)."""
-        parts = [
-            arm.bodies.terms(own_q, own_v, effects)
-            for own_q, own_v, effects in zip(
-                np.split(q, len(groups)), np.split(v, len(groups)), groups, strict=True
-            )
-        ]
-        added = arm.bodies.holding(q) if arm.compensates else np.zeros_like(q)
-        return _Terms(
-            np.concatenate([part.M for part in parts]),
-            np.concatenate([part.bias for part in parts]),
-            added,
-        )
+    def terms(q: Array, v: Array, step: int) -> BodyTerms:
+        """Returns those of positions and velocities (lanes, joints) in a step."""
+        q, v = q.reshape(shape), v.reshape(shape)
+        if expansion:
+            found, far = expansion.at(step, q, v)
+        else:
+            found, far = BodyTerms.zeros(*shape), np.ones(shape[:2], dtype=bool)
+        by_drake = far | is_loaded
+        for n in np.flatnonzero(by_drake.any(axis=1)).tolist():
+            own = (n, by_drake[n])
+            found.put(own, arm.bodies.terms(q[own], v[own], on_bodies[n]))
+        return found.flat()
 
     return terms
+
+
+def _expansion(
+    bodies: Bodies, segments: Sequence[Segment], steps: int, h: float
+) -> Expansion | None:
+    """Returns the rigid bodies near what was measured; None where that isn't known."""
+    after = np.asarray(h * (np.arange(steps) + 0.5), np.float64)
+    paths = [s.measured_at(s.start + after) for s in segments]
+    known = [path for path in paths if path]
+    if len(known) < len(paths):
+        return None
+    q, v = (np.stack(arrays, axis=1) for arrays in zip(*known, strict=True))
+    return Expansion.along(bodies, q, v)
 
 
 def _missing(
@@ -119,7 +131,7 @@ def _missing(
     segments: Sequence[Segment],
     steps: int,
     h: float,
-) -> Callable[[Array, Array, Array, _Terms, int, int], Array]:
+) -> Callable[[Array, Array, Array, BodyTerms, int, int], Array]:
     """Returns what gives the torques that are missing for accelerations."""
     inputs = _inputs(sets, segments, steps, h)
     drive = Drive(
@@ -130,17 +142,18 @@ def _missing(
     effects = _stacked([s.effects for s in sets], len(segments))
 
     def missing(
-        q: Array, v: Array, a: Array, terms: _Terms, step: int, stage: int
+        q: Array, v: Array, a: Array, terms: BodyTerms, step: int, stage: int
     ) -> Array:
-        """Returns load and friction minus the drives' torque (lanes, joints)."""
+        """Returns load and friction minus the drives' torque (..., lanes, joints)."""
         load = terms.load(a)
         given = inputs.at((step, stage))
         torque = drive.torque(q, v, given) + given.enabled * terms.added
-        samples = ArmSamples(arm.joints, q, v, a, load)
-        needed = load
-        for effect in effects:
-            needed = needed + effect.torques(samples)
-        return np.asarray(needed - torque)
+        needed = load - torque
+        for effect, lanes in effects:
+            own = (x[..., lanes, :] for x in (q, v, a, load))
+            samples = ArmSamples(arm.joints, *own)
+            needed[..., lanes, :] += effect.torques(samples)
+        return needed
 
     return missing
 
@@ -163,21 +176,27 @@ def _inputs(
 
 def _stacked(
     sets: Sequence[tuple[ArmEffect, ...]], segments: int
-) -> list[ArmTorqueEffect]:
-    """Returns the effects of all sets with fields (sets segments,), for all lanes."""
+) -> list[tuple[ArmTorqueEffect, slice]]:
+    """Returns the effects of all sets with fields (n,), and the n lanes of each.
+
+    Lanes (sets segments,) of sets before the first in which an effect is not null, and
+    after the last, are none of its.
+    """
     found = []
     for alternatives in zip(*sets, strict=True):
-        first = alternatives[0]
-        if not isinstance(first, ArmTorqueEffect):
+        acts = np.flatnonzero([not effect.is_null for effect in alternatives])
+        if not isinstance(alternatives[0], ArmTorqueEffect) or not len(acts):
             continue
-        if all(effect.is_null for effect in alternatives):
-            continue
+        first, end = int(acts[0]), int(acts[-1]) + 1
         numbers = {
-            f.name: np.repeat([getattr(e, f.name) for e in alternatives], segments)
-            for f in dataclasses.fields(first)
+            f.name: np.repeat(
+                [getattr(e, f.name) for e in alternatives[first:end]], segments
+            )
+            for f in dataclasses.fields(alternatives[0])
             if isinstance(f.default, float)
         }
-        found.append(dataclasses.replace(first, **numbers))
+        effect = dataclasses.replace(alternatives[0], **numbers)
+        found.append((effect, slice(first * segments, end * segments)))
     return found
 
 

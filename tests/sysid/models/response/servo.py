@@ -6,6 +6,7 @@ import numpy as np
 
 from drake_disasm.logs import Log, LogHeader, LogWriter, flat_columns, read_log
 from sysid.models.response.drive import Drive, Inputs
+from sysid.models.response.near_motion import Bodies
 from sysid.models.response.rigid_bodies import RigidBodies
 from sysid.models.response.segments import Segment
 from sysid.models.response.simulation import Arm, ParameterSet, simulate
@@ -45,7 +46,7 @@ def write_response(folder: Path, *effects, episodes=2, duration=6.0, **columns) 
     """
     folder.parent.mkdir(exist_ok=True)
     urdf = write_pendulum(folder.parent / "pendulum.urdf")
-    arm = Arm(("servo",), RigidBodies(str(urdf), ("servo",)), False)
+    arm = Arm(("servo",), Bodies(RigidBodies(str(urdf), ("servo",)), False))
     drive = Drive(np.array([STIFFNESS]), np.array([DAMPING]), np.inf)
     parameters = ParameterSet(drive, DELAY, effects)
     header = LogHeader("joint_response", "swing", {}, joints=("servo",), urdf=str(urdf))

@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -12,6 +14,7 @@ from drake_disasm.effects import (
 )
 from sysid.models.regressor import ArmDynamics
 from sysid.models.response.drive import Drive, DriveSettings, Inputs
+from sysid.models.response.near_motion import Bodies
 from sysid.models.response.rigid_bodies import RigidBodies
 from sysid.models.response.segments import Segment, inputs_of
 from sysid.models.response.simulation import Arm, ParameterSet, simulate
@@ -24,7 +27,7 @@ TIMES = np.linspace(0.0, 2.0, 401)
 @pytest.fixture
 def arm(tmp_path):
     urdf = write_two_link_arm(tmp_path / "two.urdf")
-    return Arm(JOINTS, RigidBodies(str(urdf), JOINTS), False)
+    return Arm(JOINTS, Bodies(RigidBodies(str(urdf), JOINTS), False))
 
 
 def goal(t):
@@ -90,13 +93,13 @@ def test_at_rest_spring_and_gravity_balance(arm):
     motion = run(arm, [parameters()], [still], 2000)
     q = motion.q[-1, 0]
     np.testing.assert_allclose(motion.v[-1], 0.0, atol=1e-8)
-    np.testing.assert_allclose(K * (q_d - q), arm.bodies.holding(q), atol=1e-6)
+    np.testing.assert_allclose(K * (q_d - q), arm.bodies.arm.holding(q), atol=1e-6)
 
 
 def test_a_controller_that_compensates_gravity_has_no_error_at_rest(arm):
     q_d = np.array([0.4, -0.2])
     still = segment(command=lambda t: np.tile(q_d, (len(t), 1)))
-    arm = Arm(arm.joints, arm.bodies, True)
+    arm = Arm(arm.joints, Bodies(arm.bodies.arm, True))
     motion = run(arm, [parameters()], [still], 2000)
     np.testing.assert_allclose(motion.q[-1, 0, 0], q_d, atol=1e-8)
 
@@ -188,3 +191,19 @@ def test_a_payload_takes_what_the_regressor_says(arm, tmp_path):
     )
     found = arm.bodies.terms(q, v, [tilt]).load(vd)
     np.testing.assert_allclose(found, Y @ dynamics.inertia + by_tilt, atol=1e-9)
+
+
+def test_near_the_measured_motion_simulations_are_as_by_drake(arm):
+    """Also of sets with a payload or a tilt, and of those that leave the motion."""
+    sets = [
+        parameters(JointViscousFriction(JOINTS[0], b), FlangePayload(m), ArmTilt(rx=r))
+        for b, m, r in ((0.3, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.05), (8.0, 0, 0))
+    ]
+    wanted = run(arm, sets, [segment()])
+    first = wanted.q[:, 0, 0], wanted.v[:, 0, 0]
+    near = dataclasses.replace(segment(), measured=first)
+    found = run(arm, sets, [near])
+    away = np.abs(wanted.q - wanted.q[:, :1]).max(axis=(0, 2, 3))
+    assert away[1] > 0.01 and away[3] > 0.1
+    np.testing.assert_allclose(found.q, wanted.q, atol=2e-5)
+    np.testing.assert_allclose(found.q[:, 1:3], wanted.q[:, 1:3], atol=1e-9)
