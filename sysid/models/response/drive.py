@@ -113,6 +113,10 @@ class Drive:
     damping: Array
     limit: float
 
+    def of(self, lanes: Any) -> "Drive":
+        """Returns the drives of some lanes."""
+        return Drive(self.stiffness[lanes], self.damping[lanes], self.limit)
+
     def torque(self, q: Array, v: Array, inputs: Inputs) -> Array:
         """Returns torques (..., joints) at positions and velocities (..., joints)."""
         pull, drag = self.pull(q, inputs), inputs.enabled * (inputs.rate - v)

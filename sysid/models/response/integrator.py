@@ -8,7 +8,7 @@ of second order, too.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,39 @@ _GAMMA = 1.0 - np.sqrt(0.5)
 STAGES = (_GAMMA, 1.0)
 _MOST_ITERATIONS = 50
 _MOST_HALVINGS = 40
+_DONE = 0.5  # share of the lanes that are done, from which on others go on without
 _DESCENT = 0.1  # of the descent that is promised, at least
 _CHANGE = 1e-7  # rad/s, for differences
 _SMALL = 1e-10  # rad/s: velocities are known so well
 
+#: Numbers of lanes, increasing, or all of them.
+Lanes = NDArray[np.intp] | slice
 #: What the rigid bodies give, of whatever type.
-Terms = TypeVar("Terms")
+Terms = TypeVar("Terms", contravariant=True)
+
+
+class Missing(Protocol[Terms]):
+    """Load and friction minus the drives' torque."""
+
+    def __call__(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        terms: Terms,
+        step: int,
+        stage: int,
+        lanes: Lanes,
+    ) -> Array:
+        """Returns what is missing in some lanes (..., n, joints).
+
+        Args:
+            q, v, a: (..., n, joints) positions, velocities and accelerations.
+            terms: rigid bodies, of all lanes.
+            step, stage: of the step, and which.
+            lanes: (n,) increasing numbers, or all.
+        """
+        ...
 
 
 @dataclass(frozen=True)
@@ -42,7 +69,7 @@ def integrate(
     steps: int,
     h: float,
     terms: Callable[[Array, Array, int], Terms],
-    missing: Callable[[Array, Array, Array, Terms, int, int], Array],
+    missing: Missing[Terms],
 ) -> Motion:
     """Returns how lanes move from where they begin; NaN where no step was found.
 
@@ -51,9 +78,7 @@ def integrate(
         steps: how many.
         h: of a step [s].
         terms: rigid bodies at (lanes, joints) positions and velocities, of a step.
-        missing: load and friction minus the drives' torque (..., lanes, joints), at
-            positions, velocities and accelerations, with these terms, in a step's
-            stage.
+        missing: see there.
     """
     a = np.zeros_like(q)
     path_q, path_v = [q], [v]
@@ -79,7 +104,7 @@ def _stage(
     a: Array,
     dt: float,
     terms: Terms,
-    missing: Callable[[Array, Array, Array, Terms, int, int], Array],
+    missing: Missing[Terms],
     step: int,
     stage: int,
 ) -> Array:
@@ -87,7 +112,7 @@ def _stage(
 
     There v + dt a and q + dt (v + dt a). By Newton's method; a step that does not
     bring the balance nearer is halved, lane by lane, since dry friction that has
-    changed its sign leads far too far.
+    changed its sign leads far too far. Lanes that are done wait for no other.
 
     Args:
         q, v: (lanes, joints) that the stage starts from.
@@ -97,21 +122,27 @@ def _stage(
         missing: see `integrate`.
         step, stage: their numbers.
     """
+    found, left = a.copy(), np.arange(len(a))
+    lanes: Lanes = slice(None)
 
     def short(a: Array) -> Array:
         """Returns what is missing (..., lanes, joints) for accelerations."""
-        end = v + dt * a
-        return missing(q + dt * end, end, a, terms, step, stage)
+        end = v[lanes] + dt * a
+        return missing(q[lanes] + dt * end, end, a, terms, step, stage, lanes)
 
     r = short(a)
     for _ in range(_MOST_ITERATIONS):
         newton = np.linalg.solve(_slope(short, a, r, dt), -r[..., None])[..., 0]
         change, r = _descent(short, a, r, np.asarray(newton, np.float64), dt)
-        a = a + change
-        moved = dt * np.abs(change).max(axis=1)
-        if not (moved > _SMALL).any():
-            break
-    return np.where((moved <= _SMALL)[:, None], a, np.nan)
+        found[left] = a = a + change
+        is_done = ~(dt * np.abs(change).max(axis=1) > _SMALL)
+        if is_done.all():
+            return found
+        if is_done.sum() > _DONE * len(left):
+            left, a, r = left[~is_done], a[~is_done], r[~is_done]
+            lanes, is_done = left, is_done[~is_done]
+    found[left[~is_done]] = np.nan
+    return found
 
 
 def _descent(

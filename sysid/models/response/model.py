@@ -161,6 +161,7 @@ class JointResponseModel(LogModel):
         q, v, vd = np.concatenate(motions, axis=1)
         load = self._bodies.terms(q, v, ()).load(vd)
         self._most = _largest(load, v, vd)
+        self._most_per_load = _largest_per_load(self._joints, load)
         if self._settings.gravity_compensation:
             load = load - self._bodies.holding(q)
         by_delay = {t: joined(own) for t, *own in zip(delays, *inputs, strict=True)}
@@ -222,11 +223,14 @@ class JointResponseModel(LogModel):
         more than a small servo has.
         """
         added = in_units_of_joints(parameters, effects, self._prismatic)
-        return super().with_effects(effects, [self._bounded(p) for p in added])
+        bounded = [self._bounded(p, effects) for p in added]
+        return super().with_effects(effects, bounded)
 
-    def _bounded(self, parameter: Parameter) -> Parameter:
-        """Returns a parameter with bounds that no arm of this size exceeds."""
-        most = self._most.get(parameter.unit)
+    def _bounded(self, parameter: Parameter, effects: Sequence[Effect]) -> Parameter:
+        """Returns a field of effects with bounds that no arm of this size exceeds."""
+        joint = getattr(effects[int(parameter.path.split(".")[1])], "joint", "")
+        sizes = self._most | self._most_per_load.get(joint, {})
+        most = sizes.get(parameter.unit)
         if most is None or parameter.is_shape:
             return parameter
         most = max(most, 2.0 * abs(parameter.nominal))
@@ -374,6 +378,21 @@ def _largest(load: Array, v: Array, vd: Array) -> dict[str, float]:
     }
     found = {unit: most for unit, most in sizes.items() if 0.0 < most < np.inf}
     return found | {prismatic_unit(unit): most for unit, most in found.items()}
+
+
+def _largest_per_load(
+    joints: Sequence[str], load: Array
+) -> dict[str, dict[str, float]]:
+    """Returns how large friction per squared load (n, joints) may be, by the joint.
+
+    As large as the greatest load itself: no gear would move beyond.
+    """
+    unit = "1/(N m)"
+    most = 1.0 / np.maximum(np.abs(load).max(axis=0), 1e-9)
+    return {
+        joint: {unit: float(k), prismatic_unit(unit): float(k)}
+        for joint, k in zip(joints, most, strict=True)
+    }
 
 
 def _settings_of(logs: Sequence[Log]) -> DriveSettings:

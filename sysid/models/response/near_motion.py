@@ -61,6 +61,10 @@ class BodyTerms(RigidBodyTerms):
         """Returns terms of states (..., joints) that are to be put in."""
         return cls(np.zeros((*shape, shape[-1])), np.zeros(shape), np.zeros(shape))
 
+    def of(self, lanes: NDArray[np.intp] | slice) -> Self:
+        """Returns those of some states (n, joints) in a row."""
+        return type(self)(self.M[lanes], self.bias[lanes], self.added[lanes])
+
     def put(self, where: tuple[int, NDArray[np.bool_]], terms: "BodyTerms") -> None:
         """Replaces those of some states."""
         for name in ("M", "bias", "added"):

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,13 @@ from drake_disasm.effects import (
 )
 from sysid.models.base import Array
 from sysid.models.response.drive import Drive, Inputs
-from sysid.models.response.integrator import STAGES, Motion, integrate
+from sysid.models.response.integrator import (
+    STAGES,
+    Lanes,
+    Missing,
+    Motion,
+    integrate,
+)
 from sysid.models.response.near_motion import Bodies, BodyTerms, Expansion
 from sysid.models.response.segments import Segment
 
@@ -131,7 +138,7 @@ def _missing(
     segments: Sequence[Segment],
     steps: int,
     h: float,
-) -> Callable[[Array, Array, Array, BodyTerms, int, int], Array]:
+) -> Missing[BodyTerms]:
     """Returns what gives the torques that are missing for accelerations."""
     inputs = _inputs(sets, segments, steps, h)
     drive = Drive(
@@ -142,17 +149,23 @@ def _missing(
     effects = _stacked([s.effects for s in sets], len(segments))
 
     def missing(
-        q: Array, v: Array, a: Array, terms: BodyTerms, step: int, stage: int
+        q: Array,
+        v: Array,
+        a: Array,
+        terms: BodyTerms,
+        step: int,
+        stage: int,
+        lanes: Lanes,
     ) -> Array:
-        """Returns load and friction minus the drives' torque (..., lanes, joints)."""
+        """See Missing."""
+        terms, given = terms.of(lanes), inputs.at((step, stage, lanes))
         load = terms.load(a)
-        given = inputs.at((step, stage))
-        torque = drive.torque(q, v, given) + given.enabled * terms.added
+        torque = drive.of(lanes).torque(q, v, given) + given.enabled * terms.added
         needed = load - torque
-        for effect, lanes in effects:
-            own = (x[..., lanes, :] for x in (q, v, a, load))
-            samples = ArmSamples(arm.joints, *own)
-            needed[..., lanes, :] += effect.torques(samples)
+        for effect in effects:
+            acting, own = effect.of(lanes)
+            samples = ArmSamples(arm.joints, *(x[..., own, :] for x in (q, v, a, load)))
+            needed[..., own, :] += acting.torques(samples)
         return needed
 
     return missing
@@ -174,29 +187,60 @@ def _inputs(
     return Inputs(*(np.stack([getattr(i, n) for i in order], axis=2) for n in names))
 
 
-def _stacked(
-    sets: Sequence[tuple[ArmEffect, ...]], segments: int
-) -> list[tuple[ArmTorqueEffect, slice]]:
-    """Returns the effects of all sets with fields (n,), and the n lanes of each.
+@dataclass(frozen=True)
+class _LaneEffect:
+    """An effect in neighbouring lanes.
 
-    Lanes (sets segments,) of sets before the first in which an effect is not null, and
-    after the last, are none of its.
+    Attributes:
+        effect: with fields (n,), one for each lane.
+        lanes: which n.
     """
-    found = []
-    for alternatives in zip(*sets, strict=True):
-        acts = np.flatnonzero([not effect.is_null for effect in alternatives])
-        if not isinstance(alternatives[0], ArmTorqueEffect) or not len(acts):
-            continue
-        first, end = int(acts[0]), int(acts[-1]) + 1
+
+    effect: ArmTorqueEffect
+    lanes: slice
+
+    @classmethod
+    def of_sets(
+        cls, alternatives: Sequence[ArmTorqueEffect], segments: int, begin: int
+    ) -> Self:
+        """Returns one of neighbouring sets from `begin` on, so many segments each."""
         numbers = {
-            f.name: np.repeat(
-                [getattr(e, f.name) for e in alternatives[first:end]], segments
-            )
+            f.name: np.repeat([getattr(e, f.name) for e in alternatives], segments)
             for f in dataclasses.fields(alternatives[0])
             if isinstance(f.default, float)
         }
         effect = dataclasses.replace(alternatives[0], **numbers)
-        found.append((effect, slice(first * segments, end * segments)))
+        first = begin * segments
+        return cls(effect, slice(first, first + len(alternatives) * segments))
+
+    def of(self, lanes: Lanes) -> tuple[ArmTorqueEffect, slice]:
+        """Returns the effect in some lanes, and which of those it acts in."""
+        if isinstance(lanes, slice):
+            return self.effect, self.lanes
+        ends = np.searchsorted(lanes, [self.lanes.start, self.lanes.stop])
+        own = slice(*ends.tolist())
+        chosen = lanes[own] - self.lanes.start
+        numbers = {
+            f.name: getattr(self.effect, f.name)[chosen]
+            for f in dataclasses.fields(self.effect)
+            if isinstance(f.default, float)
+        }
+        return dataclasses.replace(self.effect, **numbers), own
+
+
+def _stacked(sets: Sequence[tuple[ArmEffect, ...]], segments: int) -> list[_LaneEffect]:
+    """Returns the effects of all sets, in the lanes (sets segments,) where they act.
+
+    Those of sets before the first in which an effect is not null, and after the last,
+    are none of its.
+    """
+    found = []
+    for alternatives in zip(*sets, strict=True):
+        acts = np.flatnonzero([not effect.is_null for effect in alternatives])
+        torques = [e for e in alternatives if isinstance(e, ArmTorqueEffect)]
+        if torques and len(acts):
+            first, end = int(acts[0]), int(acts[-1]) + 1
+            found.append(_LaneEffect.of_sets(torques[first:end], segments, first))
     return found
 
 

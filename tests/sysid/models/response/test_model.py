@@ -10,6 +10,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     JointCoulombFriction,
     JointLoadFriction,
+    JointQuadraticFriction,
     TorqueGain,
     registered_effects,
 )
@@ -18,7 +19,7 @@ from sysid.data_checks.check import check_data
 from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.spikes import spike_findings
 from sysid.data_checks.subject import Subject
-from sysid.effect_selection.candidates import candidates
+from sysid.effect_selection.candidates import candidates, extended
 from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.settings import DEFAULT_SETTINGS
@@ -234,3 +235,12 @@ def test_where_a_segment_begins_anew_is_no_spike(log):
     subject = Subject([log], model, DataSettings())
     expected = SimpleNamespace(scale=noise, all_residuals=lambda: drift / noise)
     assert not spike_findings(subject, expected)
+
+
+def test_friction_per_squared_load_is_at_most_what_locks_the_gear(log):
+    """Beyond it there is no derivative: nothing moves."""
+    model = JointResponseModel([log])
+    model, _ = extended(model, candidates(model, [JointQuadraticFriction]))
+    (high,) = [p.high for p in model.parameters if p.unit == "1/(N m)"]
+    heaviest = 0.5 * 9.81 * 0.1  # N m, of the pendulum held out straight
+    assert 0.3 / heaviest < high < 3.0 / heaviest

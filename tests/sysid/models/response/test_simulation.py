@@ -207,3 +207,15 @@ def test_near_the_measured_motion_simulations_are_as_by_drake(arm):
     assert away[1] > 0.01 and away[3] > 0.1
     np.testing.assert_allclose(found.q, wanted.q, atol=2e-5)
     np.testing.assert_allclose(found.q[:, 1:3], wanted.q[:, 1:3], atol=1e-9)
+
+
+def test_lanes_that_take_many_iterations_are_as_alone(arm):
+    """Others are done long before; they go on without them."""
+    dry = [JointCoulombFriction(j, 50.0, 1e-4) for j in JOINTS]
+    none = [JointCoulombFriction(j, 0.0, 1e-4) for j in JOINTS]
+    sets = [parameters(*none), parameters(*dry), parameters(*none)]
+    segments = [segment(at=(0.1, 0.3)), segment(at=(-0.4, 0.2))]
+    beside = run(arm, sets, segments, 100)
+    for number, own in enumerate(sets):
+        alone = run(arm, [own], segments, 100)
+        np.testing.assert_allclose(beside.q[:, number], alone.q[:, 0], atol=1e-9)
