@@ -52,7 +52,8 @@ class RefitSearch(ForwardSearch):
 
     def _next(self, fit: Fit, survey: Survey) -> Fit | None:
         rankings = list[_Ranking]()
-        if fit.objective <= self._settings.max_linear_objective:
+        is_near = fit.objective <= self._settings.max_linear_objective
+        if is_near or not fit.model.makes_contact:
             rankings.append(self._tried(fit, survey, {}))
         if self._needs_prescreening(fit, survey, rankings):
             rankings.append(self._tried(fit, *self._prescreened(fit, survey)))
@@ -73,7 +74,7 @@ class RefitSearch(ForwardSearch):
         is not what is missing; and the residual may be below it, too, and yet halved by
         what is.
         """
-        if self._is_over or not survey.effects:
+        if self._is_over or not survey.effects or not fit.model.makes_contact:
             return False
         if not rankings:
             return True

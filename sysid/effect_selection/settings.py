@@ -262,6 +262,14 @@ class SelectionSettings:
         "an effect that costs a channel more than that, significantly, is wrong "
         "however much the others gain",
     )
+    max_rise_per_gain: float = _setting(
+        0.001,
+        "of the loss that an effect takes off all channels",
+        "a channel that stays within its stated noise is not harmed by so little more: "
+        "joints move each other",
+        "friction of two joints that took 70 % off the objective was rejected for a "
+        "wrist that went from 0.45 to 0.64 times its noise",
+    )
     noticeable: float = _setting(
         0.3,
         "times the noise, if that is stated",

@@ -70,6 +70,9 @@ class LogModel(abc.ABC):
         held_out_share: share of the episodes that closing the loop holds out; with 0,
             contiguous blocks of rows are held out in turn, each predicted by a fit to
             all others.
+        makes_contact: whether predictions may change at once, where contact is made or
+            lost: derivatives far from the data then promise nothing, and effects are
+            compared by fits.
         has_commands: whether rows are commanded steps of an arm, which `displaced`
             can move: the arm may then scatter about its commands.
     """
@@ -79,6 +82,7 @@ class LogModel(abc.ABC):
     affine: bool = False
     effect_types: ClassVar[tuple[type[Effect], ...]] = ()
     held_out_share: ClassVar[float] = 0.0
+    makes_contact: ClassVar[bool] = True
     has_commands: ClassVar[bool] = False
     _effects: tuple[Effect, ...] = ()
     _own_parameters: tuple[Parameter, ...] | None = None  # None: none was frozen

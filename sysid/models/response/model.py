@@ -65,6 +65,7 @@ class JointResponseModel(LogModel):
     """
 
     effect_types = (ArmTorqueEffect, *ON_BODIES)
+    makes_contact = False
 
     def __init__(
         self,

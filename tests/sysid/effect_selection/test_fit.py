@@ -129,3 +129,16 @@ def test_an_added_effect_ends_where_the_models_own_derivatives_lead(tmp_path):
     at_truth = Objective(true, Workers(), fitter.huber_delta)(np.zeros(0))[0]
     assert fit.objective < at_truth
     assert fit.values["GroovePose.ry"] == pytest.approx(_TURN, rel=0.03)
+
+
+@pytest.mark.parametrize(("off", "harmed"), [(60.0, []), (3.0, ["fy"])])
+def test_a_channel_within_its_noise_may_pay_a_thousandth_of_the_gain(gain, off, harmed):
+    """Two joints' friction moves the wrist by less than its encoder's step."""
+    fitter, effect = gain
+    fit = fitter.fit((effect,))
+    names = [c.name for c in fit.model.measurements.channels]
+    before, after = (fit.linearisation.residual.copy() for _ in range(2))
+    before[:, names.index("fz")] = off
+    before[:, names.index("fy")], after[:, names.index("fy")] = 0.1, 0.95
+    first, last = (_with(fit, residual=r, huber_delta=np.inf) for r in (before, after))
+    assert last.harmed_channels(first) == harmed

@@ -21,6 +21,7 @@ MODULES = [
 ]
 #: Numerical guards and sizes of output, which decide nothing.
 ALLOWED = {
+    "_BETWEEN_LOOKS",  # at the clock
     "_RIDGE",
     "_AT_BOUND",
     "_LEAST_LEFT",
