@@ -44,7 +44,9 @@ from sysid.parameters import Parameter
 
 SEGMENT = 1.0  # s: several times what a servo takes to forget where it was
 _STEP = 0.005  # s, of the integrator at most
-_TOGETHER = 32  # parameter sets that are simulated side by side
+#: Parameter sets times joints that are simulated side by side: more would be a little
+#: faster in one process, and leave others without work.
+_TOGETHER = 64
 _CHUNK = 32  # segments of one piece of work
 _FEWEST = 24  # of a thinned model, if there are so many
 _REACH = 30.0  # times what was guessed, on either side
@@ -305,7 +307,7 @@ class JointResponseModel(LogModel):
     @property
     def together(self) -> int:
         """See LogModel."""
-        return _TOGETHER
+        return max(1, _TOGETHER // len(self._joints))
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
