@@ -34,6 +34,7 @@ from drake_disasm.importing import (
 from drake_disasm.importing.description import described, summary
 from drake_disasm.importing.plots import plot_import
 from drake_disasm.importing.units import factor
+from drake_disasm.logs.header import HEADER_NAME, read_header
 
 _EXAMPLES = """examples:
   python tools/import_log.py run.mcap --show            what is in it, and the guess
@@ -80,7 +81,12 @@ def _add_map_arguments(add: Callable[..., object]) -> None:
     )
     add("--map", type=Path, metavar="FILE", help="what is what (default: guessed)")
     add("--save-map", type=Path, metavar="FILE", help="write the map, to edit it")
-    add("--urdf", default="", metavar="FILE", help="that describes the arm")
+    add(
+        "--urdf",
+        default="",
+        metavar="FILE",
+        help="that describes the arm (default: of the log.yaml beside a table of ours)",
+    )
     add(
         "--joints",
         nargs="+",
@@ -161,15 +167,24 @@ def main(arguments: Sequence[str]) -> int:
 
 def _fields(args: argparse.Namespace, sources: Sequence[Source]) -> FieldMap:
     """Returns the map that is given, or guessed; the command line comes first."""
-    if args.urdf:
-        model_path(args.urdf, "give a file that is there by --urdf")
-    joints = args.joints or (movable_joints(args.urdf) if args.urdf else [])
+    urdf = args.urdf or _urdf_of_log(args.sources[0])
+    if urdf:
+        model_path(urdf, "give a file that is there by --urdf")
+    joints = args.joints or (movable_joints(urdf) if urdf else [])
     if args.map:
         fields = read_map(args.map)
     else:
-        fields = guessed_map(sources[0], args.kind, joints, args.urdf)
+        fields = guessed_map(sources[0], args.kind, joints, urdf)
     changes = {"urdf": args.urdf, "joints": tuple(args.joints), "task": args.task}
     return dataclasses.replace(fields, **{n: v for n, v in changes.items() if v})
+
+
+def _urdf_of_log(source: Path) -> str:
+    """Returns the URDF that the log of a table names; "" for a table of no log."""
+    folder = source.parent
+    if source.suffix != ".parquet" or not (folder / HEADER_NAME).exists():
+        return ""
+    return read_header(folder).urdf or ""
 
 
 def _indented(text: str) -> str:

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drake_disasm.logs import read_log
+from drake_disasm.cell.parsing import movable_joints
+from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from tests.sysid.real_data import real_folder, write_arm, write_slide
 from tests.tools.programs import run_program
 
@@ -65,6 +66,22 @@ def test_bad_input_is_one_line(
     assert run.returncode == 2 and said in run.stderr
     assert len(run.stderr.strip().splitlines()) == 1
     assert not (tmp_path / "x").exists()
+
+
+def test_a_table_of_a_log_of_ours_has_the_logs_urdf(tmp_path: Path) -> None:
+    arm = "package://disasm_models/iiwa14/iiwa14.urdf"
+    joints = movable_joints(arm)
+    q = 0.1 * np.sin(np.linspace(0.0, 6.0, 600))[:, None] * np.ones(len(joints))
+    header = LogHeader("joint_response", "swing", {}, joints=tuple(joints), urdf=arm)
+    time = 0.01 * np.arange(len(q))
+    table = {"time": time, "q_commanded": q, "q": q, "tau": 3.0 * q}
+    with LogWriter(tmp_path / "ours", header) as writer:
+        writer.write_episode(flat_columns("joint_response", table))
+    source = tmp_path / "ours" / "episode_0000.parquet"
+    run = run_program("import_log", str(source), "--out", str(tmp_path / "log"))
+    assert run.returncode == 0, run.stderr
+    found = read_log(tmp_path / "log").header
+    assert found.urdf == arm and found.joints == tuple(joints)
 
 
 def test_a_real_record_is_closed_from_its_raw_file(tmp_path: Path) -> None:
