@@ -4,7 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.multibody.tree import JacobianWrtVariable, SpatialInertia, UnitInertia
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    JacobianWrtVariable,
+    RigidBody,
+    SpatialInertia,
+    UnitInertia,
+    WeldJoint,
+)
 
 from drake_disasm.effects import ArmEffect, ArmTilt, FlangePayload
 from sysid.models.arm_plant import ArmPlant
@@ -40,7 +48,7 @@ class RigidBodies:
         self._arm = arm = ArmPlant.of(urdf, joints)
         self._context = arm.plant.CreateDefaultContext()
         self._columns = np.array(arm.columns)
-        self._link = arm.bodies[arm.last_body]
+        self._link, self._X_LF = _carrier(arm.plant, arm.bodies[arm.last_body])
         self._nominal = self._link.default_spatial_inertia()
         gravity = arm.plant.gravity_field().gravity_vector()
         self._g = float(np.linalg.norm(gravity))
@@ -89,12 +97,15 @@ class RigidBodies:
         return states
 
     def _set_payload(self, payloads: Sequence[FlangePayload]) -> None:
-        """Sets what the last link weighs, with payloads on it."""
-        M_F = self._nominal
-        pi = np.sum([p.inertial for p in payloads] or [np.zeros(10)], axis=0)
-        mass = M_F.get_mass() + pi[0]
-        moment = M_F.get_mass() * M_F.get_com() + pi[1:4]
-        upper = M_F.CalcRotationalInertia().CopyToFullMatrix3()[np.triu_indices(3)]
+        """Sets what the link that carries the flange weighs, with payloads on that."""
+        if not payloads:
+            self._link.SetSpatialInertiaInBodyFrame(self._context, self._nominal)
+            return
+        M_L = self._nominal
+        pi = _seen_from(self._X_LF, np.sum([p.inertial for p in payloads], axis=0))
+        mass = M_L.get_mass() + pi[0]
+        moment = M_L.get_mass() * M_L.get_com() + pi[1:4]
+        upper = M_L.CalcRotationalInertia().CopyToFullMatrix3()[np.triu_indices(3)]
         xx, xy, xz, yy, yz, zz = (upper + pi[4:]) / mass
         unit = UnitInertia(xx, yy, zz, xy, xz, yz)
         loaded = SpatialInertia(mass, moment / mass, unit, skip_validity_check=True)
@@ -108,3 +119,42 @@ class RigidBodies:
         )
         dg = self._g * np.array([tilt.ry, -tilt.rx, 0.0])
         return np.asarray(plant.CalcTotalMass(self._context) * (J.T @ dg))
+
+
+def _carrier(
+    plant: MultibodyPlant, flange: RigidBody
+) -> tuple[RigidBody, RigidTransform]:
+    """Returns the link that a flange is welded to and that has mass, and X_LF.
+
+    Most URDFs end in frames that weigh nothing, whose inertia no payload adds to. The
+    flange itself, if it moves by itself or nothing in the chain has mass.
+    """
+    welds = {
+        int(joint.child_body().index()): joint.parent_body()
+        for joint in (plant.get_joint(i) for i in plant.GetJointIndices())
+        if joint.type_name() == WeldJoint.kTypeName
+    }
+    link = flange
+    while not link.default_mass() and int(link.index()) in welds:
+        link = welds[int(link.index())]
+    if not link.default_mass():
+        return flange, RigidTransform()
+    frames = link.body_frame(), flange.body_frame()
+    return link, plant.CalcRelativeTransform(plant.CreateDefaultContext(), *frames)
+
+
+def _seen_from(X_LF: RigidTransform, pi_F: Array) -> Array:
+    """Returns inertial parameters (10,) about and in F as about and in L.
+
+    Of [m, m c, Ixx, Ixy, Ixz, Iyy, Iyz, Izz], linear in them, also without a mass
+    (Khalil and Dombre 2002).
+    """
+    R, p = X_LF.rotation().matrix(), X_LF.translation()
+    m, c = pi_F[0], R @ pi_F[1:4]
+    I_F = np.zeros((3, 3))
+    I_F[np.triu_indices(3)] = pi_F[4:]
+    I_F = I_F + np.triu(I_F, 1).T
+    turned = R @ I_F @ R.T
+    twice = np.outer(p, c) + np.outer(c, p) + m * np.outer(p, p)
+    moved = turned + np.trace(twice) * np.eye(3) - twice
+    return np.concatenate([[m], c + m * p, moved[np.triu_indices(3)]])

@@ -177,8 +177,18 @@ def test_a_lane_that_fails_is_nan_and_the_others_go_on(arm):
     assert np.isnan(motion.q[-1, 1]).all()
 
 
-def test_a_payload_takes_what_the_regressor_says(arm, tmp_path):
-    dynamics = ArmDynamics(str(tmp_path / "two.urdf"), JOINTS)
+FLANGE = """<link name="tool0"/><joint name="flange" type="fixed">
+<parent link="lower"/><child link="tool0"/><origin xyz="0.1 -0.2 0.3" rpy="0.4 1 -2"/>
+</joint>"""
+
+
+@pytest.mark.parametrize("flange", ["", FLANGE], ids=["on the last link", "on tool0"])
+def test_a_payload_takes_what_the_regressor_says(tmp_path, flange):
+    """Also on a flange that weighs nothing itself, as URDFs end in."""
+    urdf = write_two_link_arm(tmp_path / "two.urdf")
+    urdf.write_text(urdf.read_text().replace("</robot>", f"{flange}</robot>"))
+    arm = Arm(JOINTS, Bodies(RigidBodies(str(urdf), JOINTS), False))
+    dynamics = ArmDynamics(str(urdf), JOINTS)
     payload = FlangePayload(0.7, 0.02, -0.03, 0.1)
     tilt = ArmTilt(0.02, -0.05)
     q, v, vd = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 20, 2))
