@@ -25,7 +25,7 @@ import endurance
 import numpy as np
 import psutil
 import training_speed
-from effect_matrix import closing_time, run_matrix
+from effect_matrix import COUNTS, closing_time, run_matrix
 from objective_speed import (
     SIZES,
     THESIS_S,
@@ -419,16 +419,12 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         type=Path,
         metavar="DIR",
         help="instead: blind tests of closing the loop, each effect at three sizes, "
-        "null logs, pairs, effects that the library lacks; takes hours, Ctrl-C and the "
+        "several, none, one that the library lacks; takes hours, Ctrl-C and the "
         "same command go on; writes results.jsonl, effects.md, confusion.png",
     )
-    for option, usual, words in (
-        ("seeds", 5, "of each effect at each size"),
-        ("nulls", 100, "logs without an effect, of each correlation of the noise"),
-        ("pairs", 40, "logs with two effects"),
-    ):
+    for name, usual, words in COUNTS:
         parser.add_argument(
-            f"--{option}",
+            f"--{name.replace('_', '-')}",
             type=options.count,
             default=usual,
             metavar="N",
@@ -453,8 +449,8 @@ def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
     if args.effects:
-        counts = args.seeds, args.nulls, args.pairs
-        print(run_matrix(args.effects, *counts, args.first_seed))
+        counts = {name: getattr(args, name) for name, _, _ in COUNTS}
+        print(run_matrix(args.effects, counts, args.first_seed))
         return 0
     wanted = set(args.only) if args.only else {k for g in MEASUREMENTS for k in g}
     groups = {g: m for g, m in MEASUREMENTS.items() if wanted & set(g)}

@@ -4,7 +4,7 @@ import os
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from drake_disasm.common.files import make_folder, write_figure, write_text
 from drake_disasm.common.finished_work import FinishedWork
 from drake_disasm.common.program import ProgressBar
 from drake_disasm.effects import GroovePose
+from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
 from sysid.effect_selection.close_loop import close_loop
@@ -24,8 +25,8 @@ from sysid.validation.blind_tests import (
     Case,
     left_out_cases,
     null_cases,
-    pair_cases,
     run_cases,
+    several_cases,
     single_cases,
 )
 from sysid.validation.synthetic_logs import transitions_log
@@ -34,28 +35,36 @@ from sysid.workers import Workers
 
 LEVELS = (1.0, 2.0, 5.0)
 CORRELATIONS = (0.0, 0.5)
+#: What is counted, how often by default, and what it is.
+COUNTS = (
+    ("seeds", 5, "of each effect at each size"),
+    ("pairs", 40, "logs with two effects"),
+    ("triples", 20, "logs with three effects"),
+    ("nulls", 100, "logs without an effect, of each correlation of the noise"),
+    ("left_out", 1, "logs of each effect, which the library lacks"),
+)
 _LEFT_OUT_LEVEL = 5.0
-_PAIR_LEVEL = 3.0
+_SEVERAL_LEVEL = 3.0
 _STEPS, _TURN = 80, 0.0349066  # of an episode; rad, as in removal_turned
 
 
-def run_matrix(folder: Path, seeds: int, nulls: int, pairs: int, first: int = 0) -> str:
+def run_matrix(folder: Path, counts: Mapping[str, int], first: int = 0) -> str:
     """Runs the blind tests; returns what they show, as Markdown.
 
     Answers that are in the folder already are not asked for again.
 
     Args:
         folder: gets `results.jsonl` with the answers, `effects.md` and `confusion.png`.
-        seeds: of each effect at each level.
-        nulls: logs without an effect, of each correlation of the noise.
-        pairs: logs with two effects.
+        counts: by what `COUNTS` lists.
         first: of the seeds.
     """
+    seeds = {name: range(first, first + count) for name, count in counts.items()}
     groups: dict[str, list[Case]] = {
-        "singles": single_cases(LEVELS, range(first, first + seeds)),
-        "pairs": pair_cases(_PAIR_LEVEL, range(first, first + pairs)),
-        "nulls": null_cases(CORRELATIONS, range(first, first + nulls)),
-        "left out": left_out_cases(_LEFT_OUT_LEVEL, range(first, first + 1)),
+        "seeds": single_cases(LEVELS, seeds["seeds"]),
+        "pairs": several_cases(2, _SEVERAL_LEVEL, seeds["pairs"]),
+        "triples": several_cases(3, _SEVERAL_LEVEL, seeds["triples"]),
+        "nulls": null_cases(CORRELATIONS, seeds["nulls"]),
+        "left_out": left_out_cases(_LEFT_OUT_LEVEL, seeds["left_out"]),
     }
     cases = [case for group in groups.values() for case in group]
     make_folder(folder)
@@ -67,36 +76,36 @@ def run_matrix(folder: Path, seeds: int, nulls: int, pairs: int, first: int = 0)
     by_key = {a.case.key: a for a in found}
     text = in_words({n: [by_key[c.key] for c in g] for n, g in groups.items()})
     write_text(folder / "effects.md", text + "\n")
-    singles = [by_key[c.key] for c in groups["singles"]]
+    singles = [by_key[c.key] for c in groups["seeds"]]
     if singles:
         write_figure(folder / "confusion.png", confusion_figure(singles), dpi=110)
     return text
 
 
-def in_words(found: dict[str, list[Answer]]) -> str:
+def in_words(found: Mapping[str, Sequence[Answer]]) -> str:
     """Returns what blind tests of each kind show, as Markdown."""
-    singles, pairs, nulls, left = found.values()
+    singles, left = found["seeds"], found["left_out"]
     lines = [table(singles), "", errors_table(singles), ""] if singles else []
-    if pairs:
-        both = sum(a.in_tie for a in pairs)
-        lines.append(f"two effects at once: both found in {both} of {len(pairs)} logs")
+    for level in LEVELS:
+        own = [a.named_first for a in singles if a.case.level == level]
+        lines += _counted(f"one effect, {level:g} times the noise: named first", own)
+    for name in ("pairs", "triples"):
+        lines += _counted(f"{name}: all named or tied", [a.in_tie for a in found[name]])
     for rho in CORRELATIONS:
-        own = [a for a in nulls if a.case.correlation == rho]
-        alarms = sum(a.ending != "none" for a in own)
-        if own:
-            lines.append(
-                f"nothing there, noise correlated {rho:g}: "
-                f"{alarms} alarms in {len(own)} logs"
-            )
-    if left:
-        said = Counter(a.ending for a in left)
-        lines.append(
-            "an effect that the library lacks: "
-            f"unexplained in {said['unexplained']}, none in {said['none']}, explained "
-            f"in part by another name in {said['partly']} and wholly in "
-            f"{said['explained']} of {len(left)}"
-        )
-    return "\n".join(lines)
+        own = [a.ending != "none" for a in found["nulls"] if a.case.correlation == rho]
+        lines += _counted(f"nothing there, noise correlated by {rho:g}: alarms", own)
+    open_ = [a.ending != "explained" for a in left]
+    lines += _counted("an effect that the library lacks: not explained", open_)
+    ends = Counter(a.ending for a in left).items()
+    return "\n".join([*lines, ", ".join(f"{count} {end}" for end, count in ends)])
+
+
+def _counted(what: str, passed: Sequence[bool]) -> list[str]:
+    """Returns a line with how many passed, and Wilson's interval; none of none."""
+    if not passed:
+        return []
+    low, high = (100.0 * end for end in wilson_interval(sum(passed), len(passed)))
+    return [f"{what}: {sum(passed)} of {len(passed)} ({low:.0f} to {high:.0f} %)"]
 
 
 @contextmanager

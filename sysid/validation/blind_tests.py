@@ -206,11 +206,9 @@ def single_cases(levels: Sequence[float], seeds: Sequence[int]) -> list[Case]:
     ]
 
 
-def pair_cases(level: float, seeds: Sequence[int]) -> list[Case]:
-    """Returns two effects at once, drawn from all pairs."""
-    return [
-        Case(pair, level, seed) for seed, pair in zip(seeds, _pairs(), strict=False)
-    ]
+def several_cases(count: int, level: float, seeds: Sequence[int]) -> list[Case]:
+    """Returns several different effects at once, drawn from all."""
+    return [Case(e, level, s) for s, e in zip(seeds, _several(count), strict=False)]
 
 
 def null_cases(correlations: Sequence[float], seeds: Sequence[int]) -> list[Case]:
@@ -227,10 +225,10 @@ def left_out_cases(level: float, seeds: Sequence[int]) -> list[Case]:
     ]
 
 
-def _pairs() -> Iterator[tuple[str, str]]:
-    """Yields pairs of different effects in a random, repeatable order."""
+def _several(count: int) -> Iterator[tuple[str, ...]]:
+    """Yields so many different effects, in a random, repeatable order."""
     names = [effect.__name__ for effect in observable_effects()]
     random = np.random.default_rng(0)
     while True:
-        first, second = random.choice(len(names), 2, replace=False)
-        yield names[first], names[second]
+        drawn = random.choice(len(names), count, replace=False)
+        yield tuple(names[i] for i in drawn)

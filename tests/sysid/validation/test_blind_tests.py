@@ -17,10 +17,10 @@ from sysid.validation.blind_tests import (
     Case,
     nominal,
     observable_effects,
-    pair_cases,
     residual,
     run_case,
     run_cases,
+    several_cases,
     single_cases,
 )
 from sysid.validation.random_effects import random_effect
@@ -100,10 +100,11 @@ def test_answers_are_kept_and_not_asked_for_again(tmp_path):
     assert executor.done == 5
 
 
-def test_pairs_are_of_two_effects_that_can_show():
+@pytest.mark.parametrize("count", [2, 3])
+def test_several_effects_differ_and_can_show(count):
     names = {effect.__name__ for effect in observable_effects()}
-    for case in pair_cases(3.0, range(20)):
-        assert len(set(case.effects)) == 2 and set(case.effects) <= names
+    for case in several_cases(count, 3.0, range(20)):
+        assert len(set(case.effects)) == count and set(case.effects) <= names
 
 
 def test_tables_and_figure_count_what_was_said():
