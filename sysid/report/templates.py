@@ -1,5 +1,7 @@
 """Fills the templates of reports."""
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import jinja2
@@ -28,6 +30,16 @@ def _brief(value: float) -> str:
     return f"{value:.2g}"
 
 
+def interval(ends: Sequence[float]) -> str:
+    """Returns an interval in as many digits as tell its ends apart, at least two."""
+    low, high = ends
+    largest, width = max(abs(low), abs(high)), high - low
+    digits = 2
+    if 0.0 < width < largest:
+        digits = min(6, math.ceil(math.log10(largest / width)) + 1)
+    return f"{low:.{digits}g} … {high:.{digits}g}"
+
+
 def _figure(drawn: Plot) -> str:
     """Returns a figure as HTML, for a page that has Plotly's script."""
     config = {"displaylogo": False, "responsive": True}
@@ -44,6 +56,7 @@ def _figure(drawn: Plot) -> str:
 _ENVIRONMENT.filters["number"] = _number
 _ENVIRONMENT.filters["short"] = _short
 _ENVIRONMENT.filters["brief"] = _brief
+_ENVIRONMENT.filters["interval"] = interval
 _ENVIRONMENT.filters["figure"] = _figure
 _ENVIRONMENT.globals["plotly_script"] = get_plotlyjs
 

@@ -5,6 +5,7 @@ it began in fade (multiple shooting, Bock 1981, with the states as measured).
 """
 
 import dataclasses
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -68,8 +69,9 @@ def reach_of(episodes: Sequence[Episode]) -> float:
 def measured_noise(episodes: Sequence[Episode]) -> Array:
     """Returns the standard deviation (joints,) of measured positions.
 
-    By what three rows in a row are off a line, which no motion of a servo bends as much
-    as noise does; or by the encoder's step, if that is more.
+    By how far each row is off the cubic through two on either side, which follows what
+    a servo does also where rows are far apart; or by the encoder's step, if that is
+    more.
 
     Args:
         episodes: of a log of kind `joint_response`.
@@ -77,16 +79,33 @@ def measured_noise(episodes: Sequence[Episode]) -> Array:
     off, steps = [], []
     for episode in episodes:
         time, q = episode["time"], episode["q"]
-        share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
-        middle = (1.0 - share) * q[:-2] + share * q[2:]
-        off.append((q[1:-1] - middle) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2))
+        weights = _cubic_weights(time)
+        beside = np.array([q[near] for near in _BESIDE])
+        between = np.einsum("kn,knj->nj", weights, beside)
+        scale = np.sqrt(1.0 + np.sum(weights**2, axis=0))[:, None]
+        off.append((q[2:-2] - between) / scale)
         steps.append([quantum(column) for column in q.T])
     size = np.abs(np.concatenate(off))
+    if not len(size):  # nothing but scraps
+        return np.full(size.shape[1], _LEAST_NOISE)
     most = np.quantile(size, _INNER, axis=0)
     inner = np.sum(size**2 * (size <= most), axis=0) / np.sum(size <= most, axis=0)
     scatter = np.sqrt(inner) / _INNER_SHARE
     rounding = np.max(steps, axis=0) / np.sqrt(12.0)
     return np.maximum(np.maximum(scatter, rounding), _LEAST_NOISE)
+
+
+#: Of each row but the first and last two, two on either side.
+_BESIDE = (slice(0, -4), slice(1, -3), slice(3, -1), slice(4, None))
+
+
+def _cubic_weights(time: Array) -> Array:
+    """Returns the weights (4, n) of rows beside each in Lagrange's cubic there."""
+    beside = np.array([time[near] for near in _BESIDE])
+    weights = np.ones_like(beside)
+    for i, j in itertools.permutations(range(4), 2):
+        weights[i] *= (time[2:-2] - beside[j]) / (beside[i] - beside[j])
+    return weights
 
 
 @dataclass(frozen=True)

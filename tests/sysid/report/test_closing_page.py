@@ -8,6 +8,7 @@ import pytest
 from drake_disasm.effects import SensorDrift
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.report import closing_page
+from sysid.report.templates import interval
 from tests.sysid.effect_selection.blind import closed, static_log
 from tests.sysid.report.pages import own_part
 
@@ -80,3 +81,17 @@ def test_a_long_log_of_many_channels_stays_small(found):
         episode=np.zeros(rows, dtype=np.int64),
     )
     own_part(closing_page(dataclasses.replace(found, errors=long), {}))
+
+
+@pytest.mark.parametrize(
+    ("ends", "shown"),
+    [
+        ((5.978, 5.998), "5.978 … 5.998"),
+        ((0.1234, 0.3456), "0.12 … 0.35"),
+        ((-0.02, 0.03), "-0.02 … 0.03"),
+        ((2.0, 2.0), "2 … 2"),
+        ((1e6, 1e6 + 1e-9), "1e+06 … 1e+06"),
+    ],
+)
+def test_an_interval_has_the_digits_that_tell_its_ends_apart(ends, shown):
+    assert interval(ends) == shown

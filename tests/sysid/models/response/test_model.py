@@ -27,6 +27,7 @@ from sysid.effect_selection.survey import survey_candidates
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.response.model import JointResponseModel
+from sysid.models.response.segments import measured_noise
 from sysid.objective import Objective
 from sysid.workers import Workers
 from tests.sysid.models.response.servo import (
@@ -244,3 +245,20 @@ def test_friction_per_squared_load_is_at_most_what_locks_the_gear(log):
     (high,) = [p.high for p in model.parameters if p.unit == "1/(N m)"]
     heaviest = 0.5 * 9.81 * 0.1  # N m, of the pendulum held out straight
     assert 0.3 / heaviest < high < 3.0 / heaviest
+
+
+@pytest.mark.parametrize("rate", [50.0, 100.0, 500.0])
+@pytest.mark.parametrize("noise", [3e-5, 1e-3])
+def test_the_noise_is_told_from_the_motion_at_any_rate(rate, noise):
+    """Of rows that are not evenly spaced, of a joint that reverses twice a second."""
+    random = np.random.default_rng(0)
+    time = np.arange(0.0, 20.0, 1.0 / rate)
+    time = time + random.uniform(0.0, 0.1 / rate, len(time))
+    q = 0.3 * np.sin(np.pi * time) + 0.05 * np.sin(4.0 * np.pi * time)
+    q = q[:, None] + random.normal(0.0, noise, (len(time), 1))
+    assert measured_noise([{"time": time, "q": q}]) == pytest.approx(noise, rel=0.2)
+
+
+def test_a_scrap_of_a_recording_has_the_least_noise():
+    scrap = {"time": np.arange(4.0), "q": np.ones((4, 2))}
+    assert measured_noise([scrap]).tolist() == [1e-6, 1e-6]
