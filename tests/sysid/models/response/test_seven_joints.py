@@ -1,76 +1,27 @@
-"""An iiwa that is told where to go and says where it is: what the loop finds.
+"""Effects are found by where an arm is, without torques."""
 
-The logs are simulated, in steps five times finer than the model's.
-"""
-
-from pathlib import Path
-
-import numpy as np
 import pytest
 
-from drake_disasm.effects import FlangePayload
-from drake_disasm.logs import Log, LogHeader, LogWriter, flat_columns, read_log
 from sysid.effect_selection.close_loop import close_loop
-from sysid.models.response.drive import Drive, Inputs
 from sysid.models.response.model import JointResponseModel
-from sysid.models.response.near_motion import Bodies
-from sysid.models.response.rigid_bodies import RigidBodies
-from sysid.models.response.segments import Segment
-from sysid.models.response.simulation import Arm, ParameterSet, simulate
-
-JOINTS = tuple(f"iiwa_joint_{i}" for i in range(1, 8))
-URDF = "package://disasm_models/iiwa14/iiwa14.urdf"
-STIFFNESS = np.array([3000.0, 3000.0, 2500.0, 2500.0, 1500.0, 1000.0, 600.0])
-DAMPING = np.array([120.0, 120.0, 90.0, 80.0, 40.0, 25.0, 12.0])
-DELAY = 0.008
-NOISE, QUANTUM = 3e-5, 2e-5  # rad
-POSTURE = np.array([0.0, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0])
-DURATION, PERIOD = 15.0, 0.01
+from tests.sysid.models.response.seven_joints import HIDDEN, write_log
 
 
-def goals(time: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Returns commanded positions (n, 7): a Fourier series that begins at rest."""
-    goal = np.zeros((len(time), len(JOINTS)))
-    for k in (1, 2, 3, 5, 8):
-        size, phase = random.normal(0.0, 0.25 / k**0.5, 7), random.uniform(0.0, 6.28, 7)
-        angle = 2.0 * np.pi * k * time[:, None] / DURATION
-        goal += size * (np.sin(angle + phase) - np.sin(phase))
-    share = np.clip(time / 2.0, 0.0, 1.0)[:, None]
-    return POSTURE + share**2 * (3.0 - 2.0 * share) * goal
-
-
-def write_log(folder: Path, *effects, seed: int = 0) -> Log:
-    """Writes what an iiwa with effects does behind its drives, and reads it."""
-    random = np.random.default_rng(seed)
-    time = PERIOD * np.arange(round(DURATION / PERIOD) + 1)
-    goal, one = goals(time, random), np.ones((len(time), len(JOINTS)))
-    bodies = RigidBodies(URDF, JOINTS)
-    start = POSTURE - bodies.holding(POSTURE[None])[0] / STIFFNESS
-    inputs = Inputs(goal, 0.0 * one, one, one, one)
-    segment = Segment(0.0, start, np.zeros(7), time, inputs)
-    own = ParameterSet(Drive(STIFFNESS, DAMPING, np.inf), DELAY, effects)
-    steps = 10 * (len(time) - 1)
-    motion = simulate(Arm(JOINTS, Bodies(bodies, False)), [own], [segment], steps, 1e-3)
-    q = motion.q[::10, 0, 0]
-    q = np.round((q + random.normal(0.0, NOISE, q.shape)) / QUANTUM) * QUANTUM
-    header = LogHeader("joint_response", "swing", {}, joints=JOINTS, urdf=URDF)
-    with LogWriter(folder, header) as writer:
-        table = {"time": time, "q_commanded": goal, "q": q}
-        writer.write_episode(flat_columns("joint_response", table))
-    return read_log(folder)
+def verdict(folder, name):
+    effects, seed = HIDDEN[name]
+    log = write_log(folder / "log", *effects, seed=seed)
+    return close_loop(JointResponseModel([log])).verdict
 
 
 @pytest.mark.slow
 def test_where_nothing_is_hidden_nothing_is_found(tmp_path):
-    closed = close_loop(JointResponseModel([write_log(tmp_path / "log")]))
-    assert closed.verdict.ending == "none"
+    assert verdict(tmp_path, "nothing").ending == "none"
 
 
 @pytest.mark.slow
-def test_a_hidden_payload_is_found_without_torques(tmp_path):
-    payload = FlangePayload(mass=1.5, cy=0.02, cz=0.12)
-    closed = close_loop(JointResponseModel([write_log(tmp_path / "log", payload)]))
-    assert closed.verdict.names == ("FlangePayload",)
-    found = {v.name.rpartition(".")[2]: v.value for v in closed.verdict.values}
-    assert found["mass"] == pytest.approx(1.5, rel=0.1)
-    assert found["cz"] == pytest.approx(0.12, rel=0.1)
+def test_a_hidden_payload_is_found(tmp_path):
+    found = verdict(tmp_path, "payload")
+    assert found.names == ("FlangePayload",)
+    values = {v.name.rpartition(".")[2]: v.value for v in found.values}
+    assert values["mass"] == pytest.approx(1.5, rel=0.1)
+    assert values["cz"] == pytest.approx(0.12, rel=0.1)
