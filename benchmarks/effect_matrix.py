@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 from objective_speed import recorded_log
 
 from drake_disasm.common.executors import WorkerPool
@@ -72,7 +73,9 @@ def run_matrix(folder: Path, counts: Mapping[str, int], first: int = 0) -> str:
         ProgressBar(unit="log") as bar,
         WorkerPool(os.cpu_count() or 1, progress=bar) as pool,
     ):
-        found = run_cases(cases, pool, FinishedWork(folder))
+        # In no order, so that a part of them stands for all.
+        order = np.random.default_rng(0).permutation(len(cases))
+        found = run_cases([cases[i] for i in order], pool, FinishedWork(folder))
     by_key = {a.case.key: a for a in found}
     text = in_words({n: [by_key[c.key] for c in g] for n, g in groups.items()})
     write_text(folder / "effects.md", text + "\n")
