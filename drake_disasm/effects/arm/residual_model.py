@@ -41,7 +41,7 @@ class ArmResidualModel(ArmTorqueEffect):
             inputs = self.inputs_of(samples, joint)
             found = function(inputs.reshape(-1, inputs.shape[-1]))
             added[..., samples.joints.index(joint)] = found.reshape(inputs.shape[:-1])
-        return self.share * added
+        return self.column("share") * added
 
     @staticmethod
     def inputs_of(samples: ArmSamples, joint: str) -> np.ndarray:

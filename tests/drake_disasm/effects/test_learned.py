@@ -61,6 +61,19 @@ def test_a_joint_gets_what_was_learned(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found, [[0.0, HEIGHT], [0.0, 0.0]])
 
 
+def test_many_samples_at_once_have_a_share_each(tmp_path: Path) -> None:
+    """As where a joint's response is simulated for many parameter sets."""
+    path = tmp_path / "model.npz"
+    outputs = {"b": step_above_zero(4, 1, -5.0, 5.0)}
+    LearnedFunctions(ArmResidualModel.inputs, outputs).save(path)
+    v = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 5, 2))
+    zero, share = np.zeros_like(v), np.linspace(0.0, 1.0, 5)
+    effect = ArmResidualModel(str(path), share=share)
+    found = effect.torques(ArmSamples(("a", "b"), zero, v, zero, zero))
+    np.testing.assert_array_equal(found[..., 1], share * HEIGHT * (v[..., 1] > 0.0))
+    assert not found[..., 0].any()
+
+
 def test_a_scenario_finds_the_file_beside_it(tmp_path: Path) -> None:
     step_in_fy(tmp_path)
     effects = [SensorResidualModel("model.npz", share=1.0)]
