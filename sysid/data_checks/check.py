@@ -26,6 +26,15 @@ from sysid.workers import Workers
 
 Model = TypeVar("Model", bound=LogModel)
 
+
+def assumption_findings(subject: Subject) -> list[DataFinding]:
+    """Returns what the model takes for granted."""
+    return [
+        DataFinding("assumed", each.what, each.remedy)
+        for each in subject.model.assumptions
+    ]
+
+
 #: What logs show by themselves, and what shows against a model's expectation.
 _OF_LOGS = (
     clock_findings,
@@ -33,6 +42,7 @@ _OF_LOGS = (
     stuck_findings,
     processing_findings,
     log_unit_findings,
+    assumption_findings,
 )
 _OF_MODEL = (axes_findings, delay_findings, spike_findings, quantum_findings)
 

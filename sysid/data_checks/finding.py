@@ -12,6 +12,7 @@ from drake_disasm.common.errors import DisasmError
 
 #: Kinds of findings, with what each means.
 KINDS: Mapping[str, str] = {
+    "assumed": "what the model takes for granted, since the log doesn't say it",
     "axes": "axes are swapped or have the wrong sign",
     "constant": "a channel never changes, where it should",
     "derivatives": "velocities or accelerations are not the derivatives",

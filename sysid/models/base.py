@@ -4,6 +4,7 @@ import abc
 import copy
 import itertools
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -31,6 +32,19 @@ HUBER_DELTA = 3.0
 
 class PredictionError(Exception):
     """A model can't be evaluated at these parameters: the simulation failed."""
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """What a model takes for granted: the logs don't say it, or say otherwise.
+
+    Attributes:
+        what: in words, with the reason.
+        remedy: what to do.
+    """
+
+    what: str
+    remedy: str
 
 
 class LogModel(abc.ABC):
@@ -75,6 +89,7 @@ class LogModel(abc.ABC):
             compared by fits.
         has_commands: whether rows are commanded steps of an arm, which `displaced`
             can move: the arm may then scatter about its commands.
+        assumptions: that a check of the data reports.
     """
 
     parameters: tuple[Parameter, ...]
@@ -84,6 +99,7 @@ class LogModel(abc.ABC):
     held_out_share: ClassVar[float] = 0.0
     makes_contact: ClassVar[bool] = True
     has_commands: ClassVar[bool] = False
+    assumptions: tuple[Assumption, ...] = ()
     _effects: tuple[Effect, ...] = ()
     _own_parameters: tuple[Parameter, ...] | None = None  # None: none was frozen
     _frozen: Mapping[str, float] = {}

@@ -22,13 +22,13 @@ class DriveSettings:
         limit: c, beyond which the amplifier saturates: of gain times error; infinite
             if it doesn't.
         gravity_compensation: whether the controller adds what gravity takes, by the
-            URDF, as an arm in impedance control does.
+            URDF, as an arm in impedance control does; None: not stated.
         velocity_feedforward: whether the damping acts on the error of the velocity,
             not on the velocity.
     """
 
     limit: float = np.inf
-    gravity_compensation: bool = False
+    gravity_compensation: bool | None = None
     velocity_feedforward: bool = False
 
     @classmethod
@@ -52,7 +52,7 @@ class DriveSettings:
                 f"{where}: key 'drive.limit' is {limit!r}; give a number above zero, "
                 "the gain times error at which the amplifier saturates"
             )
-        switches = {name: mapping.get(name, False) for name in _KEYS[1:]}
+        switches = {name: mapping[name] for name in _KEYS[1:] if name in mapping}
         for name, value in switches.items():
             if not isinstance(value, bool):
                 raise DisasmError(

@@ -15,7 +15,7 @@ from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
 from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_logs
 from sysid.models.arm_plant import ArmPlant
-from sysid.models.base import Array, LogModel
+from sysid.models.base import Array, Assumption, LogModel
 from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints, prismatic_unit
 from sysid.models.measurements import Channel, Measurements
@@ -54,6 +54,7 @@ _LONGEST = 0.3  # s, of damping over stiffness: slower is no servo
 _LATEST = 0.05  # s, of a goal
 _TRIED = 21  # delays of the goal, evenly spaced, that the guess is made of
 _MANY = 5.0  # times the greatest torque of the rigid bodies, at most, by any effect
+_CLEARLY = 0.1  # of what one kind of controller leaves, at most, if it is the other
 _MOST_ROWS = 2000  # that the guess is made of
 
 
@@ -165,10 +166,35 @@ class JointResponseModel(LogModel):
         load = self._bodies.terms(q, v, ()).load(vd)
         self._most = _largest(load, v, vd)
         self._most_per_load = _largest_per_load(self._joints, load)
-        if self._settings.gravity_compensation:
-            load = load - self._bodies.holding(q)
         by_delay = {t: joined(own) for t, *own in zip(delays, *inputs, strict=True)}
-        return guessed_drives(load, q, v, vd, by_delay, self._settings.limit)
+        limit, holding = self._settings.limit, self._bodies.holding(q)
+        guesses = [
+            guessed_drives(load - added, q, v, vd, by_delay, limit)
+            for added in (0.0 * holding, holding)
+        ]
+        return guesses[self._compensates(*guesses)]
+
+    def _compensates(self, without: Guess, compensating: Guess) -> bool:
+        """Returns whether the controller adds what gravity takes, as is stated.
+
+        Or as is clear from the motion, where nothing is stated. Keeps that as an
+        assumption, and where what is stated is clearly wrong.
+
+        Args:
+            without: drives that have to hold the arm against gravity.
+            compensating: those that don't.
+        """
+        stated = self._settings.gravity_compensation
+        shares = [float(np.mean(g.left)) for g in (without, compensating)]
+        is_clear = min(shares) < _CLEARLY * max(shares)
+        by_motion = is_clear and shares[1] < shares[0]
+        assumed = by_motion if stated is None else stated
+        self._settings = dataclasses.replace(
+            self._settings, gravity_compensation=assumed
+        )
+        if is_clear and by_motion != bool(stated):
+            self.assumptions = (_assumption(stated, by_motion, shares),)
+        return assumed
 
     def _drive_parameters(
         self, guess: Guess, episodes: Sequence[Episode], logs: Sequence[Log]
@@ -186,7 +212,9 @@ class JointResponseModel(LogModel):
                 raise refusal(
                     logs[0].folder,
                     f"joint '{joint}' does not follow 'q_commanded.{i}'",
-                    "check signs and units of both, the gain, and that the joint "
+                    self.assumptions[0].remedy
+                    if self.assumptions
+                    else "check signs and units of both, the gain, and that the joint "
                     "carries something by the URDF",
                 )
             unit, of_damping = "N m/rad", "N m s/rad"
@@ -329,7 +357,7 @@ class JointResponseModel(LogModel):
             segments = [dataclasses.replace(s, measured=None) for s in segments]
         after = self._time[rows] - np.array([s.start for s in segments])[segment]
         steps = max(1, int(np.ceil(float(after.max()) / _STEP - 1e-9)))
-        bodies = Bodies(self._bodies, self._settings.gravity_compensation)
+        bodies = Bodies(self._bodies, bool(self._settings.gravity_compensation))
         arm = Arm(self._joints, bodies)
         sets = [self._parameter_set(theta) for theta in thetas]
         motion = simulate(arm, sets, segments, steps, _STEP)
@@ -351,6 +379,26 @@ class JointResponseModel(LogModel):
 @functools.lru_cache(maxsize=4)
 def _rigid_bodies(urdf: str, joints: tuple[str, ...]) -> RigidBodies:
     return RigidBodies(urdf, joints)
+
+
+def _assumption(
+    stated: bool | None, by_motion: bool, shares: Sequence[float]
+) -> Assumption:
+    """Returns that a controller adds what gravity takes, or doesn't.
+
+    Args:
+        stated: whether it does by the log; None: that doesn't say.
+        by_motion: whether it does by the motion.
+        shares: of the torques that drives can't have given, if it doesn't and does.
+    """
+    said = "doesn't say whether" if stated is None else "says otherwise:"
+    does = "adds" if by_motion else "does not add"
+    missed = " and ".join(f"{100.0 * share:.2g} %" for share in sorted(shares))
+    return Assumption(
+        f"log.yaml {said} the controller {does} what gravity takes, which the motion "
+        f"shows (drives miss {missed} of the torques, with and without)",
+        f"state 'drive: {{gravity_compensation: {str(by_motion).lower()}}}' there",
+    )
 
 
 def _smoothed(

@@ -80,8 +80,8 @@ def measured_noise(episodes: Sequence[Episode]) -> Array:
     for episode in episodes:
         time, q = episode["time"], episode["q"]
         weights = _cubic_weights(time)
-        beside = np.array([q[near] for near in _BESIDE])
-        between = np.einsum("kn,knj->nj", weights, beside)
+        neighbours = np.array([q[near] for near in _NEIGHBOURS])
+        between = np.einsum("kn,knj->nj", weights, neighbours)
         scale = np.sqrt(1.0 + np.sum(weights**2, axis=0))[:, None]
         off.append((q[2:-2] - between) / scale)
         steps.append([quantum(column) for column in q.T])
@@ -96,15 +96,15 @@ def measured_noise(episodes: Sequence[Episode]) -> Array:
 
 
 #: Of each row but the first and last two, two on either side.
-_BESIDE = (slice(0, -4), slice(1, -3), slice(3, -1), slice(4, None))
+_NEIGHBOURS = (slice(0, -4), slice(1, -3), slice(3, -1), slice(4, None))
 
 
 def _cubic_weights(time: Array) -> Array:
-    """Returns the weights (4, n) of rows beside each in Lagrange's cubic there."""
-    beside = np.array([time[near] for near in _BESIDE])
-    weights = np.ones_like(beside)
+    """Returns the weights (4, n) of each row's neighbours in Lagrange's cubic there."""
+    t = np.array([time[near] for near in _NEIGHBOURS])
+    weights = np.ones_like(t)
     for i, j in itertools.permutations(range(4), 2):
-        weights[i] *= (time[2:-2] - beside[j]) / (beside[i] - beside[j])
+        weights[i] *= (time[2:-2] - t[j]) / (t[i] - t[j])
     return weights
 
 

@@ -34,7 +34,15 @@ def goals(time: np.ndarray, number: int) -> np.ndarray:
     return (0.7 * np.sin(2.0 * time) + 0.4 * np.sin(5.3 * time))[:, None]
 
 
-def write_response(folder: Path, *effects, episodes=2, duration=6.0, **columns) -> Log:
+def write_response(
+    folder: Path,
+    *effects,
+    episodes=2,
+    duration=6.0,
+    compensates=False,
+    quantum=QUANTUM,
+    **columns,
+) -> Log:
     """Writes what a servo with effects does, simulated in fine steps.
 
     Args:
@@ -42,11 +50,13 @@ def write_response(folder: Path, *effects, episodes=2, duration=6.0, **columns) 
         effects: at the joint.
         episodes: how many.
         duration: of each [s].
+        compensates: whether the controller adds what gravity takes.
+        quantum: of the encoder [rad].
         columns: beside those of the positions, (n, 1) each.
     """
     folder.parent.mkdir(exist_ok=True)
     urdf = write_pendulum(folder.parent / "pendulum.urdf")
-    arm = Arm(("servo",), Bodies(RigidBodies(str(urdf), ("servo",)), False))
+    arm = Arm(("servo",), Bodies(RigidBodies(str(urdf), ("servo",)), compensates))
     drive = Drive(np.array([STIFFNESS]), np.array([DAMPING]), np.inf)
     parameters = ParameterSet(drive, DELAY, effects)
     header = LogHeader("joint_response", "swing", {}, joints=("servo",), urdf=str(urdf))
@@ -59,7 +69,7 @@ def write_response(folder: Path, *effects, episodes=2, duration=6.0, **columns) 
             inputs = Inputs(goal, 0.0 * goal, columns.get("gain", one), one, on)
             segment = Segment(0.0, np.zeros(1), np.zeros(1), time, inputs)
             motion = simulate(arm, [parameters], [segment], 5 * (len(time) - 1), 0.001)
-            q = np.round(motion.q[::5, 0, 0] / QUANTUM) * QUANTUM
+            q = np.round(motion.q[::5, 0, 0] / quantum) * quantum
             table = {"time": time, "q_commanded": goal, "q": q, **columns}
             writer.write_episode(flat_columns("joint_response", table))
     return read_log(folder)

@@ -262,3 +262,40 @@ def test_the_noise_is_told_from_the_motion_at_any_rate(rate, noise):
 def test_a_scrap_of_a_recording_has_the_least_noise():
     scrap = {"time": np.arange(4.0), "q": np.ones((4, 2))}
     assert measured_noise([scrap]).tolist() == [1e-6, 1e-6]
+
+
+@pytest.fixture(scope="module")
+def held(tmp_path_factory):
+    """A servo whose controller holds the pendulum, which its log does not say."""
+    folder = tmp_path_factory.mktemp("held") / "log"
+    return write_response(folder, duration=3.0, compensates=True, quantum=1e-5)
+
+
+def test_a_controller_that_holds_the_arm_is_known_by_the_motion(held):
+    model = JointResponseModel([held])
+    error = model.predictions(true_parameters()) - model.measurements.values
+    assert np.sqrt(np.mean(error**2)) < 3e-4
+    (found,) = [f for f in check_data([held], model) if f.kind == "assumed"]
+    assert "doesn't say whether the controller adds what gravity takes" in found.what
+    assert "gravity_compensation: true" in found.remedy
+
+
+def test_nothing_is_assumed_where_the_arm_hangs_on_its_drives(log):
+    assert not JointResponseModel([log]).assumptions
+
+
+def _stating(log, compensates):
+    header = dataclasses.replace(
+        log.header, drive={"gravity_compensation": compensates}
+    )
+    return dataclasses.replace(log, header=header)
+
+
+def test_what_is_stated_counts_and_is_doubted(held):
+    (assumed,) = JointResponseModel([_stating(held, False)]).assumptions
+    assert "says otherwise: the controller adds what gravity takes" in assumed.what
+
+
+def test_where_what_is_stated_can_not_be_the_refusal_says_so(log):
+    with pytest.raises(DisasmError, match="gravity_compensation: false"):
+        JointResponseModel([_stating(log, True)])
