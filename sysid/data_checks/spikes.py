@@ -52,6 +52,9 @@ def _errors(subject: Subject, expected: Expectation) -> Array:
 def _alone(r: Array, piece: NDArray[np.int64]) -> Array:
     """Returns by how much rows of a residual (n,) are off the median of four around.
 
+    Or off a line through the next two, if that is less, at the ends of a piece: there
+    are no rows on one side, and a residual that grows is no spike.
+
     Args:
         r: the residual.
         piece: of each row; a residual may jump between two pieces.
@@ -63,6 +66,10 @@ def _alone(r: Array, piece: NDArray[np.int64]) -> Array:
             padded = np.pad(r[own], 2, mode="reflect")
             windows = np.lib.stride_tricks.sliding_window_view(padded, 5)
             found[own] = r[own] - np.median(windows[:, [0, 1, 3, 4]], axis=1)
+            for end in (own[:3], own[::-1][:3]):
+                a, b, c = r[end]
+                off = np.array([a - 2.0 * b + c, b - 0.5 * (a + c)])
+                found[end[:2]] = np.minimum(np.abs(found[end[:2]]), np.abs(off))
     return found
 
 

@@ -60,7 +60,8 @@ def _missing_line(verdict: Verdict, most: int) -> str:
     left, effects = _left_text(verdict), _effects_text(verdict, most)
     if verdict.ending == "unexplained":
         nearest = f". Nearest: {effects}" if effects else ""
-        return f"No library effect explains the residual: {left}{nearest}"
+        tried = "effect tried so far" if verdict.is_provisional else "library effect"
+        return f"No {tried} explains the residual: {left}{nearest}"
     return f"missing: {effects}" + (f". Left unexplained: {left}" if left else "")
 
 

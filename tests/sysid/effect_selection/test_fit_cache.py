@@ -77,6 +77,7 @@ def test_candidates_that_the_time_was_not_enough_for_are_counted(tmp_path):
     assert 0 < count < len(candidates(model, registered_effects()))
     assert f"the time was over before {count} candidate effects were" in found.text
     assert "no effect tried so far explains" in found.sentence
+    assert "No effect tried so far explains the residual" in found.text
     assert to_mapping(found)["end"]["untested"] == list(found.end.untested)
     page = closing_page(found, {})
     assert f"{count} candidate effects were not tested" in page
