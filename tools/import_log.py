@@ -167,7 +167,7 @@ def main(arguments: Sequence[str]) -> int:
 
 def _fields(args: argparse.Namespace, sources: Sequence[Source]) -> FieldMap:
     """Returns the map that is given, or guessed; the command line comes first."""
-    urdf = args.urdf or _urdf_of_log(args.sources[0])
+    urdf = args.urdf or ("" if args.map else _urdf_of_log(args.sources[0]))
     if urdf:
         model_path(urdf, "give a file that is there by --urdf")
     joints = args.joints or (movable_joints(urdf) if urdf else [])

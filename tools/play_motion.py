@@ -42,7 +42,7 @@ _EXAMPLES = """examples:
   python tools/play_motion.py out/motion/motion.csv --no-meshcat --record out/arm_log \\
       --hidden arm.yaml        a log that states removal and measured another arm
   python tools/import_log.py out/arm_log/episode_0000.parquet --kind joint_motion \\
-      --urdf out/arm_log/arm.urdf --out out/arm_torques
+      --out out/arm_torques
   python tools/close_loop.py --log out/arm_torques --out out/arm_closed
 """
 

@@ -393,10 +393,10 @@ def _assumption(
     """
     said = "doesn't say whether" if stated is None else "says otherwise:"
     does = "adds" if by_motion else "does not add"
-    missed = " and ".join(f"{100.0 * share:.2g} %" for share in sorted(shares))
+    without, compensating = (f"{100.0 * share:.2g} %" for share in shares)
     return Assumption(
         f"log.yaml {said} the controller {does} what gravity takes, which the motion "
-        f"shows (drives miss {missed} of the torques, with and without)",
+        f"shows (drives miss {compensating} of the torques if it does, else {without})",
         f"state 'drive: {{gravity_compensation: {str(by_motion).lower()}}}' there",
     )
 

@@ -26,7 +26,7 @@ from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.effect_selection.survey import survey_candidates
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models.from_logs import ModelChoice, model_of
-from sysid.models.response.model import JointResponseModel
+from sysid.models.response.model import JointResponseModel, _assumption
 from sysid.models.response.segments import measured_noise
 from sysid.objective import Objective
 from sysid.workers import Workers
@@ -294,6 +294,12 @@ def _stating(log, compensates):
 def test_what_is_stated_counts_and_is_doubted(held):
     (assumed,) = JointResponseModel([_stating(held, False)]).assumptions
     assert "says otherwise: the controller adds what gravity takes" in assumed.what
+
+
+def test_the_shares_that_drives_miss_are_told_apart():
+    said = _assumption(True, False, (0.01, 0.8)).what
+    assert "says otherwise: the controller does not add what gravity takes" in said
+    assert "drives miss 80 % of the torques if it does, else 1 %" in said
 
 
 def test_where_what_is_stated_can_not_be_the_refusal_says_so(log):
