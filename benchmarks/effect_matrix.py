@@ -77,11 +77,12 @@ def run_matrix(folder: Path, counts: Mapping[str, int], first: int = 0) -> str:
         order = np.random.default_rng(0).permutation(len(cases))
         found = run_cases([cases[i] for i in order], pool, FinishedWork(folder))
     by_key = {a.case.key: a for a in found}
-    text = in_words({n: [by_key[c.key] for c in g] for n, g in groups.items()})
+    answers = {n: [by_key[c.key] for c in g] for n, g in groups.items()}
+    text = in_words(answers)
     write_text(folder / "effects.md", text + "\n")
-    singles = [by_key[c.key] for c in groups["seeds"]]
-    if singles:
-        write_figure(folder / "confusion.png", confusion_figure(singles), dpi=110)
+    if answers["seeds"]:
+        figure = confusion_figure(answers["seeds"])
+        write_figure(folder / "confusion.png", figure, dpi=110)
     return text
 
 
@@ -99,8 +100,10 @@ def in_words(found: Mapping[str, Sequence[Answer]]) -> str:
         lines += _counted(f"nothing there, noise correlated by {rho:g}: alarms", own)
     open_ = [a.ending != "explained" for a in left]
     lines += _counted("an effect that the library lacks: not explained", open_)
-    ends = Counter(a.ending for a in left).items()
-    return "\n".join([*lines, ", ".join(f"{count} {end}" for end, count in ends)])
+    if left:
+        ends = Counter(a.ending for a in left).items()
+        lines.append(", ".join(f"{count} {end}" for end, count in ends))
+    return "\n".join(lines)
 
 
 def _counted(what: str, passed: Sequence[bool]) -> list[str]:

@@ -29,7 +29,7 @@ FLOORS = {
         {"studies"},
     ),
     "sysid": (
-        {"parameters", "confidence", "optimise", "thresholds"},
+        {"parameters", "confidence", "deadline", "optimise", "thresholds"},
         {"scenario_parameters"},
         {"models"},
         {"workers"},

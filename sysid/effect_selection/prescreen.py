@@ -7,12 +7,12 @@ explain.
 
 import dataclasses
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from sysid.deadline import parts_until
 from sysid.effect_selection.candidates import Candidate, extended
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
@@ -43,12 +43,9 @@ def prescreening_fits(
     small = dataclasses.replace(fitter, base=base.thin(every), workers=Workers())
     before = small.fit(fit.effects, fit)
     jobs = [_PrescreeningFit(small, before, effects) for effects in sets]
-    size = _BETWEEN_LOOKS if deadline < math.inf else max(1, len(jobs))
     found: list[Fit] = []
-    for begin in range(0, len(jobs), size):
-        found += fitter.workers.map(_PrescreeningFit.run, jobs[begin : begin + size])
-        if time.monotonic() > deadline:
-            break
+    for part in parts_until(deadline, len(jobs), _BETWEEN_LOOKS):
+        found += fitter.workers.map(_PrescreeningFit.run, jobs[part])
     return before, found
 
 

@@ -2,13 +2,12 @@
 
 import dataclasses
 import math
-import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.deadline import parts_until
 from sysid.objective import Objective, huber_weights
 
 Array = NDArray[np.float64]
@@ -123,7 +122,8 @@ def extend(
     source, origin = objective.differences, linearisation.residual
     at_origin = u[None] if source is not objective else u[None][:0]
     found: list[Array] = []
-    for part in _parts(len(points), source, deadline):
+    size = max(_BETWEEN_LOOKS, source.model.together)
+    for part in parts_until(deadline, len(points), size):
         together = np.vstack([points[part], at_origin])
         found += source.residuals(objective.scaling.from_unit(together))
         if len(at_origin):
@@ -134,16 +134,6 @@ def extend(
     )
     u = u[: known + len(columns)]
     return dataclasses.replace(linearisation, u=u, jacobian=jacobian)
-
-
-def _parts(count: int, source: Objective, deadline: float) -> Iterator[slice]:
-    """Yields which points are evaluated together, until the time is over."""
-    most = max(_BETWEEN_LOOKS, source.model.together)
-    size = most if deadline < math.inf else count
-    for begin in range(0, count, size):
-        yield slice(begin, begin + size)
-        if time.monotonic() > deadline:
-            return
 
 
 def _at(objective: Objective, u: Array, residual: Array | None) -> Linearisation:

@@ -6,6 +6,7 @@ of the rigid bodies is taken at the middle of the step, where the motion before 
 of second order, too.
 """
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
@@ -86,11 +87,12 @@ def integrate(
     for step in range(steps):
         middle = (q + 0.5 * h * v + 0.125 * h * h * a, v + 0.5 * h * a)
         of_step = terms(*middle, step)
-        first = _stage(q, v, a, _GAMMA * h, of_step, missing, step, 0)
+        in_step = functools.partial(missing, terms=of_step, step=step)
+        first = _stage(q, v, a, _GAMMA * h, functools.partial(in_step, stage=0))
         v_1 = v + _GAMMA * h * first
         rest = (1.0 - _GAMMA) * h
         q, v = q + rest * v_1, v + rest * first
-        second = _stage(q, v, first, _GAMMA * h, of_step, missing, step, 1)
+        second = _stage(q, v, first, _GAMMA * h, functools.partial(in_step, stage=1))
         v = v + _GAMMA * h * second
         q = q + _GAMMA * h * v
         a = second
@@ -104,10 +106,7 @@ def _stage(
     v: Array,
     a: Array,
     dt: float,
-    terms: Terms,
-    missing: Missing[Terms],
-    step: int,
-    stage: int,
+    missing: Callable[..., Array],
 ) -> Array:
     """Returns accelerations a with which nothing is missing at the stage's end.
 
@@ -120,9 +119,7 @@ def _stage(
         q, v: (lanes, joints) that the stage starts from.
         a: (lanes, joints) to begin with.
         dt: of the stage [s].
-        terms: of the step.
-        missing: see `integrate`.
-        step, stage: their numbers.
+        missing: see `Missing`, in this stage.
     """
     found, left = a.copy(), np.arange(len(a))
     lanes: Lanes = slice(None)
@@ -130,7 +127,7 @@ def _stage(
     def short(a: Array) -> Array:
         """Returns what is missing (..., lanes, joints) for accelerations."""
         end = v[lanes] + dt * a
-        return missing(q[lanes] + dt * end, end, a, terms, step, stage, lanes)
+        return missing(q[lanes] + dt * end, end, a, lanes=lanes)
 
     r, is_known = short(a), False
     for _ in range(_MOST_ITERATIONS):

@@ -204,12 +204,10 @@ class _LaneEffect:
         cls, alternatives: Sequence[ArmTorqueEffect], segments: int, begin: int
     ) -> Self:
         """Returns one of neighbouring sets from `begin` on, so many segments each."""
-        numbers = {
-            f.name: np.repeat([getattr(e, f.name) for e in alternatives], segments)
-            for f in dataclasses.fields(alternatives[0])
-            if isinstance(f.default, float)
-        }
-        effect = dataclasses.replace(alternatives[0], **numbers)
+        effect = _with_numbers(
+            alternatives[0],
+            lambda name: np.repeat([getattr(e, name) for e in alternatives], segments),
+        )
         first = begin * segments
         return cls(effect, slice(first, first + len(alternatives) * segments))
 
@@ -220,12 +218,16 @@ class _LaneEffect:
         ends = np.searchsorted(lanes, [self.lanes.start, self.lanes.stop])
         own = slice(*ends.tolist())
         chosen = lanes[own] - self.lanes.start
-        numbers = {
-            f.name: getattr(self.effect, f.name)[chosen]
-            for f in dataclasses.fields(self.effect)
-            if isinstance(f.default, float)
-        }
-        return dataclasses.replace(self.effect, **numbers), own
+        effect = self.effect
+        return _with_numbers(effect, lambda name: getattr(effect, name)[chosen]), own
+
+
+def _with_numbers(
+    effect: ArmTorqueEffect, of: Callable[[str], Array]
+) -> ArmTorqueEffect:
+    """Returns an effect with other numbers, by the names of its fields."""
+    names = [f.name for f in dataclasses.fields(effect) if isinstance(f.default, float)]
+    return dataclasses.replace(effect, **{name: of(name) for name in names})
 
 
 def _stacked(sets: Sequence[tuple[ArmEffect, ...]], segments: int) -> list[_LaneEffect]:
