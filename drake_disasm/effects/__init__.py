@@ -97,6 +97,7 @@ from drake_disasm.effects.arm.time_shift import ArmDelay, JointDelay
 from drake_disasm.effects.arm.base_tilt import ArmTilt
 from drake_disasm.effects.arm.flange_payload import FlangePayload
 from drake_disasm.effects.arm.joint_elasticity import JointElasticity
+from drake_disasm.effects.arm.joint_backlash import JointBacklash
 from drake_disasm.effects.arm.residual_model import ArmResidualModel
 # isort: on
 
@@ -131,6 +132,7 @@ __all__ = [
     "GrooveViscousFriction",
     "Imprecision",
     "JointAsymmetricFriction",
+    "JointBacklash",
     "JointCoulombFriction",
     "JointCoupling",
     "JointDelay",

@@ -20,6 +20,7 @@ from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints, prismatic_unit
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.response.drive import Drive, DriveSettings, joined
+from sysid.models.response.gears import ON_GEARS
 from sysid.models.response.near_motion import MOST_KEPT, Bodies
 from sysid.models.response.rigid_bodies import RigidBodies
 from sysid.models.response.segments import (
@@ -67,7 +68,7 @@ class JointResponseModel(LogModel):
     damping, and all have a delay T of the goal. Those are the parameters.
     """
 
-    effect_types = (ArmTorqueEffect, *ON_BODIES)
+    effect_types = (ArmTorqueEffect, *ON_BODIES, *ON_GEARS)
     makes_contact = False
 
     def __init__(
@@ -158,7 +159,7 @@ class JointResponseModel(LogModel):
             time = episode["time"]
             motions.append(np.stack([fit.q, fit.v, fit.vd]))
             given = inputs_of(episode, self._settings)
-            whole = Segment(0.0, fit.q[0], fit.v[0], time, given)
+            whole = Segment(0.0, fit.q[0], fit.v[0], time, given, fit.vd[0])
             inputs.append([whole.inputs_at(at, t) for t in delays])
             states.append(np.stack([given.goal, interpolated(at, fit.v, time)]))
         self._state = np.concatenate(states, axis=1)

@@ -117,6 +117,7 @@ class Segment:
         q, v: (joints,) there.
         time: (n,) of the episode [s].
         inputs: of the drives in the episode, row by row (n, joints).
+        vd: (joints,) accelerations there.
         measured: positions and velocities of the episode, row by row, (n, joints)
             each, which simulated ones should be near; None: not known.
     """
@@ -126,6 +127,7 @@ class Segment:
     v: Array
     time: Array
     inputs: Inputs
+    vd: Array
     measured: tuple[Array, Array] | None = None
 
     def inputs_at(self, times: Array, delay: float) -> Inputs:
@@ -197,7 +199,7 @@ def segments_of(
     state = local_fit(time, episode["q"], starts, reach)
     inputs = inputs_of(episode, settings)
     segments = [
-        Segment(float(start), state.q[i], state.v[i], time, inputs)
+        Segment(float(start), state.q[i], state.v[i], time, inputs, state.vd[i])
         for i, start in enumerate(starts)
     ]
     return segments, number

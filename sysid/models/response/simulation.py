@@ -17,6 +17,7 @@ from drake_disasm.effects import (
 )
 from sysid.models.base import Array
 from sysid.models.response.drive import Drive, Inputs
+from sysid.models.response.gears import Gears
 from sysid.models.response.integrator import (
     STAGES,
     Lanes,
@@ -66,7 +67,7 @@ def simulate(
     steps: int,
     h: float,
 ) -> Motion:
-    """Returns how the arm moves: q and v of (steps + 1, sets, segments, joints).
+    """Returns how the motors move: q and v of (steps + 1, sets, segments, joints).
 
     Args:
         arm: which.
@@ -75,26 +76,28 @@ def simulate(
         steps: as many for each.
         h: of a step [s].
     """
-    shape = (len(sets), len(segments), len(arm.joints))
-    q, v = (
-        np.broadcast_to([getattr(s, name) for s in segments], shape).reshape(
-            -1, shape[2]
-        )
-        for name in ("q", "v")
-    )
-    of_lanes = (arm, sets, segments, steps, h)
-    motion = integrate(q, v, steps, h, _terms(*of_lanes), _missing(*of_lanes))
-    return Motion(*(a.reshape(steps + 1, *shape) for a in (motion.q, motion.v)))
+    gears = Gears.of(arm.joints, [s.effects for s in sets])
+    q, v = gears.start(arm.bodies, segments)
+    of_lanes = (arm, gears.repeated(len(segments)), sets, segments, steps, h)
+    terms, missing = _terms(*of_lanes), _missing(*of_lanes)
+    q_0, v_0 = (x.reshape(-1, x.shape[-1]) for x in (q, v))
+    motion = integrate(q_0, v_0, steps, h, terms, missing)
+    shape = (steps + 1, *q.shape)
+    return Motion(*(gears.motors(x.reshape(shape)) for x in (motion.q, motion.v)))
 
 
 def _terms(
     arm: Arm,
+    gears: Gears,
     sets: Sequence[ParameterSet],
     segments: Sequence[Segment],
     steps: int,
     h: float,
 ) -> Callable[[Array, Array, int], BodyTerms]:
-    """Returns what gives the rigid bodies of all lanes (sets segments, joints)."""
+    """Returns what gives the rigid bodies of all lanes (sets segments, joints).
+
+    Those are where the links are.
+    """
     shape = (len(sets), len(segments), len(arm.joints))
     expansion = _expansion(arm.bodies, segments, steps, h)
     on_bodies = [
@@ -104,8 +107,8 @@ def _terms(
     is_loaded = np.array([bool(effects) for effects in on_bodies])[:, None]
 
     def terms(q: Array, v: Array, step: int) -> BodyTerms:
-        """Returns those of positions and velocities (lanes, joints) in a step."""
-        q, v = q.reshape(shape), v.reshape(shape)
+        """Returns those of coordinates and rates (lanes, joints + e) in a step."""
+        q, v = (gears.links(x).reshape(shape) for x in (q, v))
         if expansion:
             found, far = expansion.at(step, q, v)
         else:
@@ -134,6 +137,7 @@ def _expansion(
 
 def _missing(
     arm: Arm,
+    gears: Gears,
     sets: Sequence[ParameterSet],
     segments: Sequence[Segment],
     steps: int,
@@ -159,14 +163,16 @@ def _missing(
     ) -> Array:
         """See Missing."""
         terms, given = terms.of(lanes), inputs.at((step, stage, lanes))
-        load = terms.load(a)
+        load = terms.load(gears.links(a))
+        by_gears = gears.missing(q, a, load, lanes)
+        q, v, a = (gears.motors(x) for x in (q, v, a))
         torque = drive.of(lanes).torque(q, v, given) + given.enabled * terms.added
         needed = load - torque
         for effect in effects:
             acting, own = effect.of(lanes)
             samples = ArmSamples(arm.joints, *(x[..., own, :] for x in (q, v, a, load)))
             needed[..., own, :] += acting.torques(samples)
-        return needed
+        return np.concatenate([needed, by_gears], axis=-1) if gears.any else needed
 
     return missing
 

@@ -56,7 +56,8 @@ def write_response(
     """
     folder.parent.mkdir(exist_ok=True)
     urdf = write_pendulum(folder.parent / "pendulum.urdf")
-    arm = Arm(("servo",), Bodies(RigidBodies(str(urdf), ("servo",)), compensates))
+    bodies = Bodies(RigidBodies(str(urdf), ("servo",)), compensates)
+    arm = Arm(("servo",), bodies)
     drive = Drive(np.array([STIFFNESS]), np.array([DAMPING]), np.inf)
     parameters = ParameterSet(drive, DELAY, effects)
     header = LogHeader("joint_response", "swing", {}, joints=("servo",), urdf=str(urdf))
@@ -67,7 +68,7 @@ def write_response(
             goal = goals(time, number)
             on = columns.get("enabled", one)
             inputs = Inputs(goal, 0.0 * goal, columns.get("gain", one), one, on)
-            segment = Segment(0.0, np.zeros(1), np.zeros(1), time, inputs)
+            segment = Segment(0.0, *np.zeros((2, 1)), time, inputs, np.zeros(1))
             motion = simulate(arm, [parameters], [segment], 5 * (len(time) - 1), 0.001)
             q = np.round(motion.q[::5, 0, 0] / quantum) * quantum
             table = {"time": time, "q_commanded": goal, "q": q, **columns}

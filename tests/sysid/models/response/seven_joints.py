@@ -15,7 +15,9 @@ import numpy as np
 from drake_disasm.effects import (
     ArmTilt,
     FlangePayload,
+    JointBacklash,
     JointCoulombFriction,
+    JointElasticity,
     JointViscousFriction,
 )
 from drake_disasm.logs import Log, LogHeader, LogWriter, flat_columns, read_log
@@ -56,10 +58,11 @@ def write_log(folder: Path, *effects, seed: int = 0) -> Log:
     bodies = RigidBodies(URDF, JOINTS)
     start = POSTURE - bodies.holding(POSTURE[None])[0] / STIFFNESS
     inputs = Inputs(goal, 0.0 * one, one, one, one)
-    segment = Segment(0.0, start, np.zeros(7), time, inputs)
+    segment = Segment(0.0, start, np.zeros(7), time, inputs, np.zeros(7))
     own = ParameterSet(Drive(STIFFNESS, DAMPING, np.inf), DELAY, effects)
     steps = 10 * (len(time) - 1)
-    motion = simulate(Arm(JOINTS, Bodies(bodies, False)), [own], [segment], steps, 1e-3)
+    arm = Arm(JOINTS, Bodies(bodies, False))
+    motion = simulate(arm, [own], [segment], steps, 1e-3)
     q = motion.q[::10, 0, 0]
     q = np.round((q + random.normal(0.0, NOISE, q.shape)) / QUANTUM) * QUANTUM
     header = LogHeader("joint_response", "swing", {}, joints=JOINTS, urdf=URDF)
@@ -82,6 +85,8 @@ HIDDEN = {
         3,
     ),
     "tilt": ((ArmTilt(rx=0.03, ry=-0.02),), 4),
+    "a gear that yields": ((JointElasticity(JOINTS[1], 3e-4),), 5),
+    "play": ((JointBacklash(JOINTS[3], 4e-3, 0.5),), 6),
 }
 
 
@@ -89,8 +94,11 @@ def main() -> None:
     """Prints the verdict on each log, and how long it took."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
-    out = parser.parse_args().out
-    for name, (effects, seed) in HIDDEN.items():
+    parser.add_argument("--only", nargs="+", choices=HIDDEN, default=list(HIDDEN))
+    parsed = parser.parse_args()
+    out = parsed.out
+    for name in parsed.only:
+        effects, seed = HIDDEN[name]
         log = write_log(out / name, *effects, seed=seed)
         begin = clock.perf_counter()
         closed = close_loop(JointResponseModel([log]))

@@ -38,7 +38,7 @@ def segment(enabled=1.0, gain=1.0, supply=1.0, at=(0.1, 0.3), command=goal):
     one = np.ones((len(TIMES), 2))
     goal, none = command(TIMES), 0.0 * one
     inputs = Inputs(goal, none, gain * one, supply * one, enabled * one)
-    return Segment(0.0, np.array(at), np.zeros(2), TIMES, inputs)
+    return Segment(0.0, np.array(at), np.zeros(2), TIMES, inputs, np.zeros(2))
 
 
 def parameters(*effects, delay=0.0, limit=np.inf, k=K, d=D):
@@ -99,7 +99,7 @@ def test_at_rest_spring_and_gravity_balance(arm):
 def test_a_controller_that_compensates_gravity_has_no_error_at_rest(arm):
     q_d = np.array([0.4, -0.2])
     still = segment(command=lambda t: np.tile(q_d, (len(t), 1)))
-    arm = Arm(arm.joints, Bodies(arm.bodies.arm, True))
+    arm = dataclasses.replace(arm, bodies=Bodies(arm.bodies.arm, True))
     motion = run(arm, [parameters()], [still], 2000)
     np.testing.assert_allclose(motion.q[-1, 0, 0], q_d, atol=1e-8)
 
@@ -152,7 +152,8 @@ def test_damping_acts_on_the_error_of_the_velocity_if_the_drive_allows_for_it():
     added = drive.torque(0.0 * v, v, forward) - drive.torque(0.0 * v, v, plain)
     rate = [1.5 * np.cos(3.0 * TIMES), -0.8 * np.sin(2.0 * TIMES)]
     np.testing.assert_allclose(added / D, np.stack(rate, axis=1), atol=0.02)
-    late = Segment(0.0, v[0], v[0], TIMES, forward).inputs_at(np.array([1.0]), 0.1)
+    late = Segment(0.0, v[0], v[0], TIMES, forward, v[0])
+    late = late.inputs_at(np.array([1.0]), 0.1)
     assert late.rate[0, 0] == pytest.approx(1.5 * np.cos(2.7), abs=1e-3)
 
 
