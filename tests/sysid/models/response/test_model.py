@@ -8,7 +8,9 @@ import pytest
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
+    JointBacklash,
     JointCoulombFriction,
+    JointElasticity,
     JointLoadFriction,
     JointQuadraticFriction,
     TorqueGain,
@@ -216,10 +218,12 @@ def test_no_candidate_fails_where_its_derivative_is_taken(log):
     [
         JointCoulombFriction("servo", 0.08, 0.005),
         JointLoadFriction("servo", 0.4, 0.02),
+        JointElasticity("servo", 0.05),
+        JointBacklash("servo", 0.02, 0.02),
     ],
     ids=lambda e: type(e).__name__,
 )
-def test_the_loop_names_a_hidden_friction(tmp_path, hidden):
+def test_the_loop_names_what_is_hidden_in_a_servo(tmp_path, hidden):
     log = write_response(tmp_path / "log", hidden)
     closed = close_loop(JointResponseModel([log]))
     assert closed.verdict.names[0].startswith(type(hidden).__name__)
