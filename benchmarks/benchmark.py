@@ -25,7 +25,7 @@ import endurance
 import numpy as np
 import psutil
 import training_speed
-from effect_matrix import COUNTS, closing_time, run_matrix
+from effect_matrix import COUNTS, LEVELS, closing_time, run_matrix
 from objective_speed import (
     SIZES,
     THESIS_S,
@@ -431,6 +431,15 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
             help=f"with --effects: {words} (default: {usual})",
         )
     parser.add_argument(
+        "--levels",
+        type=options.above_zero,
+        nargs="+",
+        default=LEVELS,
+        metavar="X",
+        help="with --effects: sizes of single effects, times the noise "
+        "(default: 1 2 5)",
+    )
+    parser.add_argument(
         "--first-seed",
         type=options.seed,
         default=0,
@@ -450,7 +459,7 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     if args.effects:
         counts = {name: getattr(args, name) for name, _, _ in COUNTS}
-        print(run_matrix(args.effects, counts, args.first_seed))
+        print(run_matrix(args.effects, counts, args.first_seed, args.levels))
         return 0
     wanted = set(args.only) if args.only else {k for g in MEASUREMENTS for k in g}
     groups = {g: m for g, m in MEASUREMENTS.items() if wanted & set(g)}

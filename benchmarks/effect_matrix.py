@@ -34,7 +34,7 @@ from sysid.validation.synthetic_logs import transitions_log
 from sysid.validation.tables import confusion_figure, errors_table, table
 from sysid.workers import Workers
 
-LEVELS = (1.0, 2.0, 5.0)
+LEVELS = (1.0, 2.0, 5.0)  # times the noise
 CORRELATIONS = (0.0, 0.5)
 #: What is counted, how often by default, and what it is.
 COUNTS = (
@@ -49,7 +49,12 @@ _SEVERAL_LEVEL = 3.0
 _STEPS, _TURN = 80, 0.0349066  # of an episode; rad, as in removal_turned
 
 
-def run_matrix(folder: Path, counts: Mapping[str, int], first: int = 0) -> str:
+def run_matrix(
+    folder: Path,
+    counts: Mapping[str, int],
+    first: int = 0,
+    levels: Sequence[float] = LEVELS,
+) -> str:
     """Runs the blind tests; returns what they show, as Markdown.
 
     Answers that are in the folder already are not asked for again.
@@ -58,10 +63,11 @@ def run_matrix(folder: Path, counts: Mapping[str, int], first: int = 0) -> str:
         folder: gets `results.jsonl` with the answers, `effects.md` and `confusion.png`.
         counts: by what `COUNTS` lists.
         first: of the seeds.
+        levels: sizes of single effects, times the noise.
     """
     seeds = {name: range(first, first + count) for name, count in counts.items()}
     groups: dict[str, list[Case]] = {
-        "seeds": single_cases(LEVELS, seeds["seeds"]),
+        "seeds": single_cases(levels, seeds["seeds"]),
         "pairs": several_cases(2, _SEVERAL_LEVEL, seeds["pairs"]),
         "triples": several_cases(3, _SEVERAL_LEVEL, seeds["triples"]),
         "nulls": null_cases(CORRELATIONS, seeds["nulls"]),
@@ -90,7 +96,7 @@ def in_words(found: Mapping[str, Sequence[Answer]]) -> str:
     """Returns what blind tests of each kind show, as Markdown."""
     singles, left = found["seeds"], found["left_out"]
     lines = [table(singles), "", errors_table(singles), ""] if singles else []
-    for level in LEVELS:
+    for level in sorted({a.case.level for a in singles}):
         own = [a.named_first for a in singles if a.case.level == level]
         lines += _counted(f"one effect, {level:g} times the noise: named first", own)
     for name in ("pairs", "triples"):
