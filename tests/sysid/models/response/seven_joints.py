@@ -86,7 +86,7 @@ HIDDEN = {
     ),
     "tilt": ((ArmTilt(rx=0.03, ry=-0.02),), 4),
     "a gear that yields": ((JointElasticity(JOINTS[1], 3e-4),), 5),
-    "play": ((JointBacklash(JOINTS[3], 4e-3, 0.5),), 6),
+    "play": ((JointBacklash(JOINTS[0], 4e-3, 1.0),), 6),
 }
 
 
