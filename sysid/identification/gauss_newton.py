@@ -18,6 +18,10 @@ Array = NDArray[np.float64]
 _DAMPING = (0.0, 1e-3, 1e-2, 1e-1, 1.0, 10.0)  # all tried at once, as one batch
 #: Share of the objective that an iteration has to gain for another one to follow.
 MIN_GAIN = 1e-3
+#: Steps that gain little far from the noise are tried so many times as long.
+_LONGER = (8.0, 64.0)
+_LITTLE = 0.02  # of the objective
+_FAR = 1.2  # times the noise
 
 
 def gauss_newton(
@@ -55,6 +59,11 @@ def gauss_newton(
         batches = _batches(objective, linearisation, min_gain, central)
         point, residual = _best(objective, batches, value)
         reached = objective.value(residual)
+        if not central and value > _FAR and reached > (1.0 - _LITTLE) * value:
+            longer = _best(objective, [_longer(linearisation)], reached)
+            if objective.value(longer[1]) < reached:
+                point, residual = longer
+                reached = objective.value(residual)
         if reached >= value:
             break
         linearisation = linearise(
@@ -116,6 +125,19 @@ def _alone(linearisation: Linearisation) -> Array:
     w = linearisation.weights.reshape(-1)
     slope, power = J.T @ (w * r), np.einsum("ip,i,ip->p", J, w, J)
     return np.asarray(np.diag(-slope / np.maximum(power, 1e-300)))
+
+
+def _longer(linearisation: Linearisation) -> Array:
+    """Returns points (d, p) beyond the full step, and beyond those of one parameter.
+
+    Where a few rows are steep and far off, as at a wall, the weights that stand for
+    Huber's loss give it a curvature that it has not: steps lead downhill, but are a
+    hundred times too short.
+    """
+    alone = _alone(linearisation) if len(linearisation.u) > 1 else []
+    steps = np.array([_steps(linearisation)[0], *alone])
+    longer = np.concatenate([times * steps for times in _LONGER])
+    return np.asarray(np.clip(linearisation.u + longer, 0.0, 1.0))
 
 
 def _steps(linearisation: Linearisation) -> Array:

@@ -1,6 +1,7 @@
 """How many simulations a fit takes, where each costs seconds."""
 
 import numpy as np
+import pytest
 
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models.base import Array, LogModel
@@ -53,3 +54,26 @@ def test_where_no_step_of_all_helps_each_parameter_is_tried_alone():
     found = gauss_newton(objective, start, 6, central=False)
     a, b = objective.scaling.from_unit(found.u)
     np.testing.assert_allclose([a, b], [0.3, 0.0], atol=0.01)
+
+
+class _OneSteepReading(LogModel):
+    """y = a in 39 readings, which are one, and y = 30 a in another, which is zero."""
+
+    def __init__(self) -> None:
+        self.x = np.r_[30.0, np.ones(39)]
+        self.parameters = (Parameter("a", 0.001, -5.0, 5.0, "N"),)
+        channels = [Channel("y", "N", noise=0.01)]
+        self.measurements = Measurements.of_array(self.x == 1.0, channels)
+
+    def predict(self, theta: Array, rows: slice) -> Array:
+        return (theta[0] * self.x)[rows]
+
+    def select_rows(self, mask):
+        return self.replace(x=self.x[mask])
+
+
+def test_where_one_reading_makes_steps_short_longer_ones_are_tried():
+    """An outlier is no more than linear in Huber's loss; its weight says otherwise."""
+    objective = Objective(_OneSteepReading(), Workers(), huber_delta=3.0)
+    found = gauss_newton(objective, objective.start, 8, central=False)
+    assert objective.scaling.from_unit(found.u)[0] == pytest.approx(1.0, abs=0.05)
