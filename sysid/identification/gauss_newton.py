@@ -134,8 +134,9 @@ def _longer(linearisation: Linearisation) -> Array:
     Huber's loss give it a curvature that it has not: steps lead downhill, but are a
     hundred times too short.
     """
-    alone = _alone(linearisation) if len(linearisation.u) > 1 else []
-    steps = np.array([_steps(linearisation)[0], *alone])
+    steps = _steps(linearisation)[:1]
+    if len(linearisation.u) > 1:
+        steps = np.concatenate([steps, _alone(linearisation)])
     longer = np.concatenate([times * steps for times in _LONGER])
     return np.asarray(np.clip(linearisation.u + longer, 0.0, 1.0))
 

@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 
 from drake_disasm.effects import ArmEffect, JointBacklash, JointElasticity
 from sysid.models.base import Array
-from sysid.models.response.near_motion import Bodies
-from sysid.models.response.segments import Segment
 
 #: Effects between motors and links.
 ON_GEARS = (JointElasticity, JointBacklash)
@@ -75,25 +73,27 @@ class Gears:
         repeated = (np.repeat(x, times, axis=0) for x in numbers)
         return Gears(self.joints, self.which, *repeated)
 
-    def start(self, bodies: Bodies, segments: Sequence[Segment]) -> tuple[Array, Array]:
-        """Returns coordinates and rates (sets, segments, joints + e) at the begin.
+    def start(
+        self, q: Array, v: Array, load: Array, rate: Array
+    ) -> tuple[Array, Array]:
+        """Returns coordinates and their rates (lanes, joints + e) at the begin.
 
-        Links are where the load of the measured motion has them.
+        Args:
+            q, v: (lanes, joints) of the motors.
+            load, rate: (lanes, joints) that the gears pass on, and its derivative.
         """
-        q, v, vd = (
-            np.array([getattr(s, n) for s in segments]) for n in ("q", "v", "vd")
+        load, rate = load[:, self.which], rate[:, self.which]
+        twist, soon = (
+            self._twist_of(load + dt * rate, slice(None)) for dt in (0.0, _SOON)
         )
-        shape = (len(self.compliance), *q.shape)
-        q_0, v_0 = (np.broadcast_to(x, shape) for x in (q, v))
-        if not self.any:
-            return q_0, v_0
-        load = bodies.terms(q, v, ()).load(vd)
-        soon = bodies.terms(q + _SOON * v, v + _SOON * vd, ()).load(vd)
-        every = slice(None), None
-        twist, later = (self._twist_of(x[:, self.which], every) for x in (load, soon))
-        q_link = q_0[..., self.which] - twist
-        v_link = v_0[..., self.which] - (later - twist) / _SOON
-        return np.concatenate([q_0, q_link], -1), np.concatenate([v_0, v_link], -1)
+        q, v = self.with_links(q), self.with_links(v)
+        q[:, self.joints :] -= twist
+        v[:, self.joints :] -= (soon - twist) / _SOON
+        return q, v
+
+    def with_links(self, x: Array) -> Array:
+        """Returns coordinates (..., joints + e) of links that follow their motors."""
+        return np.concatenate([x, x[..., self.which]], axis=-1)
 
     def links(self, x: Array) -> Array:
         """Returns what coordinates (..., joints + e) are of the links."""

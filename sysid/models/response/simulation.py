@@ -76,14 +76,54 @@ def simulate(
         steps: as many for each.
         h: of a step [s].
     """
-    gears = Gears.of(arm.joints, [s.effects for s in sets])
-    q, v = gears.start(arm.bodies, segments)
-    of_lanes = (arm, gears.repeated(len(segments)), sets, segments, steps, h)
+    shape = (len(sets), len(segments), len(arm.joints))
+    q, v, vd = (
+        np.broadcast_to([getattr(s, name) for s in segments], shape).reshape(
+            -1, shape[2]
+        )
+        for name in ("q", "v", "vd")
+    )
+    gears = Gears.of(arm.joints, [s.effects for s in sets]).repeated(len(segments))
+    of_lanes = (arm, gears, sets, segments, steps, h)
     terms, missing = _terms(*of_lanes), _missing(*of_lanes)
-    q_0, v_0 = (x.reshape(-1, x.shape[-1]) for x in (q, v))
-    motion = integrate(q_0, v_0, steps, h, terms, missing)
-    shape = (steps + 1, *q.shape)
-    return Motion(*(gears.motors(x.reshape(shape)) for x in (motion.q, motion.v)))
+    if gears.any:
+        load, rate = _loads_at_begin(gears, (q, v, vd), h, terms, missing)
+        q, v = gears.start(q, v, load, rate)
+    motion = integrate(q, v, steps, h, terms, missing)
+    motors = (gears.motors(x) for x in (motion.q, motion.v))
+    return Motion(*(x.reshape(steps + 1, *shape) for x in motors))
+
+
+def _loads_at_begin(
+    gears: Gears,
+    state: tuple[Array, Array, Array],
+    h: float,
+    terms: Callable[[Array, Array, int], BodyTerms],
+    missing: Missing[BodyTerms],
+) -> tuple[Array, Array]:
+    """Returns the loads of the gears, and their rates (lanes, joints), at the begin.
+
+    Loads are what the drives give, less friction: a measured acceleration is too noisy
+    to say what the bodies need. It will do for the rate.
+
+    Args:
+        gears: of the lanes.
+        state: (lanes, joints) positions, velocities and accelerations, as measured.
+        h: of a step [s].
+        terms, missing: of the lanes, see `integrate`.
+    """
+    q, v, vd = state
+    needed, passed = [], []
+    for stage, share in enumerate(STAGES):
+        dt = share * h
+        at, rates = (gears.with_links(x) for x in (q + dt * v, v + dt * vd))
+        bodies = terms(at, rates, 0)
+        short = missing(at, rates, gears.with_links(vd), bodies, 0, stage, slice(None))
+        needed.append(bodies.load(vd))
+        passed.append(needed[-1] - gears.motors(short))
+    between = STAGES[1] - STAGES[0]
+    rate = (needed[1] - needed[0]) / (between * h)
+    return passed[0] - (passed[1] - passed[0]) * STAGES[0] / between, rate
 
 
 def _terms(
