@@ -2,9 +2,11 @@
 
 import os
 import re
+import tempfile
 import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
+from pathlib import Path
 
 import fuzz
 import numpy as np
@@ -16,6 +18,12 @@ from tests.tools.programs import run_program
 
 #: A few cases of each reader and codec; the program itself reads thousands.
 CASES = dict.fromkeys(fuzz.READERS, 40) | dict.fromkeys(fuzz.CODECS, 400)
+
+
+@pytest.fixture(autouse=True)
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Subjects leave their files to whoever says where temporary ones are."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3 import DDPG
+from stable_baselines3.common.logger import Logger
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import GroovePose
@@ -61,6 +62,7 @@ def test_every_id_makes_its_scenario(name: str) -> None:
 def test_stable_baselines3_trains_on_it_as_it_stands() -> None:
     env = gymnasium.make("drake_disasm/Chapter3-v0")
     agent = DDPG("MlpPolicy", env, learning_starts=0, batch_size=8, device="cpu")
+    agent.set_logger(Logger(None, []))  # its own makes a folder that stays
     agent.learn(12)
     action, _ = agent.predict(env.reset(seed=0)[0], deterministic=True)
     assert env.action_space.contains(action)

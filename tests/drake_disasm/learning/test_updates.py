@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 from stable_baselines3 import DDPG, SAC, TD3
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from torch.utils._pytree import tree_leaves
 
@@ -156,6 +157,7 @@ def _share_noise(agent: Agent, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _train_reference(reference: Any, batches: list[np.ndarray]) -> None:
     reference.replay_buffer = _Fed(batches)
+    reference.set_logger(Logger(None, []))  # its own makes a folder that stays
     reference._setup_learn(1)
     reference.train(len(batches), reference.batch_size)
 
