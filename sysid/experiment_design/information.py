@@ -10,14 +10,13 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.effects import (
     ArmEffect,
-    ArmResidualModel,
     DelayEffect,
     Effect,
     amplitudes,
     registered_effects,
 )
 from sysid.confidence import Z
-from sysid.models.arm_motion import ArmMotion
+from sysid.models.arm_motion import IN_TORQUES, ArmMotion
 from sysid.models.effects import at_null
 from sysid.models.regressor import ArmDynamics, base_set
 
@@ -157,7 +156,7 @@ def arm_effects() -> dict[str, type[Effect]]:
     return {
         kind.__name__: kind
         for kind in registered_effects()
-        if issubclass(kind, ArmEffect) and not issubclass(kind, ArmResidualModel)
+        if issubclass(kind, IN_TORQUES) and kind.is_physical
     }
 
 
@@ -169,9 +168,8 @@ def _amplitudes(
     found: dict[str, ArmEffect] = {}
     for name in kinds:
         if name not in known:
-            raise DisasmError(
-                f"effect {name}: is none of an arm; {closest(name, list(known))}"
-            )
+            remedy = closest(name, list(known))
+            raise DisasmError(f"effect {name}: no arm's torques show it; {remedy}")
         for effect in at_null(known[name], joints, duration):
             assert isinstance(effect, ArmEffect)
             found.setdefault(_name(effect), effect)

@@ -22,6 +22,9 @@ from sysid.models.base import Array
 from sysid.models.elastic_torques import ElasticTorques
 from sysid.models.regressor import ArmDynamics, BaseSet
 
+#: Effects that show in the torques of a motion: what `ArmMotion` knows.
+IN_TORQUES = (ArmTorqueEffect, DelayEffect, FlangePayload, ArmTilt, JointElasticity)
+
 _BY_SAMPLE = (
     "row",
     "time",

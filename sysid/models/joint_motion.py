@@ -14,7 +14,7 @@ from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
 from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_logs
-from sysid.models.arm_motion import ArmMotion
+from sysid.models.arm_motion import IN_TORQUES, ArmMotion
 from sysid.models.base import Array, LogModel
 from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints
@@ -36,7 +36,7 @@ class JointMotionModel(LogModel):
     """
 
     affine = True
-    effect_types = (ArmEffect,)
+    effect_types = IN_TORQUES
     residual_effect = ArmResidualModel
 
     def __init__(

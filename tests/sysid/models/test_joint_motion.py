@@ -7,6 +7,8 @@ from pydrake.multibody.tree import MultibodyForces
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     JointAsymmetricFriction,
+    JointBacklash,
+    JointElasticity,
     JointViscousFriction,
     TorqueRipple,
 )
@@ -196,3 +198,9 @@ def test_refuses_an_effect_at_a_joint_that_the_log_does_not_have(urdf, tmp_path)
             [read_log(tmp_path / "log")],
             ModelChoice(urdf=str(urdf), scenario=scenario),
         )
+
+
+def test_play_is_no_candidate_where_torques_can_not_show_it(urdf, tmp_path):
+    model = JointMotionModel([motion_log(tmp_path / "log", urdf)])
+    found = model.applicable_effects([JointBacklash, JointElasticity])
+    assert {type(e) for e in found} == {JointElasticity}
