@@ -218,8 +218,16 @@ def _channel_series(
     errors: HeldOut, number: int, time: Array, rows: NDArray[np.int64],
     own: Sequence[Array],
 ) -> list[tuple[int, go.Scatter]]:  # fmt: skip
-    """Returns a channel's series with the number of the panel of each."""
-    x, found = _small(time[rows]), []
+    """Returns a channel's series with the number of the panel of each.
+
+    Lines end with an episode: a reading that is none stands between two.
+    """
+    ends = np.flatnonzero(np.diff(errors.episode[rows])) + 1
+
+    def shown(values: Array) -> NDArray[np.float32]:
+        return _small(np.insert(values[rows], ends, np.nan))
+
+    x, found = shown(time), []
     for (label, colour), predicted, error in zip(
         _ENDS, (errors.before, errors.after), own, strict=True
     ):
@@ -228,12 +236,12 @@ def _channel_series(
         for panel, y in ((1, predicted[:, number]), (2, error)):
             text = name if panel == 1 else f"error {label}"
             trace = go.Scatter(
-                x=x, y=_small(y[rows]), name=text, mode="lines", line=line,
+                x=x, y=shown(y), name=text, mode="lines", line=line,
                 legendgroup=label, showlegend=panel == 1,
             )  # fmt: skip
             found.append((panel, trace))
     dots = go.Scatter(
-        x=x, y=_small(errors.measured[rows, number]), name="measured",
+        x=x, y=shown(errors.measured[:, number]), name="measured",
         mode="markers" if len(rows) <= _SHOWN_DOTS else "lines",
         marker={"color": _MEASURED, "size": 4}, line={"color": _MEASURED, "width": 2},
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The torque sensor of a joint has an offset."""
+"""A constant torque at a joint."""
 
 import dataclasses
 
@@ -12,14 +12,15 @@ from drake_disasm.effects.registry import register_effect
 @register_effect
 @dataclasses.dataclass
 class TorqueOffset(JointEffect):
-    """A constant in the reading of a joint's torque sensor.
+    """A constant torque at a joint: its torque sensor, or its drive, has an offset.
 
     Equation: tau = c.
-    Where it acts: one joint of the arm, on the torque that its sensor measures.
+    Where it acts: one joint of the arm, on the torque that its sensor measures, or that
+    its drive has to give.
     """
 
     joint: str = joint_name()
-    size: float = amplitude("N m", -200.0, 200.0, "offset of the reading")
+    size: float = amplitude("N m", -200.0, 200.0, "the offset")
 
     noun = "an offset of the torque"
     experiment = "rests of this joint in several poses, each reached from both sides"

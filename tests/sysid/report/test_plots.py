@@ -49,6 +49,18 @@ def test_a_channel_is_shown_at_a_time_and_each_has_its_titles():
     assert drawn.caption == "All 100 rows."
 
 
+def test_lines_end_with_an_episode():
+    errors = _errors(90, channels=1, episodes=3)
+    drawn = plots.fit_plot(errors)
+    lines = [t for t in drawn.figure.data if (t.name or "").startswith("predicted")]
+    assert len(lines) == 2
+    for line, values in zip(lines, (errors.before, errors.after), strict=True):
+        assert np.flatnonzero(np.isnan(line.y)).tolist() == [30, 61]
+        shown = line.y[~np.isnan(line.y)]
+        np.testing.assert_allclose(shown, values[:, 0], rtol=1e-6)
+        assert not line.connectgaps
+
+
 def test_a_costly_reading_is_marked_in_its_channel():
     errors = _errors(100)
     drawn = plots.fit_plot(errors, costly=[(7, 1)])
