@@ -31,6 +31,8 @@ class Parameter:
         path: where it stands in a scenario, such as `effects.0.ry`; the name itself
             if it is left out.
         is_shape: whether it is a shape parameter of an effect, not an amplitude.
+        first_step: over which its derivative is first taken, in its unit; None: a
+            share of the bounds.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Parameter:
     log_scale: bool = False
     path: str = ""
     is_shape: bool = False
+    first_step: float | None = None
 
     @classmethod
     def of_field(
@@ -76,6 +79,7 @@ class Parameter:
             low > 0.0 and high > DECADES * low if log_scale is None else log_scale,
             path,
             bool(metadata.get("grid")),
+            metadata.get("step"),
         )
 
     def __post_init__(self) -> None:

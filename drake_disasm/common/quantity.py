@@ -19,6 +19,7 @@ def quantity(
     high: float = math.inf,
     choices: tuple[str, ...] = (),
     grid: tuple[float, ...] = (),
+    step: float | None = None,
 ) -> Any:
     """Returns a dataclass field holding a number, a list of numbers or a word.
 
@@ -29,9 +30,11 @@ def quantity(
         low, high: inclusive bounds, in `unit`, of each element.
         choices: the words allowed, for a word.
         grid: values from which a search may begin, where the default is not enough.
+        step: by which a search first changes it, where a smaller one shows nothing of
+            what it does; None leaves that to the search.
     """
     metadata = {"unit": unit, "doc": doc, "low": low, "high": high}
-    metadata |= {"choices": choices, "grid": grid}
+    metadata |= {"choices": choices, "grid": grid, "step": step}
     if isinstance(default, list):
         return dataclasses.field(
             default_factory=lambda: list(default),

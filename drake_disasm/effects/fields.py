@@ -6,15 +6,19 @@ from typing import Any
 from drake_disasm.common.quantity import quantity
 
 
-def amplitude(unit: str, low: float, high: float, doc: str) -> Any:
+def amplitude(
+    unit: str, low: float, high: float, doc: str, step: float | None = None
+) -> Any:
     """Returns a field that says how large an effect is; its default, zero, is null.
 
     Args:
         unit: SI unit, "1" for a pure number.
         low, high: inclusive bounds, with zero between them.
         doc: what it is, in a line.
+        step: from null, over which a search first looks at what it does; None leaves
+            that to the search.
     """
-    return quantity(0.0, unit, doc, low=low, high=high)
+    return quantity(0.0, unit, doc, low=low, high=high, step=step)
 
 
 def shape_parameter(

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.deadline import parts_until
 from sysid.objective import Objective, huber_weights
+from sysid.parameters import Parameter
 
 Array = NDArray[np.float64]
 
@@ -80,7 +82,7 @@ def linearise(
             one-sided differences.
     """
     size = len(u)
-    steps = np.full(size, FIRST_STEP) if steps is None else steps
+    steps = _first_steps(objective.model.parameters) if steps is None else steps
     if not central:
         return extend(_at(objective, u, residual), objective, u, steps)
     ahead = np.clip(u + np.diag(steps), 0.0, 1.0)
@@ -113,7 +115,8 @@ def extend(
             out; the first few never are.
     """
     known = len(linearisation.u)
-    steps = np.full(len(u) - known, FIRST_STEP) if steps is None else steps
+    if steps is None:
+        steps = _first_steps(objective.model.parameters[known:])
     if not len(steps):
         return linearisation
     way = np.where(u[known:] > 0.5, -steps, steps)
@@ -134,6 +137,15 @@ def extend(
     )
     u = u[: known + len(columns)]
     return dataclasses.replace(linearisation, u=u, jacobian=jacobian)
+
+
+def _first_steps(parameters: Sequence[Parameter]) -> Array:
+    """Returns steps (p,) of the unit box with which nothing is known yet."""
+    stated = (
+        p.first_step / (p.high - p.low) if p.first_step else FIRST_STEP
+        for p in parameters
+    )
+    return np.array(list(stated))
 
 
 def _at(objective: Objective, u: Array, residual: Array | None) -> Linearisation:

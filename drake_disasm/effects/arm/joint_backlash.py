@@ -7,6 +7,10 @@ from drake_disasm.effects.base import ArmEffect
 from drake_disasm.effects.fields import amplitude, joint_name, shape_parameter
 from drake_disasm.effects.registry import register_effect
 
+#: The time that a link takes from one end to the other, and so what a motion shows, is
+#: in no proportion to a small play.
+_STEP = 2e-3  # rad, beyond most encoders
+
 
 @register_effect
 @dataclasses.dataclass
@@ -22,7 +26,7 @@ class JointBacklash(ArmEffect):
     """
 
     joint: str = joint_name()
-    play: float = amplitude("rad", 0.0, 0.1, "b, from one end to the other")
+    play: float = amplitude("rad", 0.0, 0.1, "b, from one end to the other", _STEP)
     load: float = shape_parameter(
         0.1, "N m", 1e-3, 20.0, "tau_0, that takes a link to an end", (0.01, 0.1, 1.0)
     )
