@@ -101,11 +101,12 @@ def main(arguments: Sequence[str]) -> int:
         delta = model.default_huber_delta
         fitter = Fitter.of(model, workers, delta, DEFAULT_SETTINGS, args.out / "fits")
         before: Fit | None = None
-        for name, kinds in _models().items():
+        by_hand = _models() if args.only != "loop" else {}
+        for name, kinds in by_hand.items():
             before = _best_fit(fitter, kinds, before)
             table[name] = _row(name, before, runs)
             write_json(args.out / "result.json", table)
-        if not args.by_hand:
+        if args.only != "by-hand":
             closed = close_loop(
                 model,
                 workers=workers,
@@ -128,7 +129,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, help="folder")
     parser.add_argument("--workers", type=int, default=1, help="processes (default 1)")
     parser.add_argument(
-        "--by-hand", action="store_true", help="only the models made by hand"
+        "--only",
+        choices=("by-hand", "loop"),
+        help="the models made by hand, or the loop",
     )
     return parser.parse_args(arguments)
 

@@ -16,8 +16,8 @@ DATA = SHARED / "servo_pendulum"
 
 
 def test_the_command_line_asks_for_data_and_a_folder() -> None:
-    args = parse(["data", "--out", "out", "--by-hand"])
-    assert (args.data, args.out, args.by_hand) == (Path("data"), Path("out"), True)
+    args = parse(["data", "--out", "out", "--only", "loop"])
+    assert (args.data, args.out, args.only) == (Path("data"), Path("out"), "loop")
 
 
 @pytest.mark.skipif(not DATA.exists(), reason=f"{DATA} is not here")
