@@ -38,7 +38,8 @@ def gauss_newton(
     Each step is SciPy's bounded linear least squares, weighted by Huber's weights
     and damped as by Levenberg and Marquardt; of six dampings, evaluated at once, the
     best is taken. It finds the local optimum, and how sharp that is. With one-sided
-    differences each parameter is tried alone where no step of all of them helps.
+    differences each parameter is tried alone where no step of all of them helps, and
+    longer steps where usual ones gain little.
 
     Args:
         objective: to minimise.
@@ -56,14 +57,8 @@ def gauss_newton(
         value = objective.value(linearisation.residual)
         if callback:
             callback(value)
-        batches = _batches(objective, linearisation, min_gain, central)
-        point, residual = _best(objective, batches, value)
+        point, residual = _next(objective, linearisation, min_gain, central)
         reached = objective.value(residual)
-        if not central and value > _FAR and reached > (1.0 - _LITTLE) * value:
-            longer = _best(objective, [_longer(linearisation)], reached)
-            if objective.value(longer[1]) < reached:
-                point, residual = longer
-                reached = objective.value(residual)
         if reached >= value:
             break
         linearisation = linearise(
@@ -72,6 +67,25 @@ def gauss_newton(
         if reached > (1.0 - min_gain) * value:
             break
     return linearisation
+
+
+def _next(
+    objective: Objective, linearisation: Linearisation, min_gain: float, central: bool
+) -> tuple[Array, Array]:
+    """Returns the best point (p,) that steps lead to, and the residuals there.
+
+    Longer steps are tried too where usual ones gain little far from the noise, but not
+    where an evaluation takes seconds.
+    """
+    value = objective.value(linearisation.residual)
+    batches = _batches(objective, linearisation, min_gain, central)
+    best = _best(objective, batches, value)
+    reached = objective.value(best[1])
+    is_done = value <= _FAR or reached <= (1.0 - _LITTLE) * value
+    if central or objective.model.costly or is_done:
+        return best
+    longer = _best(objective, [_longer(linearisation)], reached)
+    return longer if objective.value(longer[1]) < reached else best
 
 
 def _batches(
