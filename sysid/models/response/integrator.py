@@ -112,8 +112,10 @@ def _stage(
 
     There v + dt a and q + dt (v + dt a). By Newton's method; a step that does not
     bring the balance nearer is halved, lane by lane, since dry friction that has
-    changed its sign leads far too far. Slopes that have served well serve again, and
-    lanes that are done wait for no other.
+    changed its sign leads far too far. How near it is, the change says that the same
+    slopes would ask for next (Deuflhard 1974): torques would not do, of which a gear's
+    hardly change with its twist. Slopes that have served well serve again, and lanes
+    that are done wait for no other.
 
     Args:
         q, v: (lanes, joints) that the stage starts from.
@@ -133,9 +135,8 @@ def _stage(
     for _ in range(_MOST_ITERATIONS):
         if not is_known:
             J = _slope(short, a, r, dt)
-        newton = np.linalg.solve(J, -r[..., None])[..., 0]
         size = np.linalg.norm(r, axis=1)
-        change, r = _descent(short, a, r, np.asarray(newton, np.float64), dt)
+        change, r = _descent(short, a, r, J, dt)
         found[left] = a = a + change
         is_known = bool((np.linalg.norm(r, axis=1) <= _CLOSER * size).all())
         is_done = ~(dt * np.abs(change).max(axis=1) > _SMALL)
@@ -149,26 +150,33 @@ def _stage(
 
 
 def _descent(
-    short: Callable[[Array], Array], a: Array, r: Array, change: Array, dt: float
+    short: Callable[[Array], Array], a: Array, r: Array, J: Array, dt: float
 ) -> tuple[Array, Array]:
     """Returns Newton's change, halved in lanes that miss more by it, and what is left.
 
     Args:
         short: what is missing (lanes, joints) for accelerations.
         a, r: accelerations, and what is missing for them.
-        change: of the accelerations, by Newton's method.
+        J: (lanes, joints, joints) slopes.
         dt: of the stage [s].
     """
-    size, share = np.linalg.norm(r, axis=1), np.ones(len(a))
+    change = _newton(J, r)
+    size, share = np.linalg.norm(change, axis=1), np.ones(len(a))
     most = dt * np.abs(change).max(axis=1)
     for _ in range(_MOST_HALVINGS):
         left = short(a + share[:, None] * change)
-        is_worse = np.linalg.norm(left, axis=1) > (1.0 - _DESCENT * share) * size
+        asked = np.linalg.norm(_newton(J, left), axis=1)
+        is_worse = asked > (1.0 - _DESCENT * share) * size
         is_worse &= share * most > _SMALL
         if not is_worse.any():
             break
         share = np.where(is_worse, 0.5 * share, share)
     return share[:, None] * change, left
+
+
+def _newton(J: Array, r: Array) -> Array:
+    """Returns the changes (lanes, joints) after which nothing is missing, by slopes."""
+    return np.asarray(np.linalg.solve(J, -r[..., None])[..., 0], np.float64)
 
 
 def _slope(short: Callable[[Array], Array], a: Array, r: Array, dt: float) -> Array:
