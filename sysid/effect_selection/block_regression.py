@@ -25,6 +25,7 @@ Columns = NDArray[np.int64]
 
 # Numerical guards, not thresholds.
 _RIDGE = 1e-10  # of the diagonal, against columns that depend on each other
+_UNDETERMINED = 1e-6  # of what all blocks say of a column, by the other blocks
 _LEAST_LEFT = 1e-3  # of a direction's power that a fit may leave of a block
 _AT_BOUND = 1e-9  # of a parameter's range: rounding of a point on the bound
 
@@ -173,14 +174,19 @@ class BlockRegression:
         ends = [*self.begins[1:], len(self.r)]
         return [slice(i, j) for i, j in zip(self.begins, ends, strict=True)]
 
-    def held_out_losses(self, columns: Columns) -> Array:
+    def held_out_losses(self, columns: Columns, back: Array | None = None) -> Array:
         """Returns the loss of each block (B,) with columns fitted to all others.
 
         Contact makes and breaks: at a few rows a derivative is huge and meaningless. So
         columns are fitted with and without limited leverage of such rows, outliers of
         the fit lose their influence, and the better of the two fits counts.
+
+        Args:
+            columns: which.
+            back: (P,) from each parameter to its null, where it goes if the other
+                blocks say nothing of it; null is here, if it is left out.
         """
-        return self._held_out(columns).losses
+        return self._held_out(columns, back).losses
 
     def scores(self, columns: Columns) -> Scores:
         """Returns what the blocks say of columns that explain nothing by chance.
@@ -226,20 +232,23 @@ class BlockRegression:
         lengths = np.linalg.solve(_spread(H, noise), H)
         return np.asarray(np.linalg.norm(lengths, axis=0))
 
-    def _held_out(self, columns: Columns) -> "_HeldOut":
-        a = self.A[:, self._feasible(columns)]
+    def _held_out(self, columns: Columns, back: Array | None = None) -> "_HeldOut":
+        columns = self._feasible(columns)
+        back = np.zeros(len(self.scale)) if back is None else back * self.scale
+        a, own = self.A[:, columns], back[columns]
         priors = [np.ones(len(self.r))]
         if np.isfinite(self.huber_delta) and a.shape[1]:
             priors.append(self._leverage_weights(a))
-        found = [self._cross_validated(a, w) for w in priors]
+        found = [self._cross_validated(a, w, own) for w in priors]
         return min(found, key=lambda each: float(each.losses.sum()))
 
-    def _cross_validated(self, a: Array, prior: Array) -> "_HeldOut":
+    def _cross_validated(self, a: Array, prior: Array, back: Array) -> "_HeldOut":
         """Returns how columns (n, k) fitted to all other blocks predict each.
 
         Args:
             a: columns.
             prior: (n,) weights of rows, times which Huber's are taken.
+            back: (k,) to where what the others don't determine goes.
         """
         w = prior * self._weights(self.r)
         H, g = self._normal_equations(a, w)
@@ -249,7 +258,9 @@ class BlockRegression:
                 phi = -_solve(H.sum(axis=0)[None], g.sum(axis=0)[None])[0]
                 w = prior * self._weights(self.r + a @ phi)
                 H, g = self._normal_equations(a, w)
-        others = -_solve(H.sum(axis=0) - H, g.sum(axis=0) - g)
+        total = H.sum(axis=0)
+        weak = _UNDETERMINED * np.diag(np.diagonal(total))
+        others = -_solve(total + weak - H, g.sum(axis=0) - g - weak @ back)
         lengths = np.diff(self.begins, append=len(self.r))
         change = np.einsum("nk,nk->n", a, np.repeat(others, lengths, axis=0))
         return _HeldOut(self._loss(self.r + change), H, null, a, weights)

@@ -125,5 +125,6 @@ def _block_gains(
     """Returns what each block gains (B,), and the loss of all before."""
     losses = before.regression(blocks, filtered).block_losses
     own = np.arange(len(after.theta))
-    left = after.regression(blocks, filtered).held_out_losses(own)
+    back = after.null - after.linearisation.u
+    left = after.regression(blocks, filtered).held_out_losses(own, back)
     return losses - left, float(losses.sum())

@@ -88,7 +88,8 @@ class ForwardSearch(abc.ABC):
             fit = self._all_rows_of(known)
             survey = self._survey(fit)
         while not self._is_over and (found := self._next(fit, survey)) is not None:
-            fit, survey = found, self._survey(found)
+            fit = self._without_misshapen(found)
+            survey = self._survey(fit)
         rounds, is_complete = tuple(self._rounds), not self._is_over
         return SearchResult(first, fit, begin, survey, rounds, is_complete)
 
@@ -148,17 +149,36 @@ class ForwardSearch(abc.ABC):
             added = kept
 
     def _without_needless(self, fit: Fit) -> Fit:
-        """Returns the fit without effects that later ones have made needless."""
-        while True:
-            gains = fit.effect_gains
-            needless = [
-                c for c in fit.effects if gains[c.name] < self._settings.min_gain
-            ]
-            if not needless:
+        """Returns the fit without effects that later ones have made needless.
+
+        By the linear account, which a fit without has to confirm: the derivative of a
+        wall says nothing of what an effect is worth.
+        """
+        limit, gains = self._settings.min_gain, fit.effect_gains
+        for effect in sorted(fit.effects, key=lambda c: gains[c.name]):
+            if gains[effect.name] >= limit:
                 return fit
-            least = min(needless, key=lambda c: gains[c.name])
-            fit = self.fitter.fit(tuple(c for c in fit.effects if c is not least), fit)
-            self._report_fit(f"without {least.text}", fit)
+            rest = tuple(c for c in fit.effects if c is not effect)
+            without = self.fitter.fit(rest, fit)
+            if without.loss <= fit.loss / (1.0 - limit):
+                self._report_fit(f"without {effect.text}", without)
+                return self._without_needless(without)
+        return fit
+
+    def _without_misshapen(self, fit: Fit) -> Fit:
+        """Returns the fit without effects that later ones have driven to a bound.
+
+        They stood for those, and are no candidates any more.
+        """
+        for effect in fit.effects:
+            names = [effect.name]
+            if not (fit.at_bound(names) or fit.is_misshapen(names)):
+                continue
+            self.library = [c for c in self.library if c.name != effect.name]
+            rest = tuple(c for c in fit.effects if c is not effect)
+            self._report(f"{effect.name}: removed, since it has come to a bound")
+            return self._without_misshapen(self.fitter.fit(rest, fit))
+        return fit
 
     def _is_better(self, before: Fit, after: Fit, trial: Evidence) -> bool:
         """Returns whether the loss falls, and a trial's effects make sense.

@@ -16,7 +16,7 @@ from sysid.effect_selection.block_regression import BlockRegression
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence, most_parsimonious
 from sysid.effect_selection.refit_search import as_good_as_the_best, ties_by_fit
-from sysid.effect_selection.search import trials
+from sysid.effect_selection.search import LinearSearch, trials
 from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
 
 _SCATTER = np.random.default_rng(0).normal(size=40)
@@ -141,3 +141,61 @@ def test_of_two_that_differ_at_one_row_the_simpler_is_taken():
     assert as_good_as_the_best(trials, before)[0] is second
     before.states_model_error = False
     assert as_good_as_the_best(trials, before)[0] is first
+
+
+@pytest.mark.parametrize("back", [0.0, -2.0])
+def test_what_the_other_blocks_say_nothing_of_goes_to_null(back):
+    """A column acts in one block, and by rounding in the others."""
+    rows, size = 80, 4
+    A = np.full((rows, 1), 1e-9)
+    A[:size] = 3.0
+    r = np.full(rows, 0.5)
+    regression = BlockRegression(
+        A, r, np.arange(0, rows, size), np.ones(1), np.zeros(1), 1, np.inf,
+        SelectionSettings(), r,
+    )  # fmt: skip
+    losses = regression.held_out_losses(np.array([0]), np.array([back]))
+    assert losses[0] == pytest.approx(size * (0.5 + 3.0 * back) ** 2, rel=1e-3)
+    np.testing.assert_allclose(losses[1:], size * 0.25)
+
+
+class _Fitter:
+    """Knows what fits of some effects leave."""
+
+    settings = DEFAULT_SETTINGS
+
+    def __init__(self, **losses):
+        self.losses = losses
+
+    def fit(self, effects, start=None):
+        names = "".join(e.name for e in effects)
+        return SimpleNamespace(
+            effects=effects,
+            loss=self.losses[names],
+            objective=0.0,
+            effect_gains={e.name: 0.001 for e in effects},
+            at_bound=lambda which: which == ["b"] and len(names) > 1,
+            is_misshapen=lambda which: False,
+        )
+
+
+def _search(fitter):
+    library = [SimpleNamespace(name=name, text=name) for name in "ab"]
+    return LinearSearch(fitter, library), fitter.fit(tuple(library))
+
+
+@pytest.mark.parametrize(("without_b", "left"), [(1.001, "a"), (50.0, "ab")])
+def test_an_effect_is_needless_if_a_fit_without_it_is_as_good(without_b, left):
+    """The linear account says that both are."""
+    losses = {"ab": 1.0, "a": without_b, "b": 50.0, "": 60.0}
+    search, fit = _search(_Fitter(**losses))
+    found = search._without_needless(fit)
+    assert "".join(e.name for e in found.effects) == left
+
+
+def test_what_a_later_effect_drives_to_a_bound_is_no_candidate_any_more():
+    losses = {"ab": 1.0, "a": 2.0}
+    search, fit = _search(_Fitter(**losses))
+    found = search._without_misshapen(fit)
+    assert [e.name for e in found.effects] == ["a"]
+    assert [c.name for c in search.library] == ["a"]
