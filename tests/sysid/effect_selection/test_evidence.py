@@ -147,7 +147,7 @@ def test_of_two_that_differ_at_one_row_the_simpler_is_taken():
 def test_what_the_other_blocks_say_nothing_of_goes_to_null(back):
     """A column acts in one block, and by rounding in the others."""
     rows, size = 80, 4
-    A = np.full((rows, 1), 1e-9)
+    A = np.full((rows, 1), 1e-12)
     A[:size] = 3.0
     r = np.full(rows, 0.5)
     regression = BlockRegression(
