@@ -74,15 +74,15 @@ def _next(
 ) -> tuple[Array, Array]:
     """Returns the best point (p,) that steps lead to, and the residuals there.
 
-    Longer steps are tried too where usual ones gain little far from the noise, but not
-    where an evaluation takes seconds.
+    Longer steps are tried too where usual ones gain little far from the noise, of
+    models that make contact, but not where an evaluation takes seconds.
     """
     value = objective.value(linearisation.residual)
     batches = _batches(objective, linearisation, min_gain, central)
     best = _best(objective, batches, value)
     reached = objective.value(best[1])
-    is_done = value <= _FAR or reached <= (1.0 - _LITTLE) * value
-    if central or objective.model.costly or is_done:
+    model, is_done = objective.model, value <= _FAR or reached < (1.0 - _LITTLE) * value
+    if central or is_done or model.costly or not model.makes_contact:
         return best
     longer = _best(objective, [_longer(linearisation)], reached)
     return longer if objective.value(longer[1]) < reached else best

@@ -25,6 +25,7 @@ ALLOWED = {
     "_RIDGE",
     "_AT_BOUND",
     "_LEAST_LEFT",
+    "_UNDETERMINED",
     "_NEAR",
     "_SHOWN",
     "_MOST",
