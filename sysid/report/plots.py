@@ -225,6 +225,7 @@ def _channel_series(
     ends = np.flatnonzero(np.diff(errors.episode[rows])) + 1
 
     def shown(values: Array) -> NDArray[np.float32]:
+        """Returns what is drawn of values (rows,)."""
         return _small(np.insert(values[rows], ends, np.nan))
 
     x, found = shown(time), []
