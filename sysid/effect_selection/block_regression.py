@@ -184,7 +184,8 @@ class BlockRegression:
         Args:
             columns: which.
             back: (P,) from each parameter to its null, where it goes if the other
-                blocks say nothing of it; null is here, if it is left out.
+                blocks say nothing of it; None: null is here, and dependent columns
+                are told apart as far as rounding allows.
         """
         return self._held_out(columns, back).losses
 
@@ -234,21 +235,23 @@ class BlockRegression:
 
     def _held_out(self, columns: Columns, back: Array | None = None) -> "_HeldOut":
         columns = self._feasible(columns)
-        back = np.zeros(len(self.scale)) if back is None else back * self.scale
-        a, own = self.A[:, columns], back[columns]
+        a = self.A[:, columns]
+        own = None if back is None else (back * self.scale)[columns]
         priors = [np.ones(len(self.r))]
         if np.isfinite(self.huber_delta) and a.shape[1]:
             priors.append(self._leverage_weights(a))
         found = [self._cross_validated(a, w, own) for w in priors]
         return min(found, key=lambda each: float(each.losses.sum()))
 
-    def _cross_validated(self, a: Array, prior: Array, back: Array) -> "_HeldOut":
+    def _cross_validated(
+        self, a: Array, prior: Array, back: Array | None
+    ) -> "_HeldOut":
         """Returns how columns (n, k) fitted to all other blocks predict each.
 
         Args:
             a: columns.
             prior: (n,) weights of rows, times which Huber's are taken.
-            back: (k,) to where what the others don't determine goes.
+            back: (k,) to where what the others don't determine goes, if known.
         """
         w = prior * self._weights(self.r)
         H, g = self._normal_equations(a, w)
@@ -258,9 +261,11 @@ class BlockRegression:
                 phi = -_solve(H.sum(axis=0)[None], g.sum(axis=0)[None])[0]
                 w = prior * self._weights(self.r + a @ phi)
                 H, g = self._normal_equations(a, w)
-        total = H.sum(axis=0)
-        weak = _UNDETERMINED * np.diag(np.diagonal(total))
-        others = -_solve(total + weak - H, g.sum(axis=0) - g - weak @ back)
+        H_others, g_others = H.sum(axis=0) - H, g.sum(axis=0) - g
+        if back is not None:
+            weak = _UNDETERMINED * np.diagonal(H.sum(axis=0))
+            H_others, g_others = H_others + np.diag(weak), g_others - weak * back
+        others = -_solve(H_others, g_others)
         lengths = np.diff(self.begins, append=len(self.r))
         change = np.einsum("nk,nk->n", a, np.repeat(others, lengths, axis=0))
         return _HeldOut(self._loss(self.r + change), H, null, a, weights)
