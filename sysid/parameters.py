@@ -31,8 +31,8 @@ class Parameter:
         path: where it stands in a scenario, such as `effects.0.ry`; the name itself
             if it is left out.
         is_shape: whether it is a shape parameter of an effect, not an amplitude.
-        first_step: over which its derivative is first taken, in its unit; None: a
-            share of the bounds.
+        first_step: over which its derivative is first taken, in its unit; of none that
+            is searched by its logarithm. None: a share of the bounds.
     """
 
     name: str

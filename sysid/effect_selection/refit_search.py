@@ -222,8 +222,7 @@ class RefitSearch(ForwardSearch):
         for effect in fit.effects[:-1]:
             if gains[effect.name] > limits.clearly_needed_gain:
                 continue
-            rest = tuple(c for c in fit.effects if c is not effect)
-            without = self.fitter.fit(rest, fit)
+            without = self._fit_without(fit, effect)
             if without.loss <= (1.0 + limits.min_gain) * fit.loss:
                 self._report_fit(f"without {effect.text}", without)
                 fit = without

@@ -158,8 +158,7 @@ class ForwardSearch(abc.ABC):
         for effect in sorted(fit.effects, key=lambda c: gains[c.name]):
             if gains[effect.name] >= limit:
                 return fit
-            rest = tuple(c for c in fit.effects if c is not effect)
-            without = self.fitter.fit(rest, fit)
+            without = self._fit_without(fit, effect)
             if without.loss <= fit.loss / (1.0 - limit):
                 self._report_fit(f"without {effect.text}", without)
                 return self._without_needless(without)
@@ -175,10 +174,13 @@ class ForwardSearch(abc.ABC):
             if not (fit.at_bound(names) or fit.is_misshapen(names)):
                 continue
             self.library = [c for c in self.library if c.name != effect.name]
-            rest = tuple(c for c in fit.effects if c is not effect)
             self._report(f"{effect.name}: removed, since it has come to a bound")
-            return self._without_misshapen(self.fitter.fit(rest, fit))
+            return self._without_misshapen(self._fit_without(fit, effect))
         return fit
+
+    def _fit_without(self, fit: Fit, effect: Candidate) -> Fit:
+        """Returns a fit without one of its effects."""
+        return self.fitter.fit(tuple(c for c in fit.effects if c is not effect), fit)
 
     def _is_better(self, before: Fit, after: Fit, trial: Evidence) -> bool:
         """Returns whether the loss falls, and a trial's effects make sense.

@@ -78,19 +78,21 @@ def _next(
     models that make contact, but not where an evaluation takes seconds.
     """
     value = objective.value(linearisation.residual)
-    batches = _batches(objective, linearisation, min_gain, central)
+    steps = _steps(linearisation)
+    batches = _batches(objective, linearisation, steps, min_gain, central)
     best = _best(objective, batches, value)
     reached = objective.value(best[1])
     model, is_done = objective.model, value <= _FAR or reached < (1.0 - _LITTLE) * value
     if central or is_done or model.costly or not model.makes_contact:
         return best
-    longer = _best(objective, [_longer(linearisation)], reached)
+    longer = _best(objective, [_longer(linearisation, steps[:1])], reached)
     return longer if objective.value(longer[1]) < reached else best
 
 
 def _batches(
     objective: Objective,
     linearisation: Linearisation,
+    steps: Array,
     min_gain: float,
     all_at_once: bool,
 ) -> list[Array]:
@@ -101,7 +103,7 @@ def _batches(
     another iteration, they are not tried; nor is each parameter alone.
     """
     u = linearisation.u
-    points = np.clip(u + _steps(linearisation), 0.0, 1.0)
+    points = np.clip(u + steps, 0.0, 1.0)
     if all_at_once:
         return [points]
     promised = objective.value(
@@ -141,14 +143,14 @@ def _alone(linearisation: Linearisation) -> Array:
     return np.asarray(np.diag(-slope / np.maximum(power, 1e-300)))
 
 
-def _longer(linearisation: Linearisation) -> Array:
-    """Returns points (d, p) beyond the full step, and beyond those of one parameter.
+def _longer(linearisation: Linearisation, steps: Array) -> Array:
+    """Returns points (d, p) beyond the full step (1, p), and beyond those of one
+    parameter.
 
     Where a few rows are steep and far off, as at a wall, the weights that stand for
     Huber's loss give it a curvature that it has not: steps lead downhill, but are a
     hundred times too short.
     """
-    steps = _steps(linearisation)[:1]
     if len(linearisation.u) > 1:
         steps = np.concatenate([steps, _alone(linearisation)])
     longer = np.concatenate([times * steps for times in _LONGER])

@@ -141,11 +141,12 @@ def extend(
 
 def _first_steps(parameters: Sequence[Parameter]) -> Array:
     """Returns steps (p,) of the unit box with which nothing is known yet."""
-    stated = (
-        p.first_step / (p.high - p.low) if p.first_step else FIRST_STEP
-        for p in parameters
+    return np.array(
+        [
+            p.first_step / (p.high - p.low) if p.first_step else FIRST_STEP
+            for p in parameters
+        ]
     )
-    return np.array(list(stated))
 
 
 def _at(objective: Objective, u: Array, residual: Array | None) -> Linearisation:

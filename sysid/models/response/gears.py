@@ -11,13 +11,14 @@ a link stays at an end of its play.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.effects import ArmEffect, JointBacklash, JointElasticity
 from sysid.models.base import Array
+from sysid.models.response.integrator import Lanes
 
 #: Effects between motors and links.
 ON_GEARS = (JointElasticity, JointBacklash)
@@ -107,9 +108,7 @@ class Gears:
         """Returns what coordinates (..., joints + e) are of the motors."""
         return x[..., : self.joints]
 
-    def missing(
-        self, q: Array, a: Array, load: Array, lanes: NDArray[np.intp] | slice
-    ) -> Array:
+    def missing(self, q: Array, a: Array, load: Array, lanes: Lanes) -> Array:
         """Returns what the gears pass on less what the links need (..., n, e) [N m].
 
         Of a rigid gear, by how much the motor's acceleration is the greater.
@@ -125,7 +124,7 @@ class Gears:
         is_rigid = yields == 0.0
         return np.where(is_rigid, apart, beyond / np.where(is_rigid, 1.0, yields))
 
-    def _twist_of(self, load: Array, lanes: Any) -> Array:
+    def _twist_of(self, load: Array, lanes: Lanes) -> Array:
         """Returns how far motors are ahead of links under loads (..., n, e)."""
         c, b = self.compliance[lanes], self.play[lanes]
         return np.asarray(c * load + 0.5 * b * np.tanh(load / self.load_0[lanes]))

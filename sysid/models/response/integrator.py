@@ -112,10 +112,8 @@ def _stage(
 
     There v + dt a and q + dt (v + dt a). By Newton's method; a step that does not
     bring the balance nearer is halved, lane by lane, since dry friction that has
-    changed its sign leads far too far. How near it is, the change says that the same
-    slopes would ask for next (Deuflhard 1974): torques would not do, of which a gear's
-    hardly change with its twist. Slopes that have served well serve again, and lanes
-    that are done wait for no other.
+    changed its sign leads far too far. Slopes that have served well serve again, and
+    lanes that are done wait for no other.
 
     Args:
         q, v: (lanes, joints) that the stage starts from.
@@ -153,6 +151,9 @@ def _descent(
     short: Callable[[Array], Array], a: Array, r: Array, J: Array, dt: float
 ) -> tuple[Array, Array]:
     """Returns Newton's change, halved in lanes that miss more by it, and what is left.
+
+    How much they miss, the change says that the same slopes would ask for next
+    (Deuflhard 1974): torques would not do, of which a gear's hardly change with twist.
 
     Args:
         short: what is missing (lanes, joints) for accelerations.

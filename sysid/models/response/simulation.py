@@ -204,15 +204,16 @@ def _missing(
         """See Missing."""
         terms, given = terms.of(lanes), inputs.at((step, stage, lanes))
         load = terms.load(gears.links(a))
-        by_gears = gears.missing(q, a, load, lanes)
-        q, v, a = (gears.motors(x) for x in (q, v, a))
-        torque = drive.of(lanes).torque(q, v, given) + given.enabled * terms.added
-        needed = load - torque
+        motors = tuple(gears.motors(x) for x in (q, v, a))
+        torque = drive.of(lanes).torque(motors[0], motors[1], given)
+        needed = load - (torque + given.enabled * terms.added)
         for effect in effects:
             acting, own = effect.of(lanes)
-            samples = ArmSamples(arm.joints, *(x[..., own, :] for x in (q, v, a, load)))
+            samples = ArmSamples(arm.joints, *(x[..., own, :] for x in (*motors, load)))
             needed[..., own, :] += acting.torques(samples)
-        return np.concatenate([needed, by_gears], axis=-1) if gears.any else needed
+        if not gears.any:
+            return needed
+        return np.concatenate([needed, gears.missing(q, a, load, lanes)], axis=-1)
 
     return missing
 

@@ -56,8 +56,7 @@ def write_response(
     """
     folder.parent.mkdir(exist_ok=True)
     urdf = write_pendulum(folder.parent / "pendulum.urdf")
-    bodies = Bodies(RigidBodies(str(urdf), ("servo",)), compensates)
-    arm = Arm(("servo",), bodies)
+    arm = Arm(("servo",), Bodies(RigidBodies(str(urdf), ("servo",)), compensates))
     drive = Drive(np.array([STIFFNESS]), np.array([DAMPING]), np.inf)
     parameters = ParameterSet(drive, DELAY, effects)
     header = LogHeader("joint_response", "swing", {}, joints=("servo",), urdf=str(urdf))

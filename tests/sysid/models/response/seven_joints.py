@@ -61,8 +61,7 @@ def write_log(folder: Path, *effects, seed: int = 0) -> Log:
     segment = Segment(0.0, start, np.zeros(7), time, inputs, np.zeros(7))
     own = ParameterSet(Drive(STIFFNESS, DAMPING, np.inf), DELAY, effects)
     steps = 10 * (len(time) - 1)
-    arm = Arm(JOINTS, Bodies(bodies, False))
-    motion = simulate(arm, [own], [segment], steps, 1e-3)
+    motion = simulate(Arm(JOINTS, Bodies(bodies, False)), [own], [segment], steps, 1e-3)
     q = motion.q[::10, 0, 0]
     q = np.round((q + random.normal(0.0, NOISE, q.shape)) / QUANTUM) * QUANTUM
     header = LogHeader("joint_response", "swing", {}, joints=JOINTS, urdf=URDF)
