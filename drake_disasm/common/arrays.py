@@ -74,7 +74,11 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def apply_matrix(matrices: Array, vectors: Array) -> Array:
-    """Returns matrices (..., n, m) times vectors (..., m)."""
+    """Returns matrices (..., n, m), or one for all, times vectors (..., m).
+
+    One by one: what a row of `vectors @ matrix.T` comes to depends on its company, on
+    some processors.
+    """
     xp = namespace(matrices, vectors)
     return xp.matmul(matrices, vectors[..., None])[..., 0]
 

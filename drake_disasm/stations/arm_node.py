@@ -66,23 +66,16 @@ class ArmStep:
 
     def ahead(self, x: Array, u: Array) -> Array:
         """Returns x' (n, 12) for states and commands (n, 12)."""
-        return _times(self.F, x) + _times(self.C, u)
+        return apply_matrix(self.F, x) + apply_matrix(self.C, u)
 
     def after(self, x_ahead: Array, s: Array) -> Array:
         """Returns x+ (n, 12) once the bolt is at s (n, 12)."""
-        return x_ahead + _times(self.P, s - x_ahead)
+        return x_ahead + apply_matrix(self.P, s - x_ahead)
 
     @property
     def is_stable(self) -> bool:
         """Whether an arm that leans on a bolt in contact comes to rest."""
         return bool(np.abs(np.linalg.eigvals(self.F - self.P @ self.F)).max() < 1.0)
-
-
-def _times(matrices: Array, vectors: Array) -> Array:
-    """Returns one matrix, or one for each, times vectors (n, k)."""
-    if matrices.ndim > 2:
-        return apply_matrix(matrices, vectors)
-    return vectors @ matrices.T
 
 
 def _gains(springs: Springs) -> np.ndarray:
