@@ -172,6 +172,7 @@ class RefitSearch(ForwardSearch):
             if not self._is_confirmed(fit, found, trial):
                 self._report_rejected(trial)
                 continue
+            found = self._without_replaced(fit, found, trial)
             confirmed.append((trial, found))
             # A model that states an error of its own may be below that and wrong.
             at_noise = found.objective < self._settings.noise_level
@@ -182,7 +183,7 @@ class RefitSearch(ForwardSearch):
     def _trial_fit(
         self, fit: Fit, survey: Survey, trial: Evidence, start: Fit | None
     ) -> Fit:
-        """Returns a fit to all rows with what is tried, without what that replaces."""
+        """Returns a fit to all rows with what is tried."""
         if start:
             found = self.fitter.fit(start.effects, start)
             found = _significant_only(self.fitter, found, len(found.effects) - 1)
@@ -191,7 +192,7 @@ class RefitSearch(ForwardSearch):
             found = self._with_hidden_amplitudes(fit, found, trial)
         if fit.states_model_error:
             found = without_noise(self.fitter, found)
-        return self._without_replaced(self._without_needless(found))
+        return self._without_needless(found)
 
     def _with_hidden_amplitudes(self, fit: Fit, found: Fit, trial: Evidence) -> Fit:
         """Returns the fit with amplitudes that the survey left out, if they help.
@@ -216,14 +217,19 @@ class RefitSearch(ForwardSearch):
         tests = len({candidate.name for candidate in self.library})
         return measured_evidence(before, after, trial, tests).accepted
 
-    def _without_replaced(self, fit: Fit) -> Fit:
-        """Returns the fit without effects that the newest replaces, by fits without."""
+    def _without_replaced(self, before: Fit, fit: Fit, trial: Evidence) -> Fit:
+        """Returns the fit without effects that a confirmed one replaces.
+
+        By fits without, each of which takes as long as the trial did: what was
+        rejected is not asked.
+        """
         limits, gains = self._settings, fit.effect_gains
         for effect in fit.effects[:-1]:
             if gains[effect.name] > limits.clearly_needed_gain:
                 continue
             without = self._fit_without(fit, effect)
-            if without.loss <= (1.0 + limits.min_gain) * fit.loss:
+            is_as_good = without.loss <= (1.0 + limits.min_gain) * fit.loss
+            if is_as_good and self._is_confirmed(before, without, trial):
                 self._report_fit(f"without {effect.text}", without)
                 fit = without
         return fit

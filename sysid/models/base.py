@@ -379,8 +379,11 @@ class LogModel(abc.ABC):
         """Residual, in standard deviations, beyond which the loss is linear.
 
         Infinite where the model is affine: least squares then has one exact optimum.
+        And where no contact is made or broken, which is why single rows are far off:
+        of an arm that lacks its friction all are.
         """
-        return np.inf if self.affine else HUBER_DELTA
+        is_bent = self.makes_contact and not self.affine
+        return HUBER_DELTA if is_bent else np.inf
 
     @property
     def noise_groups(self) -> tuple[str, ...]:
