@@ -66,6 +66,11 @@ def test_a_fit_finds_the_drive(log):
     np.testing.assert_allclose(theta, true_parameters(), rtol=0.05)
 
 
+def test_fits_are_least_squares(log):
+    """Of a servo that lacks its friction every row is far off, and none an outlier."""
+    assert JointResponseModel([log]).default_huber_delta == math.inf
+
+
 def test_a_fit_begins_near_the_drive_and_its_delay(log):
     nominal = {p.name: p.nominal for p in JointResponseModel([log]).parameters}
     assert nominal["delay"] == pytest.approx(DELAY, abs=0.0026)
