@@ -240,9 +240,7 @@ class LockstepTrainings:
             own = training.spec.scenario
             scenarios.setdefault(id(own), with_impact(own))
         rows = [scenarios[id(t.spec.scenario)] for t in self.trainings]
-        # NumPy rounds a batch of one differently from the same row of a larger one,
-        # and bits must not depend on how many are trained beside it.
-        self._twin = BatchedTwin(rows * 2 if len(rows) == 1 else rows, device="numpy")
+        self._twin = BatchedTwin(rows, device="numpy")
         self._learners: dict[int, _Learner] = {}
         self._history: BatchHistory | None = None
 
