@@ -23,7 +23,7 @@ from drake_disasm.common.program import ProgressBar, run
 from drake_disasm.common.progress import ProgressUpdate
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.mdp import Outcome
-from drake_disasm.policies import find_policy, load_policy, make_policy
+from drake_disasm.policies import SCRIPTED, find_policy, load_policy, make_policy
 from drake_disasm.scenario import draw, load_scenario
 from drake_disasm.systems.policy import Policy
 from drake_disasm.task.episode import run_episode
@@ -43,7 +43,10 @@ def main(arguments: Sequence[str]) -> int:
     args.out.mkdir(parents=True, exist_ok=True)
     found = {}
     for name in (args.policy, _BASELINE):
-        path = args.out / f"{Path(name).stem}_{args.station}.jsonl"
+        path = (
+            args.out
+            / f"{Path(name).stem}_{Path(args.scenario).stem}_{args.station}.jsonl"
+        )
         found[name] = _episodes(path, name, args)
     print("\n".join(table(found[args.policy], found[_BASELINE])))
     return 0
@@ -64,7 +67,8 @@ def table(own: Sequence[Row], baseline: Sequence[Row]) -> list[str]:
     for label, which in [*bins, ("all", np.ones(len(own), bool))]:
         for name, rows in (("policy", own), (_BASELINE, baseline)):
             part = [row for row, taken in zip(rows, which, strict=True) if taken]
-            lines.append(f"{label} | {name} | {_figures(part)}")
+            if part:
+                lines.append(f"{label} | {name} | {_figures(part)}")
     return [*lines, *_differences(own, baseline)]
 
 
@@ -101,9 +105,11 @@ def _episodes(path: Path, name: str, args: argparse.Namespace) -> list[Row]:
     rows = [json.loads(line) for line in lines[: args.episodes]]
     if len(rows) == args.episodes:
         return rows
-    policy: Policy = make_policy(_BASELINE, scenario)
-    if name != _BASELINE:
-        policy = load_policy(find_policy(name))
+    policy: Policy
+    if name in SCRIPTED:
+        policy = make_policy(name, scenario)
+    else:
+        policy = load_policy(find_policy(name) or Path(name))
     simulation = TaskSimulation(scenario, args.station, policy)
     with ProgressBar("episode") as bar, path.open("a") as stream:
         while len(rows) < args.episodes:
