@@ -6,11 +6,13 @@ the data it is of no use: there every effect is fitted to a few rows (`prescreen
 
 import dataclasses
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.common.progress import ProgressUpdate, ignore_progress
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.fit import Fit
@@ -24,6 +26,7 @@ from sysid.effect_selection.prescreen import prescreening_fits
 from sysid.effect_selection.search import ForwardSearch, ties, trials
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.effect_selection.survey import Survey
+from sysid.workers import Workers
 
 #: Fits with one more effect each, by the names of the effects, to start from.
 _Starts = Mapping[tuple[str, ...], Fit]
@@ -164,35 +167,58 @@ class RefitSearch(ForwardSearch):
     ) -> tuple[list[_Trial], list[_Trial]]:
         """Returns the trials that their fits confirm, and all trials, with fits."""
         confirmed, tried = [], []
-        for trial in chosen:
-            if self._is_over:
-                break
-            found = self._trial_fit(fit, survey, trial, starts.get(trial.effects))
-            tried.append((trial, found))
-            if not self._is_confirmed(fit, found, trial):
-                self._report_rejected(trial)
+        jobs = [_TrialFit.of(self, fit, survey, e, starts) for e in chosen]
+        for job, outcome in zip(jobs, self._outcomes(jobs), strict=False):
+            for update in outcome.updates:
+                self.progress(update)
+            found = outcome.fit
+            tried.append((job.trial, found))
+            if not outcome.is_confirmed:
                 continue
-            found = self._without_replaced(fit, found, trial)
-            confirmed.append((trial, found))
+            confirmed.append((job.trial, found))
             # A model that states an error of its own may be below that and wrong.
             at_noise = found.objective < self._settings.noise_level
             if found.model.costly and at_noise and not found.states_model_error:
                 break
         return confirmed, tried
 
-    def _trial_fit(
-        self, fit: Fit, survey: Survey, trial: Evidence, start: Fit | None
-    ) -> Fit:
-        """Returns a fit to all rows with what is tried."""
-        if start:
-            found = self.fitter.fit(start.effects, start)
+    def _outcomes(self, jobs: Sequence["_TrialFit"]) -> Iterator["_Outcome"]:
+        """Yields what comes of trials, as long as there is time.
+
+        They are fitted side by side; one after the other where the workers are needed
+        for the simulations of each.
+        """
+        workers = self.fitter.workers
+        if workers.in_this_process or self.fitter.base.costly:
+            for job in jobs:
+                if self._is_over:
+                    return
+                yield job.run()
+        elif not self._is_over:
+            yield from workers.map(_TrialFit.run, [job.alone for job in jobs])
+
+    def trial_fit(self, fit: Fit, job: "_TrialFit") -> tuple[Fit, bool]:
+        """Returns a fit to all rows with what is tried, and whether it is confirmed.
+
+        One that is confirmed is without the effects that it replaces.
+
+        Args:
+            fit: without it.
+            job: says what is tried.
+        """
+        if job.start:
+            found = self.fitter.fit(job.start.effects, job.start)
             found = _significant_only(self.fitter, found, len(found.effects) - 1)
         else:
-            found = self._fit_chosen(fit, survey, trial)
-            found = self._with_hidden_amplitudes(fit, found, trial)
+            found = self._fit_added(fit, job.added, job.derivatives)
+            found = self._with_hidden_amplitudes(fit, found, job.trial)
         if fit.states_model_error:
             found = without_noise(self.fitter, found)
-        return self._without_needless(found)
+        found = self._without_needless(found)
+        if not self._is_confirmed(fit, found, job.trial):
+            self._report_rejected(job.trial)
+            return found, False
+        return self._without_replaced(fit, found, job.trial), True
 
     def _with_hidden_amplitudes(self, fit: Fit, found: Fit, trial: Evidence) -> Fit:
         """Returns the fit with amplitudes that the survey left out, if they help.
@@ -233,6 +259,69 @@ class RefitSearch(ForwardSearch):
                 self._report_fit(f"without {effect.text}", without)
                 fit = without
         return fit
+
+
+@dataclasses.dataclass(frozen=True)
+class _Outcome:
+    """What came of a trial: its fit, whether that confirms it, and what to tell."""
+
+    fit: Fit
+    is_confirmed: bool
+    updates: list[ProgressUpdate]
+
+
+@dataclasses.dataclass(frozen=True)
+class _TrialFit:
+    """A fit with what is tried, as work for a process.
+
+    Attributes:
+        search: that tries it.
+        fit: without it.
+        trial: what is tried.
+        start: where its fit begins, if that is known; else
+        added: its effects, as pruned by a survey, and
+        derivatives: (rows, channels) by their amplitudes, by name.
+    """
+
+    search: RefitSearch
+    fit: Fit
+    trial: Evidence
+    start: Fit | None
+    added: Sequence[Candidate] = ()
+    derivatives: Mapping[str, NDArray[np.float64]] = dataclasses.field(
+        default_factory=dict
+    )
+
+    @classmethod
+    def of(
+        cls,
+        search: RefitSearch,
+        fit: Fit,
+        survey: Survey,
+        trial: Evidence,
+        starts: _Starts,
+    ) -> Self:
+        """Returns the fit of a trial, from where a prescreening fit ended, if any."""
+        if start := starts.get(trial.effects):
+            return cls(search, fit, trial, start)
+        added = survey.linearised.pruned(trial.candidates)
+        derivatives = survey.linearised.derivatives(added)
+        return cls(search, fit, trial, None, added, derivatives)
+
+    @property
+    def alone(self) -> Self:
+        """The same for a process of its own, which has no workers."""
+        fitter = dataclasses.replace(self.search.fitter, workers=Workers())
+        search = dataclasses.replace(
+            self.search, fitter=fitter, progress=ignore_progress
+        )
+        return dataclasses.replace(self, search=search)
+
+    def run(self) -> _Outcome:
+        """Returns what comes of it."""
+        updates: list[ProgressUpdate] = []
+        search = dataclasses.replace(self.search, progress=updates.append)
+        return _Outcome(*search.trial_fit(self.fit, self), updates)
 
 
 def at_own_minimum(fitter: Fitter, fit: Fit) -> Fit:

@@ -3,9 +3,12 @@
 import abc
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from sysid.effect_selection.candidates import Candidate
@@ -140,11 +143,25 @@ class ForwardSearch(abc.ABC):
         """
         linear = survey.linearised
         added = linear.pruned(chosen.candidates)
-        derivatives = linear.derivatives(added)
+        return self._fit_added(fit, added, linear.derivatives(added))
+
+    def _fit_added(
+        self,
+        fit: Fit,
+        added: Sequence[Candidate],
+        derivatives: Mapping[str, NDArray[np.float64]],
+    ) -> Fit:
+        """Returns the fit with more effects, without amplitudes that end at a bound.
+
+        Args:
+            fit: without them.
+            added: the effects.
+            derivatives: (rows, channels) by their amplitudes, by name.
+        """
         while True:
             found = self.fitter.fit((*fit.effects, *added), fit, derivatives)
             kept = found.within_bounds(added)
-            if kept == added or not kept:
+            if kept == list(added) or not kept:
                 return found
             added = kept
 

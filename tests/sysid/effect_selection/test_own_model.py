@@ -10,6 +10,7 @@ from drake_disasm.effects import (
     JointCoulombFriction,
     JointEffect,
     JointSamples,
+    JointStribeckFriction,
     SensorBias,
     TorqueOffset,
 )
@@ -18,6 +19,7 @@ from sysid.effect_selection.output import to_mapping
 from sysid.models import Channel, LogModel, Measurements
 from sysid.parameters import Parameter
 from sysid.report import closing_page
+from sysid.workers import Workers
 
 _ROWS, _NOISE, _FRICTION = 300, 0.01, 0.3
 
@@ -95,6 +97,28 @@ def test_an_unexplained_residual_beyond_the_stated_noise_is_called_so(pendulum):
 def test_a_model_on_which_no_effect_can_act_is_refused(pendulum):
     with pytest.raises(DisasmError, match=r"Pendulum.* effect_types"):
         close_loop(pendulum, library=[SensorBias])
+
+
+class Simulated(Pendulum):
+    """The same, of which nobody says that effects are linear."""
+
+    affine = False
+
+
+def test_trials_side_by_side_are_those_one_by_one(pendulum):
+    model = Simulated(pendulum.q, pendulum.v, pendulum.measurements.values)
+    library = [JointCoulombFriction, JointStribeckFriction, TorqueOffset]
+    found = []
+    for count in (1, 2):
+        told = []
+        with Workers(count) as workers:
+            closed = close_loop(
+                model, library=library, workers=workers, progress=told.append
+            )
+        found.append((closed.text, [update.message for update in told]))
+    assert found[0] == found[1]
+    assert "missing: JointCoulombFriction.pivot" in found[0][0]
+    assert any("rejected" in message for message in found[0][1])
 
 
 def test_progress_may_stop_it(pendulum):
