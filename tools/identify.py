@@ -169,8 +169,7 @@ def _add_judgement_arguments(add: Callable[..., object]) -> None:
         type=options.above_zero_or_inf,
         metavar="K",
         help="the loss is linear for residuals beyond K standard deviations; inf for "
-        "least squares as in eq. 4.8 (default: 3 for transitions, inf for static "
-        "readings and joint torques)",
+        "least squares as in eq. 4.8 (default: 3 for transitions, else inf)",
     )
     add(
         "--unidentifiable",
