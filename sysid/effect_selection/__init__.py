@@ -5,6 +5,7 @@ rows that were not fitted, and adds those that are confirmed. From the top:
 
     close_loop                          the library call and its result
     search, refit_search                which effect is added: by evidence, or by fits
+    trial_comparison, simplification    which of their fits, and with how little in it
     survey, evidence, prescreen         how candidates are ranked
     fitter, fit, fit_cache              a model with chosen effects, fitted
     block_regression, significance      what blocks of rows gain, and whether by chance

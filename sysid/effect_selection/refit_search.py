@@ -5,7 +5,6 @@ the data it is of no use: there every effect is fitted to a few rows (`prescreen
 """
 
 import dataclasses
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Self
 
@@ -16,21 +15,28 @@ from drake_disasm.common.progress import ProgressUpdate, ignore_progress
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.measured_evidence import (
-    amplitude_p,
     linear_p,
     measured_evidence,
 )
 from sysid.effect_selection.prescreen import prescreening_fits
 from sysid.effect_selection.search import ForwardSearch, ties, trials
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.effect_selection.simplification import (
+    at_own_minimum,
+    with_significant_only,
+    without_noise,
+)
 from sysid.effect_selection.survey import Survey
+from sysid.effect_selection.trial_comparison import (
+    Trial,
+    as_good_as_the_best,
+    pairs_of,
+    ties_by_fit,
+)
 from sysid.workers import Workers
 
 #: Fits with one more effect each, by the names of the effects, to start from.
 _Starts = Mapping[tuple[str, ...], Fit]
-_Trial = tuple[Evidence, Fit]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,8 +52,8 @@ class _Ranking:
 
     survey: Survey
     likely: list[Evidence]
-    confirmed: list[_Trial]
-    tried: list[_Trial]
+    confirmed: list[Trial]
+    tried: list[Trial]
 
 
 class RefitSearch(ForwardSearch):
@@ -98,7 +104,7 @@ class RefitSearch(ForwardSearch):
 
     def _tried_in_pairs(self, fit: Fit, alone: _Ranking) -> _Ranking:
         """Returns a ranking none of whose effects is confirmed alone, by pairs."""
-        pairs = _pairs(alone.tried, self._settings)
+        pairs = pairs_of(alone.tried, self._settings)
         return _Ranking(
             alone.survey, alone.likely, *self._try(fit, alone.survey, pairs, {})
         )
@@ -164,7 +170,7 @@ class RefitSearch(ForwardSearch):
 
     def _try(
         self, fit: Fit, survey: Survey, chosen: Sequence[Evidence], starts: _Starts
-    ) -> tuple[list[_Trial], list[_Trial]]:
+    ) -> tuple[list[Trial], list[Trial]]:
         """Returns the trials that their fits confirm, and all trials, with fits."""
         confirmed, tried = [], []
         jobs = [_TrialFit.of(self, fit, survey, e, starts) for e in chosen]
@@ -208,7 +214,7 @@ class RefitSearch(ForwardSearch):
         """
         if job.start:
             found = self.fitter.fit(job.start.effects, job.start)
-            found = _significant_only(self.fitter, found, len(found.effects) - 1)
+            found = with_significant_only(self.fitter, found, len(found.effects) - 1)
         else:
             found = self._fit_added(fit, job.added, job.derivatives)
             found = self._with_hidden_amplitudes(fit, found, job.trial)
@@ -234,7 +240,7 @@ class RefitSearch(ForwardSearch):
         full = self.fitter.fit((*fit.effects, *trial.candidates), found)
         if full.loss > (1.0 - self._settings.min_gain) * found.loss:
             return found
-        return _significant_only(self.fitter, full, len(fit.effects))
+        return with_significant_only(self.fitter, full, len(fit.effects))
 
     def _is_confirmed(self, before: Fit, after: Fit, trial: Evidence) -> bool:
         """Returns whether blocks that are not fitted are predicted better."""
@@ -322,166 +328,3 @@ class _TrialFit:
         updates: list[ProgressUpdate] = []
         search = dataclasses.replace(self.search, progress=updates.append)
         return _Outcome(*search.trial_fit(self.fit, self), updates)
-
-
-def at_own_minimum(fitter: Fitter, fit: Fit) -> Fit:
-    """Returns the fit at the model's own minimum, with as few amplitudes as will do.
-
-    A surrogate's derivatives stop short of it: effects that are not there would explain
-    what they leave.
-    """
-    far = fit.objective > fitter.settings.noise_level
-    if fitter.base.costly and not fitter.exact and far:
-        fitter = fitter.with_exact_derivatives()
-        fit = fitter.fit(fit.effects, fit)
-    return simplified(fitter, fit)
-
-
-def simplified(fitter: Fitter, fit: Fit) -> Fit:
-    """Returns the fit without amplitudes that gain next to nothing, or noise explains.
-
-    Even if they are significant: they have taken up what the model does a little
-    differently from the device.
-    """
-    fit = without_noise(fitter, fit)
-    simple = _only(fitter, fit, [_of_use(fit, effect) for effect in fit.effects])
-    return simple if simple.loss <= (1.0 + fit.settings.min_gain) * fit.loss else fit
-
-
-def without_noise(fitter: Fitter, fit: Fit) -> Fit:
-    """Returns the fit without amplitudes that stated noise or error can explain."""
-    if not fit.noise_is_stated:
-        return fit
-    return _only(fitter, fit, [_beyond_noise(fit, e) for e in fit.effects])
-
-
-def _only(fitter: Fitter, fit: Fit, effects: Sequence[Candidate]) -> Fit:
-    """Returns the fit with effects that have fewer amplitudes."""
-    return fit if tuple(effects) == fit.effects else fitter.fit(tuple(effects), fit)
-
-
-def _of_use(fit: Fit, effect: Candidate) -> Candidate:
-    """Returns an effect with its best amplitude and others that gain enough."""
-    gains = _gains(fit, effect)
-    return _with(effect, gains >= min(fit.settings.min_amplitude_gain, max(gains)))
-
-
-def _beyond_noise(fit: Fit, effect: Candidate) -> Candidate:
-    """Returns an effect with its best amplitude and others that noise can't explain."""
-    p = np.array([amplitude_p(fit, int(c)) for c in fit.columns_of(effect)])
-    gains = _gains(fit, effect)
-    return _with(effect, (p < fit.settings.alpha) | (gains == max(gains)))
-
-
-def _gains(fit: Fit, effect: Candidate) -> NDArray[np.float64]:
-    """Returns what each amplitude of an effect gains (k,)."""
-    return np.array(fit.gains_of([np.array([c]) for c in fit.columns_of(effect)]))
-
-
-def _with(effect: Candidate, kept: NDArray[np.bool_]) -> Candidate:
-    """Returns an effect with some of its amplitudes (k,)."""
-    pairs = zip(effect.fields, kept, strict=True)
-    return effect.only([field for field, keep in pairs if keep])
-
-
-def _significant_only(fitter: Fitter, fit: Fit, known: int) -> Fit:
-    """Returns the fit whose effects after the known ones are all significant.
-
-    Or as few amplitudes as will do, where that costs more: the derivative of one that
-    makes contact hides what the others are worth.
-    """
-    effects = fit.significant_only(known)
-    if len(effects) == known or effects == fit.effects:
-        return fit
-    found = fitter.fit(effects, fit)
-    most = (1.0 + fit.settings.min_gain) * fit.loss
-    return found if found.loss <= most else _few_enough(fitter, fit, known, most)
-
-
-def _few_enough(fitter: Fitter, fit: Fit, known: int, most: float) -> Fit:
-    """Returns the fit without amplitudes that it can do without, tried one by one.
-
-    Args:
-        fitter: of all rows.
-        fit: with all of them.
-        known: number of the effects that keep all amplitudes.
-        most: loss that is as good.
-    """
-    names = [(effect.name, f) for effect in fit.effects[known:] for f in effect.fields]
-    for name, field in names:
-        effects = [_without(e, field) if e.name == name else e for e in fit.effects]
-        if any(not effect.fields for effect in effects):
-            continue
-        found = fitter.fit(tuple(effects), fit)
-        if found.loss <= most:
-            fit = found
-    return fit
-
-
-def _without(effect: Candidate, field: str) -> Candidate:
-    """Returns an effect without an amplitude."""
-    return effect.only([each for each in effect.fields if each != field])
-
-
-def ties_by_fit(
-    best: Evidence,
-    rivals: Sequence[Evidence],
-    confirmed: Sequence[_Trial],
-    before: Fit,
-    found: Fit,
-) -> tuple[Evidence, ...]:
-    """Returns rivals that could explain as much as the chosen effect's fit does.
-
-    Those that were fitted are judged by their fits, but for the row at which the two
-    differ most: where a bolt jams, micrometres decide. Others are judged by the linear
-    account: how much less they explain by it than the best does by the same.
-    """
-    limit = (1.0 + found.settings.refit_tie_margin) * found.loss
-    others = sorted(confirmed, key=lambda trial: -trial[1].loss)
-    others = [trial for trial in others if trial[0].effects != best.effects]
-    losses = {e.effects: loss_but_for_a_row(fit, found) for e, fit in others}
-    known = {e.effects: e for e, _ in others}
-    for rival in rivals:
-        less = (best.gain - rival.gain) * before.loss
-        losses.setdefault(rival.effects, found.loss + less)
-        known.setdefault(rival.effects, rival)
-    return tuple(rival for name, rival in known.items() if losses[name] <= limit)
-
-
-def loss_but_for_a_row(fit: Fit, other: Fit) -> float:
-    """Returns a fit's loss, with another's at the row at which they differ most."""
-    losses = [np.sum(each.bounded_residual**2, axis=1) for each in (fit, other)]
-    more = losses[0] - losses[1]
-    return fit.loss - float(more[np.argmax(np.abs(more))])
-
-
-def _pairs(tried: Sequence[_Trial], settings: SelectionSettings) -> list[Evidence]:
-    """Returns pairs of what was tried alone, the best first."""
-    order = sorted(tried, key=lambda trial: trial[1].loss)
-    return [
-        dataclasses.replace(
-            first,
-            explanation=(*first.candidates, *second.candidates),
-            parameter_count=first.parameter_count + second.parameter_count,
-        )
-        for (first, _), (second, _) in itertools.combinations(order, 2)
-    ][: settings.refit_max_pairs]
-
-
-def as_good_as_the_best(confirmed: Sequence[_Trial], before: Fit) -> _Trial:
-    """Returns the simplest of the fits that leave about as little as the best does.
-
-    That is the first in their rankings. Where the model is off by itself a little less
-    is no reason: a step of the sensor that begins at once is no better than an offset.
-    Nor is a single row; the simplest is that with the fewest parameters then.
-    """
-    settings = before.settings
-    best = min((fit for _, fit in confirmed), key=lambda fit: fit.loss)
-    if not before.states_model_error:
-        limit = (1.0 + settings.min_gain) * best.loss
-        return next(trial for trial in confirmed if trial[1].loss <= limit)
-    rivals = [fit for _, fit in confirmed if loss_but_for_a_row(fit, best) < best.loss]
-    best = min(rivals, key=lambda fit: loss_but_for_a_row(fit, best), default=best)
-    limit = (1.0 + settings.parsimony_tolerance) * best.loss
-    as_good = [t for t in confirmed if loss_but_for_a_row(t[1], best) <= limit]
-    return min(as_good, key=lambda trial: len(trial[1].theta))

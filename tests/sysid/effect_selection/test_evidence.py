@@ -15,9 +15,9 @@ from drake_disasm.effects import (
 from sysid.effect_selection.block_regression import BlockRegression
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence, most_parsimonious
-from sysid.effect_selection.refit_search import as_good_as_the_best, ties_by_fit
 from sysid.effect_selection.search import LinearSearch, trials
 from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
+from sysid.effect_selection.trial_comparison import as_good_as_the_best, ties_by_fit
 
 _SCATTER = np.random.default_rng(0).normal(size=40)
 

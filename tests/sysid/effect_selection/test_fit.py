@@ -13,8 +13,8 @@ from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
 from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.refit_search import at_own_minimum, simplified
 from sysid.effect_selection.settings import SelectionSettings
+from sysid.effect_selection.simplification import at_own_minimum, simplified
 from sysid.effect_selection.verdict import parameter_values
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
