@@ -1,14 +1,18 @@
 """Tables: CSV, NPZ, NPY, MATLAB, Parquet and LeRobot datasets."""
 
 import csv
+import io
+import itertools
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow  # type: ignore[import-untyped]
+import pyarrow.compute  # type: ignore[import-untyped]
+import pyarrow.csv  # type: ignore[import-untyped]
 import pyarrow.parquet  # type: ignore[import-untyped]
 
 from drake_disasm.common.errors import DisasmError
@@ -45,37 +49,92 @@ def read_csv(path: Path) -> list[Stream]:
     that is not of numbers is left out; an empty cell is no number.
     """
     with _readable(path), path.open(newline="", encoding="utf-8-sig") as file:
-        lines = (line for line in file if line.strip())
-        text = [line for line in lines if not line.lstrip().startswith(_COMMENTS)]
-        if not text:
-            raise DisasmError(f"{path}: has no rows")
-        dialect = _delimiter(text[0])
-        rows = list(csv.reader(text, delimiter=dialect, skipinitialspace=True))
-        names = [cell.strip() for cell in rows[0]]
+        filled = (line for line in file if line.strip())
+        rows = (line for line in filled if not line.lstrip().startswith(_COMMENTS))
+        first = next(rows, "")
+        delimiter = max(_DELIMITERS, key=first.strip().count)
+        cells = next(csv.reader([first], delimiter=delimiter, skipinitialspace=True))
+        names = [cell.strip() for cell in cells]
         if all(_is_number(cell) for cell in names):
-            names = [f"column_{i}" for i in range(len(names))]
+            names, second = [f"column_{i}" for i in range(len(names))], first
         else:
-            rows = rows[1:]
-        rows = [_without_last_empty(row, len(names)) for row in rows]
-        for number, row in enumerate(rows, 1):
-            if len(row) != len(names):
-                raise DisasmError(
-                    f"{path}: row {number} has {len(row)} cells, the first line "
-                    f"{len(names)}; correct it"
-                )
-        columns = zip(names, zip(*rows, strict=True), strict=True) if rows else ()
-        arrays = {
-            name: found for name, c in columns if (found := _numbers(c)) is not None
-        }
+            second = next(rows, "")
+        if not second:
+            raise DisasmError(f"{path}: has no rows")
+        lines = _Lines(itertools.chain([second], rows), delimiter, len(names))
+        columns = _cells(path, lines, delimiter, names)
+        numbers = ((name, _numbers(column)) for name, column in columns)
+        arrays = {name: found for name, found in numbers if found is not None}
     return [_table(path, arrays)]
 
 
-def _delimiter(line: str) -> str:
-    return max(_DELIMITERS, key=line.strip().count)
+class _Lines(io.RawIOBase):
+    """A file of the lines of a table, for PyArrow.
+
+    Args:
+        lines: of the rows.
+        delimiter: of their cells; of blanks, several are one.
+        count: of the columns; an empty cell after the last one is none.
+    """
+
+    def __init__(self, lines: Iterator[str], delimiter: str, count: int) -> None:
+        self._lines, self._delimiter, self._count = lines, delimiter, count
+        self._left = bytearray()
+
+    def readable(self) -> bool:
+        """See RawIOBase."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """See RawIOBase."""
+        while len(self._left) < len(buffer) and (line := next(self._lines, "")):
+            self._left += self._plain(line).encode()
+        count = min(len(buffer), len(self._left))
+        buffer[:count] = self._left[:count]
+        del self._left[:count]
+        return count
+
+    def _plain(self, line: str) -> str:
+        line = line.strip(None if self._delimiter != "\t" else " \r\n")
+        if self._delimiter == " ":
+            line = " ".join(line.split())
+        ends = line.endswith(self._delimiter)
+        if ends and line.count(self._delimiter) == self._count:
+            line = line[:-1]
+        return line + "\n"
 
 
-def _without_last_empty(row: list[str], count: int) -> list[str]:
-    return row[:-1] if len(row) == count + 1 and not row[-1].strip() else row
+def _cells(
+    path: Path, lines: _Lines, delimiter: str, names: Sequence[str]
+) -> Iterator[tuple[str, pyarrow.ChunkedArray]]:
+    """Yields the names and the cells of a table's columns, as text; "" is null."""
+    wrong: list[Any] = []
+
+    def refuse(row: Any) -> str:
+        """Has PyArrow stop at a row that is too long or too short."""
+        wrong.append(row)
+        return "error"
+
+    unique = [str(i) for i in range(len(names))]  # names may be there twice
+    try:
+        table = pyarrow.csv.read_csv(
+            pyarrow.PythonFile(lines, mode="r"),
+            pyarrow.csv.ReadOptions(use_threads=False, column_names=unique),
+            pyarrow.csv.ParseOptions(delimiter=delimiter, invalid_row_handler=refuse),
+            pyarrow.csv.ConvertOptions(
+                column_types=dict.fromkeys(unique, pyarrow.string()),
+                strings_can_be_null=True,
+                null_values=[""],
+            ),
+        )
+    except pyarrow.ArrowException:
+        if not wrong:
+            raise
+        raise DisasmError(
+            f"{path}: row {wrong[0].number} has {wrong[0].actual_columns} cells, the "
+            f"first line {len(names)}; correct it"
+        ) from None
+    yield from zip(names, table.columns, strict=True)
 
 
 def _is_number(cell: str) -> bool:
@@ -86,10 +145,17 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _numbers(cells: tuple[str, ...]) -> np.ndarray | None:
-    flags = {"true": "1", "false": "0", "": "nan"}
+def _numbers(cells: pyarrow.ChunkedArray) -> np.ndarray | None:
+    """Returns the numbers that cells of text say, NaN for null; None if they don't."""
+    trimmed = pyarrow.compute.utf8_trim_whitespace(cells)
     try:
-        return np.array([float(flags.get(c.strip().lower(), c)) for c in cells])
+        return np.asarray(trimmed.cast(pyarrow.float64()).to_numpy())
+    except pyarrow.ArrowInvalid:
+        pass  # PyArrow has no flags, and fewer ways to write a number than Python
+    flags = {"true": "1", "false": "0", "": "nan"}
+    texts = (cell or "" for cell in trimmed.to_pylist())
+    try:
+        return np.array([float(flags.get(text.lower(), text)) for text in texts])
     except ValueError:
         return None
 

@@ -35,6 +35,17 @@ def test_csv_as_programs_write_it(tmp_path: Path, text: str) -> None:
     assert "name" not in stream.names
 
 
+def test_a_column_of_csv_may_begin_otherwise_than_it_goes_on(tmp_path: Path) -> None:
+    """Whole numbers, then others, megabytes later; and a flag among numbers."""
+    path = tmp_path / "run.csv"
+    rows = 200_000
+    path.write_text("a,b,c\n" + "0,1,x\n" * rows + "0.5, true,\n")
+    [stream] = read_source(path).streams
+    assert stream.channels["a"][-1] == 0.5 and len(stream.channels["a"]) == rows + 1
+    assert stream.channels["b"].tolist() == [1.0] * (rows + 1)
+    assert "c" not in stream.names
+
+
 def test_csv_without_names_and_with_flags_and_holes(tmp_path: Path) -> None:
     path = tmp_path / "run.txt"
     path.write_text("0,1\n1,2\n")
