@@ -23,9 +23,8 @@ from drake_disasm.common.program import ProgressBar, run
 from drake_disasm.common.progress import ProgressUpdate
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.mdp import Outcome
-from drake_disasm.policies import SCRIPTED, find_policy, load_policy, make_policy
+from drake_disasm.policies import resolve_policy
 from drake_disasm.scenario import draw, load_scenario
-from drake_disasm.systems.policy import Policy
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.simulation import TaskSimulation
 
@@ -43,10 +42,8 @@ def main(arguments: Sequence[str]) -> int:
     args.out.mkdir(parents=True, exist_ok=True)
     found = {}
     for name in (args.policy, _BASELINE):
-        path = (
-            args.out
-            / f"{Path(name).stem}_{Path(args.scenario).stem}_{args.station}.jsonl"
-        )
+        of = f"{Path(name).stem}_{Path(args.scenario).stem}_{args.station}"
+        path = args.out / f"{of}.jsonl"
         found[name] = _episodes(path, name, args)
     print("\n".join(table(found[args.policy], found[_BASELINE])))
     return 0
@@ -105,11 +102,7 @@ def _episodes(path: Path, name: str, args: argparse.Namespace) -> list[Row]:
     rows = [json.loads(line) for line in lines[: args.episodes]]
     if len(rows) == args.episodes:
         return rows
-    policy: Policy
-    if name in SCRIPTED:
-        policy = make_policy(name, scenario)
-    else:
-        policy = load_policy(find_policy(name) or Path(name))
+    policy = resolve_policy(name, scenario)
     simulation = TaskSimulation(scenario, args.station, policy)
     with ProgressBar("episode") as bar, path.open("a") as stream:
         while len(rows) < args.episodes:

@@ -18,8 +18,7 @@ from drake_disasm.logs import Log, read_logs
 from drake_disasm.policies import (
     SCRIPTED,
     find_policy,
-    load_policy,
-    make_policy,
+    resolve_policy,
     shipped_policies,
 )
 from drake_disasm.scenario import Scenario, shipped_scenarios
@@ -172,12 +171,8 @@ def named_policy(name: str, scenario: Scenario) -> Policy:
     Raises:
         DisasmError: there is none of that name, or it does not fit the scenario.
     """
-    if name in SCRIPTED:
-        return make_policy(name, scenario)
-    if path := find_policy(name):
-        policy = load_policy(path)
-        policy.check_fits(scenario)
-        return policy
+    if name in SCRIPTED or find_policy(name):
+        return resolve_policy(name, scenario)
     if ":" in name:
         return _imported(name)
     known, name = [*SCRIPTED, *shipped_policies()], clipped(name)

@@ -95,6 +95,7 @@ class _Lines(io.RawIOBase):
         return count
 
     def _plain(self, line: str) -> str:
+        """Returns a line with one delimiter between its cells and none at its end."""
         line = line.strip(None if self._delimiter != "\t" else " \r\n")
         if self._delimiter == " ":
             line = " ".join(line.split())
@@ -106,8 +107,8 @@ class _Lines(io.RawIOBase):
 
 def _cells(
     path: Path, lines: _Lines, delimiter: str, names: Sequence[str]
-) -> Iterator[tuple[str, pyarrow.ChunkedArray]]:
-    """Yields the names and the cells of a table's columns, as text; "" is null."""
+) -> list[tuple[str, pyarrow.ChunkedArray]]:
+    """Returns the names and the cells of a table's columns, as text; "" is null."""
     wrong: list[Any] = []
 
     def refuse(row: Any) -> str:
@@ -134,7 +135,7 @@ def _cells(
             f"{path}: row {wrong[0].number} has {wrong[0].actual_columns} cells, the "
             f"first line {len(names)}; correct it"
         ) from None
-    yield from zip(names, table.columns, strict=True)
+    return list(zip(names, table.columns, strict=True))
 
 
 def _is_number(cell: str) -> bool:

@@ -4,6 +4,7 @@ from drake_disasm.policies.exploring import Exploring
 from drake_disasm.policies.files import (
     find_policy,
     load_policy,
+    resolve_policy,
     save_policy,
     scenario_hash,
     shipped_policies,
@@ -33,6 +34,7 @@ __all__ = [
     "find_policy",
     "load_policy",
     "make_policy",
+    "resolve_policy",
     "save_policy",
     "scenario_hash",
     "shipped_policies",

@@ -35,7 +35,7 @@ from drake_disasm.policies.network import (
     Network,
     PolicyDescription,
 )
-from drake_disasm.policies.scripted import SCRIPTED, Admittance, Straight
+from drake_disasm.policies.scripted import SCRIPTED, Admittance, Straight, make_policy
 from drake_disasm.scenario import Scenario, scenario_to_mapping
 
 FORMAT = "drake_disasm/policy/1"
@@ -97,6 +97,25 @@ def load_policy(path: Path) -> LearnedPolicy:
         return _policy(arrays, text)
     except DisasmError as error:
         raise DisasmError(f"policy {path}: {error}") from None
+
+
+def resolve_policy(
+    name: str, scenario: Scenario
+) -> Straight | Admittance | LearnedPolicy:
+    """Returns a scripted policy, a shipped one, or that of a path.
+
+    Args:
+        name: of a scripted or a shipped policy, or a path.
+        scenario: that it is to act on.
+
+    Raises:
+        DisasmError: no such file, it is damaged, or it does not fit the scenario.
+    """
+    if name in SCRIPTED:
+        return make_policy(name, scenario)
+    policy = load_policy(find_policy(name) or Path(name))
+    policy.check_fits(scenario)
+    return policy
 
 
 def find_policy(name: str) -> Path | None:

@@ -21,7 +21,7 @@ from drake_disasm.learning.experiment import (
     write_summary,
 )
 from drake_disasm.learning.jobs import SeedJob, seed_jobs, train_seeds
-from drake_disasm.policies import SCRIPTED, find_policy, load_policy, make_policy
+from drake_disasm.policies import resolve_policy
 from drake_disasm.studies.study import (
     PolicyTest,
     Preparation,
@@ -29,7 +29,6 @@ from drake_disasm.studies.study import (
     Study,
     Treatment,
 )
-from drake_disasm.systems.policy import Policy
 from drake_disasm.task.simulation import TaskSimulation
 
 _MARKER = "study.json"
@@ -140,7 +139,8 @@ def _jobs(stage: Stage, folder: Path) -> list[SeedJob]:
 
 def run_test(job: PolicyTest, progress: Progress) -> None:
     """Runs a policy's greedy episodes and writes their figures."""
-    simulation = TaskSimulation(job.scenario, job.station, _policy(job))
+    policy = resolve_policy(job.policy, job.scenario)
+    simulation = TaskSimulation(job.scenario, job.station, policy)
 
     def told(update: ProgressUpdate) -> None:
         """Passes progress on under the name of the stage."""
@@ -149,15 +149,6 @@ def run_test(job: PolicyTest, progress: Progress) -> None:
     figures = summed_up(evaluate(simulation, job.seeds, progress=told))
     make_folder(job.path.parent)
     write_json(job.path, dataclasses.asdict(figures))
-
-
-def _policy(job: PolicyTest) -> Policy:
-    """Returns the policy of a test; refuses one that does not fit its scenario."""
-    if job.policy in SCRIPTED:
-        return make_policy(job.policy, job.scenario)
-    policy = load_policy(find_policy(job.policy) or Path(job.policy))
-    policy.check_fits(job.scenario)
-    return policy
 
 
 @dataclasses.dataclass(frozen=True)

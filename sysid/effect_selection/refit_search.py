@@ -203,15 +203,12 @@ class RefitSearch(ForwardSearch):
         elif not self._is_over:
             yield from workers.map(_TrialFit.run, [job.alone for job in jobs])
 
-    def trial_fit(self, fit: Fit, job: "_TrialFit") -> tuple[Fit, bool]:
+    def trial_fit(self, job: "_TrialFit") -> tuple[Fit, bool]:
         """Returns a fit to all rows with what is tried, and whether it is confirmed.
 
         One that is confirmed is without the effects that it replaces.
-
-        Args:
-            fit: without it.
-            job: says what is tried.
         """
+        fit = job.fit
         if job.start:
             found = self.fitter.fit(job.start.effects, job.start)
             found = with_significant_only(self.fitter, found, len(found.effects) - 1)
@@ -319,7 +316,7 @@ class _TrialFit:
         """The same for a process of its own, which has no workers."""
         fitter = dataclasses.replace(self.search.fitter, workers=Workers())
         search = dataclasses.replace(
-            self.search, fitter=fitter, progress=ignore_progress
+            self.search, fitter=fitter, progress=ignore_progress, _rounds=[]
         )
         return dataclasses.replace(self, search=search)
 
@@ -327,4 +324,4 @@ class _TrialFit:
         """Returns what comes of it."""
         updates: list[ProgressUpdate] = []
         search = dataclasses.replace(self.search, progress=updates.append)
-        return _Outcome(*search.trial_fit(self.fit, self), updates)
+        return _Outcome(*search.trial_fit(self), updates)
