@@ -29,6 +29,8 @@ from drake_disasm.common.text import clipped
 READERS = (
     *("log_csv", "log_parquet", "log_unfinished", "scenario", "policy", "checkpoint"),
     *("hardware", "parameters", "results"),
+    *("import_csv", "import_npz", "import_npy", "import_mat", "import_parquet"),
+    *("import_lerobot", "import_mcap", "import_ros2", "import_ros1", "import_map"),
 )
 CODECS = (
     *("hex_sample", "hex_request", "robotiq_status", "robotiq_command"),

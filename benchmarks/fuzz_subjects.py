@@ -1,24 +1,23 @@
 """What is fuzzed: every reader of files, and every codec of a device."""
 
-import dataclasses
-import io
-import tempfile
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa  # type: ignore[import-untyped]
-import pyarrow.parquet as pq  # type: ignore[import-untyped]
 from drake import lcmt_iiwa_status
-from mutations import (
-    Random,
-    damaged,
-    damaged_archive,
-    damaged_columns,
-    damaged_csv,
-    damaged_yaml,
+from fuzz_importers import IMPORTERS
+from mutations import Random, damaged, damaged_csv, damaged_yaml
+from subject import (
+    Subject,
+    archive_damage,
+    either_way,
+    file_subject,
+    folder_subject,
+    new_folder,
+    parquet_damage,
+    yaml_subject,
 )
 
 from drake_disasm.common.archive import Arrays, unpack
@@ -47,85 +46,31 @@ from sysid.scenario_parameters import read_requests
 _ROWS, _JOINTS = 6, 3
 
 
-@dataclasses.dataclass(frozen=True)
-class Subject:
-    """A reader or codec that is fuzzed.
-
-    Attributes:
-        make: returns something damaged to be read.
-        read: reads it.
-    """
-
-    make: Callable[[Random], Any]
-    read: Callable[[Any], object]
-
-
-def _file(name: str, make: Callable[[Random], bytes], read: Any) -> Subject:
-    """Returns the subject of a reader of one file, which is written and read."""
-    path = _folder() / name
-
-    def write_and_read(content: bytes) -> object:
-        """Returns what is read."""
-        path.write_bytes(content)
-        return read(path)
-
-    return Subject(make, write_and_read)
-
-
-def _folder() -> Path:
-    """Returns a new folder; whoever set `tempfile.tempdir` removes it."""
-    return Path(tempfile.mkdtemp())
-
-
-def _either_way(text: str, edit: Callable[[str, Random], str], rng: Random) -> bytes:
-    """Returns text damaged blindly, by design, or both."""
-    text = edit(text, rng) if rng.integers(4) else text
-    data = text.encode(errors="replace")
-    return damaged(data, rng) if rng.integers(4) == 0 else data
-
-
-def _yaml_file(name: str, texts: list[str], read: Any) -> Subject:
-    def make(rng: Random) -> bytes:
-        """Returns a damaged one."""
-        text = texts[rng.integers(len(texts))]
-        return _either_way(text, damaged_yaml, rng)
-
-    return _file(name, make, read)
-
-
 def _scenario() -> Subject:
     shipped = ("removal_turned", "removal_randomised", "chapter3")
     texts = [dump_scenario(load_scenario(name)) for name in shipped]
     paths = [models_dir() / f"scenarios/{name}.yaml" for name in shipped]
     texts += [path.read_text("utf-8") for path in paths]
-    return _yaml_file("s.yaml", texts, lambda path: load_scenario(str(path)))
+    return yaml_subject("s.yaml", texts, lambda path: load_scenario(str(path)))
 
 
 def _hardware() -> Subject:
     text = (models_dir() / "hardware" / "cell.yaml").read_text("utf-8")
-    return _yaml_file("h.yaml", [text], load_hardware_config)
+    return yaml_subject("h.yaml", [text], load_hardware_config)
 
 
 def _parameters() -> Subject:
     text = "contact.friction: {low: 0.0, high: 1.0, nominal: 0.2, scale: linear}\n" * 2
     text += "GroovePose.ry:\n  low: -0.1\n  high: 0.1\n"
-    return _yaml_file("p.yaml", [text], lambda path: read_requests([str(path)]))
+    return yaml_subject("p.yaml", [text], lambda path: read_requests([str(path)]))
 
 
 def _archive(data: bytes, kind: Any) -> Callable[[Random], bytes]:
-    arrays, text = unpack(data, kind)
-
-    def make(rng: Random) -> bytes:
-        """Returns a damaged one."""
-        if rng.integers(2):
-            return damaged(data, rng)
-        return damaged_archive(arrays, text, rng)
-
-    return make
+    return archive_damage(data, *unpack(data, kind))
 
 
 def _policy() -> Subject:
-    rng, path = np.random.default_rng(0), _folder() / "p.npz"
+    rng, path = np.random.default_rng(0), new_folder() / "p.npz"
     widths = ((5, 12), (6, 5))
     network = Network(
         tuple(rng.normal(size=width).astype(np.float32) for width in widths),
@@ -133,7 +78,7 @@ def _policy() -> Subject:
     )
     to_action = ActionMap(np.ones(6), Admittance())
     save_policy(path, LearnedPolicy(network, np.ones(12), to_action))
-    return _file("p.npz", _archive(path.read_bytes(), POLICY), load_policy)
+    return file_subject("p.npz", _archive(path.read_bytes(), POLICY), load_policy)
 
 
 def _checkpoint() -> Subject:
@@ -145,31 +90,22 @@ def _checkpoint() -> Subject:
     config = Hyperparameters(hidden=[4], replay=20, batch=4)
     training = Training(TrainingSpec(scenario, "twin", config, 0, compiled=False))
     training.run_episode()
-    path = _folder() / "c.npz"
+    path = new_folder() / "c.npz"
     training.save(path)
-    return _file("c.npz", _archive(path.read_bytes(), CHECKPOINT), training.restore)
+    return file_subject(
+        "c.npz", _archive(path.read_bytes(), CHECKPOINT), training.restore
+    )
 
 
 def _results() -> Subject:
     """Results that a run keeps to be resumed: JSON, lines of JSON, arrays."""
-    folder, identity = _folder(), {"seed": 0, "config": {"rate": 0.1}}
+    folder, identity = new_folder(), {"seed": 0, "config": {"rate": 0.1}}
     work = FinishedWork(folder, identity)
     work.keep_all([(["stage", [0.1]], {"x": [1.0, 2.0]}), ("b", 3)])
     work.arrays("key", lambda: {"u": np.arange(3.0)})
-    whole = {path.name: path.read_bytes() for path in folder.iterdir()}
-
-    def make(rng: Random) -> tuple[str, bytes]:
-        """Returns a damaged one."""
-        name = list(whole)[rng.integers(len(whole))]
-        return name, damaged(whole[name], rng)
-
-    def read(content: tuple[str, bytes]) -> None:
-        """Reads it beside what is whole."""
-        for name, data in (whole | dict([content])).items():
-            (folder / name).write_bytes(data)
-        FinishedWork(folder, identity).arrays("key", dict)
-
-    return Subject(make, read)
+    return folder_subject(
+        folder, lambda: FinishedWork(folder, identity).arrays("key", dict)
+    )
 
 
 def _columns_of(quantity: Quantity, rng: Random) -> Arrays:
@@ -212,7 +148,7 @@ def _sample_log(folder: Path, kind: str, file_format: str, rng: Random) -> Array
 
 
 def _log(file_format: str) -> Subject:
-    folders = {kind: _folder() for kind in KINDS}
+    folders = {kind: new_folder() for kind in KINDS}
     rng = np.random.default_rng(0)
     columns = {k: _sample_log(f, k, file_format, rng) for k, f in folders.items()}
     names = ("log.yaml", f"episode_0000.{file_format}")
@@ -224,10 +160,10 @@ def _log(file_format: str) -> Subject:
         name = names[min(1, rng.integers(4))]
         data = whole[kind][name]
         if name == "log.yaml":
-            return kind, name, _either_way(data.decode(), damaged_yaml, rng)
+            return kind, name, either_way(data.decode(), damaged_yaml, rng)
         if file_format == "csv":
-            return kind, name, _either_way(data.decode(), damaged_csv, rng)
-        return kind, name, _damaged_parquet(data, columns[kind], rng)
+            return kind, name, either_way(data.decode(), damaged_csv, rng)
+        return kind, name, parquet_damage(data, columns[kind])(rng)
 
     def read(content: tuple[str, str, bytes]) -> None:
         """Reads it beside what is whole."""
@@ -241,7 +177,7 @@ def _log(file_format: str) -> Subject:
 
 def _unfinished() -> Subject:
     """Rows that a killed program leaves, which the next start closes."""
-    folder, kind = _folder(), "transitions"
+    folder, kind = new_folder(), "transitions"
     _sample_log(folder, kind, "csv", np.random.default_rng(0))
     log = {path.name: path.read_bytes() for path in folder.iterdir()}
     text = log.pop("episode_0000.csv").decode()
@@ -249,7 +185,7 @@ def _unfinished() -> Subject:
 
     def make(rng: Random) -> bytes:
         """Returns damaged rows."""
-        return _either_way(text, damaged_csv, rng)
+        return either_way(text, damaged_csv, rng)
 
     def read(content: bytes) -> None:
         """Resumes a log that has such rows."""
@@ -260,18 +196,6 @@ def _unfinished() -> Subject:
         LogWriter(folder, header, "csv", resume=True)
 
     return Subject(make, read)
-
-
-def _damaged_parquet(data: bytes, columns: Arrays, rng: Random) -> bytes:
-    if rng.integers(2):
-        return damaged(data, rng)
-    changed = damaged_columns(columns | {"rows": np.zeros(_ROWS)}, rng)
-    stream = io.BytesIO()
-    try:
-        pq.write_table(pa.table(changed), stream)
-    except (pa.ArrowException, ValueError):  # what no Parquet file can be
-        return damaged(data, rng)
-    return stream.getvalue()
 
 
 def _datagram(valid: list[bytes], decode: Callable[[bytes], object]) -> Subject:
@@ -331,6 +255,7 @@ SUBJECTS: Mapping[str, Callable[[], Subject]] = {
     "hardware": _hardware,
     "parameters": _parameters,
     "results": _results,
+    **IMPORTERS,
     "hex_sample": _hex_sample,
     "hex_request": _hex_request,
     "robotiq_status": partial(_registers, registers.decode_status),

@@ -1,6 +1,5 @@
 """ROS 1 and ROS 2 bags and MCAP files, by rosbags; no ROS has to be installed."""
 
-import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -8,13 +7,10 @@ from typing import Any
 import numpy as np
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.text import clipped
-from drake_disasm.importing.stream import Stream
+from drake_disasm.importing.stream import Stream, readable
 
 _MOST_VALUES = 2**28
 _NANO = 1e-9
-#: What rosbags raises of damaged files, beside its own errors.
-_DAMAGE = (OSError, ValueError, TypeError, LookupError, AssertionError, struct.error)
 
 
 def read_bag(path: Path) -> list[Stream]:
@@ -28,19 +24,15 @@ def read_bag(path: Path) -> list[Stream]:
         DisasmError: rosbags is not installed, or the bag can't be read.
     """
     try:
-        from rosbags.highlevel import AnyReader, AnyReaderError
-        from rosbags.rosbag2 import ReaderError
+        from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise DisasmError(
             f"{path}: reading bags needs rosbags; pip install 'drake_disasm[bags]'"
         ) from None
     store = get_typestore(Stores.LATEST)
-    try:
-        with AnyReader([path], default_typestore=store) as reader:
-            found = [_stream(reader, each) for each in _by_topic(reader)]
-    except (AnyReaderError, ReaderError, *_DAMAGE) as error:
-        raise DisasmError(f"{path}: can't be read: {clipped(str(error))}") from None
+    with readable(path), AnyReader([path], default_typestore=store) as reader:
+        found = [_stream(reader, each) for each in _by_topic(reader)]
     streams = [stream for stream in found if stream is not None]
     if not streams:
         raise DisasmError(f"{path}: has no topic with messages of numbers")

@@ -10,15 +10,18 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.importing.field_map import FieldMap, quantity_of
 from drake_disasm.importing.processing import Done, Processed, Processing, process
 from drake_disasm.importing.recording import Recording, recordings_of
 from drake_disasm.importing.signals import clock_of
 from drake_disasm.importing.source import Source
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns
-from drake_disasm.logs.schema import Form
+from drake_disasm.logs.schema import KINDS, Form
 
 Array = NDArray[np.float64]
+
+_MADE = ("time", "v", "vd")  # by `recording` and `processing`
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,6 +63,7 @@ def import_recordings(
     Raises:
         DisasmError: the map does not fit them, or nothing is left.
     """
+    _check_needed(fields)
     found = [
         each.between(*processing.between)
         for source in sources
@@ -75,6 +79,16 @@ def import_recordings(
     period = float(np.median(np.diff(parts[0].columns["time"])))
     episodes = tuple(_from_its_begin(part) for part in parts)
     return Imported(tuple(found), episodes, period, done)
+
+
+def _check_needed(fields: FieldMap) -> None:
+    """Refuses a map without what the kind needs and nothing else can tell."""
+    for quantity in KINDS[fields.kind].quantities:
+        name = quantity.name
+        if quantity.required and name not in (*fields.columns, *_MADE):
+            raise DisasmError(
+                f"map: a {fields.kind} log needs {name}; say which channels it is in"
+            )
 
 
 def _as_recorded(recording: Recording, kind: str) -> dict[str, Array]:

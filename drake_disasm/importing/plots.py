@@ -8,7 +8,12 @@ import numpy as np
 
 from drake_disasm.common.files import write_figure
 from drake_disasm.importing.importer import Imported
-from drake_disasm.importing.signals import even_times, resample, spectrum_of, stretches
+from drake_disasm.importing.signals import (
+    even_times,
+    longest_stretch,
+    resample,
+    spectrum_of,
+)
 
 _SHOWN = 2.0  # s
 
@@ -31,7 +36,7 @@ def plot_import(imported: Imported, path: Path) -> None:
     assert done is not None
     figure, axes = pyplot.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
     recording = imported.recordings[0]
-    longest = max(stretches(recording.time), key=lambda rows: rows.stop - rows.start)
+    longest = longest_stretch(recording.time)
     time = recording.time[longest]
     at = even_times(time)
     q = resample(time, recording.columns["q"][longest], at)

@@ -22,6 +22,9 @@ from drake_disasm.importing.signals import (
 
 Array = NDArray[np.float64]
 
+_FEWEST = 4  # rows of a stretch
+_SAME = 1e-3  # by which periods of two recordings may differ
+
 
 @dataclasses.dataclass(frozen=True)
 class Processing:
@@ -90,7 +93,11 @@ def process(
     """
     clocks = tuple(clock_of(recording.time) for recording in recordings)
     period = float(np.median([clock.period for clock in clocks]))
-    parts = [part for each in recordings for part in _even(each)]
+    parts = [part for each in recordings for part in _even(each, period)]
+    if not parts:
+        raise DisasmError(
+            f"no stretch of {_FEWEST} rows is without gaps; record without losses"
+        )
     cutoff = _cutoff_of(parts, period, processing)
     low = LowPass(cutoff, period) if math.isfinite(cutoff) else None
     decimation = processing.decimate or (low.decimation if low else 1)
@@ -129,16 +136,17 @@ def _cutoff_of(
     return cutoff
 
 
-def _even(recording: Recording) -> list[Recording]:
-    """Returns the stretches between gaps, evenly spaced."""
+def _even(recording: Recording, period: float) -> list[Recording]:
+    """Returns the stretches between gaps, in rows a period [s] apart."""
     found = []
     for rows in stretches(recording.time):
         time = recording.time[rows]
-        if len(time) < 4:
+        if len(time) < _FEWEST:
             continue
         part = {name: values[rows] for name, values in recording.columns.items()}
-        if not clock_of(time).is_even:
-            at = even_times(time)
+        clock = clock_of(time)
+        if not clock.is_even or abs(clock.period - period) > _SAME * period:
+            at = even_times(time, period)
             part = {name: resample(time, values, at) for name, values in part.items()}
             time = at
         found.append(dataclasses.replace(recording, time=time, columns=part))

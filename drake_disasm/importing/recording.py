@@ -18,12 +18,15 @@ from drake_disasm.importing.shift import (
     link_features,
     motion_features,
 )
-from drake_disasm.importing.signals import resample
+from drake_disasm.importing.signals import clock_of, resample
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stream import Stream
 from drake_disasm.importing.units import factor
 
 Array = NDArray[np.float64]
+
+_LARGEST = 1e50  # a larger value is damage: its square times another's would overflow
+_CLOSEST = 0.01  # of the median period: rows that are closer can't tell a slope
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,7 +37,7 @@ class Recording:
         name: of the source, with the episode's number if there are several.
         time: (n,) increasing [s].
         columns: (n, k) of each quantity, SI.
-        dropped: rows that held no number, or whose time did not increase.
+        dropped: rows that held no number, or came no later than the one before.
         shifts: of other streams' clocks, by the stream's name.
     """
 
@@ -134,12 +137,14 @@ def _values(source: Source, name: str, column: Column) -> Array:
 
 def _clean(name: str, time: Array, columns: dict[str, Array]) -> Recording:
     """Returns the rows that hold numbers at times that increase."""
-    whole = np.isfinite(time)
+    whole = np.abs(time) < _LARGEST
     for values in columns.values():
-        whole &= np.isfinite(values).all(axis=1)
+        whole &= (np.abs(values) < _LARGEST).all(axis=1)
     order = np.flatnonzero(whole)
+    closest = _CLOSEST * clock_of(time[order]).period
     greatest = np.maximum.accumulate(time[order])
-    later = np.concatenate([[True], time[order][1:] > greatest[:-1]])[: len(order)]
+    later = np.diff(time[order], prepend=-np.inf) > 0.0
+    later[1:] &= time[order][1:] - greatest[:-1] > closest
     kept = order[later]
     if len(kept) < 2:
         raise DisasmError(f"{name}: no two rows hold numbers at times that increase")

@@ -15,6 +15,7 @@ from drake_disasm.importing.signals import (
     LowPass,
     chosen_cutoff,
     even_times,
+    longest_stretch,
     resample,
 )
 
@@ -119,14 +120,16 @@ def motion_features(
 ) -> tuple[Array, Array, float]:
     """Returns times (m,), what forces depend on then (m, k), and its cut-off [Hz].
 
-    Features are the same if time ran backwards. A shift in time is not, so that these
-    can't make up for it; velocities could.
+    They are of the longest stretch without a gap, and the same if time ran backwards.
+    A shift in time is not, so that these can't make up for it; velocities could.
 
     Args:
         time: (n,) increasing [s].
         q: (n, j) positions of the joints.
         features: of q and its derivatives.
     """
+    longest = longest_stretch(time)
+    time, q = time[longest], q[longest]
     at = even_times(time)
     period = float(at[1] - at[0])
     even = resample(time, q, at)
@@ -183,11 +186,13 @@ def estimated_shift(
 
 
 def _low_passed(time: Array, values: Array, cutoff: float) -> tuple[Array, Array]:
-    """Returns a stream through the same filter as the motion.
+    """Returns a stream's longest stretch through the same filter as the motion.
 
     Noise would be less between rows than on them, so that shifts by half a period
     would seem better than they are.
     """
+    longest = longest_stretch(time)
+    time, values = time[longest], values[longest]
     at = even_times(time)
     period = float(at[1] - at[0])
     low = LowPass(min(cutoff, LARGEST_CUTOFF * 0.5 / period), period)

@@ -94,9 +94,19 @@ def resample(time: Array, values: Array, at: Array) -> Array:
     return np.asarray(make_interp_spline(time, values, k=min(3, len(time) - 1))(at))
 
 
-def even_times(time: Array) -> Array:
-    """Returns times (m,) a median period apart, from the first to the last."""
-    period = clock_of(time).period
+def longest_stretch(time: Array) -> slice:
+    """Returns the rows of the longest stretch between gaps of increasing times (n,)."""
+    return max(stretches(time), key=lambda rows: rows.stop - rows.start)
+
+
+def even_times(time: Array, period: float | None = None) -> Array:
+    """Returns even times (m,) from the first to the last.
+
+    Args:
+        time: (n,) increasing [s], without gaps.
+        period: between them [s]; None for the median of `time`.
+    """
+    period = clock_of(time).period if period is None else period
     count = int(np.floor((time[-1] - time[0]) / period * (1.0 + 1e-9))) + 1
     return time[0] + period * np.arange(count)
 

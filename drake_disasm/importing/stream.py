@@ -1,10 +1,15 @@
-"""Channels that share a clock."""
+"""Channels that share a clock, and what reading them from a damaged file ends with."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.text import clipped
 
 Array = NDArray[np.float64]
 
@@ -55,3 +60,25 @@ def flat(arrays: Mapping[str, np.ndarray]) -> dict[str, Array]:
             continue
         found |= {f"{name}.{i}": columns[:, i] for i in range(columns.shape[1])}
     return found
+
+
+@contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """Makes what a library raises of a damaged file one line.
+
+    Of damage it may be anything: NumPy tokenises a header as Python, SciPy lets zlib's
+    errors through, a length of 2^60 bytes in an MCAP file is a MemoryError.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        DisasmError: whatever went wrong.
+    """
+    try:
+        yield
+    except DisasmError:
+        raise
+    except Exception as error:
+        what = clipped(str(error)) or type(error).__name__
+        raise DisasmError(f"{path}: can't be read: {what}") from None

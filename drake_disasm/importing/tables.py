@@ -3,9 +3,7 @@
 import csv
 import io
 import itertools
-import zipfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,29 +14,11 @@ import pyarrow.csv  # type: ignore[import-untyped]
 import pyarrow.parquet  # type: ignore[import-untyped]
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.text import clipped
-from drake_disasm.importing.stream import Stream, flat
+from drake_disasm.importing.matlab import load_mat
+from drake_disasm.importing.stream import Stream, flat, readable
 
 _COMMENTS = ("#", "%")
 _DELIMITERS = ",;\t "
-
-
-@contextmanager
-def _readable(path: Path) -> Iterator[None]:
-    """Turns what libraries raise of a damaged file into one line."""
-    try:
-        yield
-    except (
-        OSError,
-        ValueError,
-        TypeError,
-        KeyError,
-        EOFError,
-        zipfile.BadZipFile,
-        csv.Error,
-        pyarrow.ArrowException,
-    ) as error:
-        raise DisasmError(f"{path}: can't be read: {clipped(str(error))}") from None
 
 
 def read_csv(path: Path) -> list[Stream]:
@@ -48,7 +28,7 @@ def read_csv(path: Path) -> list[Stream]:
     semicolons, tabs or blanks; without names they are column_0, column_1, ... A column
     that is not of numbers is left out; an empty cell is no number.
     """
-    with _readable(path), path.open(newline="", encoding="utf-8-sig") as file:
+    with readable(path), path.open(newline="", encoding="utf-8-sig") as file:
         filled = (line for line in file if line.strip())
         rows = (line for line in filled if not line.lstrip().startswith(_COMMENTS))
         first = next(rows, "")
@@ -163,13 +143,13 @@ def _numbers(cells: pyarrow.ChunkedArray) -> np.ndarray | None:
 
 def read_npz(path: Path) -> list[Stream]:
     """Reads NumPy's archive of arrays."""
-    with _readable(path), np.load(path, allow_pickle=False) as file:
+    with readable(path), np.load(path, allow_pickle=False) as file:
         return [_table(path, _numeric({name: file[name] for name in file.files}))]
 
 
 def read_npy(path: Path) -> list[Stream]:
     """Reads one array (n, k): columns column.0, column.1, ... or a record array's."""
-    with _readable(path):
+    with readable(path):
         array = np.load(path, allow_pickle=False)
         names = array.dtype.names
         found = {n: array[n] for n in names} if names else {"column": array}
@@ -178,39 +158,19 @@ def read_npy(path: Path) -> list[Stream]:
 
 def read_mat(path: Path) -> list[Stream]:
     """Reads a MATLAB file of version 7 or older; a struct's members are struct.name."""
-    from scipy.io import loadmat
-
-    with _readable(path):
-        try:
-            found = loadmat(path, simplify_cells=True)
-        except NotImplementedError:
-            raise DisasmError(
-                f"{path}: is of MATLAB 7.3; save it with -v7, or as CSV"
-            ) from None
-        return [_table(path, _numeric(_members(found)))]
-
-
-def _members(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    found = dict[str, Any]()
-    for name, value in values.items():
-        if name.startswith("__"):
-            continue
-        if isinstance(value, dict):
-            found |= _members(value, f"{prefix}{name}.")
-        else:
-            found[prefix + name] = value
-    return found
+    with readable(path):
+        return [_table(path, load_mat(path))]
 
 
 def read_parquet(path: Path) -> list[Stream]:
     """Reads a Parquet table; columns of lists are name.0, name.1, ..."""
-    with _readable(path):
+    with readable(path):
         return [_table(path, _columns(pyarrow.parquet.read_table(path)))]
 
 
 def read_lerobot(path: Path) -> list[Stream]:
     """Reads the Parquet files of a LeRobot dataset, episodes one after the other."""
-    with _readable(path):
+    with readable(path):
         files = sorted((path / "data").rglob("*.parquet"))
         if not files:
             raise DisasmError(f"{path}: has no data/**/*.parquet")

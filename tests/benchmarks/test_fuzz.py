@@ -18,6 +18,7 @@ from tests.tools.programs import run_program
 
 #: A few cases of each reader and codec; the program itself reads thousands.
 CASES = dict.fromkeys(fuzz.READERS, 40) | dict.fromkeys(fuzz.CODECS, 400)
+CASES["import_mat"] = 10  # each starts a process
 
 
 @pytest.fixture(autouse=True)

@@ -12,7 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.importing.signals import chosen_cutoff, even_times, quantum, resample
+from drake_disasm.importing.signals import (
+    chosen_cutoff,
+    even_times,
+    longest_stretch,
+    quantum,
+    resample,
+)
 from drake_disasm.logs import Episode
 from sysid.models.base import Array
 from sysid.models.response.drive import DriveSettings, Inputs
@@ -58,10 +64,11 @@ def reach_of(episodes: Sequence[Episode]) -> float:
     """Returns how far a local parabola may reach [s], by the motion's spectrum."""
     cutoffs = []
     for episode in episodes:
-        time = episode["time"]
+        longest = longest_stretch(episode["time"])
+        time = episode["time"][longest]
         if len(time) > 2 * _LEAST_ROWS:
             even = even_times(time)
-            q = resample(time, episode["q"], even)
+            q = resample(time, episode["q"][longest], even)
             cutoffs.append(chosen_cutoff(q, float(even[1] - even[0])))
     return 0.25 / max(cutoffs) if cutoffs else 0.0
 

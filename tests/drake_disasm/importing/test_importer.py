@@ -250,3 +250,56 @@ def test_a_response_without_commands_is_refused(tmp_path: Path) -> None:
     path.write_text("\n".join(["t,q", *(f"{0.01 * i},{i}" for i in range(20))]))
     with pytest.raises(DisasmError, match="commanded joint positions"):
         guessed_map(read_source(path), "joint_response", ["a"], "arm.urdf")
+
+
+def test_what_the_kind_needs_has_to_be_in_the_map(tmp_path: Path) -> None:
+    columns = {"tau": _FIELDS["columns"]["tau"] | {"scale": 1.0}}  # type: ignore[index]
+    fields = parse_map(_FIELDS | {"columns": columns})
+    with pytest.raises(DisasmError, match="a joint_motion log needs q"):
+        _imported(_table(tmp_path / "run.npz"), fields)
+
+
+def test_rows_that_came_at_once_or_are_absurd_are_dropped(tmp_path: Path) -> None:
+    """A burst: a slope between such rows would be their noise, a thousand times."""
+    path = _table(tmp_path / "run.npz", kt=1.0)
+    values = dict(np.load(path))
+    values["t"][500] = values["t"][499] + 1e-6
+    values["angle"][700] = 1e300
+    np.savez(path, **values)
+    recording = _imported(path, parse_map(_FIELDS)).recordings[0]
+    assert recording.dropped == 2 and np.diff(recording.time).min() > 0.004
+
+
+def test_gaps_everywhere_leave_nothing(tmp_path: Path) -> None:
+    path = _table(tmp_path / "run.npz", kt=1.0)
+    values = dict(np.load(path))
+    rows = np.arange(2000)
+    values["t"] = 1e3 * (0.005 * rows + 10.0 * (rows // 3))
+    np.savez(path, **values)
+    with pytest.raises(DisasmError, match="no stretch of 4 rows is without gaps"):
+        _imported(path, parse_map(_FIELDS))
+
+
+def test_a_clock_that_is_set_during_the_record_is_a_gap(tmp_path: Path) -> None:
+    """A robot that had no network when it was switched on: 1970, then today."""
+    path = _table(tmp_path / "run.npz", kt=1.0)
+    values = dict(np.load(path))
+    values["t"][800:] += 1.7e12
+    np.savez(path, **values)
+    found = _imported(path, parse_map(_FIELDS))
+    assert [len(each["time"]) for each in found.episodes] == [
+        800 // found.done.decimation - 2 * found.done.reach // found.done.decimation,
+        1200 // found.done.decimation - 2 * found.done.reach // found.done.decimation,
+    ]
+
+
+def test_recordings_at_two_rates_get_one(tmp_path: Path) -> None:
+    """The filter is of one period: at another its derivatives would be off."""
+    paths = _table(tmp_path / "a.npz", kt=1.0), tmp_path / "b.npz"
+    _table(paths[1], rows=2500, period=0.004, kt=1.0)
+    sources = [read_source(path) for path in paths]
+    found = import_recordings(sources, parse_map(_FIELDS), Processing(cutoff=20.0))
+    for episode in found.episodes:
+        begin = found.done.reach * found.period / found.done.decimation
+        _, v, _ = motion((begin + episode["time"])[:, None])
+        assert np.abs(episode["v"] - v).max() < 0.02

@@ -115,6 +115,23 @@ def test_what_can_t_be_read_is_refused_in_one_line(
     assert "\n" not in str(refused.value) and str(path) in str(refused.value)
 
 
+def test_damage_that_crashes_scipy_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.mat"
+    savemat(path, {"t": np.arange(4.0), "s": {"a": np.arange(3.0)}})
+    content = bytearray(path.read_bytes())
+    content[177] = 192  # of the length of a variable's name: a fault in SciPy 1.17.1
+    path.write_bytes(content)
+    with pytest.raises(DisasmError, match="can't be read: "):
+        read_source(path)
+
+
+def test_matlab_7_3_is_refused_with_the_remedy(tmp_path: Path) -> None:
+    path = tmp_path / "run.mat"
+    path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(512))
+    with pytest.raises(DisasmError, match="MATLAB 7\\.3; save it with -v7"):
+        read_source(path)
+
+
 def test_a_channel_that_is_not_there_names_its_neighbours(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     path.write_text("time,position\n0,1\n1,2\n")

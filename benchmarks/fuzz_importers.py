@@ -1,0 +1,196 @@
+"""What is fuzzed of the import: each format, from the file to the log."""
+
+import io
+import shutil
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa  # type: ignore[import-untyped]
+import pyarrow.parquet as pq  # type: ignore[import-untyped]
+from mutations import Random, damaged, damaged_csv
+from scipy.io import savemat
+from subject import (
+    Subject,
+    archive_damage,
+    blindly_or,
+    either_way,
+    file_subject,
+    folder_subject,
+    new_folder,
+    parquet_damage,
+    yaml_subject,
+)
+
+from drake_disasm.common.archive import Arrays
+from drake_disasm.fakes.bag import FakeBag
+from drake_disasm.importing import (
+    FieldMap,
+    Processing,
+    guessed_map,
+    import_recordings,
+    read_map,
+    read_source,
+    write_log,
+)
+from drake_disasm.importing.description import described, summary
+
+_JOINTS = ("shoulder", "elbow")
+_TIME = np.arange(120) / 50.0  # s
+
+
+def _motion() -> Arrays:
+    """Returns the columns of a motion of two joints."""
+    found = {"time": _TIME}
+    for i, rate in enumerate((0.4, 0.9)):
+        found[f"q_{i}"] = np.sin(2.0 * np.pi * rate * _TIME)
+        found[f"tau_{i}"] = np.cos(2.0 * np.pi * rate * _TIME)
+    return found
+
+
+def _import(path: Path, kind: str = "joint_motion") -> None:
+    """Does all that the program does, with a guessed map."""
+    source = read_source(path)
+    described(source)
+    _write(path, guessed_map(source, kind))
+
+
+def _write(path: Path, fields: FieldMap) -> None:
+    source = read_source(path)
+    imported = import_recordings([source], fields, Processing())
+    summary(imported)
+    folder = new_folder()
+    try:
+        write_log(imported, [source], fields, folder, {"program": "fuzz"})
+    finally:
+        shutil.rmtree(folder)
+
+
+def _csv() -> Subject:
+    columns = _motion()
+    rows = [",".join(columns), *_text(np.stack(list(columns.values()), axis=1))]
+
+    def make(rng: Random) -> bytes:
+        """Returns a damaged one."""
+        return either_way("\n".join(rows) + "\n", damaged_csv, rng)
+
+    return file_subject("r.csv", make, _import)
+
+
+def _text(table: np.ndarray) -> list[str]:
+    return [",".join(f"{value:.6g}" for value in row) for row in table]
+
+
+def _npz() -> Subject:
+    columns, stream = _motion(), io.BytesIO()
+    np.savez(stream, allow_pickle=False, **columns)
+    make = archive_damage(stream.getvalue(), columns, {"note": "a"})
+    return file_subject("r.npz", make, _import)
+
+
+def _npy() -> Subject:
+    columns, stream = _motion(), io.BytesIO()
+    np.save(stream, np.rec.fromarrays(list(columns.values()), names=list(columns)))
+    return file_subject("r.npy", partial(damaged, stream.getvalue()), _import)
+
+
+def _mat() -> Subject:
+    columns, stream = _motion(), io.BytesIO()
+    savemat(stream, {"run": columns, "gain": 2.0}, do_compression=True)
+    plain = io.BytesIO()
+    savemat(plain, columns)
+    make = blindly_or(stream.getvalue(), partial(damaged, plain.getvalue()))
+    return file_subject("r.mat", make, _import)
+
+
+def _parquet() -> Subject:
+    columns, stream = _motion(), io.BytesIO()
+    pq.write_table(pa.table(columns), stream)
+    return file_subject(
+        "r.parquet", parquet_damage(stream.getvalue(), columns), _import
+    )
+
+
+def _lerobot() -> Subject:
+    """A dataset of one file, whose positions and commands are lists."""
+    folder, columns, stream = new_folder(), _motion(), io.BytesIO()
+    q = np.stack([columns["q_0"], columns["q_1"]], axis=1)
+    table = {
+        "observation.state": q.tolist(),
+        "action": (q + 0.01).tolist(),
+        "timestamp": columns["time"],
+        "episode_index": np.zeros(len(q), dtype=np.int64),
+    }
+    pq.write_table(pa.table(table), stream)
+    flat = {"timestamp": columns["time"], "episode_index": table["episode_index"]}
+    for name in ("meta", "data"):
+        (folder / name).mkdir()
+    (folder / "meta/info.json").write_text("{}")
+    path = folder / "data/episode_000000.parquet"
+
+    def read(content: bytes) -> None:
+        """Imports what an arm was told and did."""
+        path.write_bytes(content)
+        _import(folder, "joint_response")
+
+    return Subject(parquet_damage(stream.getvalue(), flat), read)
+
+
+def _bag(mcap: bool = True) -> Path:
+    """Returns the folder of a bag of the motion with a wrench."""
+    bag, folder = FakeBag(), new_folder() / "bag"
+    columns = _motion()
+    q, tau = (
+        np.stack([columns[f"{name}_{i}"] for i in (0, 1)], axis=1)
+        for name in ("q", "tau")
+    )
+    for i, time in enumerate(_TIME):
+        bag.add_joint_state(time, _JOINTS, q[i], tau[i])
+        bag.add_wrench(time + 0.003, np.concatenate([q[i], tau[i], q[i]]))
+    bag.write(folder, mcap)
+    return folder
+
+
+def _mcap() -> Subject:
+    data = next(_bag().glob("*.mcap")).read_bytes()
+    return file_subject("r.mcap", partial(damaged, data), _import)
+
+
+def _ros2() -> Subject:
+    """A folder of SQLite's file and its description."""
+    folder = _bag(mcap=False)
+    return folder_subject(folder, partial(_import, folder))
+
+
+def _ros1() -> Subject:
+    """The same bag as ROS 1 has it."""
+    from rosbags.convert import convert
+    from rosbags.typesys import Stores, get_typestore
+
+    path, stores = new_folder() / "r.bag", (Stores.LATEST, Stores.ROS1_NOETIC)
+    types = [get_typestore(store) for store in stores]
+    convert([_bag()], path, "", 0, None, "", *types, (), (), (), ())
+    return file_subject("r.bag", partial(damaged, path.read_bytes()), _import)
+
+
+def _map() -> Subject:
+    path = new_folder() / "r.npz"
+    np.savez(path, allow_pickle=False, **_motion())
+    guess = guessed_map(read_source(path), "joint_motion").to_yaml()
+    return yaml_subject("m.yaml", [guess], lambda m: _write(path, read_map(m)))
+
+
+#: By name: what makes each format's subject.
+IMPORTERS: Mapping[str, Callable[[], Subject]] = {
+    "import_csv": _csv,
+    "import_npz": _npz,
+    "import_npy": _npy,
+    "import_mat": _mat,
+    "import_parquet": _parquet,
+    "import_lerobot": _lerobot,
+    "import_mcap": _mcap,
+    "import_ros2": _ros2,
+    "import_ros1": _ros1,
+    "import_map": _map,
+}
