@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +73,7 @@ def joint_features(q: Array, v: Array, vd: Array) -> Array:
 
 
 def link_features(urdf: str, joints: Sequence[str]) -> Features:
-    """Returns what the wrench of a rigid load on an arm's last link depends on.
+    """Returns what the wrench of a rigid load on what the last joint moves depends on.
 
     Gravity less acceleration, angular acceleration, and products of two angular
     velocities, all in the link's frame: the load's ten inertial parameters and the
@@ -83,14 +84,14 @@ def link_features(urdf: str, joints: Sequence[str]) -> Features:
         joints: names of its joints, in the order of q.
     """
     plant = MultibodyPlant(0.0)
-    instance = add_model(plant, urdf)
+    add_model(plant, urdf)
     plant.Finalize()
     context = plant.CreateDefaultContext()
     at_rest = plant.GetPositionsAndVelocities(context)
     chosen = [plant.GetJointByName(name) for name in joints]
     columns = [joint.velocity_start() for joint in chosen]
     rows = [joint.position_start() for joint in chosen]
-    link = plant.get_body(plant.GetBodyIndices(instance)[-1])
+    link = min(chosen, key=lambda joint: _moved(plant, joint)).child_body()
     gravity = plant.gravity_field().gravity_vector()
     i, j = np.triu_indices(3)
 
@@ -113,6 +114,11 @@ def link_features(urdf: str, joints: Sequence[str]) -> Features:
         return found
 
     return features
+
+
+def _moved(plant: MultibodyPlant, joint: Any) -> int:
+    """Returns how many bodies a joint moves: the last one of a chain the fewest."""
+    return len(plant.GetBodiesKinematicallyAffectedBy([joint.index()]))
 
 
 def motion_features(

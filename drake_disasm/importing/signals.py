@@ -14,7 +14,7 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
-from scipy.signal import welch
+from scipy.signal import oaconvolve, welch
 
 Array = NDArray[np.float64]
 
@@ -152,9 +152,8 @@ class LowPass:
             values: (n, k), a period apart.
             order: as of `kernel`.
         """
-        taps = self.kernel(order)
-        columns = [np.convolve(column, taps, mode="valid") for column in values.T]
-        return np.stack(columns, axis=1)
+        taps = self.kernel(order)[:, None]
+        return np.asarray(oaconvolve(values, taps, mode="valid", axes=0))
 
     @property
     def decimation(self) -> int:

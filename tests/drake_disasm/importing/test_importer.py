@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 import yaml
 
+from drake_disasm.cell.parsing import movable_joints
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.free_motion.cell_urdf import cell_urdf
 from drake_disasm.importing import (
     FieldMap,
     Processing,
@@ -18,7 +20,9 @@ from drake_disasm.importing import (
     write_log,
 )
 from drake_disasm.importing.field_map import Column, parse_map
+from drake_disasm.importing.shift import link_features
 from drake_disasm.logs import read_log
+from drake_disasm.scenario import load_scenario
 from tests.drake_disasm.importing.bag import motion, record_arm
 
 
@@ -303,3 +307,15 @@ def test_recordings_at_two_rates_get_one(tmp_path: Path) -> None:
         begin = found.done.reach * found.period / found.done.decimation
         _, v, _ = motion((begin + episode["time"])[:, None])
         assert np.abs(episode["v"] - v).max() < 0.02
+
+
+def test_a_bench_in_the_urdf_is_not_what_the_sensor_carries(tmp_path: Path) -> None:
+    """The cell's URDF ends with links that are fixed to the world."""
+    path = tmp_path / "cell.urdf"
+    path.write_text(cell_urdf(load_scenario("removal")))
+    arm = "package://disasm_models/iiwa14/iiwa14.urdf"
+    joints = movable_joints(arm)
+    q, v, vd = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 5, len(joints)))
+    found = [link_features(urdf, joints)(q, v, vd) for urdf in (str(path), arm)]
+    np.testing.assert_allclose(*found, atol=1e-9)
+    assert np.ptp(found[0], axis=0)[1:].min() > 0.1  # it moves
