@@ -78,6 +78,14 @@ def _add_size_arguments(add: Callable[..., object]) -> None:
         help="of each training (default: the study's)",
     )
     add(
+        "--robot-episodes",
+        type=options.positive,
+        default=0,
+        metavar="N",
+        help="let agents go on learning on the robot, where a study has one "
+        "(default: they are only tested there)",
+    )
+    add(
         "--validation",
         type=options.positive,
         metavar="N",
@@ -154,6 +162,7 @@ def _study(args: argparse.Namespace, arguments: Sequence[str]) -> Study:
         levels=dict(map(_levels, args.levels)),
         episodes=args.episodes,
         validation=args.validation,
+        robot_episodes=args.robot_episodes,
         changes=tuple(args.hyper),
         overrides=tuple(args.overrides),
         lockstep=not args.diagram,

@@ -34,7 +34,7 @@ from drake_disasm.task.simulation import TaskSimulation
 _MARKER = "study.json"
 _NEW = "give a new folder"
 #: More of a study may be asked for when it is resumed.
-_MAY_GROW = ("seeds", "levels", "compare")
+_MAY_GROW = ("seeds", "levels", "compare", "robot_episodes")
 
 
 def open_study(study: Study, folder: Path, resume: bool) -> dict[str, Any]:

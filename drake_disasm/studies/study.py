@@ -141,6 +141,7 @@ class StudyOptions:
         levels: of some factors, by name; others have all theirs.
         episodes: of each training; None for the study's number.
         validation: greedy episodes of each policy; None for the study's number.
+        robot_episodes: of learning on the robot after that on a twin; 0 for none.
         changes: of hyper-parameters, as KEY=VALUE.
         overrides: of the scenario, as KEY=VALUE.
         lockstep: whether trainings run side by side on batches of twins.
@@ -153,6 +154,7 @@ class StudyOptions:
     levels: Mapping[str, Sequence[str]] = dataclasses.field(default_factory=dict)
     episodes: int | None = None
     validation: int | None = None
+    robot_episodes: int = 0
     changes: tuple[str, ...] = ()
     overrides: tuple[str, ...] = ()
     lockstep: bool = True
@@ -202,12 +204,14 @@ class Study(abc.ABC):
         source: in the thesis, or elsewhere.
         factors: and all their levels.
         seeds, episodes, validation: of the whole study.
+        has_robot: whether agents can go on learning on what stands for a robot.
 
     Args:
         options: what the user chooses.
 
     Raises:
-        DisasmError: a level or a factor that is not studied.
+        DisasmError: a level or a factor that is not studied, or learning on a robot
+            where there is none.
     """
 
     name: ClassVar[str]
@@ -217,9 +221,15 @@ class Study(abc.ABC):
     seeds: ClassVar[int]
     episodes: ClassVar[int]
     validation: ClassVar[int] = 10
+    has_robot: ClassVar[bool] = False
 
     def __init__(self, options: StudyOptions) -> None:
         self.options = options
+        if options.robot_episodes and not self.has_robot:
+            raise DisasmError(
+                f"--robot-episodes: there is no robot in study '{self.name}'; leave it "
+                "out"
+            )
         known = [factor.name for factor in self.factors]
         for name in options.levels:
             if name not in known:

@@ -2,29 +2,34 @@
 
 A robot differs from its twin in one way or another (`mismatches`). Agents are trained
 on twins that know more or less of it (_BRANCHES), and act on the robot without having
-seen it; the cell stands for the robot, and is simulated, too::
+seen it; then they go on learning there, if that is wanted, beside one that comes from
+no twin. The cell stands for the robot, and is simulated, too::
 
     folder/
       robots/MISMATCH/                 a log of the robot, and twins from it
       mismatch_M__agent_A__branch_B/   trainings on a twin; "any" for a common one
       tests/MISMATCH/AGENT__BRANCH/    greedy episodes on the robot, a file per seed
+      robot__mismatch_M__.../          with --robot-episodes: learning there
 """
 
 import dataclasses
 import functools
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from drake_disasm.learning.hyperparameters import Hyperparameters, override
+from drake_disasm.learning.learning_curve import plot_learning_curves
+from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.training import Purpose, seed_for
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.scenario.schema import Range
-from drake_disasm.studies.results import paired_difference, rate
-from drake_disasm.studies.runner import finished, read_test
+from drake_disasm.studies.runner import SeedResult, finished, read_test
 from drake_disasm.studies.study import (
     Factor,
     Level,
+    Picture,
     PolicyTest,
     Stage,
     Study,
@@ -32,6 +37,14 @@ from drake_disasm.studies.study import (
     Treatment,
     agent_config,
     folder_name,
+)
+from sysid.studies.branch_tables import (
+    BranchTables,
+    first_success_cell,
+    performance,
+    performance_cell,
+    success_cell,
+    success_share,
 )
 from sysid.studies.closed_twin import ClosedTwin, with_effects
 from sysid.studies.mismatches import MISMATCHES
@@ -57,9 +70,13 @@ _WIDE = (
     Range("ChainPull.k", 0.0, 150.0),  # N/m
     Range("CommandGain.x", -0.4, 0.4),
 )
-_NOMINAL, _WIDE_NAME, _CLOSED = "nominal", "wide", "closed"
+#: Share of each batch on the robot that comes from the twin's replay memory: without it
+#: the new memory is so narrow that the agent unlearns.
+_REHEARSAL = 0.5
+_UNTRAINED, _NOMINAL, _WIDE_NAME, _CLOSED = "untrained", "nominal", "wide", "closed"
 #: What a twin knows of the robot, and where; those not made from a log serve them all.
 _BRANCHES = {
+    _UNTRAINED: "no twin: it learns on the robot alone",
     _NOMINAL: "the twin as it is",
     _WIDE_NAME: "the twin, randomised widely",
     "identified": "the twin, its parameters identified on a log",
@@ -85,13 +102,19 @@ class TwinTransferStudy(Study):
         Factor("branch", "", tuple(_BRANCHES)),
     )
     seeds, episodes, validation = 10, 100, 2
+    has_robot = True
 
     def stages(self, folder: Path) -> Iterator[Stage]:
-        """Yields the robots' logs with twins, then trainings, then tests."""
+        """Yields the robots' logs and twins, trainings, tests, trainings there."""
         robots = [self._robot(str(name), folder) for name in self.levels["mismatch"]]
         yield Stage(preparations=robots)
         yield Stage(self._trainings(folder), self.options.seeds)
         yield Stage(tests=self._tests(folder))
+        if self.options.robot_episodes:
+            there = [
+                self._treatment_there(each, folder) for each in self._ready(folder)
+            ]
+            yield Stage(there, self.options.seeds)
 
     def _robot(self, mismatch: str, folder: Path) -> ClosedTwin:
         nominal = self._nominal
@@ -131,6 +154,27 @@ class TwinTransferStudy(Study):
         )
         return Treatment(folder_name(known), levels, experiment)
 
+    def _treatment_there(self, levels: dict[str, Level], folder: Path) -> Treatment:
+        """Returns the training on the robot that follows one on a twin, or none."""
+        is_first = levels["branch"] == _UNTRAINED
+        start = "" if is_first else str(folder / self.treatment(levels, folder).folder)
+        config, preset_name = self._agent(str(levels["agent"]))
+        experiment = self.experiment(_SCENARIO, config, preset_name)
+        there = dataclasses.replace(
+            experiment.config,
+            episodes=self.options.robot_episodes,
+            demonstrations=0.0 if is_first else _REHEARSAL,
+        )
+        experiment = dataclasses.replace(
+            experiment,
+            scenario=self._robot(str(levels["mismatch"]), folder).robot,
+            station=_STATION,
+            config=there,
+            start=start,
+            lockstep=False,  # a batch has no arm
+        )
+        return Treatment(f"robot__{folder_name(levels)}", levels, experiment)
+
     def _agent(self, name: str) -> tuple[Hyperparameters, str]:
         algorithm, _, is_normalised = name.partition("_")
         config, preset_name = agent_config(algorithm, _SCENARIO)
@@ -138,7 +182,7 @@ class TwinTransferStudy(Study):
 
     def _trainings(self, folder: Path) -> list[Treatment]:
         """Returns each training once: some twins are the same for all robots."""
-        every = [self.treatment(each, folder) for each in self._ready(folder)]
+        every = [self.treatment(each, folder) for each in self._from_twins(folder)]
         return list({each.folder: each for each in every}.values())
 
     def _ready(self, folder: Path) -> list[dict[str, Level]]:
@@ -149,9 +193,13 @@ class TwinTransferStudy(Study):
             if self._robot(str(levels["mismatch"]), folder).is_finished
         ]
 
+    def _from_twins(self, folder: Path) -> list[dict[str, Level]]:
+        """Returns those of them whose agents are trained on a twin."""
+        return [each for each in self._ready(folder) if each["branch"] != _UNTRAINED]
+
     def _tests(self, folder: Path) -> list[PolicyTest]:
         tests = []
-        for levels in self._ready(folder):
+        for levels in self._from_twins(folder):
             training = self.treatment(levels, folder)
             robot = self._robot(str(levels["mismatch"]), folder).robot
             for result in finished([training], self.options.seeds, folder):
@@ -170,14 +218,58 @@ class TwinTransferStudy(Study):
         return tests
 
     def tables(self, folder: Path) -> list[Table]:
-        """Returns what was found of each robot, success there, and who gains what."""
-        return [
+        """Returns what was found of each robot, what is done there, and who gains."""
+        make = BranchTables(self.levels, _BRANCHES, _CLOSED)
+        new = functools.partial(self._arrived, folder=folder)
+        found = [
             self._found(folder),
-            self._by_branch("Episodes on the robot that succeed", folder, _success),
-            self._by_branch("Mean episodic reward on the robot", folder, _reward),
-            self._gains("Reward that closing the loop adds", folder, "performance"),
-            self._gains("Success that closing the loop adds", folder, "success"),
+            make.by_branch("Episodes on the robot that succeed", new, success_cell),
+            make.by_branch("Mean episodic reward on the robot", new, performance_cell),
+            make.gains("Reward that closing the loop adds", new, performance),
+            make.gains("Success that closing the loop adds", new, success_share),
         ]
+        if not self.options.robot_episodes:
+            return found
+        learned = functools.partial(self._learned, folder=folder)
+        return [
+            *found,
+            make.by_branch("P, learning on the robot", learned, performance_cell),
+            make.by_branch("Success, learning on the robot", learned, success_cell),
+            make.by_branch("First success of each seed", learned, first_success_cell),
+            make.gains("P that closing the loop adds", learned, performance),
+        ]
+
+    def pictures(self, folder: Path) -> list[Picture]:
+        """Returns how agents learn on the robot, by where they come from."""
+        if not self.options.robot_episodes:
+            return []
+        found = []
+        for mismatch, agent in itertools.product(
+            self.levels["mismatch"], self.levels["agent"]
+        ):
+            levels = {"mismatch": mismatch, "agent": agent}
+            curves = self._curves(levels, folder)
+            if curves:
+                found.append(
+                    Picture(
+                        f"Learning on the robot: {mismatch}, {agent}",
+                        f"robot_{mismatch}_{agent}.png",
+                        functools.partial(plot_learning_curves, curves),
+                    )
+                )
+        return found
+
+    def _curves(
+        self, levels: dict[str, Level], folder: Path
+    ) -> dict[str, list[list[dict[str, float]]]]:
+        """Returns the episodes of each branch's seeds that have learned."""
+        found = {}
+        for branch in self.levels["branch"]:
+            results = self._results_there(levels | {"branch": branch}, folder)
+            if results:
+                paths = [r.folder / "episodes.csv" for r in results]
+                found[str(branch)] = list(map(read_episodes, paths))
+        return found
 
     def _found(self, folder: Path) -> Table:
         rows = []
@@ -190,75 +282,35 @@ class TwinTransferStudy(Study):
         columns = ["mismatch", "what is there", "what is found", "verdict"]
         return Table("The robots, and what closing the loop finds", columns, rows)
 
-    def _by_branch(
-        self, title: str, folder: Path, cell: Callable[[list[dict[str, Any]]], str]
-    ) -> Table:
-        rows = []
-        for mismatch in self.levels["mismatch"]:
-            for agent in self.levels["agent"]:
-                levels = {"mismatch": mismatch, "agent": agent}
-                cells = [
-                    cell(list(self._results(levels | {"branch": b}, folder).values()))
-                    for b in self.levels["branch"]
-                ]
-                rows.append([str(mismatch), str(agent), *cells])
-        columns = ["mismatch", "agent", *map(str, self.levels["branch"])]
-        note = "; ".join(f"{name}: {text}" for name, text in _BRANCHES.items())
-        return Table(title, columns, rows, note)
-
-    def _gains(self, title: str, folder: Path, figure: str) -> Table:
-        others = [b for b in self.levels["branch"] if b != _CLOSED]
-        rows = []
-        for mismatch in self.levels["mismatch"]:
-            for agent in self.levels["agent"]:
-                levels = {"mismatch": mismatch, "agent": agent}
-                own = self._figures(levels | {"branch": _CLOSED}, folder, figure)
-                cells = [
-                    paired_difference(
-                        own, self._figures(levels | {"branch": b}, folder, figure)
-                    )
-                    for b in others
-                ]
-                rows.append([str(mismatch), str(agent), *cells])
-        columns = ["mismatch", "agent", *(f"against {name}" for name in others)]
-        note = (
-            "Mean of the differences seed by seed, and its 95 % interval by Student's "
-            "t; the number of pairs in brackets."
-        )
-        return Table(title, columns, rows, note)
-
-    def _figures(
-        self, levels: dict[str, Level], folder: Path, figure: str
-    ) -> dict[int, float]:
-        return {
-            seed: test["successes"] / test["episodes"]
-            if figure == "success"
-            else test[figure]
-            for seed, test in self._results(levels, folder).items()
-        }
-
-    def _results(
+    def _arrived(
         self, levels: dict[str, Level], folder: Path
     ) -> dict[int, dict[str, Any]]:
-        """Returns the figures on the robot of the seeds that are finished."""
+        """Returns the figures on arrival at the robot of the seeds that are tested."""
         found = {
             seed: read_test(_test_path(folder, levels, seed))
             for seed in self.options.seeds
         }
         return {seed: test for seed, test in found.items() if test is not None}
 
+    def _learned(
+        self, levels: dict[str, Level], folder: Path
+    ) -> dict[int, dict[str, Any]]:
+        """Returns the figures of learning on the robot of the seeds that have."""
+        return {
+            r.seed: r.figures["training"]
+            | {"first_success": r.figures["first_success"]}
+            for r in self._results_there(levels, folder)
+        }
+
+    def _results_there(
+        self, levels: dict[str, Level], folder: Path
+    ) -> list[SeedResult]:
+        if not self._robot(str(levels["mismatch"]), folder).is_finished:
+            return []
+        treatment = self._treatment_there(levels, folder)
+        return finished([treatment], self.options.seeds, folder)
+
 
 def _test_path(folder: Path, levels: dict[str, Level], seed: int) -> Path:
     own = f"{levels['agent']}__{levels['branch']}"
     return folder / "tests" / str(levels["mismatch"]) / own / f"seed_{seed:03d}.json"
-
-
-def _success(tests: list[dict[str, Any]]) -> str:
-    successes, episodes = (sum(t[k] for t in tests) for k in ("successes", "episodes"))
-    return rate(int(successes), int(episodes))
-
-
-def _reward(tests: list[dict[str, Any]]) -> str:
-    if not tests:
-        return "-"
-    return f"{sum(t['performance'] for t in tests) / len(tests):.1f}"

@@ -5,7 +5,6 @@ import pytest
 from tests.tools.programs import run_program
 
 LOG = ("--log", "nowhere", "--out", "nowhere")
-STUDY = ("--before", "chapter3", "--after", "chapter3", "--stand-in", "chapter3")
 #: Program, the options that it needs, and options of numbers with what is refused.
 PROGRAMS: list[tuple[str, tuple[str, ...], list[str]]] = [
     (
@@ -41,11 +40,11 @@ PROGRAMS: list[tuple[str, tuple[str, ...], list[str]]] = [
     ("fuzz", (), ["--files=0", "--datagrams=x", "--seed=-1", "--case=-1"]),
     ("close_loop", LOG, ["--huber=nan", "--huber=-1", "--workers=0"]),
     (
-        "transfer_study",
-        (*STUDY, "--out", "nowhere"),
+        "study",
+        ("twin_transfer", "--out", "nowhere"),
         [
-            *("--rehearsal=1.5", "--rehearsal=nan", "--first-seed=-1"),
-            *("--episodes=0", "--stand-in-episodes=0", "--seeds=0"),
+            *("--seeds=0", "--first-seed=-1", "--episodes=0", "--validation=0"),
+            *("--robot-episodes=-1", "--workers=0"),
         ],
     ),
     ("benchmark", (), ["--seeds=-1", "--nulls=-1", "--pairs=x"]),

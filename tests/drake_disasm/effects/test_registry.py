@@ -305,7 +305,6 @@ def test_a_missing_file_or_module_is_named() -> None:
         "evaluate",
         "identify",
         "close_loop",
-        "transfer_study",
     ],
 )
 def test_every_program_that_reads_scenarios_imports_effects(

@@ -6,15 +6,24 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_text
 from drake_disasm.common.progress import ignore_progress
 from drake_disasm.effects import GroovePose, SensorBias
 from drake_disasm.learning.evaluation import Evaluation
+from drake_disasm.logs import read_log
+from drake_disasm.mdp import REWARD_TERMS
+from drake_disasm.policies import load_policy
 from drake_disasm.scenario import dump_scenario, load_scenario, validate
-from drake_disasm.studies.results import paired_difference
+from drake_disasm.studies.precision import PrecisionStudy
+from drake_disasm.studies.report import write_report
+from drake_disasm.studies.results import mean_of, paired_difference
+from drake_disasm.studies.runner import run_study
 from drake_disasm.studies.study import StudyOptions
+from sysid.studies import twin_transfer
 from sysid.studies.closed_twin import ClosedTwin, with_effects, with_intervals
 from sysid.studies.mismatches import MISMATCHES
 from sysid.studies.twin_transfer import TwinTransferStudy, _test_path
@@ -92,9 +101,80 @@ def test_tables_compare_seed_by_seed(tmp_path: Path) -> None:
     assert "GroovePose.rz 0.05 (0.04 to 0.06)" in found.rows[0][2]
     assert found.rows[0][3].startswith("provisional: The model lacks")
     assert success.rows == [["tilted", "ddpg", "1/6 (3 to 56 %)", "6/6 (61 to 100 %)"]]
-    assert reward.rows[0][2:] == ["1.0", "4.0"]
+    assert reward.rows[0][2:] == ["1.0 ± 1.0", "4.0 ± 0.0"]
     assert gain.rows[0][2] == "+3.00 (+0.52 to +5.48; 3)"
     assert more.rows[0][2].startswith("+0.83 (")
+
+
+def test_learning_on_the_robot_follows_the_twin_or_nothing(tmp_path: Path) -> None:
+    make_robot(tmp_path, "tilted")
+    levels = {"mismatch": ["tilted"], "agent": ["ddpg"]}
+    branches = ["untrained", "closed"]
+    options = StudyOptions((0,), levels | {"branch": branches}, robot_episodes=60)
+    *twins, there = TwinTransferStudy(options).stages(tmp_path)
+    assert len([t for stage in twins for t in stage.treatments]) == 1
+    new, closed = (treatment.experiment for treatment in there.treatments)
+    assert not new.start and new.config.demonstrations == 0.0
+    assert Path(closed.start) == tmp_path / twins[1].treatments[0].folder
+    assert closed.config.demonstrations == 0.5
+    for each in (new, closed):
+        assert each.station == "cell" and each.config.episodes == 60
+        assert each.scenario.effects == list(MISMATCHES["tilted"].effects)
+
+
+def test_there_is_no_robot_in_other_studies() -> None:
+    with pytest.raises(DisasmError, match="no robot in study 'precision'"):
+        PrecisionStudy(StudyOptions((0,), robot_episodes=3))
+
+
+def test_agents_arrive_and_learn_and_the_report_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All of it, on a twin in the robot's place."""
+    monkeypatch.setattr(twin_transfer, "_STATION", "twin")
+    make_robot(tmp_path, "tilted")
+    small = StudyOptions(
+        seeds=(0, 1),
+        levels={
+            "mismatch": ["tilted"],
+            "agent": ["ddpg"],
+            "branch": ["untrained", "nominal", "closed"],
+        },
+        episodes=2,
+        validation=1,
+        changes=("hidden=[8]", "batch=8", "exploration=0.0002"),
+        overrides=("task.steps=6",),
+        compiled=False,
+        provenance={"command": "study", "commit": "c", "date": "d"},
+    )
+    tests = TwinTransferStudy(small)
+    run_study(tests, tmp_path)
+    test = tmp_path / "tests/tilted/ddpg__closed/seed_001.json"
+    arrived = test.read_bytes()
+    learning = TwinTransferStudy(dataclasses.replace(small, robot_episodes=3))
+    run_study(learning, tmp_path)  # more may be asked for afterwards
+    assert (
+        tmp_path / "tests/tilted/ddpg__closed/seed_001.json"
+    ).read_bytes() == arrived
+    tables = {t.title: t for t in write_report(learning, tmp_path, small.provenance)}
+    [row] = tables["P, learning on the robot"].rows
+    for branch, cell in zip(("untrained", "nominal", "closed"), row[2:], strict=True):
+        name = f"robot__mismatch_tilted__agent_ddpg__branch_{branch}"
+        rewards = []
+        for seed in (0, 1):
+            own = tmp_path / name / f"seed_{seed:03d}"
+            log = read_log(own / "log")
+            assert len(log.episodes) == 3 and log.header.scenario is not None
+            rewards.append(np.mean([_reward(episode) for episode in log.episodes]))
+            start = load_policy(own / "policy.npz").description.provenance.get("start")
+            assert bool(start) == (branch != "untrained")
+        assert cell == mean_of(rewards)
+    assert tables["P that closing the loop adds"].rows[0][2:] != ["-", "-"]
+    assert (tmp_path / "robot_tilted_ddpg.png").read_bytes().startswith(b"\x89PNG")
+
+
+def _reward(episode: Any) -> float:
+    return float(sum(np.nansum(episode[f"reward.{term}"]) for term in REWARD_TERMS))
 
 
 def test_a_difference_needs_pairs() -> None:
