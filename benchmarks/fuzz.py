@@ -1,8 +1,8 @@
 """Reads damaged files and datagrams: nothing but the documented error may come.
 
 Each case is damaged at random, or by design (nesting, aliases, long numbers, wrong
-types, NaN), and read in another process under a watchdog. Prints a table as Markdown;
-exits with 1 if anything but a DisasmError came, or a refusal took two seconds.
+types, NaN), and read in another process under a watchdog. Prints a table as Markdown,
+row by row; exits with 1 if anything but a DisasmError came, or a refusal took two seconds.
 """
 
 import argparse
@@ -40,6 +40,10 @@ SLOW = 2.0  # s of the processor's time
 _MOST_FAILURES = 100  # at the next end of the process the rest is left out
 _HANGS = 60.0  # s, on a machine that is busy
 _MEMORY = 4 * 2**30  # bytes that reading may take
+_HEAD = (
+    "| reader | tried | accepted | refused | other exceptions | slowest refusal |\n"
+    "|---|---|---|---|---|---|"
+)
 _EXAMPLES = """examples:
   python benchmarks/fuzz.py --files 1000 --datagrams 10000 --seed 1
   python benchmarks/fuzz.py --only scenario --seed 1 --case 4711   that one, here
@@ -64,6 +68,15 @@ class Row:
     refused: int = 0
     failures: list[tuple[int, str]] = dataclasses.field(default_factory=list)
     slowest: float = 0.0
+
+    @property
+    def text(self) -> str:
+        """The row of the table, in Markdown."""
+        others = self.tried - self.accepted - self.refused
+        return (
+            f"| {self.name} | {self.tried} | {self.accepted} | {self.refused} | "
+            f"{others} | {self.slowest:.2f} s |"
+        )
 
     def add(self, number: int, found: str, seconds: float) -> None:
         """Counts a case by what was found of it."""
@@ -129,11 +142,12 @@ def main(arguments: Sequence[str]) -> int:
                 print(f"{name}: {_read_here(name, args.seed, args.case)}")
         return 0
     rows = []
+    print(_HEAD, flush=True)
     with program.ProgressBar(unit="case") as progress:
         for name in args.only:
             count = args.files if name in READERS else args.datagrams
             rows.append(fuzz(name, args.seed, count, progress))
-    print(table(rows))
+            print(rows[-1].text, flush=True)
     for row in rows:
         for number, what in row.failures[:10]:
             print(f"--only {row.name} --seed {args.seed} --case {number}: {what}")
@@ -165,20 +179,6 @@ def fuzz(
             row.add(number, found, seconds)
             progress(ProgressUpdate(name, row.tried, count))
     return row
-
-
-def table(rows: Sequence[Row]) -> str:
-    """Returns the rows as Markdown."""
-    lines = [
-        "| reader | tried | accepted | refused | other exceptions | slowest refusal |",
-        "|---|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| {r.name} | {r.tried} | {r.accepted} | {r.refused} | "
-        f"{r.tried - r.accepted - r.refused} | {r.slowest:.2f} s |"
-        for r in rows
-    ]
-    return "\n".join(lines)
 
 
 def _watched(

@@ -74,16 +74,17 @@ def _next(
 ) -> tuple[Array, Array]:
     """Returns the best point (p,) that steps lead to, and the residuals there.
 
-    Longer steps are tried too where usual ones gain little far from the noise, of
-    models that make contact, but not where an evaluation takes seconds.
+    Longer steps are tried too where usual ones gain little far from the noise and the
+    loss is Huber's, whose weights give rows that are steep and far off a curvature that
+    the loss has not; but not where an evaluation takes seconds.
     """
     value = objective.value(linearisation.residual)
     steps = _steps(linearisation)
     batches = _batches(objective, linearisation, steps, min_gain, central)
     best = _best(objective, batches, value)
     reached = objective.value(best[1])
-    model, is_done = objective.model, value <= _FAR or reached < (1.0 - _LITTLE) * value
-    if central or is_done or model.costly or not model.makes_contact:
+    is_done = value <= _FAR or reached < (1.0 - _LITTLE) * value
+    if central or is_done or objective.model.costly or np.isinf(objective.huber_delta):
         return best
     longer = _best(objective, [_longer(linearisation, steps[:1])], reached)
     return longer if objective.value(longer[1]) < reached else best
