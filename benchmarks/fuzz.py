@@ -2,7 +2,8 @@
 
 Each case is damaged at random, or by design (nesting, aliases, long numbers, wrong
 types, NaN), and read in another process under a watchdog. Prints a table as Markdown,
-row by row; exits with 1 if anything but a DisasmError came, or a refusal took two seconds.
+row by row; exits with 1 if anything but a DisasmError came, or a refusal took two
+seconds.
 """
 
 import argparse
