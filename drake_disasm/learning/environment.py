@@ -11,7 +11,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.errors import DisasmError, DivergedError, UnreachableError
 from drake_disasm.effects import Effect
 from drake_disasm.mdp import REWARD_TERMS, Outcome
 from drake_disasm.scenario import Scenario, load_scenario
@@ -83,15 +83,26 @@ class DisassemblyEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     ) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Advances one period of the MDP.
 
+        An action that leads the arm beyond its limits, or has the simulation diverge,
+        ends the episode outside of the workspace, with the state before it. Not the
+        first one: where that can't be done the scenario is at fault.
+
         Raises:
-            DisasmError: the action is not six finite numbers.
+            DisasmError: the action is not six finite numbers, or the first of an
+                episode and can't be done.
         """
         action = np.asarray(action, dtype=float)
         if action.shape != (6,) or not np.isfinite(action).all():
             raise DisasmError(
                 f"action {action}: give 6 finite numbers [dx dy dz du dv dw], m and rad"
             )
-        result = self.result = self.simulation.step(action)
+        try:
+            result = self.simulation.step(action)
+        except (UnreachableError, DivergedError):
+            if self.simulation.steps == 1:
+                raise
+            result = self.result.cut_short()
+        self.result = result
         return (
             result.observation.astype(np.float32),
             result.reward,

@@ -193,7 +193,8 @@ class Training:
                 explorer.network = self.agent.network()
         if learning and not every_step:
             self.learn(config.updates_per_step * summary.steps, updates)
-        summary.bolt_is_out = self.env.simulation.bolt_is_out()
+        if self.env.result.is_whole:
+            summary.bolt_is_out = self.env.simulation.bolt_is_out()
         self.summaries.append(summary)
         return summary, recorder
 
@@ -219,8 +220,12 @@ class Training:
             after, reward, terminated, _, _ = self.env.step(action)
             self.replay.add(scaled, chosen, reward, after / self.scale, terminated)
             self._observation = after
-            recorder.acted(self.env.result)
-            summary.add(self.env.result)
+            result = self.env.result
+            if not result.is_whole:
+                summary.outcome = result.outcome
+                return
+            recorder.acted(result)
+            summary.add(result)
 
     def run_round(self, updates: int) -> None:
         """Does updates on the replay memory, without acting (thesis 3.4.2)."""

@@ -47,16 +47,26 @@ class StepResult:
         observation: (12,) the state after it.
         reward_terms: the weighted terms by name; the reward is their sum.
         outcome: how the episode stands.
+        is_whole: whether the station came to the step's end.
     """
 
     observation: np.ndarray
     reward_terms: dict[str, float]
     outcome: Outcome
+    is_whole: bool = True
 
     @property
     def reward(self) -> float:
         """Sum of the terms."""
         return sum(self.reward_terms.values())
+
+    def cut_short(self) -> "StepResult":
+        """Returns a next step that can't be done: outside of the workspace, as it was.
+
+        Nobody can say what it would have been worth: its reward is 0.
+        """
+        nothing = dict.fromkeys(self.reward_terms, 0.0)
+        return StepResult(self.observation, nothing, Outcome.WORKSPACE, is_whole=False)
 
 
 class TaskSimulation:

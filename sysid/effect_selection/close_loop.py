@@ -238,7 +238,7 @@ def _judged(
     first, last, end = found.first, found.last, found.end
     errors = held_out_errors(fitter, first, last, held_out)
     scatter = fit_command_scatter(fitter, last) if may_scatter else None
-    left = left_over(last) if scatter is None else []
+    left = left_over(scatter.left_of(last) if scatter else last)
     model = fit_residual_model(last, left, held_out)
     against = contradictions(last, end.linearised, len(fitter.base.parameters))
     verdict = judge(

@@ -48,12 +48,20 @@ class CommandScatter:
         gain: share of the loss that it accounts for.
         objective: with it accounted for, without the few rows in which contact came or
             went.
+        residual: (rows, channels) that it leaves, in units of the noise: of unit
+            covariance, if nothing else is missing; 0 in those few rows.
     """
 
     std: Array
     interval: Array
     gain: float
     objective: float
+    residual: Array
+
+    def left_of(self, fit: Fit) -> Fit:
+        """Returns the fit that it was found in, with what it leaves of the residual."""
+        linear = dataclasses.replace(fit.linearisation, residual=self.residual)
+        return dataclasses.replace(fit, linearisation=linear)
 
 
 @dataclass(frozen=True)
@@ -82,7 +90,11 @@ class _Likelihood:
         return bent + np.linalg.slogdet(M)[1], bent
 
     def best(self) -> Array:
-        """Returns the standard deviations (3,) of the greatest likelihood."""
+        """Returns the standard deviations (3,) of the greatest likelihood.
+
+        Those of axes that scatter little beside another are 0: the derivatives are not
+        right so far from where they were taken.
+        """
         limits = self.settings
 
         def loss(log: Array) -> float:
@@ -92,7 +104,20 @@ class _Likelihood:
         ends = (np.log(limits.scatter_min_ratio), np.log(limits.scatter_max_ratio))
         found = minimize(loss, np.zeros(3), method="L-BFGS-B", bounds=[ends] * 3)
         std: Array = np.exp(found.x)
-        return np.where(std > 2.0 * limits.scatter_min_ratio, std, 0.0)
+        least = max(2.0 * limits.scatter_min_ratio, limits.scatter_min_axis * std.max())
+        return np.where(std > least, std, 0.0)
+
+    def whitened(self, std: Array) -> Array:
+        """Returns the residuals (n, c) less what scatter makes them vary together.
+
+        C^(-1/2) r with their covariance C = J S J' + 1. The symmetric root, so that
+        each channel stays as near to itself as can be (Kessy, Lewin, Strimmer 2018).
+        """
+        JD = self.J * std
+        C = np.eye(self.r.shape[1]) + np.einsum("nci,ndi->ncd", JD, JD)
+        values, axes = np.linalg.eigh(C)
+        along = np.einsum("nci,nc->ni", axes, self.r) / np.sqrt(values)
+        return np.asarray(np.einsum("nci,ni->nc", axes, along))
 
     def displacements(self, std: Array) -> Array:
         """Returns the likeliest displacement of each step (n, 3)."""
@@ -168,14 +193,15 @@ def _summary(likelihood: _Likelihood, std: Array) -> CommandScatter:
     """Returns a scatter (3,) with its interval and what it explains."""
     limits = likelihood.settings
     before, after = (likelihood.rows(s)[1] for s in (np.zeros(3), std))
-    usual = after[after <= np.quantile(after, 1.0 - limits.scatter_edge_share)]
+    is_usual = after <= np.quantile(after, 1.0 - limits.scatter_edge_share)
     away = Z * likelihood.standard_errors(std)
     ends = np.stack([np.maximum(std - away, 0.0), std + away], axis=-1)
     return CommandScatter(
         std * limits.scatter_scale,
         ends * limits.scatter_scale,
         float(1.0 - after.sum() / before.sum()),
-        float(np.sqrt(usual.mean() / likelihood.r.shape[1])),
+        float(np.sqrt(after[is_usual].mean() / likelihood.r.shape[1])),
+        likelihood.whitened(std) * is_usual[:, None],
     )
 
 

@@ -518,6 +518,12 @@ class SelectionSettings:
         "of scatter_scale",
         "a standard deviation of less is none: far below the encoders' 2e-5 m",
     )
+    scatter_min_axis: float = _setting(
+        0.15,
+        "of the axis that scatters most",
+        "contact is not linear: of six logs that scatter along one axis alone the "
+        "others got 0.03 to 0.11 of it",
+    )
     scatter_max_ratio: float = _setting(
         1e3, "of scatter_scale", "end of the search, beyond any arm that still works"
     )

@@ -165,7 +165,7 @@ def judge(
         _explained(first, last, left[0].gain if left else 0.0),
         against,
         _excess(last, scatter),
-        tuple(channel_findings(last)) if scatter is None else (),
+        tuple(channel_findings(scatter.left_of(last) if scatter else last)),
         tuple(limit for limit in limits if limit.effect not in names),
         tuple(left_over),
         residual_model,

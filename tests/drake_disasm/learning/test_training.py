@@ -9,16 +9,22 @@ import pytest
 import torch
 from torch.utils._pytree import tree_leaves
 
-from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.errors import DisasmError, DivergedError, UnreachableError
+from drake_disasm.common.progress import ignore_progress
 from drake_disasm.learning import run
 from drake_disasm.learning.dataset import remember
 from drake_disasm.learning.evaluation import validate_policy
+from drake_disasm.learning.experiment import Experiment
 from drake_disasm.learning.hyperparameters import preset
+from drake_disasm.learning.jobs import seed_jobs, train_seed
 from drake_disasm.learning.policy import trained_policy
 from drake_disasm.learning.replay import Replay
+from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.training import Training, TrainingSpec, action_map
+from drake_disasm.logs import read_log
 from drake_disasm.policies import Admittance, make_policy
 from drake_disasm.scenario import load_scenario
+from drake_disasm.task.simulation import TaskSimulation
 
 SCENARIO = load_scenario("chapter3", ["imprecision=0.0003", "task.steps=6"])
 
@@ -123,6 +129,39 @@ def test_what_is_remembered_is_the_action_before_imprecision() -> None:
     chosen = rows[:, 12:18] * bounds
     np.testing.assert_allclose(chosen, columns["action"][:-1], atol=1e-8)
     assert np.abs(chosen - columns["action_executed"][:-1])[:, :3].max() > 1e-5
+
+
+@pytest.mark.parametrize("failure", [UnreachableError, DivergedError])
+def test_a_step_that_the_arm_can_not_do_ends_the_episode_and_not_the_training(
+    failure: type[DisasmError],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And its log is valid, with the steps that were done."""
+    step, steps, bad = TaskSimulation.step, iter(range(100)), [2]
+
+    def one_is_too_far(simulation: Any, action: Any = None) -> Any:
+        number = next(steps)
+        result = step(simulation, action)
+        if number in bad:
+            raise failure("too far")
+        return result
+
+    monkeypatch.setattr(TaskSimulation, "step", one_is_too_far)
+    experiment = Experiment(
+        SCENARIO, "twin", "chapter3", _training(episodes=2).spec.config, validation=1
+    )
+    experiment = dataclasses.replace(experiment, compiled=False)
+    [job] = seed_jobs(experiment, [5], tmp_path)
+    train_seed(job, ignore_progress)
+    first, second = read_episodes(job.folder / "episodes.csv")
+    assert (first["outcome"], first["steps"]) == ("workspace", 2)
+    assert second["steps"] == 6
+    episodes = read_log(job.folder / "log").episodes
+    assert [episode.rows for episode in episodes] == [3, 7]
+    bad.append(next(steps) + 1)
+    with pytest.raises(failure):  # the first step of all: the start is not right
+        train_seed(dataclasses.replace(job, folder=tmp_path / "other"), ignore_progress)
 
 
 def test_a_time_limit_is_not_remembered_as_an_end() -> None:

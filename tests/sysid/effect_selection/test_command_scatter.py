@@ -8,10 +8,15 @@ from drake_disasm.effects import (
     GrooveFriction,
     Imprecision,
     SensorBias,
+    SensorDelay,
+    SensorGain,
+    SensorLag,
 )
 from drake_disasm.logs import read_log
+from sysid.effect_selection.candidates import Candidate
+from sysid.effect_selection.channel_checks import channel_findings
 from sysid.effect_selection.close_loop import close_loop
-from sysid.effect_selection.command_scatter import fit_command_scatter
+from sysid.effect_selection.command_scatter import _Likelihood, fit_command_scatter
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.models.twin import TwinModel
@@ -20,8 +25,8 @@ from sysid.validation.synthetic_logs import transitions_log
 from sysid.workers import Workers
 
 
-def _model(folder, effects):
-    transitions_log(folder / "log", nominal(), effects, 0)
+def _model(folder, effects, seed=0):
+    transitions_log(folder / "log", nominal(), effects, seed)
     return TwinModel([read_log(folder / "log")], nominal(), ())
 
 
@@ -66,3 +71,32 @@ def test_closing_the_loop_adds_it_to_the_scenario(tmp_path):
     assert "missing: Imprecision" in closed.text
     [effect] = closed.scenario.effects
     assert isinstance(effect, Imprecision) and effect.x < effect.y
+
+
+def test_what_scatter_leaves_has_unit_covariance_channel_by_channel():
+    random = np.random.default_rng(0)
+    rows, channels, std = 20_000, 6, np.array([2.0, 0.0, 5.0])
+    J = random.standard_normal((channels, 3)) * np.ones((rows, 1, 1))
+    r = np.einsum("nci,ni->nc", J, std * random.standard_normal((rows, 3)))
+    r += random.standard_normal((rows, channels))
+    whitened = _Likelihood(r, J, np.inf, SelectionSettings()).whitened(std)
+    np.testing.assert_allclose(np.cov(whitened.T), np.eye(channels), atol=0.04)
+    nothing = _Likelihood(r, J, np.inf, SelectionSettings()).whitened(np.zeros(3))
+    np.testing.assert_allclose(nothing, r)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("is_scatter", [True, False])
+def test_what_scatter_leaves_tells_whether_it_was_scatter(is_scatter, tmp_path):
+    """A lag that the library lacks would nearly do as scatter; two channels tell."""
+    lag = SensorLag(share=0.20810687472620154, time_constant=0.342796758218593)
+    effect = Imprecision(x=3.4e-5, z=3.4e-5) if is_scatter else lag
+    model = _model(tmp_path, [effect], 70000).of_episodes(range(9))
+    delta = model.default_huber_delta
+    fitter = Fitter.of(model, Workers(), delta, SelectionSettings())
+    nearest = () if is_scatter else (SensorGain(), SensorDelay())
+    fit = fitter.fit(tuple(map(Candidate.of, nearest)))
+    scatter = fit_command_scatter(fitter, fit)
+    assert scatter is not None
+    found = {finding.channel for finding in channel_findings(scatter.left_of(fit))}
+    assert not found if is_scatter else found >= {"tx", "ty"}
