@@ -252,6 +252,10 @@ def _column(name: str, raw: object) -> Column:
     if "from" not in values:
         raise DisasmError(f"map: {name} has no 'from': the channels that it is made of")
     channels = tuple(map(str, _list(values["from"], f"{name}.from")))
+    if not channels:
+        raise DisasmError(
+            f"map: {name}.from is empty; name the channels, or leave it out"
+        )
     scales = [_scale(s, name) for s in _list(values.get("scale", []), name)]
     signs = [_scale(s, name) for s in _list(values.get("sign", []), name)]
     return Column(

@@ -9,10 +9,14 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.importing.field_map import Column, FieldMap
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stream import Stream
+from drake_disasm.importing.units import UNITS
 
 #: What channels of a table are called, the more usual names first; a number may follow.
 _NAMES = {
-    "time": ("time", "t", "times", "timestamp", "stamp", "time_s", "seconds"),
+    "time": (
+        "time", "t", "times", "timestamp", "stamp", "time_s", "seconds", "__time",
+        "date", "datetime",
+    ),
     "q": (
         "q", "qm", "position", "positions", "pos", "joint_position", "joint_positions",
         "joint_pos", "q_measured", "actual_q", "angle", "angles", "theta",
@@ -116,9 +120,11 @@ def _joints_of(
         return {q: column for q, column in found.items() if q in quantities}
     found = dict[str, Column]()
     for quantity in quantities:
-        channels = _numbered(stream, quantity) or _by_joint(stream, quantity, joints)
+        channels = _numbered(stream, quantity)
+        if not channels or (joints and len(channels) != len(joints)):
+            channels = _by_joint(stream, quantity, joints) or channels
         if channels:
-            found[quantity] = Column(tuple(channels))
+            found[quantity] = _column(channels)
     return found
 
 
@@ -153,17 +159,50 @@ def _is_alive(stream: Stream, channels: Sequence[str]) -> bool:
     return any(np.ptp(stream.channels[name]) > 0 for name in channels)
 
 
+def _plain_names(stream: Stream) -> dict[str, str]:
+    """Returns the channels by their names in small letters, without unit, with dots.
+
+    "/joint_states/Position[0] [deg]" is "joint_states.position[0]".
+    """
+    found = dict[str, str]()
+    for name in stream.names:
+        plain = _name_and_unit(name)[0].lower().replace("/", ".").strip(".")
+        found.setdefault(plain, name)
+    return found
+
+
+def _name_and_unit(channel: str) -> tuple[str, str]:
+    """Returns a channel's name, and the unit in brackets behind it, if it is known."""
+    match = re.fullmatch(r"(.*?)[ _]*[\[(]([^\[\]()]+)[\])]", channel)
+    is_unit = match and match[2].strip() in UNITS and not match[2].strip().isdigit()
+    return (match[1], match[2].strip()) if match and is_unit else (channel, "")
+
+
+def _column(channels: Sequence[str]) -> Column:
+    """Returns a quantity of these channels, in the unit that their names say."""
+    units = {_name_and_unit(name)[1] for name in channels}
+    return Column(tuple(channels), units.pop() if len(units) == 1 else "")
+
+
 def _numbered(stream: Stream, quantity: str) -> list[str]:
-    """Returns channels as NAME, or NAME0, NAME.0, NAME_0, NAME[0] ... in order."""
-    lower = {name.lower(): name for name in stream.names}
+    """Returns channels as NAME, or NAME0, NAME.0, NAME_0, NAME[0] ... in order.
+
+    Or behind a prefix that all of them have and no others: field.NAME0.
+    """
+    plain = _plain_names(stream)
     for usual in _NAMES[quantity]:
-        if usual in lower:
-            return [lower[usual]]
-        pattern = re.compile(re.escape(usual) + r"[._\[ ]?(\d+)\]?$")
-        found = {int(m[1]): lower[n] for n in lower if (m := pattern.match(n))}
-        if found and sorted(found) in (
-            list(range(len(found))),
-            list(range(1, len(found) + 1)),
+        if usual in plain:
+            return [plain[usual]]
+        pattern = re.compile(rf"(|.*\.){re.escape(usual)}[._\[ ]?(\d+)\]?$")
+        by_prefix = dict[str, dict[int, str]]()
+        for name, channel in plain.items():
+            if match := pattern.match(name):
+                by_prefix.setdefault(match[1], {})[int(match[2])] = channel
+        if len(by_prefix) != 1 and "" not in by_prefix:
+            continue
+        found = by_prefix.get("") or next(iter(by_prefix.values()))
+        if min(found) < 2 and sorted(found) == list(
+            range(min(found), min(found) + len(found))
         ):
             return [found[i] for i in sorted(found)]
     return []
@@ -171,19 +210,24 @@ def _numbered(stream: Stream, quantity: str) -> list[str]:
 
 def _by_joint(stream: Stream, quantity: str, joints: Sequence[str]) -> list[str]:
     """Returns channels whose names join a quantity's and a joint's."""
+    plain = _plain_names(stream)
     for usual in _NAMES[quantity]:
         for form in ("{q}.{j}", "{q}_{j}", "{j}.{q}", "{j}_{q}"):
-            names = [form.format(q=usual, j=joint) for joint in joints]
-            if names and all(name in stream.channels for name in names):
-                return names
+            ends = [form.format(q=usual, j=joint.lower()) for joint in joints]
+            found = [
+                [c for n, c in plain.items() if n == end or n.endswith(f".{end}")]
+                for end in ends
+            ]
+            if found and all(len(channels) == 1 for channels in found):
+                return [channel for [channel] in found]
     return []
 
 
 def _time_of(stream: Stream) -> str | None:
     if stream.time is not None:
         return None
-    lower = {name.lower(): name for name in stream.names}
-    found = next((lower[name] for name in _NAMES["time"] if name in lower), None)
+    plain = _plain_names(stream)
+    found = next((plain[name] for name in _NAMES["time"] if name in plain), None)
     if found is None:
         raise DisasmError(
             "no channel is called as time is; write a map with time: {from: NAME, "
@@ -193,10 +237,12 @@ def _time_of(stream: Stream) -> str | None:
 
 
 def _time_unit(stream: Stream) -> str:
-    """Returns the unit of the time, by how far apart its values are."""
+    """Returns the unit of the time, by its name or how far apart its values are."""
     name = _time_of(stream)
     if name is None:
         return "s"
+    if said := _name_and_unit(name)[1]:
+        return said
     step = float(np.median(np.diff(stream.channels[name])))
     for unit, most in (("s", 0.5), ("ms", 500.0), ("us", 5e5)):
         if step < most:

@@ -3,7 +3,7 @@
 import csv
 import io
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,28 +24,68 @@ _DELIMITERS = ",;\t "
 def read_csv(path: Path) -> list[Stream]:
     """Reads a table of numbers with a line of names above it.
 
-    Lines that begin with # or % are comments. Columns are separated by commas,
-    semicolons, tabs or blanks; without names they are column_0, column_1, ... A column
-    that is not of numbers is left out; an empty cell is no number.
+    Lines that begin with # or % are comments, but the last one before the rows has
+    their names if there are as many. Columns are separated by commas, semicolons, tabs
+    or blanks; without names they are column_0, column_1, ... Numbers may have a decimal
+    comma where no comma separates them; dates and times become seconds since 1970. A
+    column of anything else is left out; an empty cell is no number.
     """
     with readable(path), path.open(newline="", encoding="utf-8-sig") as file:
-        filled = (line for line in file if line.strip())
-        rows = (line for line in filled if not line.lstrip().startswith(_COMMENTS))
+        rows = _Rows(file)
         first = next(rows, "")
-        delimiter = max(_DELIMITERS, key=first.strip().count)
-        cells = next(csv.reader([first], delimiter=delimiter, skipinitialspace=True))
-        names = [cell.strip() for cell in cells]
+        delimiter = _delimiter_of(first)
+        names = _split(first, delimiter)
         if all(_is_number(cell) for cell in names):
-            names, second = [f"column_{i}" for i in range(len(names))], first
+            names, second = _names_above(rows.comment, delimiter, len(names)), first
         else:
             second = next(rows, "")
         if not second:
             raise DisasmError(f"{path}: has no rows")
         lines = _Lines(itertools.chain([second], rows), delimiter, len(names))
         columns = _cells(path, lines, delimiter, names)
-        numbers = ((name, _numbers(column)) for name, column in columns)
+        numbers = ((n, _numbers(column, delimiter != ",")) for n, column in columns)
         arrays = {name: found for name, found in numbers if found is not None}
     return [_table(path, arrays)]
+
+
+class _Rows(Iterator[str]):
+    """The lines of a table that hold cells.
+
+    Attributes:
+        comment: the latest, without its sign.
+    """
+
+    def __init__(self, lines: Iterable[str]) -> None:
+        self._lines, self.comment = iter(lines), ""
+
+    def __next__(self) -> str:
+        """Returns the next one."""
+        for line in self._lines:
+            text = line.strip()
+            if not text.startswith(_COMMENTS):
+                if text:
+                    return line
+                continue
+            self.comment = text.lstrip("".join(_COMMENTS)).strip()
+        raise StopIteration
+
+
+def _delimiter_of(line: str) -> str:
+    """Returns what separates a line's cells; a comma beside semicolons is decimal."""
+    return ";" if ";" in line else max(_DELIMITERS, key=line.strip().count)
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+    return [cell.strip() for cell in cells]
+
+
+def _names_above(comment: str, delimiter: str, count: int) -> list[str]:
+    """Returns the names of columns that a comment above them has, or their numbers."""
+    names = _split(comment, delimiter) if comment else []
+    if len(names) == count and not any(map(_is_number, names)):
+        return names
+    return [f"column_{i}" for i in range(count)]
 
 
 class _Lines(io.RawIOBase):
@@ -120,25 +160,51 @@ def _cells(
 
 def _is_number(cell: str) -> bool:
     try:
-        float(cell)
+        float(cell.replace(",", "."))
     except ValueError:
         return False
     return True
 
 
-def _numbers(cells: pyarrow.ChunkedArray) -> np.ndarray | None:
-    """Returns the numbers that cells of text say, NaN for null; None if they don't."""
+def _numbers(cells: pyarrow.ChunkedArray, may_have_comma: bool) -> np.ndarray | None:
+    """Returns the numbers that cells of text say, NaN for null; None if they don't.
+
+    Args:
+        cells: of a column.
+        may_have_comma: whether a comma may be decimal.
+    """
     trimmed = pyarrow.compute.utf8_trim_whitespace(cells)
-    try:
-        return np.asarray(trimmed.cast(pyarrow.float64()).to_numpy())
-    except pyarrow.ArrowInvalid:
-        pass  # PyArrow has no flags, and fewer ways to write a number than Python
+    ways = (_plain_numbers, *([_decimal_commas] if may_have_comma else []))
+    for way in (*ways, _times):
+        try:
+            return way(trimmed)
+        except pyarrow.ArrowInvalid:
+            continue
+    # PyArrow has no flags, and fewer ways to write a number than Python.
     flags = {"true": "1", "false": "0", "": "nan"}
     texts = (cell or "" for cell in trimmed.to_pylist())
     try:
         return np.array([float(flags.get(text.lower(), text)) for text in texts])
     except ValueError:
         return None
+
+
+def _plain_numbers(cells: pyarrow.ChunkedArray) -> np.ndarray:
+    return np.asarray(cells.cast(pyarrow.float64()).to_numpy())
+
+
+def _decimal_commas(cells: pyarrow.ChunkedArray) -> np.ndarray:
+    return _plain_numbers(pyarrow.compute.replace_substring(cells, ",", "."))
+
+
+def _times(cells: pyarrow.ChunkedArray) -> np.ndarray:
+    """Returns seconds since 1970 (UTC, where no zone is said) of dates and times."""
+    try:
+        found = cells.cast(pyarrow.timestamp("ns"))
+    except pyarrow.ArrowInvalid:
+        found = cells.cast(pyarrow.timestamp("ns", "UTC"))
+    seconds = found.cast(pyarrow.int64()).cast(pyarrow.float64(), safe=False)
+    return 1e-9 * np.asarray(seconds.to_numpy())
 
 
 def read_npz(path: Path) -> list[Stream]:
@@ -187,18 +253,24 @@ def _columns(table: pyarrow.Table) -> dict[str, np.ndarray]:
             rows = table[name].to_pylist()
             if len({len(row) for row in rows}) == 1:
                 found[name] = np.array(rows)
-        elif pyarrow.types.is_timestamp(kind):
-            unit = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[kind.unit]
-            found[name] = unit * table[name].cast("int64").to_numpy()
         else:
             found[name] = table[name].to_numpy()
     return _numeric(found)
 
 
 def _numeric(arrays: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Returns those that hold real numbers."""
-    found = {name: np.asarray(array) for name, array in arrays.items()}
+    """Returns those that hold real numbers, or times: those in seconds."""
+    found = {name: _seconds(np.asarray(array)) for name, array in arrays.items()}
     return {n: a for n, a in found.items() if a.dtype.kind in "fiub"}
+
+
+def _seconds(array: np.ndarray) -> np.ndarray:
+    """Returns times since 1970, and durations, in seconds; others as they are."""
+    if array.dtype.kind not in "mM":
+        return array
+    unit = "timedelta64[ns]" if array.dtype.kind == "m" else "datetime64[ns]"
+    numbers = 1e-9 * array.astype(unit).astype(np.int64)
+    return np.where(np.isnat(array), np.nan, numbers)
 
 
 def _table(path: Path, arrays: Mapping[str, np.ndarray]) -> Stream:

@@ -102,6 +102,7 @@ def test_a_map_survives_its_file(tmp_path: Path) -> None:
         ({"columns": {"force": {"from": "x"}}}, "has no column 'force'"),
         ({"columns": {"q": {"from": "x"}}}, "q has 1 channels, not 2"),
         ({"columns": {"q": {}}}, "q has no 'from'"),
+        ({"columns": {"q": {"from": []}}}, "q.from is empty"),
         ({"columns": {"q": {"from": ["x", "y"], "unit": "degree"}}}, "degree"),
         ({"columns": {"q": {"from": ["x", "y"], "sign": 2}}}, "sign is 1 or -1"),
         (
@@ -214,13 +215,34 @@ def test_names_of_many_kinds_are_guessed(tmp_path: Path) -> None:
         ("t", "position.0", "position.1"),
         ("timestamp", "pos[0]", "pos[1]"),
         ("Time", "Theta1", "Theta2"),
+        ("%time", "field.position0", "field.position1"),  # rostopic echo -p
+        ("__time", "/joint_states/position[0]", "/joint_states/position[1]"),
     ):
         table = np.column_stack([time, np.sin(time), np.cos(time)])
         path = tmp_path / "run.csv"
         np.savetxt(path, table, delimiter=",", header=",".join(names), comments="")
         fields = guessed_map(read_source(path), "joint_motion")
-        assert fields.time == names[0]
+        assert fields.time == names[0].lstrip("%")
         assert fields.columns == {"q": Column(names[1:])}
+
+
+def test_units_behind_names_are_taken(tmp_path: Path) -> None:
+    time, path = 10.0 * np.arange(100), tmp_path / "run.csv"
+    table = np.column_stack([time, np.sin(time), np.cos(time), time, time])
+    names = "t (ms);/arm/A1/position [deg];/arm/A2/position [deg];q_0;other/q_0"
+    np.savetxt(path, table, delimiter=";", header=names, comments="")
+    fields = guessed_map(read_source(path), "joint_motion", ("A1", "A2"))
+    assert (fields.time, fields.time_unit) == ("t (ms)", "ms")
+    channels = ("/arm/A1/position [deg]", "/arm/A2/position [deg]")
+    assert fields.columns == {"q": Column(channels, "deg")}  # and not one of two q_0
+
+
+def test_of_two_topics_in_a_table_none_is_guessed(tmp_path: Path) -> None:
+    time, path = 0.01 * np.arange(100), tmp_path / "run.csv"
+    names = "t,left/q0,right/q0"
+    np.savetxt(path, np.column_stack([time] * 3), delimiter=",", header=names)
+    with pytest.raises(DisasmError, match="no channel is called as joint positions"):
+        guessed_map(read_source(path), "joint_motion")
 
 
 def test_a_time_in_milliseconds_is_noticed(tmp_path: Path) -> None:

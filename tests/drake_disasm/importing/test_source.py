@@ -24,6 +24,9 @@ _Q = np.arange(10.0).reshape(5, 2)
         "t\tq\n0\t1\n0.1\t2\n",
         "t q\n0 1\n0.1 2\n",
         "\ufefft,q,\n0,1,\n0.1,2,\n",
+        "t;q\n0,0;1,0\n0,1;2,0\n",  # decimal commas
+        "# t,q\n0,1\n0.1,2\n",  # as numpy.savetxt heads its tables
+        "# made by me\n%t;q\n0,0;1\n0,1;2\n",
     ],
 )
 def test_csv_as_programs_write_it(tmp_path: Path, text: str) -> None:
@@ -52,6 +55,29 @@ def test_csv_without_names_and_with_flags_and_holes(tmp_path: Path) -> None:
     assert read_source(path).streams[0].names == ["column_0", "column_1"]
     path.write_text("t,on\n0,true\n1,\n")
     np.testing.assert_array_equal(read_source(path).channel("on"), [1.0, np.nan])
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        ("2024-05-01 12:00:00.25", "2024-05-01 12:00:00.75"),
+        ("2024-05-01T12:00:00.25Z", "2024-05-01T12:00:00.75Z"),
+        ("2024-05-01T14:00:00.25+02:00", "2024-05-01T14:00:00.75+02:00"),
+    ],
+)
+def test_dates_and_times_are_seconds_since_1970(
+    tmp_path: Path, times: tuple[str, str]
+) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("t,q\n" + "".join(f"{time},1\n" for time in times))
+    expected = [1714564800.25, 1714564800.75]
+    np.testing.assert_allclose(read_source(path).channel("t"), expected, rtol=1e-15)
+    stamps = np.array([time[:19] for time in times], dtype="datetime64[us]")
+    np.savez(tmp_path / "run.npz", t=stamps, dt=stamps - stamps[0], q=[1.0, 2.0])
+    source = read_source(tmp_path / "run.npz")
+    hours = 3600.0 * (int(times[0][11:13]) - 12)
+    assert source.channel("t").tolist() == [1714564800.0 + hours] * 2
+    assert source.channel("dt").tolist() == [0.0, 0.0]
 
 
 def test_archives_matlab_and_parquet_agree(tmp_path: Path) -> None:
