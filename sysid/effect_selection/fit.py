@@ -178,7 +178,7 @@ class Fit:
         """Returns the channels that are significantly worse than in another fit."""
         limits, blocks = self.settings, before.blocks
         count = int(blocks.max()) + 1
-        little = limits.max_rise_per_gain * (before.loss - self.loss)
+        gain = before.loss - self.loss
         found = []
         for number, channel in enumerate(self.model.measurements.channels):
             own = [
@@ -187,7 +187,10 @@ class Fit:
             rise, rows = own[1] - own[0], len(blocks)
             large = rise.sum() > limits.max_channel_rise * max(own[0].sum(), rows)
             is_quiet = self.noise_is_stated and own[1].sum() <= rows
-            if is_quiet and rise.sum() <= little:
+            if is_quiet and rise.sum() <= limits.max_rise_per_gain * gain:
+                continue
+            is_doubled = rise.sum() > own[0].sum()
+            if not is_doubled and rise.sum() <= limits.max_doubled_per_gain * gain:
                 continue
             if large and greater_p(rise) < limits.channel_alpha:
                 found.append(channel.name)

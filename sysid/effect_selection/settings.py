@@ -270,6 +270,13 @@ class SelectionSettings:
         "friction of two joints that took 70 % off the objective was rejected for a "
         "wrist that went from 0.45 to 0.64 times its noise",
     )
+    max_doubled_per_gain: float = _setting(
+        0.005,
+        "of the loss that an effect takes off all channels",
+        "nor is a channel beyond its noise that is not doubled by so little more",
+        "rotors of six joints that took 97 % off the loss were rejected for a wrist "
+        "that went from 4 to 5 times its noise; the others came down from 20 to 40",
+    )
     noticeable: float = _setting(
         0.3,
         "times the noise, if that is stated",

@@ -142,3 +142,21 @@ def test_a_channel_within_its_noise_may_pay_a_thousandth_of_the_gain(gain, off, 
     before[:, names.index("fy")], after[:, names.index("fy")] = 0.1, 0.95
     first, last = (_with(fit, residual=r, huber_delta=np.inf) for r in (before, after))
     assert last.harmed_channels(first) == harmed
+
+
+@pytest.mark.parametrize(
+    ("off", "after", "harmed"),
+    [(60.0, 5.3, []), (30.0, 5.3, ["fy"]), (60.0, 6.0, ["fy"])],
+)
+def test_a_channel_beyond_its_noise_may_pay_little_and_not_its_double(
+    gain, off, after, harmed
+):
+    """Rotors of six joints against a wrist that they move, too."""
+    fitter, effect = gain
+    fit = fitter.fit((effect,))
+    names = [c.name for c in fit.model.measurements.channels]
+    first, last = (fit.linearisation.residual.copy() for _ in range(2))
+    first[:, names.index("fz")] = off
+    first[:, names.index("fy")], last[:, names.index("fy")] = 4.0, after
+    first, last = (_with(fit, residual=r, huber_delta=np.inf) for r in (first, last))
+    assert last.harmed_channels(first) == harmed
