@@ -28,6 +28,7 @@ from drake_disasm.fakes.bag import FakeBag
 from drake_disasm.importing import (
     FieldMap,
     Processing,
+    Source,
     guessed_map,
     import_recordings,
     read_map,
@@ -53,11 +54,10 @@ def _import(path: Path, kind: str = "joint_motion") -> None:
     """Does all that the program does, with a guessed map."""
     source = read_source(path)
     described(source)
-    _write(path, guessed_map(source, kind))
+    _write(source, guessed_map(source, kind))
 
 
-def _write(path: Path, fields: FieldMap) -> None:
-    source = read_source(path)
+def _write(source: Source, fields: FieldMap) -> None:
     imported = import_recordings([source], fields, Processing())
     summary(imported)
     folder = new_folder()
@@ -177,8 +177,9 @@ def _ros1() -> Subject:
 def _map() -> Subject:
     path = new_folder() / "r.npz"
     np.savez(path, allow_pickle=False, **_motion())
-    guess = guessed_map(read_source(path), "joint_motion").to_yaml()
-    return yaml_subject("m.yaml", [guess], lambda m: _write(path, read_map(m)))
+    source = read_source(path)
+    guess = guessed_map(source, "joint_motion").to_yaml()
+    return yaml_subject("m.yaml", [guess], lambda m: _write(source, read_map(m)))
 
 
 #: By name: what makes each format's subject.

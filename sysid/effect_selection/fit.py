@@ -190,7 +190,7 @@ class Fit:
             if is_quiet and rise.sum() <= limits.max_rise_per_gain * gain:
                 continue
             is_doubled = rise.sum() > own[0].sum()
-            if not is_doubled and rise.sum() <= limits.max_doubled_per_gain * gain:
+            if not is_doubled and rise.sum() <= limits.max_undoubled_per_gain * gain:
                 continue
             if large and greater_p(rise) < limits.channel_alpha:
                 found.append(channel.name)

@@ -270,7 +270,7 @@ class SelectionSettings:
         "friction of two joints that took 70 % off the objective was rejected for a "
         "wrist that went from 0.45 to 0.64 times its noise",
     )
-    max_doubled_per_gain: float = _setting(
+    max_undoubled_per_gain: float = _setting(
         0.005,
         "of the loss that an effect takes off all channels",
         "nor is a channel beyond its noise that is not doubled by so little more",

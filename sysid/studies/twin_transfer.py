@@ -19,13 +19,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from drake_disasm.learning.experiment import read_result
 from drake_disasm.learning.hyperparameters import Hyperparameters, override
 from drake_disasm.learning.learning_curve import plot_learning_curves
 from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.training import Purpose, seed_for
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.scenario.schema import Range
-from drake_disasm.studies.runner import SeedResult, finished, read_test
+from drake_disasm.studies.runner import finished, read_test
 from drake_disasm.studies.study import (
     Factor,
     Level,
@@ -145,19 +146,18 @@ class TwinTransferStudy(Study):
 
     def treatment(self, levels: dict[str, Level], folder: Path) -> Treatment:
         """See Study."""
-        known = levels | ({"mismatch": "any"} if levels["branch"] in _COMMON else {})
         config, preset_name = self._agent(str(levels["agent"]))
         experiment = self.experiment(_SCENARIO, config, preset_name)
         # One episode on its own twin: it is judged on the robots.
         experiment = dataclasses.replace(
             experiment, scenario=self._twin(levels, folder), validation=1
         )
-        return Treatment(folder_name(known), levels, experiment)
+        return Treatment(_name_on_twin(levels), levels, experiment)
 
     def _treatment_there(self, levels: dict[str, Level], folder: Path) -> Treatment:
         """Returns the training on the robot that follows one on a twin, or none."""
         is_first = levels["branch"] == _UNTRAINED
-        start = "" if is_first else str(folder / self.treatment(levels, folder).folder)
+        start = "" if is_first else str(folder / _name_on_twin(levels))
         config, preset_name = self._agent(str(levels["agent"]))
         experiment = self.experiment(_SCENARIO, config, preset_name)
         there = dataclasses.replace(
@@ -173,7 +173,7 @@ class TwinTransferStudy(Study):
             start=start,
             lockstep=False,  # a batch has no arm
         )
-        return Treatment(f"robot__{folder_name(levels)}", levels, experiment)
+        return Treatment(_name_there(levels), levels, experiment)
 
     def _agent(self, name: str) -> tuple[Hyperparameters, str]:
         algorithm, _, is_normalised = name.partition("_")
@@ -265,9 +265,9 @@ class TwinTransferStudy(Study):
         """Returns the episodes of each branch's seeds that have learned."""
         found = {}
         for branch in self.levels["branch"]:
-            results = self._results_there(levels | {"branch": branch}, folder)
-            if results:
-                paths = [r.folder / "episodes.csv" for r in results]
+            learned = self._finished_there(levels | {"branch": branch}, folder)
+            if learned:
+                paths = [own / "episodes.csv" for own in learned.values()]
                 found[str(branch)] = list(map(read_episodes, paths))
         return found
 
@@ -296,19 +296,31 @@ class TwinTransferStudy(Study):
         self, levels: dict[str, Level], folder: Path
     ) -> dict[int, dict[str, Any]]:
         """Returns the figures of learning on the robot of the seeds that have."""
-        return {
-            r.seed: r.figures["training"]
-            | {"first_success": r.figures["first_success"]}
-            for r in self._results_there(levels, folder)
-        }
+        found = {}
+        for seed, own in self._finished_there(levels, folder).items():
+            result = read_result(own / "result.json", online=True)
+            first = {"first_success": result["first_success"]}
+            found[seed] = result["training"] | first
+        return found
 
-    def _results_there(
+    def _finished_there(
         self, levels: dict[str, Level], folder: Path
-    ) -> list[SeedResult]:
-        if not self._robot(str(levels["mismatch"]), folder).is_finished:
-            return []
-        treatment = self._treatment_there(levels, folder)
-        return finished([treatment], self.options.seeds, folder)
+    ) -> dict[int, Path]:
+        """Returns the folders of the seeds that have learned on the robot."""
+        own = folder / _name_there(levels)
+        folders = {seed: own / f"seed_{seed:03d}" for seed in self.options.seeds}
+        return {s: f for s, f in folders.items() if (f / "result.json").exists()}
+
+
+def _name_on_twin(levels: dict[str, Level]) -> str:
+    """Returns the folder of a training on a twin, which may serve all robots."""
+    is_common = levels["branch"] in _COMMON
+    return folder_name(levels | ({"mismatch": "any"} if is_common else {}))
+
+
+def _name_there(levels: dict[str, Level]) -> str:
+    """Returns the folder of the training on the robot."""
+    return f"robot__{folder_name(levels)}"
 
 
 def _test_path(folder: Path, levels: dict[str, Level], seed: int) -> Path:

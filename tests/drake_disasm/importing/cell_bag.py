@@ -1,5 +1,6 @@
 """A bag of our own cell, as ROS drivers would leave it, and a log of the same run."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,18 @@ def record_cell(
         for name, log in logs.items()
     }
     names = movable_joints(stated.arm.model)
+    _write_bag(folder, player, lines, names, late)
+    write_text(folder / "arm.urdf", cell_urdf(stated))
+    _write_log(folder, player, names)
+
+
+def _write_bag(
+    folder: Path,
+    player: MotionPlayer,
+    lines: Mapping[str, Callable[[float], np.ndarray]],
+    names: list[str],
+    late: float,
+) -> None:
     random, bag, begin = np.random.default_rng(3), FakeBag(), player.begin
     duration = player.end - begin
     for t in bag_times(random, duration, 200.0):
@@ -71,8 +84,6 @@ def record_cell(
     for t in bag_times(random, duration, 500.0):
         bag.add_wrench(t + late, lines["wrench"](begin + max(t, 0.0)))
     bag.write(folder / "bag")
-    write_text(folder / "arm.urdf", cell_urdf(stated))
-    _write_log(folder, player, names)
 
 
 def _write_log(folder: Path, player: MotionPlayer, names: list[str]) -> None:

@@ -153,9 +153,7 @@ def test_agents_arrive_and_learn_and_the_report_says_so(
     arrived = test.read_bytes()
     learning = TwinTransferStudy(dataclasses.replace(small, robot_episodes=3))
     run_study(learning, tmp_path)  # more may be asked for afterwards
-    assert (
-        tmp_path / "tests/tilted/ddpg__closed/seed_001.json"
-    ).read_bytes() == arrived
+    assert test.read_bytes() == arrived
     tables = {t.title: t for t in write_report(learning, tmp_path, small.provenance)}
     [row] = tables["P, learning on the robot"].rows
     for branch, cell in zip(("untrained", "nominal", "closed"), row[2:], strict=True):
