@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from drake_disasm.batch.twin import BatchedTwin
+from drake_disasm.common.arrays import to_numpy
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import Scenario, load_scenario
@@ -19,7 +20,17 @@ from drake_disasm.task.simulation import TaskSimulation
 
 SIZES = (1, 16, 256, 4096)
 #: Where a batch computes, and on how many threads, by what a key says.
-KINDS = {"numpy": ("numpy", 1), "torch": ("cpu", 1), "torch_two": ("cpu", 2)}
+KINDS = {
+    "numpy": ("numpy", 1),
+    "torch": ("cpu", 1),
+    "torch_two": ("cpu", 2),
+    "cuda": ("cuda", 1),
+}
+#: All batches that are measured: kinds and how many environments.
+BATCHES = [
+    *((kind, count) for kind in ("numpy", "torch", "torch_two") for count in SIZES),
+    *(("cuda", count) for count in (256, 4096, 65536)),
+]
 CONTACTS = ("hydroelastic", "impact")
 _SCENARIO, _POLICY = "removal_turned", "admittance"
 _MOVES = 40  # of an episode
@@ -61,6 +72,8 @@ def batch_speed(count: int, kind: str, moves: np.ndarray) -> float:
     try:
         twin = BatchedTwin(scenario_with("impact"), count, device)
         twin.reset(range(count))
+        twin.step(moves[:1].repeat(count, axis=0))  # compiles what a GPU runs
+        twin.reset(range(count))
         return _steps_per_s(twin, moves)
     finally:
         torch.set_num_threads(before)
@@ -84,16 +97,22 @@ def _steps_per_s(twin: BatchedTwin, moves: np.ndarray) -> float:
         done += 1
         if time.perf_counter() - start > _SECONDS:
             break
+    to_numpy(twin.reading)  # a GPU has finished only now
     return twin.count * done / (time.perf_counter() - start)
 
 
 def speeds() -> Iterator[tuple[str, float, float]]:
-    """Yields keys, steps per second, and the ratio to the IMPACT diagram's."""
+    """Yields keys, steps per second, and the ratio to the IMPACT diagram's.
+
+    Of batches on a GPU only where there is one.
+    """
+    import torch
+
     hydroelastic, _ = diagram_speed("hydroelastic")
     impact, moves = diagram_speed("impact")
     yield "diagram_hydroelastic_steps_per_s", hydroelastic, hydroelastic / impact
     yield "diagram_impact_steps_per_s", impact, 1.0
-    for kind in KINDS:
-        for count in SIZES:
+    for kind, count in BATCHES:
+        if kind != "cuda" or torch.cuda.is_available():
             found = batch_speed(count, kind, moves)
             yield f"batch_{kind}_{count}_steps_per_s", found, found / impact

@@ -374,11 +374,7 @@ MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
     ("policy_inference_us",): measure_inference,
     (
         *(f"diagram_{contact}_steps_per_s" for contact in batch_speed.CONTACTS),
-        *(
-            f"batch_{kind}_{count}_steps_per_s"
-            for kind in batch_speed.KINDS
-            for count in batch_speed.SIZES
-        ),
+        *(f"batch_{kind}_{count}_steps_per_s" for kind, count in batch_speed.BATCHES),
     ): measure_batches,
     **{
         (f"updates_per_s_{name}", f"updates_ratio_sb3_{name}"): functools.partial(

@@ -33,7 +33,7 @@ def make_like(device: str) -> Array:
         device: "numpy", or one of torch's: "cpu", "cuda", "cuda:1".
 
     Raises:
-        DisasmError: there is no such device.
+        DisasmError: there is no such device, or Numba can't compile for it.
     """
     import numpy as np
 
@@ -42,12 +42,30 @@ def make_like(device: str) -> Array:
     import torch
 
     try:
-        return torch.zeros(0, dtype=torch.float64, device=device)
+        like = torch.zeros(0, dtype=torch.float64, device=device)
     except (RuntimeError, AssertionError) as error:
         reason = " ".join(str(error).split(". ")[0].split())
         raise DisasmError(
             f"device: '{device}' is not there ({reason}); use cpu or numpy"
         ) from None
+    if like.device.type == "cuda":
+        refuse_without_compiler(device)
+    return like
+
+
+def refuse_without_compiler(device: str) -> None:
+    """Refuses a GPU for which Numba can't compile the contact.
+
+    Raises:
+        DisasmError: says what to install.
+    """
+    from numba import cuda
+
+    if not cuda.is_available():
+        raise DisasmError(
+            f"device: Numba can't compile contact for '{device}'; "
+            "pip install 'drake_disasm[gpu]', or use cpu or numpy"
+        )
 
 
 def refuse_count(count: int) -> None:

@@ -2,6 +2,9 @@
 
 Of a step of `ImpactStep`: twists are [velocity of To; angular velocity] in G, and
 wrenches [f; tau] at To in G, (6,) each.
+
+`on_gpu` has the same functions compiled for a GPU, whose threads can neither allocate
+arrays nor compute with whole ones: what is computed stands in a `Workspace`.
 """
 
 import math
@@ -36,14 +39,79 @@ def _normals() -> np.ndarray:
 
 #: (k, 3) of all places, out of the groove, towards the bolt, in G: along its axes.
 NORMALS = _normals()
-_PLACES = len(NORMALS)
+PLACES = len(NORMALS)
 # Along which axis, and to which side.
 _AXES = np.argmax(np.abs(NORMALS), axis=1)
 _SIDES = np.sum(NORMALS, axis=1)
 #: Where a row of `ImpactConditions.table` has what.
-_LAW, _LOCK = slice(0, 4), slice(4, 16)
-_FRICTION, _R_GNG, _P_GNG, _F_GN = 16, slice(17, 26), slice(26, 29), slice(29, 32)
-_M, _K, _D, _P_BOTO = slice(32, 68), slice(68, 74), slice(74, 80), slice(80, 83)
+_LAW, _LOCK, _FRICTION, _R_GNG, _P_GNG, _F_GN = 0, 4, 16, 17, 26, 29
+_M, _K, _D, _P_BOTO, _END = 32, 68, 74, 80, 83
+
+
+class Workspace(NamedTuple):
+    """What a step of one state is computed in; the next one overwrites it.
+
+    Attributes:
+        depth, arm: (k,), (k, 3) of the places; arms from To in G.
+        R_GnG, R_GB: (3, 3).
+        T, T_inverse: (6, 6), twist = T v of the joints' rates v.
+        A, slope, trial_slope: (6, 6), see `Known`, `balance`, `newton`.
+        b, before, twist, W, r, step, there, trial_W, trial: (6,), see there.
+        p_ToBo, p_GBo, one, other: (3,).
+        by_twist: (3, 6), see `_push`.
+    """
+
+    depth: np.ndarray
+    arm: np.ndarray
+    R_GnG: np.ndarray
+    R_GB: np.ndarray
+    T: np.ndarray
+    T_inverse: np.ndarray
+    A: np.ndarray
+    slope: np.ndarray
+    trial_slope: np.ndarray
+    b: np.ndarray
+    before: np.ndarray
+    twist: np.ndarray
+    W: np.ndarray
+    r: np.ndarray
+    step: np.ndarray
+    there: np.ndarray
+    trial_W: np.ndarray
+    trial: np.ndarray
+    p_ToBo: np.ndarray
+    p_GBo: np.ndarray
+    one: np.ndarray
+    other: np.ndarray
+    by_twist: np.ndarray
+
+
+#: Of the arrays that `arranged` takes.
+SHAPES = ((PLACES,), (PLACES, 3), (2, 3, 3), (5, 6, 6), (9, 6), (4, 3), (3, 6))
+
+
+@compiled
+def arranged(
+    depth: np.ndarray,
+    arm: np.ndarray,
+    rotations: np.ndarray,
+    maps: np.ndarray,
+    vectors: np.ndarray,
+    points: np.ndarray,
+    by_twist: np.ndarray,
+) -> Workspace:
+    """Returns a workspace in some arrays, of `SHAPES`."""
+    m, v, p = maps, vectors, points
+    return Workspace(
+        *(depth, arm, rotations[0], rotations[1], m[0], m[1], m[2], m[3], m[4]),
+        *(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8]),
+        *(p[0], p[1], p[2], p[3], by_twist),
+    )
+
+
+def workspace() -> Workspace:
+    """Returns a workspace on the host."""
+    return arranged(*(np.empty(shape) for shape in SHAPES))
 
 
 class Known(NamedTuple):
@@ -54,7 +122,7 @@ class Known(NamedTuple):
         h: the step [s].
         friction: Coulomb coefficient.
         law: (4,) of the normal force.
-        depth, arm: (k,), (k, 3) of the places before the step, from To in G.
+        space: its `depth` and `arm` are of the places before the step, from To in G.
     """
 
     A: np.ndarray
@@ -62,58 +130,102 @@ class Known(NamedTuple):
     h: float
     friction: float
     law: np.ndarray
-    depth: np.ndarray
-    arm: np.ndarray
+    space: Workspace
+
+
+#: q, v, qd, vd (6,) of a state, and E, its inverse and R_GnB (3, 3), see `turning`; of
+#: n states (n, ...).
+State = tuple[np.ndarray, ...]
 
 
 @compiled
 def solve_rows(
     table: np.ndarray,
     h: float,
-    q: np.ndarray,
-    v: np.ndarray,
-    qd: np.ndarray,
-    vd: np.ndarray,
-    E: np.ndarray,
-    E_inverse: np.ndarray,
-    R_GnB: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns what `ImpactStep` has, of one state after the other.
+    states: State,
+    after: np.ndarray,
+    wrench: np.ndarray,
+    is_solved: np.ndarray,
+    space: Workspace,
+) -> None:
+    """Finds what `ImpactStep` has, of one state after the other.
 
     Args:
         table: (m, 83) of `ImpactConditions`.
         h: the step [s].
-        q, v, qd, vd: (n, 6).
-        E, E_inverse, R_GnB: (n, 3, 3), see `turning`.
+        states: of n.
+        after, wrench, is_solved: (n, 6), (n, 6), (n,) are set.
+        space: to compute in.
     """
-    depth, arm = np.empty(_PLACES), np.empty((_PLACES, 3))
-    W, turn = np.empty(6), np.empty(3)
-    after, wrench = np.empty(q.shape), np.empty(q.shape)
-    is_solved = np.zeros(len(q), np.bool_)
-    for i in range(len(q)):
-        c = table[i] if len(table) > 1 else table[0]
-        R_GnG = c[_R_GNG].reshape(3, 3)
-        p_ToBo = -(R_GnB[i] @ c[_P_BOTO])
-        T, T_inverse = np.zeros((6, 6)), np.zeros((6, 6))
-        T[:3, :3], T[3:, 3:] = R_GnG.T, R_GnG.T @ E[i]
-        T_inverse[:3, :3], T_inverse[3:, 3:] = R_GnG, E_inverse[i] @ R_GnG
-        A, b = _without_contact(c, h, q[i], v[i], qd[i], vd[i], E[i], p_ToBo)
-        A, b = T_inverse.T @ A @ T_inverse, T_inverse.T @ b
-        p_GnBo = q[i, :3] + c[_P_BOTO] + p_ToBo
-        p_GBo = R_GnG.T @ (p_GnBo - c[_P_GNG])
-        find_places(R_GnG.T @ R_GnB[i], p_GBo, c[_LOCK], depth, arm)
-        arm += R_GnG.T @ p_ToBo  # from To, which the joints move
-        known = Known(A, b, h, c[_FRICTION], c[_LAW], depth, arm)
-        twist, is_solved[i] = _solve(known, T @ v[i], W)
-        after[i] = T_inverse @ twist
-        wrench[i, :3], wrench[i, 3:] = R_GnG @ W[:3], R_GnG @ W[3:]
-        _cross(p_ToBo, wrench[i, :3], turn)
-        wrench[i, 3:] -= turn
-    return after, wrench, is_solved
+    for i in range(len(after)):
+        solve_row(table, h, states, i, after, wrench, is_solved, space)
 
 
 @compiled
-def _without_contact(
+def solve_row(
+    table: np.ndarray,
+    h: float,
+    states: State,
+    i: int,
+    after: np.ndarray,
+    wrench: np.ndarray,
+    is_solved: np.ndarray,
+    space: Workspace,
+) -> None:
+    """Finds what `ImpactStep` has of one state; see `solve_rows`.
+
+    Args:
+        i: number of the state.
+    """
+    q, v, qd, vd, E, E_inverse, R_GnB = states
+    c = table[i] if len(table) > 1 else table[0]
+    _set_places(c, q[i], R_GnB[i], space)
+    _set_without_contact(c, h, q[i], v[i], qd[i], vd[i], E[i], space)
+    _set_maps(E[i], E_inverse[i], space)
+    _to_twists(space)
+    known = Known(space.A, space.b, h, c[_FRICTION], c[_LAW:_LOCK], space)
+    _apply(space.T, v[i], space.before)
+    is_solved[i] = _solve(known)
+    _apply(space.T_inverse, space.twist, after[i])
+    _turn(space.R_GnG, space.W[:3], wrench[i, :3])
+    _turn(space.R_GnG, space.W[3:], wrench[i, 3:])
+    _add_cross(-1.0, space.p_ToBo, wrench[i, :3], wrench[i, 3:])
+
+
+@compiled
+def _set_places(
+    c: np.ndarray, q: np.ndarray, R_GnB: np.ndarray, space: Workspace
+) -> None:
+    """Sets R_GnG, R_GB, p_ToBo in Gn, p_GBo in G, and the places, from To in G.
+
+    Args:
+        c: (83,) conditions.
+        q: (6,).
+        R_GnB: (3, 3).
+        space: is set.
+    """
+    R_GnG, R_GB, p_ToBo = space.R_GnG, space.R_GB, space.p_ToBo
+    for i in range(9):
+        R_GnG[i // 3, i % 3] = c[_R_GNG + i]
+    _turn(R_GnB, c[_P_BOTO:_END], p_ToBo)
+    for i in range(3):
+        p_ToBo[i] = -p_ToBo[i]
+        space.one[i] = q[i] + c[_P_BOTO + i] + p_ToBo[i] - c[_P_GNG + i]
+    _turn_back(R_GnG, space.one, space.p_GBo)
+    for i in range(3):
+        for j in range(3):
+            R_GB[i, j] = 0.0
+            for k in range(3):
+                R_GB[i, j] += R_GnG[k, i] * R_GnB[k, j]
+    find_places(R_GB, space.p_GBo, c[_LOCK:_FRICTION], space.depth, space.arm)
+    _turn_back(R_GnG, p_ToBo, space.other)
+    for k in range(PLACES):
+        for i in range(3):
+            space.arm[k, i] += space.other[i]
+
+
+@compiled
+def _set_without_contact(
     c: np.ndarray,
     h: float,
     q: np.ndarray,
@@ -121,41 +233,80 @@ def _without_contact(
     qd: np.ndarray,
     vd: np.ndarray,
     E: np.ndarray,
-    p_ToBo: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns A (6, 6) and b (6,) of the step without contact, A v+ = b."""
-    M, K, D, f = c[_M].reshape(6, 6), c[_K], c[_D], c[_F_GN]
-    pull, turn = K * (qd - q) + D * vd, np.empty(3)
-    _cross(p_ToBo, f, turn)
-    pull[:3] += f
-    pull[3:] += E.T @ turn
-    return M + np.diag(h * D + h * h * K), M @ v + h * pull
+    space: Workspace,
+) -> None:
+    """Sets A and b of the step without contact, still of joints: A v+ = b."""
+    A, b, p_ToBo = space.A, space.b, space.p_ToBo
+    for i in range(6):
+        K, D = c[_K + i], c[_D + i]
+        pull = K * (qd[i] - q[i]) + D * vd[i]
+        if i < 3:
+            pull += c[_F_GN + i]
+        else:
+            for j in range(3):
+                one, other = (j + 1) % 3, (j + 2) % 3
+                turn = p_ToBo[one] * c[_F_GN + other] - p_ToBo[other] * c[_F_GN + one]
+                pull += E[j, i - 3] * turn
+        b[i] = h * pull
+        for j in range(6):
+            A[i, j] = c[_M + 6 * i + j]
+            b[i] += A[i, j] * v[j]
+        A[i, i] += h * D + h * h * K
 
 
 @compiled
-def _solve(
-    known: Known, before: np.ndarray, wrench: np.ndarray
-) -> tuple[np.ndarray, bool]:
-    """Returns the twist (6,) of the balance, and whether there is one.
+def _set_maps(E: np.ndarray, E_inverse: np.ndarray, space: Workspace) -> None:
+    """Sets T and its inverse."""
+    R_GnG, T, T_inverse = space.R_GnG, space.T, space.T_inverse
+    for i in range(3):
+        for j in range(3):
+            T[i, j], T_inverse[i, j] = R_GnG[j, i], R_GnG[i, j]
+            T[i, 3 + j] = T[3 + i, j] = T_inverse[i, 3 + j] = T_inverse[3 + i, j] = 0.0
+            T[3 + i, 3 + j] = T_inverse[3 + i, 3 + j] = 0.0
+            for k in range(3):
+                T[3 + i, 3 + j] += R_GnG[k, i] * E[k, j]
+                T_inverse[3 + i, 3 + j] += E_inverse[i, k] * R_GnG[k, j]
 
-    Args:
-        known: of the step.
-        before: (6,) the twist before it.
-        wrench: (6,) is set, the contact's on the bolt.
-    """
-    r, held, slope, alone = np.empty(6), np.empty(6), known.A.copy(), known.b.copy()
-    solve_in_place(slope, alone)
-    balance(known, alone, wrench, r, slope)
-    if not np.isfinite(np.sum(r)) or not np.any(wrench != 0.0):
-        return alone, np.isfinite(np.sum(r))
+
+@compiled
+def _to_twists(space: Workspace) -> None:
+    """Makes A, b of joints those of twists, T^-T A T^-1 and T^-T b."""
+    A, b, T_inverse = space.A, space.b, space.T_inverse
+    product, sums = space.slope, space.r
+    for i in range(6):
+        sums[i] = 0.0
+        for j in range(6):
+            sums[i] += T_inverse[j, i] * b[j]
+            product[i, j] = 0.0
+            for k in range(6):
+                product[i, j] += A[i, k] * T_inverse[k, j]
+    for i in range(6):
+        b[i] = sums[i]
+        for j in range(6):
+            A[i, j] = 0.0
+            for k in range(6):
+                A[i, j] += T_inverse[k, i] * product[k, j]
+
+
+@compiled
+def _solve(known: Known) -> bool:
+    """Sets twist and wrench W of the balance in `known.space`; is there one?"""
+    space = known.space
+    before, twist, wrench = space.before, space.twist, space.W
+    slope, r = space.slope, space.r
+    _copy(known.A, slope)
+    _copy_vector(known.b, twist)
+    solve_in_place(slope, twist)
+    balance(known, twist, wrench, r, slope)
+    alone = squared(r)
+    if not math.isfinite(alone) or squared(wrench) == 0.0:
+        return math.isfinite(alone)
     # A bolt that leans on a wall mostly goes on doing so.
-    balance(known, before, wrench, held, slope)
-    if squared(held) < squared(r):
-        twist = before.copy()
-        if newton(known, twist, wrench) == _SOLVED:
-            return twist, True
-    ending = newton(known, alone, wrench)
-    return alone, ending != _UNFINISHED
+    balance(known, before, wrench, r, slope)
+    if squared(r) < alone and newton(known, before, wrench) == _SOLVED:
+        _copy_vector(before, twist)
+        return True
+    return newton(known, twist, wrench) != _UNFINISHED
 
 
 @compiled
@@ -175,22 +326,24 @@ def balance(
         r: (6,) is set.
         slope: (6, 6) is set, dr by the twist.
     """
-    A, h, arm = known.A, known.h, known.arm
-    wrench[:], slope[:] = 0.0, 0.0
-    velocity, force = np.empty(3), np.empty(3)
-    by_twist = np.empty((3, 6))
-    for k in range(_PLACES):
-        _cross(twist[3:], arm[k], velocity)
+    A, h, space = known.A, known.h, known.space
+    velocity, force = space.one, space.other
+    for i in range(6):
+        wrench[i] = 0.0
+        for j in range(6):
+            slope[i, j] = 0.0
+    for k in range(PLACES):
         for i in range(3):
-            velocity[i] += twist[i]
+            velocity[i] = twist[i]
+        _add_cross(1.0, twist[3:], space.arm[k], velocity)
         rate = -_SIDES[k] * velocity[_AXES[k]]
-        after = known.depth[k] + h * rate
+        after = space.depth[k] + h * rate
         if after <= 0.0:
             continue
         F, by_depth, by_rate = normal_force(after, rate, known.law)
         dF, mu = h * by_depth + by_rate, known.friction
-        _push(_AXES[k], _SIDES[k], velocity, F, dF, mu, force, by_twist)
-        _add_wrench(arm[k], force, by_twist, wrench, slope)
+        _push(_AXES[k], _SIDES[k], velocity, F, dF, mu, force, space.by_twist)
+        _add_wrench(space.arm[k], force, space.by_twist, wrench, slope)
     for i in range(6):
         r[i] = -known.b[i] - h * wrench[i]
         for j in range(6):
@@ -250,17 +403,16 @@ def _add_wrench(
         by_twist: (3, 6), its slope by the place's velocity in [:, :3].
         wrench, slope: (6,), (6, 6), to which is added.
     """
-    torque = np.empty(3)
-    _cross(arm, force, torque)
+    _add_cross(1.0, arm, force, wrench[3:])
     for i in range(3):
         wrench[i] += force[i]
-        wrench[3 + i] += torque[i]
-        _cross(arm, by_twist[i, :3], by_twist[i, 3:])
+        for j in range(3):
+            by_twist[i, 3 + j] = 0.0
+        _add_cross(1.0, arm, by_twist[i, :3], by_twist[i, 3:])
     for j in range(6):
-        _cross(arm, by_twist[:, j], torque)
         for i in range(3):
             slope[i, j] += by_twist[i, j]
-            slope[3 + i, j] += torque[i]
+        _add_cross(1.0, arm, by_twist[:, j], slope[3:, j])
 
 
 @compiled
@@ -276,15 +428,18 @@ def newton(known: Known, twist: np.ndarray, wrench: np.ndarray) -> int:
         twist: (6,) is changed in place.
         wrench: (6,) is set, the contact's on the bolt.
     """
-    r, slope, step, there = np.empty(6), np.empty((6, 6)), np.empty(6), np.empty(6)
-    trial, trial_slope, W = np.empty(6), np.empty((6, 6)), np.empty(6)
+    space = known.space
+    slope, trial_slope, r, trial = space.slope, space.trial_slope, space.r, space.trial
+    step, there, W = space.step, space.there, space.trial_W
     balance(known, twist, wrench, r, slope)
     for _ in range(_ITERATIONS):
-        error = squared(r)
+        error, largest = squared(r), 0.0
         for i in range(6):
             step[i] = -r[i]
         solve_in_place(slope, step)
-        if np.max(np.abs(step)) < _TOLERANCE:
+        for i in range(6):
+            largest = max(largest, abs(step[i]))
+        if largest < _TOLERANCE:
             return _SOLVED
         for _ in range(1 + _SHORTEST):
             for i in range(6):
@@ -292,10 +447,14 @@ def newton(known: Known, twist: np.ndarray, wrench: np.ndarray) -> int:
             balance(known, there, W, trial, trial_slope)
             if squared(trial) < error:
                 break
-            step *= 0.5
+            for i in range(6):
+                step[i] *= 0.5
         else:
             return _STUCK
-        twist[:], wrench[:], r[:], slope[:] = there, W, trial, trial_slope
+        _copy_vector(there, twist)
+        _copy_vector(W, wrench)
+        _copy_vector(trial, r)
+        _copy(trial_slope, slope)
     return _UNFINISHED
 
 
@@ -303,8 +462,8 @@ def newton(known: Known, twist: np.ndarray, wrench: np.ndarray) -> int:
 def squared(vector: np.ndarray) -> float:
     """Returns the squared length of a vector (n,)."""
     total = 0.0
-    for value in vector:
-        total += value * value
+    for i in range(len(vector)):
+        total += vector[i] * vector[i]
     return total
 
 
@@ -320,7 +479,10 @@ def solve_in_place(A: np.ndarray, x: np.ndarray) -> None:
     """
     n = len(x)
     for k in range(n):
-        pivot = k + np.argmax(np.abs(A[k:, k]))
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > abs(A[pivot, k]):
+                pivot = i
         if pivot != k:
             for j in range(k, n):
                 A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
@@ -337,11 +499,49 @@ def solve_in_place(A: np.ndarray, x: np.ndarray) -> None:
 
 
 @compiled
-def _cross(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
-    """Sets the cross product of vectors (3,)."""
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
+def _add_cross(sign: float, a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
+    """Adds the cross product of vectors (3,), times a sign."""
+    out[0] += sign * (a[1] * b[2] - a[2] * b[1])
+    out[1] += sign * (a[2] * b[0] - a[0] * b[2])
+    out[2] += sign * (a[0] * b[1] - a[1] * b[0])
+
+
+@compiled
+def _turn(R: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
+    """Sets R x, of vectors (3,)."""
+    for i in range(3):
+        out[i] = R[i, 0] * x[0] + R[i, 1] * x[1] + R[i, 2] * x[2]
+
+
+@compiled
+def _turn_back(R: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
+    """Sets R^T x, of vectors (3,)."""
+    for i in range(3):
+        out[i] = R[0, i] * x[0] + R[1, i] * x[1] + R[2, i] * x[2]
+
+
+@compiled
+def _apply(A: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
+    """Sets A x, of (6, 6) and (6,)."""
+    for i in range(6):
+        out[i] = 0.0
+        for j in range(6):
+            out[i] += A[i, j] * x[j]
+
+
+@compiled
+def _copy(matrix: np.ndarray, to: np.ndarray) -> None:
+    """Copies (6, 6)."""
+    for i in range(6):
+        for j in range(6):
+            to[i, j] = matrix[i, j]
+
+
+@compiled
+def _copy_vector(vector: np.ndarray, to: np.ndarray) -> None:
+    """Copies (6,)."""
+    for i in range(6):
+        to[i] = vector[i]
 
 
 @compiled
@@ -388,22 +588,22 @@ def find_places(
     """
     slot, wall, lips_end, lip, under_lip, floor = lock[:6]
     start, end, neck, head, top, bottom = lock[6:]
-    up = R_GB[:, 1]
+    up, middle = R_GB[:, 1], (top + bottom) / 2.0
     for first, height in ((0, lip), (2, -lip)):
-        _circle_between(height * up, p_GBo, 2, neck, slot, first, depth, arm)
+        _circle_between(height, up, p_GBo, 2, neck, slot, first, depth, arm)
         if p_GBo[0] + height * up[0] >= lips_end:
-            depth[first : first + 2] = -1.0
-    middle = (top + bottom) / 2.0 * up
-    _circle_between(middle, p_GBo, 2, head, wall, 4, depth, arm)
-    _circle_between(middle, p_GBo, 0, head, end, 6, depth, arm)
-    depth[7] = start - (p_GBo[0] + middle[0] - head)
+            depth[first] = depth[first + 1] = -1.0
+    _circle_between(middle, up, p_GBo, 2, head, wall, 4, depth, arm)
+    _circle_between(middle, up, p_GBo, 0, head, end, 6, depth, arm)
+    depth[7] = start - (p_GBo[0] + middle * up[0] - head)
     for i in range(_RIM_POINTS):
         above, below = 8 + i, 8 + _RIM_POINTS + i
         for axis in range(3):
             rim = head * (R_GB[axis, 0] * _RIM[i, 0] + R_GB[axis, 2] * _RIM[i, 2])
             arm[above, axis] = rim + top * up[axis]
             arm[below, axis] = rim + bottom * up[axis]
-        x, y, z = p_GBo + arm[above]
+        y = p_GBo[1] + arm[above, 1]
+        x, z = p_GBo[0] + arm[above, 0], p_GBo[2] + arm[above, 2]
         is_covered = x < lips_end and abs(z) > slot
         is_inside = y < under_lip + head  # not yet lifted out
         depth[above] = y - under_lip if is_covered and is_inside else -1.0
@@ -412,7 +612,8 @@ def find_places(
 
 @compiled
 def _circle_between(
-    centre: np.ndarray,
+    height: float,
+    up: np.ndarray,
     p_GBo: np.ndarray,
     along: int,
     radius: float,
@@ -424,15 +625,16 @@ def _circle_between(
     """Sets two places, of a circle between two walls.
 
     Args:
-        centre: (3,) of the circle, from Bo.
+        height, up: of the circle's centre from Bo; a unit vector (3,) in G.
         p_GBo: (3,) [m].
         along: number of the axis across the walls, at -wall and wall.
         radius, wall: [m].
         first: number of the first of the two places.
         depth, arm: see `find_places`.
     """
-    place = p_GBo[along] + centre[along]
+    place = p_GBo[along] + height * up[along]
     for i, side in ((first, 1.0), (first + 1, -1.0)):
         depth[i] = radius - wall + side * place
-        arm[i] = centre
+        for axis in range(3):
+            arm[i, axis] = height * up[axis]
         arm[i, along] += side * radius

@@ -16,7 +16,7 @@ from drake_disasm.common.arrays import (
 )
 from drake_disasm.common.rotations import matrices_of_rpy
 from drake_disasm.effects import Environment
-from drake_disasm.impact.equations import solve_rows
+from drake_disasm.impact.equations import solve_rows, workspace
 from drake_disasm.impact.law import ImpactLaw
 from drake_disasm.impact.shape import LockShape
 
@@ -74,7 +74,7 @@ class ImpactConditions:
     p_BoTo_B: Array
 
     @functools.cached_property
-    def table(self) -> np.ndarray:
+    def table(self) -> Array:
         """All of it, a row for each state or one for all (m, 83); see `equations`."""
         around = self.around
         parts = [
@@ -88,13 +88,14 @@ class ImpactConditions:
             (self.D, (6,)),
             (self.p_BoTo_B, (3,)),
         ]
-        numbers = [(to_numpy(value), shape) for value, shape in parts]
-        rows = max(len(value) for value, shape in numbers if value.ndim > len(shape))
+        xp = namespace(around.friction)
+        arrays = [(array_like(v, around.friction), shape) for v, shape in parts]
+        rows = max(len(v) for v, shape in arrays if v.ndim > len(shape))
         columns = [
-            np.broadcast_to(value, (rows, *shape)).reshape(rows, -1)
-            for value, shape in numbers
+            xp.reshape(xp.broadcast_to(v, (rows, *shape)), (rows, -1))
+            for v, shape in arrays
         ]
-        return np.concatenate(columns, axis=1)
+        return xp.concat(columns, axis=1)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -112,7 +113,7 @@ class ImpactStep:
     G, T v+, where the groove's normals are the axes. Vectors are in Gn unless a name
     says G. States don't see each other: what one gives does not depend on its company.
 
-    Arrays are NumPy's or torch's; contact is computed on the host.
+    Arrays are NumPy's or torch's; what a GPU holds is computed there.
 
     Attributes:
         v: (n, 6) v+.
@@ -144,11 +145,18 @@ class ImpactStep:
         """
         E, R_GnB = turning(q[:, 3:])
         state = (q, v, qd, vd, E, _rates_by_turning(q[:, 3:]), R_GnB)
-        rows = [np.ascontiguousarray(to_numpy(each)) for each in state]
-        after, wrench, is_solved = solve_rows(conditions.table, h, *rows)
+        table = array_like(conditions.table, q)
+        if not isinstance(q, np.ndarray) and q.device.type == "cuda":
+            from drake_disasm.impact import on_gpu
+
+            return cls(*on_gpu.solve_rows(table, h, state))
+        rows = tuple(np.ascontiguousarray(to_numpy(each)) for each in state)
+        after, wrench = np.empty(q.shape), np.empty(q.shape)
+        is_solved = np.zeros(len(q), np.bool_)
+        solve_rows(to_numpy(table), h, rows, after, wrench, is_solved, workspace())
         if isinstance(q, np.ndarray):
             return cls(after, wrench, is_solved)
-        found = namespace(q).asarray(is_solved, device=q.device)
+        found = namespace(q).asarray(is_solved)
         return cls(array_like(after, q), array_like(wrench, q), found)
 
 

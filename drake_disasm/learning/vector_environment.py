@@ -37,6 +37,7 @@ from drake_disasm.mdp import (
 from drake_disasm.scenario import Scenario, load_scenario
 
 _MODES = (AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP)
+_WORTH_A_GPU = 1024  # environments: with fewer, starting its kernels takes longer
 _UNITS = ("m",) * 3 + ("rad",) * 3 + ("N",) * 3 + ("N m",) * 3
 _TERMINATED = np.array([outcome.terminated for outcome in Outcome])
 _TRUNCATED = np.array([outcome.truncated for outcome in Outcome])
@@ -70,7 +71,7 @@ class DisassemblyVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         scenario: an object, a shipped name, or a file; or one for each environment.
         station: "twin"; a cell has no batch.
         device: "cpu", or "cuda", where torch computes; "numpy"; or "auto": cuda if it
-            is there, else numpy, which is the fastest on a processor.
+            is there and faster (from 1024 environments), else numpy.
         autoreset_mode: SAME_STEP or NEXT_STEP.
 
     Raises:
@@ -98,7 +99,7 @@ class DisassemblyVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             "observation_units": dict(zip(STATE_NAMES, _UNITS, strict=True)),
             "action_units": dict(zip(ACTION_NAMES, _UNITS[:6], strict=True)),
         }
-        self.num_envs, self._device = num_envs, _device_of(device)
+        self.num_envs, self._device = num_envs, _device_of(device, num_envs)
         self._given = _scenarios_of(scenario, num_envs)
         self._build(self._given)
         bounds = np.max([action_bounds(s.task) for s in self._given], axis=0)
@@ -302,12 +303,16 @@ def _mode_of(mode: AutoresetMode | str) -> AutoresetMode:
     return found
 
 
-def _device_of(name: str) -> str:
+def _device_of(name: str, count: int) -> str:
     if name != "auto":
         return name
+    if count < _WORTH_A_GPU:  # torch need not even be loaded
+        return "numpy"
     import torch
+    from numba import cuda
 
-    return "cuda" if torch.cuda.is_available() else "numpy"
+    there = torch.cuda.is_available() and cuda.is_available()
+    return "cuda" if there else "numpy"
 
 
 def _scenarios_of(given: _Scenarios, count: int) -> list[Scenario]:

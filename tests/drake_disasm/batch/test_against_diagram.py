@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import torch
 
 from drake_disasm.batch.twin import BatchedTwin
 from drake_disasm.common.arrays import to_numpy
@@ -166,3 +167,15 @@ def test_torch_computes_what_numpy_does():
     found, expected = np.array(states[1]), np.array(states[0])
     which = [i for i, case in enumerate(CASES) if Imprecision not in map(type, case)]
     np.testing.assert_allclose(found[:, which], expected[:, which], atol=1e-8)
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no GPU")
+def test_a_gpu_simulates_the_same_episodes(batch):
+    moves = np.stack([_actions(effects) for effects in CASES], axis=1)
+    twin = BatchedTwin([_scenario(effects) for effects in CASES], device="cuda")
+    found = [to_numpy(twin.reset([0] * len(CASES))).copy()]
+    found += [to_numpy(twin.step(action).observation).copy() for action in moves]
+    _assert_same(
+        np.array(found).reshape(-1, 12),
+        batch.reshape(-1, 12),
+    )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from drake_disasm.batch.history import BatchHistory
+from drake_disasm.batch.refusals import refuse_without_compiler
 from drake_disasm.batch.starts import NextEpisodes
 from drake_disasm.batch.twin import BatchedTwin
 from drake_disasm.common.errors import DisasmError
@@ -275,3 +276,9 @@ def test_what_it_cannot_carry_is_one_clear_error(scenarios, options, words):
     with pytest.raises(DisasmError, match=words) as error:
         BatchedTwin(scenarios, **options)
     assert "\n" not in str(error.value)
+
+
+def test_a_gpu_without_its_compiler_is_refused(monkeypatch):
+    monkeypatch.setattr("numba.cuda.is_available", lambda: False)
+    with pytest.raises(DisasmError, match=r"'cuda'; pip install 'drake_disasm\[gpu\]'"):
+        refuse_without_compiler("cuda")

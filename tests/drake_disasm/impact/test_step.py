@@ -14,7 +14,13 @@ from drake_disasm.impact import (
     Surroundings,
     turning,
 )
-from drake_disasm.impact.equations import NORMALS, Known, balance, solve_in_place
+from drake_disasm.impact.equations import (
+    NORMALS,
+    Known,
+    balance,
+    solve_in_place,
+    workspace,
+)
 from drake_disasm.scenario import LockConfig
 
 M = np.diag([3.0, 3.0, 3.0, 0.02, 0.02, 0.02])
@@ -108,10 +114,11 @@ def test_each_state_has_its_own_conditions():
 
 def known(random):
     """Returns what a step of a bolt depends on that touches a few places."""
-    depth = np.where(random.uniform(size=len(NORMALS)) < 0.2, 2e-5, -1.0)
-    arm = random.uniform(-0.01, 0.01, NORMALS.shape)
+    space = workspace()
+    space.depth[:] = np.where(random.uniform(size=len(NORMALS)) < 0.2, 2e-5, -1.0)
+    space.arm[:] = random.uniform(-0.01, 0.01, NORMALS.shape)
     law = np.array(TURNED.law.row)
-    return Known(M + H * np.diag(D), np.zeros(6), H, 0.2, law, depth, arm)
+    return Known(M + H * np.diag(D), np.zeros(6), H, 0.2, law, space)
 
 
 @pytest.mark.parametrize("seed", range(5))
