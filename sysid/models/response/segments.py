@@ -24,6 +24,8 @@ from sysid.models.base import Array
 from sysid.models.response.drive import DriveSettings, Inputs
 
 _LEAST_NOISE = 1e-6  # rad, or m: no encoder is better
+#: Of a joint's travel; of two simulations of one arm none is nearer to the other.
+_LEAST_SHARE = 1e-5
 _INNER, _INNER_SHARE = 0.95, 0.87  # of normal noise: rms of those below a quantile
 _LEAST_ROWS = 7  # of a local parabola
 
@@ -78,12 +80,13 @@ def measured_noise(episodes: Sequence[Episode]) -> Array:
 
     By how far each row is off the cubic through two on either side, which follows what
     a servo does also where rows are far apart; or by the encoder's step, if that is
-    more.
+    more. A simulated arm may have no encoder at all: then it is what the steps of time
+    leave between it and any model.
 
     Args:
         episodes: of a log of kind `joint_response`.
     """
-    off, steps = [], []
+    off, steps, least = [], [], np.full(episodes[0]["q"].shape[1], _LEAST_NOISE)
     for episode in episodes:
         time, q = episode["time"], episode["q"]
         weights = _cubic_weights(time)
@@ -92,14 +95,15 @@ def measured_noise(episodes: Sequence[Episode]) -> Array:
         scale = np.sqrt(1.0 + np.sum(weights**2, axis=0))[:, None]
         off.append((q[2:-2] - between) / scale)
         steps.append([quantum(column) for column in q.T])
+        least = np.maximum(least, _LEAST_SHARE * np.ptp(q, axis=0))
     size = np.abs(np.concatenate(off))
     if not len(size):  # nothing but scraps
-        return np.full(size.shape[1], _LEAST_NOISE)
+        return least
     most = np.quantile(size, _INNER, axis=0)
     inner = np.sum(size**2 * (size <= most), axis=0) / np.sum(size <= most, axis=0)
     scatter = np.sqrt(inner) / _INNER_SHARE
     rounding = np.max(steps, axis=0) / np.sqrt(12.0)
-    return np.maximum(np.maximum(scatter, rounding), _LEAST_NOISE)
+    return np.maximum(np.maximum(scatter, rounding), least)
 
 
 #: Of each row but the first and last two, two on either side.

@@ -273,6 +273,13 @@ def test_a_scrap_of_a_recording_has_the_least_noise():
     assert measured_noise([scrap]).tolist() == [1e-6, 1e-6]
 
 
+def test_an_arm_without_encoder_noise_has_what_steps_of_time_leave():
+    time = np.arange(0.0, 20.0, 0.005)
+    q = np.stack([0.5 * np.sin(time), np.full(len(time), 0.3)], axis=1)
+    least = [1e-5, 1e-6]  # of a radian of travel, and of none
+    assert measured_noise([{"time": time, "q": q}]) == pytest.approx(least, rel=0.01)
+
+
 @pytest.fixture(scope="module")
 def held(tmp_path_factory):
     """A servo whose controller holds the pendulum, which its log does not say."""
