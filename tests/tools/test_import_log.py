@@ -84,6 +84,7 @@ def test_a_table_of_a_log_of_ours_has_the_logs_urdf(tmp_path: Path) -> None:
     assert found.urdf == arm and found.joints == tuple(joints)
 
 
+@pytest.mark.slow
 def test_a_real_record_is_closed_from_its_raw_file(tmp_path: Path) -> None:
     source = real_folder("emps") / "DATA_EMPS.mat"
     fields = {

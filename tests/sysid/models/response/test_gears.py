@@ -116,6 +116,7 @@ def test_two_masses_on_a_spring_move_as_in_the_textbook(arm):
     assert 3.0 < coarse / fine < 5.0
 
 
+@pytest.mark.slow
 def test_play_is_crossed_as_by_an_adaptive_integrator(arm):
     c, b = np.array([1e-3, 1e-3]), np.array([0.03, 0.0])
     coarse, fine, without = errors_of(arm, c, b, 0.001)
