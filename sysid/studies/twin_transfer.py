@@ -142,7 +142,9 @@ class TwinTransferStudy(Study):
         mismatch = str(levels["mismatch"])
         if branch == "truth":
             return with_effects(nominal, MISMATCHES[mismatch].effects)
-        return self._robot(mismatch, folder).twin(str(branch))
+        found = self._robot(mismatch, folder).twin(str(branch))
+        # Robots may be of a study with another reward, on which no log depends.
+        return dataclasses.replace(found, task=nominal.task)
 
     def treatment(self, levels: dict[str, Level], folder: Path) -> Treatment:
         """See Study."""

@@ -25,7 +25,7 @@ CHAPTERS = ("chapter3", "chapter4", "chapter5")
 
 
 def test_our_tasks_and_the_chapters_are_shipped() -> None:
-    ours = {"removal", "removal_turned", "removal_randomised"}
+    ours = {"removal", "removal_turned", "removal_randomised", "sliding_randomised"}
     impedance = {f"{name}_impedance" for name in CHAPTERS}
     stiff = {f"{name}_stiff" for name in CHAPTERS}
     assert {*ours, *CHAPTERS, *impedance, *stiff} == set(SHIPPED)

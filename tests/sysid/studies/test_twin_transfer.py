@@ -31,6 +31,16 @@ from sysid.studies.twin_transfer import TwinTransferStudy, _test_path
 NOMINAL = load_scenario("chapter3")
 
 
+def test_the_task_is_the_studys_whatever_the_robots_log_was_for(tmp_path: Path) -> None:
+    make_robot(tmp_path, "tilted")
+    levels = {"mismatch": ["tilted"], "agent": ["ddpg"], "branch": ["closed"]}
+    options = StudyOptions(seeds=(0,), levels=levels, overrides=("task.reward.w_f=4",))
+    stages = TwinTransferStudy(options).stages(tmp_path)
+    [training] = next(s for s in stages if s.treatments).treatments
+    scenario = training.experiment.scenario
+    assert scenario.task.reward.w_f == 4.0 and scenario.effects == [GroovePose(rz=0.05)]
+
+
 def study(**levels: list[str]) -> TwinTransferStudy:
     return TwinTransferStudy(StudyOptions(seeds=(0, 1, 2), levels=levels))
 
