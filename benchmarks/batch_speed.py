@@ -28,7 +28,7 @@ KINDS = {
 }
 #: All batches that are measured: kinds and how many environments.
 BATCHES = [
-    *((kind, count) for kind in ("numpy", "torch", "torch_two") for count in SIZES),
+    *((kind, count) for kind in KINDS if kind != "cuda" for count in SIZES),
     *(("cuda", count) for count in (256, 4096, 65536)),
 ]
 CONTACTS = ("hydroelastic", "impact")

@@ -109,9 +109,19 @@ def arranged(
     )
 
 
+@compiled
 def workspace() -> Workspace:
     """Returns a workspace on the host."""
-    return arranged(*(np.empty(shape) for shape in SHAPES))
+    depth, arm, rotations, maps, vectors, points, by_twist = SHAPES
+    return arranged(
+        np.empty(depth),
+        np.empty(arm),
+        np.empty(rotations),
+        np.empty(maps),
+        np.empty(vectors),
+        np.empty(points),
+        np.empty(by_twist),
+    )
 
 
 class Known(NamedTuple):
@@ -146,7 +156,6 @@ def solve_rows(
     after: np.ndarray,
     wrench: np.ndarray,
     is_solved: np.ndarray,
-    space: Workspace,
 ) -> None:
     """Finds what `ImpactStep` has, of one state after the other.
 
@@ -155,8 +164,8 @@ def solve_rows(
         h: the step [s].
         states: of n.
         after, wrench, is_solved: (n, 6), (n, 6), (n,) are set.
-        space: to compute in.
     """
+    space = workspace()
     for i in range(len(after)):
         solve_row(table, h, states, i, after, wrench, is_solved, space)
 
@@ -176,6 +185,7 @@ def solve_row(
 
     Args:
         i: number of the state.
+        space: to compute in.
     """
     q, v, qd, vd, E, E_inverse, R_GnB = states
     c = table[i] if len(table) > 1 else table[0]

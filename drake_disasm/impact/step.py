@@ -16,7 +16,7 @@ from drake_disasm.common.arrays import (
 )
 from drake_disasm.common.rotations import matrices_of_rpy
 from drake_disasm.effects import Environment
-from drake_disasm.impact.equations import solve_rows, workspace
+from drake_disasm.impact.equations import solve_rows
 from drake_disasm.impact.law import ImpactLaw
 from drake_disasm.impact.shape import LockShape
 
@@ -153,7 +153,7 @@ class ImpactStep:
         rows = tuple(np.ascontiguousarray(to_numpy(each)) for each in state)
         after, wrench = np.empty(q.shape), np.empty(q.shape)
         is_solved = np.zeros(len(q), np.bool_)
-        solve_rows(to_numpy(table), h, rows, after, wrench, is_solved, workspace())
+        solve_rows(to_numpy(table), h, rows, after, wrench, is_solved)
         if isinstance(q, np.ndarray):
             return cls(after, wrench, is_solved)
         found = namespace(q).asarray(is_solved)
