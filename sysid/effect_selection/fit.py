@@ -146,12 +146,25 @@ class Fit:
         return bool(effects) and all(which[self.columns_of(e)].any() for e in effects)
 
     def at_bound(self, names: Sequence[str]) -> bool:
-        """Returns whether an amplitude of some effects is at a bound: unphysical."""
+        """Returns whether an amplitude of some effects is at a bound: unphysical.
+
+        Or at null; see `inside`.
+        """
         effects = [effect for effect in self.effects if effect.name in names]
         return not all(self.inside(self.columns_of(e)).all() for e in effects)
 
     def inside(self, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Returns which of some parameters (k,) are not at a bound."""
+        """Returns which of some parameters (k,) are not at a bound.
+
+        A bound that is not null, and past which hardly anything would be gained, is as
+        good an estimate as any: the true value may be near it.
+        """
+        u, null = self.linearisation.u[columns], self.null[columns]
+        is_null = np.abs(u - null) <= self.settings.bound_tolerance
+        is_content = np.array([not self._is_held_back(i) for i in columns], dtype=bool)
+        return self._between_bounds(columns) | (is_content & ~is_null)
+
+    def _between_bounds(self, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
         margin, u = self.settings.bound_tolerance, self.linearisation.u[columns]
         return np.asarray((u > margin) & (u < 1.0 - margin))
 
@@ -159,20 +172,24 @@ class Fit:
         """Returns whether some effects would explain more beyond a shape's bound.
 
         Dry friction whose transition is as wide as it may be, say, where what is
-        missing is viscous: past the bound it would lower the loss by `min_gain`.
+        missing is viscous.
         """
+        effects = [effect for effect in self.effects if effect.name in names]
+        shapes = [i for e in effects for i in self._columns(e, e.shape)]
+        return any(self._is_held_back(i) for i in shapes)
+
+    def _is_held_back(self, column: int) -> bool:
+        """Returns whether a parameter is at a bound past which it would lower the loss
+        by `min_gain`.
+        """
+        if self._between_bounds(np.array([column])).all():
+            return False
         linear, least = self.linearisation, self.settings.min_gain * self.loss
-        for effect in (e for e in self.effects if e.name in names):
-            for i in self._columns(effect, effect.shape):
-                column = linear.weights * linear.jacobian[..., i]
-                slope = float(np.sum(column * linear.residual))
-                power = float(np.sum(column * linear.jacobian[..., i]))
-                outward = np.sign(2.0 * linear.u[i] - 1.0)
-                is_pushed = outward * slope < 0.0
-                at_bound = not self.inside(np.array([i])).all()
-                if at_bound and is_pushed and slope**2 > least * power:
-                    return True
-        return False
+        derivative = linear.jacobian[..., column]
+        slope = float(np.sum(linear.weights * derivative * linear.residual))
+        power = float(np.sum(linear.weights * derivative**2))
+        outward = np.sign(2.0 * linear.u[column] - 1.0)
+        return bool(outward * slope < 0.0 and slope**2 > least * power)
 
     def harmed_channels(self, before: "Fit") -> list[str]:
         """Returns the channels that are significantly worse than in another fit."""

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from drake_disasm.effects import CommandGain, GroovePose
+from drake_disasm.effects import CommandGain, Compliance, GroovePose
 from drake_disasm.logs import read_log
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
@@ -40,6 +40,15 @@ def turned_impact(tmp_path_factory):
     folder = tmp_path_factory.mktemp("turned") / "log"
     transitions_log(folder, nominal(), [GroovePose(ry=0.02)], 0, episodes=4, steps=12)
     return _fitter(TwinModel([read_log(folder)], nominal(), ()), GroovePose)
+
+
+@pytest.fixture(scope="module")
+def yielding(tmp_path_factory):
+    """A fitter of a log of an arm that yields, and its effect."""
+    folder = tmp_path_factory.mktemp("yielding") / "log"
+    effects = [Compliance(y=3.6e-5)]
+    transitions_log(folder, nominal(), effects, 0, episodes=6, steps=12)
+    return _fitter(TwinModel([read_log(folder)], nominal(), ()), Compliance)
 
 
 def _fitter(model, kind):
@@ -93,12 +102,29 @@ def test_a_channel_that_pays_for_a_gain_is_named(gain):
     assert fit.harmed_channels(fit) == [] and fit.harmed_channels(worse) == []
 
 
-def test_an_amplitude_at_its_bound_is_noticed(gain):
+def test_an_amplitude_that_its_bound_holds_back_is_noticed(gain):
+    """At a bound past which the loss would fall, or at one that is null."""
     fitter, effect = gain
     fit = fitter.fit((effect.only(["x"]),))
     assert not fit.at_bound(["CommandGain"])
-    at_bound = _with(fit, u=np.ones_like(fit.linearisation.u))
-    assert at_bound.at_bound(["CommandGain"]) and not at_bound.at_bound(["SensorBias"])
+    content = _with(fit, u=np.ones_like(fit.linearisation.u))
+    assert not content.at_bound(["CommandGain"])
+    (column,) = content.columns_of(fit.effects[0])
+    derivative = content.linearisation.jacobian[..., column]
+    held_back = _with(content, residual=-0.5 * derivative)
+    assert held_back.at_bound(["CommandGain"])
+    assert not held_back.at_bound(["SensorBias"])
+    assert held_back.within_bounds(fit.effects) == []
+    pushed_inwards = _with(content, residual=0.5 * derivative)
+    assert pushed_inwards.within_bounds(fit.effects) == list(fit.effects)
+
+
+def test_an_amplitude_at_a_bound_that_is_null_is_none(yielding):
+    fitter, effect = yielding
+    fit = fitter.fit((effect.only(["y"]),))
+    assert fit.within_bounds(fit.effects) == list(fit.effects)
+    none = _with(fit, u=fit.null, residual=np.zeros_like(fit.linearisation.residual))
+    assert none.at_bound(["Compliance"]) and none.within_bounds(fit.effects) == []
 
 
 def test_amplitudes_that_gain_nothing_are_left_out(gain):
