@@ -50,6 +50,7 @@ def test_an_urdf_that_is_not_there_is_one_line(tmp_path):
     assert run.returncode != 0 and "none.urdf" in run.stderr
 
 
+@pytest.mark.slow
 def test_a_scenarios_arm_keeps_its_tool_off_the_bench(tmp_path):
     run = run_program(
         "excite", "--scenario=removal", "--joints", "iiwa_joint_6", "iiwa_joint_7",

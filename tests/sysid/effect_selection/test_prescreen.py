@@ -45,6 +45,7 @@ def test_a_groove_turned_by_three_degrees_is_named_and_measured(tmp_path):
     assert closed.errors.in_noise(closed.errors.after) < 1.1
 
 
+@pytest.mark.slow
 def test_many_rows_far_from_the_data_are_searched_by_few_first(tmp_path):
     """What those name is fitted to all; nothing that it replaces is tried again."""
     hidden = [GroovePose(ry=-0.0524)]

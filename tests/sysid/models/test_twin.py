@@ -101,6 +101,7 @@ def test_a_thinned_log_keeps_rows_that_follow_each_other(log, turned):
     assert len(rows) == thin.measurements.rows == 36
 
 
+@pytest.mark.slow
 def test_recovers_parameters_from_nearby(log, turned):
     start = dataclasses.replace(turned, effects=[])
     model = make(log, start, ["contact.friction", "GroovePose.ry"], coarse=False)

@@ -71,6 +71,7 @@ def smooth_torque(t, q, v):
     return K * (np.array(goal_then) - q) - (D + np.array([0.3, 0.2])) * v
 
 
+@pytest.mark.slow
 def test_it_converges_to_an_exact_solution_with_the_square_of_the_step(arm):
     reference = exact(arm, smooth_torque)
     friction = [

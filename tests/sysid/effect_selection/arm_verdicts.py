@@ -1,0 +1,267 @@
+"""What closing the loop says of a real arm's motion with one effect that it hides.
+
+    python -m tests.sysid.effect_selection.arm_verdicts white --logs 100
+    python -m tests.sysid.effect_selection.arm_verdicts ar0.9 --level 1 --friction
+
+The motion is that of a real arm (`../shared/data/kuka_lwr4`, 12 s); the torque is what
+its fitted rigid bodies and the effect predict, and noise that is drawn. Each kind of
+effect has its turn, at a joint, in a shape and with signs that are drawn, as large as
+the rigid bodies can't take up `--level` times the noise in its worst channel. With
+`--friction` every joint has dry and viscous friction besides, as real arms have. Writes
+each answer to out/arm_verdicts as it comes, and goes on from there.
+"""
+
+import argparse
+import dataclasses
+import itertools
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from drake_disasm.common import options
+from drake_disasm.common.arrays import Array
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import (
+    JointCoulombFriction,
+    JointViscousFriction,
+    shape_parameters,
+)
+from drake_disasm.logs import read_logs
+from sysid.effect_selection.candidates import Candidate, candidates, extended
+from sysid.effect_selection.close_loop import close_loop
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.identification.noise import with_estimated_noise
+from sysid.models import LogModel
+from sysid.models.from_logs import ModelChoice, model_of
+from sysid.parameters import Parameter
+from sysid.validation import null_logs
+from sysid.workers import Workers
+from tests.sysid.effect_selection.answers import Answer, complete, counted
+from tests.sysid.effect_selection.null_alarms import fitted, noise_of
+from tests.sysid.real_data import write_arm, write_motion
+
+_ROWS = 2400  # of 200 Hz: 12 s
+_SEED = 11_000
+_ROUNDS = 12  # to the size that is asked for
+_CLOSE = 0.05  # of it
+_MOST_OF_RANGE = 0.9  # of an amplitude's
+_MOST_FIELDS = 2
+_NOISE = 0.3  # of what rigid bodies leave of the real torque: without its friction
+
+
+@dataclasses.dataclass(frozen=True)
+class Hidden:
+    """An effect that was put in.
+
+    Attributes:
+        candidate: it, with the amplitudes that are not null.
+        model: with it.
+        theta: (p,) the model's parameters.
+        size: rms that the rigid bodies can't take up, in units of the noise, of the
+            channel where it is largest.
+    """
+
+    candidate: Candidate
+    model: LogModel
+    theta: Array
+    size: float
+
+    @property
+    def text(self) -> str:
+        """The values of the effect's parameters."""
+        pairs = list(zip(self.model.parameters, self.theta, strict=True))
+        own = [p for p in pairs if p[0].name.startswith(f"{self.candidate.name}.")]
+        return ", ".join(f"{parameter.name} = {value:.4g}" for parameter, value in own)
+
+
+def arm(folder: Path) -> LogModel:
+    """Returns the model of 12 s of a real arm's motion, with noise as there."""
+    urdf, log = folder / "arm.urdf", folder / "arm"
+    log = log if log.exists() else write_motion(1, log, write_arm(urdf))
+    model = model_of(read_logs([log]), ModelChoice())
+    model = model.of_rows(np.arange(model.measurements.rows) < _ROWS)
+    model = with_estimated_noise(model, Workers(), model.default_huber_delta)
+    measured = model.measurements
+    less = measured.with_noise(_NOISE * measured.noise, "assumed")
+    return model.with_measurements(less)
+
+
+def with_friction(model: LogModel, theta: Array) -> tuple[LogModel, Array]:
+    """Returns a model whose joints rub, and its parameters (p,).
+
+    By once to twice the noise each, dry and in proportion to the rate.
+    """
+    random = np.random.default_rng(_SEED)
+    kinds = candidates(model, [JointCoulombFriction, JointViscousFriction])
+    in_one_shape = {candidate.name: candidate for candidate in kinds}
+    for candidate in in_one_shape.values():
+        model, _ = extended(model, [candidate])
+        without, rubs = (model.predictions(np.append(theta, x)) for x in (0.0, 1.0))
+        torque = (rubs - without) / model.measurements.noise
+        size = np.sqrt(np.mean(torque**2, axis=0)).max()
+        theta = np.append(theta, random.uniform(1.0, 2.0) / size)
+    return model, theta
+
+
+def draw(model: LogModel, theta: Array, number: int, level: float) -> Hidden | None:
+    """Returns the effect of a case; None if none of its kind shows in this motion.
+
+    Args:
+        model: without it.
+        theta: (p,) the model's parameters.
+        number: of the case, which tells the kind.
+        level: the size that is asked for, see `Hidden`.
+    """
+    random = np.random.default_rng([_SEED, number])
+    library = candidates(model)
+    kinds = sorted({type(candidate.effect).__name__ for candidate in library})
+    kind = kinds[number % len(kinds)]
+    own = [c for c in library if type(c.effect).__name__ == kind]
+    for place in random.permutation(len(own)):
+        found = _of_size(model, theta, own[place], random, level)
+        if abs(found.size / level - 1.0) < 2.0 * _CLOSE:
+            return found
+    return None
+
+
+def _of_size(
+    model: LogModel,
+    theta: Array,
+    candidate: Candidate,
+    random: np.random.Generator,
+    level: float,
+) -> Hidden:
+    """Returns a candidate's effect, as large as it is asked for, or as it may be."""
+    count = int(random.integers(1, min(_MOST_FIELDS, len(candidate.fields)) + 1))
+    chosen = candidate.only(tuple(random.permutation(candidate.fields)[:count]))
+    longer, (new,) = extended(model, [chosen], with_shapes=True)
+    own = [longer.parameters[i] for i in new]
+    shares = np.array([random.uniform(0.5, 1.0) for _ in own])
+    signs = np.array(
+        [-1.0 if p.low < p.nominal and random.random() < 0.5 else 1.0 for p in own]
+    )
+    scale = 1e-3
+    for _ in range(_ROUNDS):
+        values = [
+            _shape(p, candidate, share)
+            if p.is_shape
+            else float(np.clip(sign * share * scale * p.high, *_within(p.low, p.high)))
+            for p, share, sign in zip(own, shares, signs, strict=True)
+        ]
+        found = np.concatenate([theta, values])
+        size = _size(model, longer, found)
+        if abs(size / level - 1.0) < _CLOSE:
+            break
+        scale *= float(np.clip(level / max(size, 1e-9), 0.1, 10.0))
+    return Hidden(chosen, longer, found, size)
+
+
+def _within(low: float, high: float) -> tuple[float, float]:
+    return _MOST_OF_RANGE * low, _MOST_OF_RANGE * high
+
+
+def _shape(parameter: Parameter, candidate: Candidate, share: float) -> float:
+    """Returns a value within an effect's grid, on a logarithmic scale if it has one."""
+    grid = shape_parameters(type(candidate.effect))[parameter.name.rsplit(".", 1)[1]]
+    low = float(np.clip(min(grid), parameter.low, parameter.high))
+    high = float(np.clip(max(grid), parameter.low, parameter.high))
+    if low <= 0.0:
+        return low + (high - low) * share
+    return float(np.exp(np.log(low) + np.log(high / low) * share))
+
+
+def _size(model: LogModel, longer: LogModel, theta: Array) -> float:
+    """Returns what the rigid bodies can't take up of an effect, see `Hidden`."""
+    measured = model.measurements.with_values(longer.predictions(theta))
+    fitter = Fitter(
+        model.with_measurements(measured), Workers(), np.inf, DEFAULT_SETTINGS
+    )
+    residual = fitter.fit(()).linearisation.residual
+    return float(np.sqrt(np.mean(residual**2, axis=0)).max())
+
+
+def answer(
+    model: LogModel,
+    real: tuple[LogModel, Array],
+    noise: null_logs.Noise,
+    level: float,
+    number: int,
+) -> Answer:
+    """Returns what closing the loop says of a case's log.
+
+    Args:
+        model: of rigid bodies.
+        real: the model of the arm without the case's effect, and its parameters.
+        noise: is drawn.
+        level: of the effect, see `draw`.
+        number: of the case.
+    """
+    hidden = draw(*real, number, level)
+    if hidden is None:
+        return {"kinds": [], "ending": "not visible", "names": [], "ties": []}
+    drawn = null_logs.null_log(hidden.model, noise, _SEED + number, hidden.theta)
+    unknown = np.full(len(drawn.measurements.channels), np.nan)
+    measured = drawn.measurements.with_noise(unknown, "unknown")
+    besides = [Candidate.of(effect).name for effect in real[0].effects]
+    put_in = {
+        "kinds": [hidden.candidate.name, *besides],
+        "hidden": hidden.text,
+        "size": hidden.size,
+    }
+    try:
+        closed = close_loop(model.with_measurements(measured))
+    except DisasmError as error:
+        refused = {"ending": "refused", "names": [], "ties": [], "text": str(error)}
+        return put_in | refused
+    found = closed.verdict
+    return put_in | {
+        "ending": found.ending,
+        "names": list(found.names),
+        "ties": [[tie.name for tie in ties] for ties in found.ties],
+        "text": closed.text,
+    }
+
+
+def _summary(name: str, answers: list[Answer]) -> str:
+    """Returns how often the effects were named, with Wilson's intervals."""
+    shown = [a for a in answers if a["kinds"]]
+    said = [{*a["names"], *itertools.chain(*a["ties"])} for a in shown]
+    pairs = list(zip(shown, said, strict=True))
+    own = [a["kinds"][0] in names for a, names in pairs]
+    named = [set(a["kinds"]) <= names for a, names in pairs]
+    as_many = [len(a["names"]) == len(a["kinds"]) for a in shown]
+    alone = list(map(all, zip(named, as_many, strict=True)))
+    rows = (
+        ("name the case's effect, or have it in a reported tie", own),
+        ("name all that is there, or have it in ties", named),
+        ("the same, and name nothing else", alone),
+    )
+    return "\n".join(counted(name, what, sum(right), shown) for what, right in rows)
+
+
+def main() -> None:
+    """Runs the program."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("noise", nargs="+", help="white, t3, ar0.9, sieve")
+    parser.add_argument("--logs", type=int, default=100)
+    parser.add_argument("--level", type=options.above_zero, default=2.0)
+    parser.add_argument(
+        "--friction", action="store_true", help="joints rub besides, undeclared, too"
+    )
+    parser.add_argument("--out", type=Path, default=Path("out/arm_verdicts"))
+    args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    model = arm(args.out / "data")
+    real = model, fitted(model)
+    real = with_friction(*real) if args.friction else real
+    besides = "_friction" * args.friction
+    for name in args.noise:
+        path = args.out / f"{name}_{args.level:g}{besides}.jsonl"
+        to = partial(answer, model, real, noise_of(name, model), args.level)
+        print(_summary(f"arm, {name}", complete(path, args.logs, to)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
