@@ -1,6 +1,7 @@
 """Adds one effect at a time; where effects are linear, the evidence decides which."""
 
 import abc
+import dataclasses
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -90,7 +91,10 @@ class ForwardSearch(abc.ABC):
         if known and known.rounds:
             fit = self._all_rows_of(known)
             survey = self._survey(fit)
-        while not self._is_over and (found := self._next(fit, survey)) is not None:
+        while not self._is_over:
+            found = self._next(fit, survey) or self._exchanged(fit)
+            if found is None:
+                break
             fit = self._without_misshapen(found)
             survey = self._survey(fit)
         rounds, is_complete = tuple(self._rounds), not self._is_over
@@ -115,6 +119,13 @@ class ForwardSearch(abc.ABC):
     @abc.abstractmethod
     def _next(self, fit: Fit, survey: Survey) -> Fit | None:
         """Returns the fit with one more effect, or pair; None if none is confirmed."""
+
+    def _exchanged(self, fit: Fit) -> Fit | None:
+        """Returns the fit with one effect in place of another, if that is better.
+
+        When no further effect is confirmed.
+        """
+        return None
 
     @property
     def _settings(self) -> SelectionSettings:
@@ -243,6 +254,36 @@ class LinearSearch(ForwardSearch):
             self._report_rejected(trial)
             if self._is_over:
                 break
+        return None
+
+    def _exchanged(self, fit: Fit) -> Fit | None:
+        """See ForwardSearch. Ties are found anew of effects that stay.
+
+        What was chosen while others were missing may have stood for those in part.
+        """
+        present: dict[tuple[str, ...], Candidate] = {
+            (effect.name,): effect for effect in fit.effects
+        }
+        for number, past in enumerate(self._rounds):
+            effect = present.get(past.chosen.effects)
+            if effect is None or self._is_over:
+                continue
+            without = self._fit_without(fit, effect)
+            survey = self._survey(without)
+            own = next((e for e in survey.effects if e.effects == (effect.name,)), None)
+            if own is None:
+                continue
+            accepted = [e for e in survey.effects if e.accepted]
+            rivals = linear_rivals(own, survey, accepted)
+            self._rounds[number] = dataclasses.replace(past, ties=ties(own, rivals))
+            better = [e for e in rivals if e.gain > own.gain and not own.ties_with(e)]
+            for trial in trials(better, 1):
+                found = self._fit_chosen(without, survey, trial)
+                enough = (1.0 - self._settings.min_gain) * fit.loss
+                if found.loss < enough and self._is_better(without, found, trial):
+                    del self._rounds[number]
+                    self._record(trial, ties(trial, rivals), survey, found)
+                    return found
         return None
 
 

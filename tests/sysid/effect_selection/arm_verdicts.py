@@ -224,10 +224,16 @@ def answer(
     }
 
 
+def said(found: Answer) -> set[str]:
+    """Returns the names in an answer and its ties, of groups of joints one by one."""
+    texts = [*found["names"], *itertools.chain(*found["ties"])]
+    return {name for text in texts for name in text.split(" and ")}
+
+
 def _summary(name: str, answers: list[Answer]) -> str:
     """Returns how often the effects were named, with Wilson's intervals."""
     shown = [a for a in answers if a["kinds"]]
-    said = [{*a["names"], *itertools.chain(*a["ties"])} for a in shown]
+    said = [said(a) for a in shown]
     pairs = list(zip(shown, said, strict=True))
     own = [a["kinds"][0] in names for a, names in pairs]
     named = [set(a["kinds"]) <= names for a, names in pairs]

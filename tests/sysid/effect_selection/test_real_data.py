@@ -9,7 +9,8 @@ from scipy.stats import binom
 from drake_disasm.logs import read_logs
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.models.from_logs import ModelChoice, model_of
-from tests.sysid.effect_selection import null_alarms
+from sysid.validation.null_logs import autoregressive
+from tests.sysid.effect_selection import arm_verdicts, null_alarms
 from tests.sysid.effect_selection.blind import sieve
 from tests.sysid.real_data import (
     write_arm,
@@ -110,3 +111,15 @@ def test_three_seconds_of_slow_noise_name_no_effect(tmp_path):
     noise = null_alarms.noise_of("sieve", model)
     answers = [null_alarms.answer(model, noise, seed) for seed in range(_NULLS)]
     assert sum(bool(found["names"]) for found in answers) <= 0.1 * _NULLS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [12, 29])
+def test_what_a_real_arms_motion_hides_beside_friction_is_named_or_in_a_tie(
+    number, tmp_path
+):
+    """A rotor, and a gain that was named a gear while friction was missing."""
+    model = arm_verdicts.arm(tmp_path)
+    real = arm_verdicts.with_friction(model, null_alarms.fitted(model))
+    found = arm_verdicts.answer(model, real, autoregressive(0.9), 1.0, number)
+    assert found["kinds"][0] in arm_verdicts.said(found)
