@@ -76,6 +76,12 @@ class ForwardSearch(abc.ABC):
     progress: Progress = ignore_progress
     deadline: float = math.inf
     _rounds: list[SelectionRound] = field(default_factory=list)
+    _replaced: set[tuple[str, ...]] = field(default_factory=set)
+    _whole_library: Sequence[Candidate] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Keeps the library as it is at the begin."""
+        self._whole_library = self.library
 
     def run(self, known: SearchResult | None = None) -> SearchResult:
         """Fits the model, and adds effects until none is confirmed any more.
@@ -112,9 +118,15 @@ class ForwardSearch(abc.ABC):
     def _is_over(self) -> bool:
         return time.monotonic() > self.deadline
 
-    def _survey(self, fit: Fit) -> Survey:
-        """Returns the evidence for each candidate that a fit does not have."""
-        return survey_candidates(self.fitter, fit, self.library, self.deadline)
+    def _survey(self, fit: Fit, library: Sequence[Candidate] | None = None) -> Survey:
+        """Returns the evidence for each candidate that a fit does not have.
+
+        Args:
+            fit: without them.
+            library: candidates; those that are left if left out.
+        """
+        wanted = self.library if library is None else library
+        return survey_candidates(self.fitter, fit, wanted, self.deadline)
 
     @abc.abstractmethod
     def _next(self, fit: Fit, survey: Survey) -> Fit | None:
@@ -259,7 +271,8 @@ class LinearSearch(ForwardSearch):
     def _exchanged(self, fit: Fit) -> Fit | None:
         """See ForwardSearch. Ties are found anew of effects that stay.
 
-        What was chosen while others were missing may have stood for those in part.
+        What was chosen while others were missing may have stood for those in part, or
+        for two of them. What has been exchanged does not come back in this way.
         """
         present: dict[tuple[str, ...], Candidate] = {
             (effect.name,): effect for effect in fit.effects
@@ -269,22 +282,36 @@ class LinearSearch(ForwardSearch):
             if effect is None or self._is_over:
                 continue
             without = self._fit_without(fit, effect)
-            survey = self._survey(without)
+            survey = self._survey(without, self._whole_library)
             own = next((e for e in survey.effects if e.effects == (effect.name,)), None)
             if own is None:
                 continue
-            accepted = [e for e in survey.effects if e.accepted]
-            rivals = linear_rivals(own, survey, accepted)
+            rivals = linear_rivals(own, survey, [])
             self._rounds[number] = dataclasses.replace(past, ties=ties(own, rivals))
-            better = [e for e in rivals if e.gain > own.gain and not own.ties_with(e)]
-            for trial in trials(better, 1):
-                found = self._fit_chosen(without, survey, trial)
-                enough = (1.0 - self._settings.min_gain) * fit.loss
-                if found.loss < enough and self._is_better(without, found, trial):
-                    del self._rounds[number]
-                    self._record(trial, ties(trial, rivals), survey, found)
-                    return found
+            trial = self._simplest(own, survey)
+            if trial is own:
+                continue
+            found = self._fit_chosen(without, survey, trial)
+            share = self._settings.tie_parsimony_tolerance
+            enough = fit.loss + share * (without.loss - fit.loss)
+            if found.loss <= enough and self._is_better(without, found, trial):
+                self._replaced.add(own.effects)
+                del self._rounds[number]
+                self._record(trial, ties(trial, rivals), survey, found)
+                return found
         return None
+
+    def _simplest(self, own: Evidence, survey: Survey) -> Evidence:
+        """Returns what is chosen of an effect, and others or pairs in its place."""
+        singles = [e for e in survey.effects if e.accepted]
+        pairs = survey.linearised.accepted_pairs(survey.effects)
+        known = {own.effects, *self._replaced}
+        others = [
+            e
+            for e in [*singles, *pairs]
+            if e.effects not in known and not set(own.effects) <= set(e.effects)
+        ]
+        return most_parsimonious(sorted([own, *others], key=lambda e: -e.gain))
 
 
 def trials(accepted: Sequence[Evidence], count: int) -> list[Evidence]:

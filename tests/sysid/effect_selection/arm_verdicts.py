@@ -233,10 +233,8 @@ def said(found: Answer) -> set[str]:
 def _summary(name: str, answers: list[Answer]) -> str:
     """Returns how often the effects were named, with Wilson's intervals."""
     shown = [a for a in answers if a["kinds"]]
-    said = [said(a) for a in shown]
-    pairs = list(zip(shown, said, strict=True))
-    own = [a["kinds"][0] in names for a, names in pairs]
-    named = [set(a["kinds"]) <= names for a, names in pairs]
+    own = [a["kinds"][0] in said(a) for a in shown]
+    named = [set(a["kinds"]) <= said(a) for a in shown]
     as_many = [len(a["names"]) == len(a["kinds"]) for a in shown]
     alone = list(map(all, zip(named, as_many, strict=True)))
     rows = (

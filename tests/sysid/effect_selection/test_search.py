@@ -5,7 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from drake_disasm.effects import JointElasticity, JointViscousFriction, TorqueGain
+from drake_disasm.effects import (
+    JointCoupling,
+    JointElasticity,
+    JointViscousFriction,
+    TorqueGain,
+)
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.search import LinearSearch, SelectionRound
@@ -15,12 +20,17 @@ _GEAR, _GAIN, _RUBS = (
     Candidate.of(kind(joint="j1"))
     for kind in (JointElasticity, TorqueGain, JointViscousFriction)
 )
+_COUPLING, _NEXT_RUBS = (
+    Candidate.of(JointCoupling(joint="j1")),
+    Candidate.of(JointViscousFriction(joint="j2")),
+)
 _SCATTER = np.random.default_rng(0).normal(size=40)
 
 
-def _evidence(candidate, gain, scatter):
+def _evidence(candidates, gain, scatter):
     gains = gain * (1.0 + scatter * _SCATTER)
-    return Evidence((candidate,), gain, 0.01, 1.0, 1, gains, DEFAULT_SETTINGS)
+    count = sum(len(c.fields) + len(c.shape) for c in candidates)
+    return Evidence(candidates, gain, 0.01, 1.0, count, gains, DEFAULT_SETTINGS)
 
 
 def _fit(effects, loss):
@@ -38,35 +48,39 @@ def _fit(effects, loss):
 class _Search(LinearSearch):
     """Has a gear in a fit, and a survey without it."""
 
-    def __init__(self, evidence, loss):
+    def __init__(self, evidence, loss, pairs=()):
         fitter = SimpleNamespace(settings=DEFAULT_SETTINGS)
+        self._pairs = pairs
         super().__init__(fitter, [_GEAR, _GAIN])
         self._found, self._loss = evidence, loss
         self._record(evidence[0], (), self._survey(None), _fit((), 1.0))
 
     def _fit_without(self, fit, effect):
-        assert effect is _GEAR
+        assert effect.name == self._found[0].effects[0]
         return _fit((_RUBS,), 20.0)
 
-    def _survey(self, fit):
-        return SimpleNamespace(effects=self._found, record=lambda: None)
+    def _survey(self, fit, library=None):
+        linear = SimpleNamespace(accepted_pairs=lambda singles: self._pairs)
+        return SimpleNamespace(
+            effects=self._found, linearised=linear, record=lambda: None
+        )
 
     def _fit_chosen(self, fit, survey, chosen):
         return _fit((*fit.effects, *chosen.candidates), self._loss)
 
 
 def test_what_could_be_in_an_effects_place_is_a_tie():
-    gear, gain = _evidence(_GEAR, 0.5, 2.0), _evidence(_GAIN, 0.48, -2.0)
+    gear, gain = _evidence((_GEAR,), 0.5, 2.0), _evidence((_GAIN,), 0.4, -2.0)
     search = _Search([gear, gain], 10.0)
     assert search._exchanged(_fit((_RUBS, _GEAR), 10.0)) is None
     (found,) = search._rounds
     assert found.chosen is gear and found.ties == (gain,)
 
 
-@pytest.mark.parametrize(("loss", "is_better"), [(5.0, True), (9.99, False)])
+@pytest.mark.parametrize(("loss", "is_better"), [(5.0, True), (12.0, False)])
 def test_what_explains_clearly_more_takes_an_effects_place(loss, is_better):
     """The blocks distinguish them; the fit has to confirm it."""
-    gear, gain = _evidence(_GEAR, 0.5, 0.0), _evidence(_GAIN, 0.75, 0.0)
+    gear, gain = _evidence((_GEAR,), 0.5, 0.0), _evidence((_GAIN,), 0.75, 0.0)
     search = _Search([gear, gain], loss)
     found = search._exchanged(_fit((_RUBS, _GEAR), 10.0))
     (recorded,) = search._rounds
@@ -75,3 +89,18 @@ def test_what_explains_clearly_more_takes_an_effects_place(loss, is_better):
     assert (found is not None) == is_better
     if is_better:
         assert found.effects == (_RUBS, _GAIN)
+
+
+def test_what_stood_for_two_simpler_effects_makes_room_for_both():
+    """A coupling is two amplitudes, and rarer than friction of two joints."""
+    coupling = _evidence((_COUPLING,), 0.5, 0.0)
+    both = _evidence((_RUBS, _NEXT_RUBS), 0.499, 0.0)
+    with_itself = _evidence((_COUPLING, _RUBS), 0.9, 0.0)
+    search = _Search([coupling], 10.0, pairs=[with_itself, both])
+    found = search._exchanged(_fit((_GAIN, _COUPLING), 10.0))
+    assert found.effects[-2:] == (_RUBS, _NEXT_RUBS)
+    assert search._rounds[0].chosen is both
+    # It does not come back in this way.
+    back = _Search([both, coupling], 10.0)
+    back._replaced = search._replaced
+    assert back._simplest(both, back._survey(None)) is both
