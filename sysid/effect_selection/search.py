@@ -256,10 +256,9 @@ class LinearSearch(ForwardSearch):
             accepted = survey.linearised.accepted_pairs(survey.effects)
         if not accepted:
             return None
-        enough = (1.0 - self._settings.min_gain) * held_out_loss(fit)
         for trial in trials(accepted, self._settings.max_trials):
             found = self._without_needless(self._fit_chosen(fit, survey, trial))
-            if self._is_better(fit, found, trial) and held_out_loss(found) <= enough:
+            if self._is_confirmed(fit, found, trial):
                 rivals = linear_rivals(trial, survey, accepted)
                 self._record(trial, ties(trial, rivals), survey, found)
                 return found
@@ -281,6 +280,7 @@ class LinearSearch(ForwardSearch):
             effect = present.get(past.chosen.effects)
             if effect is None or self._is_over:
                 continue
+            self._report(f"{effect.name}: comparing it with what could be in its place")
             without = self._fit_without(fit, effect)
             survey = self._survey(without, self._whole_library)
             own = next((e for e in survey.effects if e.effects == (effect.name,)), None)
@@ -294,12 +294,19 @@ class LinearSearch(ForwardSearch):
             found = self._fit_chosen(without, survey, trial)
             share = self._settings.tie_parsimony_tolerance
             enough = fit.loss + share * (without.loss - fit.loss)
-            if found.loss <= enough and self._is_better(without, found, trial):
+            if found.loss <= enough and self._is_confirmed(without, found, trial):
                 self._replaced.add(own.effects)
                 del self._rounds[number]
                 self._record(trial, ties(trial, rivals), survey, found)
                 return found
         return None
+
+    def _is_confirmed(self, before: Fit, after: Fit, trial: Evidence) -> bool:
+        """Returns whether it is better, of rows to which nothing is fitted, too."""
+        if not self._is_better(before, after, trial):
+            return False
+        enough = (1.0 - self._settings.min_gain) * held_out_loss(before)
+        return held_out_loss(after) <= enough
 
     def _simplest(self, own: Evidence, survey: Survey) -> Evidence:
         """Returns what is chosen of an effect, and others or pairs in its place."""

@@ -65,6 +65,9 @@ class _Search(LinearSearch):
             effects=self._found, linearised=linear, record=lambda: None
         )
 
+    def _is_confirmed(self, before, after, trial):
+        return self._is_better(before, after, trial)
+
     def _fit_chosen(self, fit, survey, chosen):
         return _fit((*fit.effects, *chosen.candidates), self._loss)
 
