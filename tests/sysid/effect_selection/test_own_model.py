@@ -105,6 +105,7 @@ class Simulated(Pendulum):
     affine = False
 
 
+@pytest.mark.slow
 def test_trials_side_by_side_are_those_one_by_one(pendulum):
     model = Simulated(pendulum.q, pendulum.v, pendulum.measurements.values)
     library = [JointCoulombFriction, JointStribeckFriction, TorqueOffset]

@@ -63,6 +63,7 @@ def test_at_the_truth_the_objective_is_the_sensors_noise(log, turned):
     assert objective(truth(objective.model))[0] == pytest.approx(0.707, abs=0.07)
 
 
+@pytest.mark.slow
 def test_workers_and_chunks_do_not_change_a_bit(log, turned, monkeypatch):
     model = make(log, turned)
     thetas = np.array([truth(model), [0.3, 5e-4, 0.02]])
