@@ -76,12 +76,6 @@ class ForwardSearch(abc.ABC):
     progress: Progress = ignore_progress
     deadline: float = math.inf
     _rounds: list[SelectionRound] = field(default_factory=list)
-    _replaced: set[tuple[str, ...]] = field(default_factory=set)
-    _whole_library: Sequence[Candidate] = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Keeps the library as it is at the begin."""
-        self._whole_library = self.library
 
     def run(self, known: SearchResult | None = None) -> SearchResult:
         """Fits the model, and adds effects until none is confirmed any more.
@@ -242,6 +236,7 @@ class ForwardSearch(abc.ABC):
         )
 
 
+@dataclass
 class LinearSearch(ForwardSearch):
     """Where a model is affine in its effects: the evidence is exact, up to the noise.
 
@@ -249,6 +244,13 @@ class LinearSearch(ForwardSearch):
     are of blocks to which the effect was not fitted, but all other parameters were:
     what is added has to lower the loss of blocks to which nothing was, too.
     """
+
+    _replaced: set[tuple[str, ...]] = field(default_factory=set)
+    _whole_library: Sequence[Candidate] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Keeps the library as it is at the begin."""
+        self._whole_library = self.library
 
     def _next(self, fit: Fit, survey: Survey) -> Fit | None:
         accepted = [e for e in survey.effects if e.accepted]

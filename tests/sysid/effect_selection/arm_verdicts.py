@@ -39,8 +39,12 @@ from sysid.parameters import Parameter
 from sysid.validation import null_logs
 from sysid.workers import Workers
 from tests.sysid.effect_selection.answers import Answer, complete, counted
-from tests.sysid.effect_selection.null_alarms import fitted, noise_of
-from tests.sysid.real_data import write_arm, write_motion
+from tests.sysid.effect_selection.null_alarms import (
+    arm_log,
+    drawn,
+    fitted,
+    noise_of,
+)
 
 _ROWS = 2400  # of 200 Hz: 12 s
 _SEED = 11_000
@@ -78,9 +82,7 @@ class Hidden:
 
 def arm(folder: Path) -> LogModel:
     """Returns the model of 12 s of a real arm's motion, with noise as there."""
-    urdf, log = folder / "arm.urdf", folder / "arm"
-    log = log if log.exists() else write_motion(1, log, write_arm(urdf))
-    model = model_of(read_logs([log]), ModelChoice())
+    model = model_of(read_logs([arm_log(folder)]), ModelChoice())
     model = model.of_rows(np.arange(model.measurements.rows) < _ROWS)
     model = with_estimated_noise(model, Workers(), model.default_huber_delta)
     measured = model.measurements
@@ -201,9 +203,7 @@ def answer(
     hidden = draw(*real, number, level)
     if hidden is None:
         return {"kinds": [], "ending": "not visible", "names": [], "ties": []}
-    drawn = null_logs.null_log(hidden.model, noise, _SEED + number, hidden.theta)
-    unknown = np.full(len(drawn.measurements.channels), np.nan)
-    measured = drawn.measurements.with_noise(unknown, "unknown")
+    measured = drawn(hidden.model, hidden.theta, noise, _SEED + number)
     besides = [Candidate.of(effect).name for effect in real[0].effects]
     put_in = {
         "kinds": [hidden.candidate.name, *besides],

@@ -23,6 +23,7 @@ from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.identification.noise import with_estimated_noise
 from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
+from sysid.models.measurements import Measurements
 from sysid.validation import null_logs
 from sysid.workers import Workers
 from tests.sysid.effect_selection.answers import Answer, complete, counted
@@ -37,10 +38,15 @@ def static(folder: Path) -> LogModel:
     return _model([log if log.exists() else write_static(100, log)])
 
 
+def arm_log(folder: Path) -> Path:
+    """Returns the log of a real arm's motion, in a folder; written if need be."""
+    urdf, log = folder / "arm.urdf", folder / "arm"
+    return log if log.exists() else write_motion(1, log, write_arm(urdf))
+
+
 def arm(folder: Path) -> LogModel:
     """Returns the model of 3 s of a real arm's motion."""
-    urdf, log = folder / "arm.urdf", folder / "arm"
-    model = _model([log if log.exists() else write_motion(1, log, write_arm(urdf))])
+    model = _model([arm_log(folder)])
     return model.of_rows(np.arange(model.measurements.rows) < _ARM_ROWS)
 
 
@@ -67,13 +73,23 @@ def fitted(model: LogModel) -> np.ndarray:
     return fitter.fit(()).theta
 
 
+def drawn(
+    model: LogModel, theta: np.ndarray, noise: null_logs.Noise, seed: int
+) -> Measurements:
+    """Returns what a model with parameters (p,) predicts and noise, as if measured.
+
+    How large the noise is they do not say.
+    """
+    measured = null_logs.null_log(model, noise, seed, theta).measurements
+    unknown = np.full(len(measured.channels), np.nan)
+    return measured.with_noise(unknown, "unknown")
+
+
 def answer(model: LogModel, noise: null_logs.Noise, seed: int) -> Answer:
     """Returns what closing the loop says of a null log."""
-    drawn = null_logs.null_log(model, noise, seed, fitted(model))
-    unknown = np.full(len(drawn.measurements.channels), np.nan)
-    measured = drawn.measurements.with_noise(unknown, "unknown")
+    measured = drawn(model, fitted(model), noise, seed)
     try:
-        found = close_loop(drawn.with_measurements(measured)).verdict
+        found = close_loop(model.with_measurements(measured)).verdict
     except DisasmError as error:
         return {"seed": seed, "ending": "refused", "names": [], "text": str(error)}
     return {
