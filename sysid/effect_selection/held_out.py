@@ -88,9 +88,27 @@ class HeldOut:
         noise = np.array([channel.noise for channel in self.channels])
         return noise if self.model_error is None else np.hypot(noise, self.model_error)
 
-    def interval(self, predicted: Array, seed: int = 0) -> Array:
-        """Returns 95 % intervals (channels, 2) of the rms, by a block bootstrap."""
-        error = predicted - self.measured
+    @property
+    def model_error_rms(self) -> Array | None:
+        """Rms (channels,) of what the model states of its own error; None: nothing."""
+        if self.model_error is None:
+            return None
+        return np.asarray(np.sqrt(np.mean(self.model_error**2, axis=0)))
+
+    def interval(
+        self, predicted: Array, unit: Array | float = 1.0, seed: int = 0
+    ) -> Array:
+        """Returns 95 % intervals of the rms, by a block bootstrap.
+
+        Args:
+            predicted: (rows, channels), SI.
+            unit: of the errors, such as `sigma`; 1: SI.
+            seed: of the bootstrap.
+
+        Returns:
+            (channels, 2).
+        """
+        error = (predicted - self.measured) / unit
         length = block_length(error, self.episode)
         # Blocks may be longer than need be; more than a thousand cost only time.
         length = max(length, len(error) // _MOST)

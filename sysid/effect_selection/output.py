@@ -90,6 +90,7 @@ def _errors(errors: HeldOut) -> dict[str, Any]:
     ends = {"before": errors.before, "after": errors.after}
     rms = {key: errors.rms(p) for key, p in ends.items()}
     intervals = {key: errors.interval(p) for key, p in ends.items()}
+    own = errors.model_error_rms
     return {
         "rows": errors.how,
         "in_noise": {k: errors.in_noise(p) for k, p in ends.items()},
@@ -99,6 +100,7 @@ def _errors(errors: HeldOut) -> dict[str, Any]:
             channel.name: {
                 "unit": channel.unit,
                 "noise": channel.noise,
+                "model_error": None if own is None else float(own[i]),
                 **{
                     key: {
                         "rms": float(rms[key][i]),

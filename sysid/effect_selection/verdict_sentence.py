@@ -51,7 +51,7 @@ def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
         errors: on rows that were not fitted.
     """
     if verdict.ending == "none":
-        return f"{_nothing(verdict)}."
+        return f"{_nothing(verdict, errors)}."
     effects, improved = effects_in_words(verdict.names), improvement_in_words(errors)
     them = "it" if len(verdict.names) == 1 else "them"
     left = left_in_words(verdict)
@@ -231,11 +231,13 @@ def undecided_text(found: Sequence[Undecided]) -> str:
     )
 
 
-def _nothing(verdict: Verdict) -> str:
+def _nothing(verdict: Verdict, errors: HeldOut) -> str:
     """Returns that nothing is missing, and what would have been found."""
     if verdict.is_provisional:
         return "So far nothing was found that the model lacks"
     text = "This log shows nothing that the model lacks: the residual is noise"
+    if errors.model_error is not None:
+        text += " and what the model states of its own error"
     kinds = by_kind([limit.effect for limit in verdict.limits])
     seen = by_kind([x.effect for x in verdict.limits if x.amplitude is not None])
     if not kinds:

@@ -75,7 +75,10 @@ def _made_worse(closed: ClosedLoop) -> set[str]:
 
 
 def _noise_origin(closed: ClosedLoop) -> str:
-    """Returns where the channels' noise is from, in words."""
-    if not closed.last.noise_is_stated:
-        return "not stated: estimated from the residual of the first fit"
-    return "as stated"
+    """Returns what the noise is, and where it is from, in words."""
+    text = "the channel's noise"
+    if closed.last.states_model_error:
+        text += " and, with it, what the model states of its own error in that row"
+    if closed.last.noise_is_stated:
+        return text
+    return f"{text} (not stated: estimated from the residual of the first fit)"

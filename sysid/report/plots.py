@@ -73,7 +73,7 @@ def fit_plot(errors: HeldOut, costly: Sequence[tuple[int, int]] = ()) -> Plot:
         series = _channel_series(errors, number, time, rows, own)
         at = marked[marked[:, 1] == number, 0]
         series.append((2, _marks(time[at], own[1][at], [place(errors, r) for r in at])))
-        series.append((2, _noise_band(time, channel)))
+        series.append((2, _noise_band(errors, number, time, rows)))
         for line, trace in series:
             trace.update(meta=number, visible=number == 0)
             figure.add_trace(trace, row=line, col=1)
@@ -87,21 +87,24 @@ def fit_plot(errors: HeldOut, costly: Sequence[tuple[int, int]] = ()) -> Plot:
 
 
 def error_plot(errors: HeldOut) -> Plot:
-    """Returns each channel's rms error before and after, in units of its noise."""
+    """Returns each channel's rms error before and after, in units of `sigma`."""
     names = [channel.name for channel in errors.channels]
-    noise = np.array([channel.noise for channel in errors.channels])
     figure = go.Figure()
     for (label, colour), predicted in zip(
         _ENDS, (errors.before, errors.after), strict=True
     ):
-        size, ends = errors.rms(predicted) / noise, errors.interval(predicted).T / noise
+        size = errors.in_sigma(predicted)
+        ends = errors.interval(predicted, errors.sigma).T
         spread = {"array": ends[1] - size, "arrayminus": size - ends[0]}
         bars = go.Bar(x=names, y=size, error_y=spread, name=label, marker_color=colour)
         figure.add_trace(bars)
     figure.add_hline(y=1.0, line={"color": _MEASURED, "dash": "dash", "width": 1})
     figure.update_yaxes(title_text="rms error / noise", rangemode="tozero")
     _finish(figure, 320)
-    return Plot(figure, "Over the rows above; the whiskers are 95 % intervals.")
+    caption = "Over the rows above; the whiskers are 95 % intervals."
+    if errors.model_error is not None:
+        caption += " The unit is the noise of each row with the model's own error."
+    return Plot(figure, caption)
 
 
 def loss_plot(found: LossMap, channels: Sequence[Channel]) -> Plot:
@@ -258,12 +261,18 @@ def _marks(x: Array, y: Array, where: Sequence[str]) -> go.Scatter:
     )  # fmt: skip
 
 
-def _noise_band(time: Array, channel: Channel) -> go.Scatter:
-    """Returns a grey band of one standard deviation about zero."""
-    left, right, high = float(time[0]), float(time[-1]), channel.noise
+def _noise_band(
+    errors: HeldOut, number: int, time: Array, rows: NDArray[np.int64]
+) -> go.Scatter:
+    """Returns a grey band of one standard deviation of a channel about zero."""
+    if errors.model_error is None:
+        x, high = time[[0, -1]], np.full(2, errors.channels[number].noise)
+    else:
+        x, high = time[rows], errors.sigma[rows, number]
     return go.Scatter(
-        x=[left, right, right, left], y=[high, high, -high, -high], fill="toself",
-        mode="none", fillcolor="rgba(32, 32, 32, 0.10)", name="noise", hoverinfo="skip",
+        x=_small(np.append(x, x[::-1])), y=_small(np.append(high, -high[::-1])),
+        fill="toself", mode="none", fillcolor="rgba(32, 32, 32, 0.10)", name="noise",
+        hoverinfo="skip",
     )  # fmt: skip
 
 

@@ -70,6 +70,14 @@ def test_none_says_what_the_log_could_have_shown():
     )
 
 
+def test_none_says_that_the_model_states_an_error_of_its_own():
+    errors = dataclasses.replace(ERRORS, model_error=np.ones_like(ERRORS.measured))
+    assert verdict_sentence(made_verdict("none"), errors) == (
+        "This log shows nothing that the model lacks: the residual is noise and what "
+        "the model states of its own error."
+    )
+
+
 def test_partly_explained_says_what_is_left():
     findings = tuple(
         ChannelFinding(name, "2 outlying rows (row 4, 5)") for name in ("fx", "fy")

@@ -51,6 +51,16 @@ def test_a_channel_that_gets_worse_is_marked(found):
     assert "Worse with the effects than without: fy." in page
 
 
+def test_an_error_that_the_model_states_of_itself_has_a_column(found):
+    own = "model's own error"
+    assert own not in own_part(closing_page(found, {}))
+    errors = dataclasses.replace(
+        found.errors, model_error=np.full_like(found.errors.measured, 0.1234375)
+    )
+    page = own_part(closing_page(dataclasses.replace(found, errors=errors), {}))
+    assert f"<th>{own}</th>" in page and page.count("<td>0.123</td>") == 6
+
+
 def test_a_value_at_its_bound_is_marked(found):
     verdict = found.verdict
     assert "at its bound" not in own_part(closing_page(found, {}))

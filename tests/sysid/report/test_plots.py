@@ -105,3 +105,21 @@ def test_errors_are_in_units_of_the_noise():
     (before, after) = plots.error_plot(_errors(1000)).figure.data
     assert before.y == pytest.approx(10.0, rel=0.2)
     assert after.y == pytest.approx(1.0, rel=0.2)
+
+
+def test_what_the_model_states_of_its_own_error_is_part_of_the_unit():
+    errors = _errors(1000)
+    own = np.zeros_like(errors.measured)
+    own[:, 1] = np.linspace(0.0, 1.0, 1000)
+    stated = dataclasses.replace(errors, model_error=own)
+    drawn = plots.error_plot(stated)
+    before = drawn.figure.data[0]
+    assert before.y == pytest.approx(stated.in_sigma(errors.before))
+    assert before.y[1] < 0.5 * before.y[0] and "own error" in drawn.caption
+    reach = before.y + before.error_y.array
+    ends = stated.interval(errors.before, stated.sigma)[:, 1]
+    assert reach == pytest.approx(ends)
+    bands = [t for t in plots.fit_plot(stated).figure.data if t.name == "noise"]
+    assert [np.max(band.y) for band in bands] == pytest.approx(
+        [0.1, np.hypot(0.1, 1.0), 0.1]
+    )
