@@ -32,7 +32,8 @@ def write_report(study: Study, folder: Path, origin: Mapping[str, Any]) -> list[
     Args:
         study: what was studied.
         folder: of the study.
-        origin: provenance of its beginning.
+        origin: provenance of its beginning, by a command that may have asked for less,
+            or for other levels.
 
     Returns:
         The tables, for the terminal.
@@ -50,6 +51,7 @@ def write_report(study: Study, folder: Path, origin: Mapping[str, Any]) -> list[
     for kind in _FORMATS:
         text = _ENVIRONMENT.get_template(f"report.{kind}.j2").render(
             study=study,
+            own=study.options.provenance,
             origin=origin,
             machine=_machine(),
             tables=[*tables, everything],

@@ -126,6 +126,20 @@ def test_a_report_has_every_seed_and_the_command(done: Path) -> None:
     assert (done / "curves_ddpg.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_report_says_which_command_it_is_of_and_which_began_the_folder(
+    done: Path,
+) -> None:
+    own = {"command": "python tools/study.py --resume", "commit": "def", "date": "now"}
+    write_report(small_precision(provenance=own), done, _ORIGIN)
+    for kind in ("md", "html"):
+        text = (done / f"report.{kind}").read_text()
+        head = text[: text.index("Every seed")]
+        assert head.index(own["command"]) < head.index("Commit def, now")
+        assert "begun at commit abc, today, by" in head
+    write_report(small_precision(), done, _ORIGIN)
+    assert "begun" not in (done / "report.md").read_text()
+
+
 def test_a_study_resumes_with_more_seeds_and_changes_nothing_else(done: Path) -> None:
     before, study = bits(done), small_precision(seeds=(0, 1, 2))
     with pytest.raises(DisasmError, match="add --resume"):
