@@ -62,7 +62,7 @@ def fit_plot(errors: HeldOut, costly: Sequence[tuple[int, int]] = ()) -> Plot:
     time, axis = _time(errors)
     marked = np.array(costly, dtype=np.int64).reshape(-1, 2)
     count = 0
-    for number, channel in enumerate(errors.channels):
+    for number in range(len(errors.channels)):
         own = [
             np.asarray(predicted[:, number] - errors.measured[:, number])
             for predicted in (errors.before, errors.after)
