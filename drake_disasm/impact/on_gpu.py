@@ -3,6 +3,8 @@
 The kernel calls the very functions of `equations`, which Numba compiles for CUDA, too.
 """
 
+import warnings
+
 import numpy as np
 from numba import cuda
 
@@ -31,7 +33,9 @@ def solve_rows(
     results = tuple(cuda.as_cuda_array(each) for each in (after, wrench, is_solved))
     rows = tuple(cuda.as_cuda_array(each.contiguous()) for each in states)
     blocks = -(-len(q) // _THREADS)
-    with cuda.gpus[q.device.index]:
+    with cuda.gpus[q.device.index], warnings.catch_warnings():
+        # Batches may be small: a step's other kernels are, too.
+        warnings.filterwarnings("ignore", message=".*low occupancy")
         kernel[blocks, _THREADS](
             cuda.as_cuda_array(table.contiguous()), h, rows, *results
         )
