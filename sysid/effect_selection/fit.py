@@ -113,7 +113,9 @@ class Fit:
         """What whitens its residual."""
         linear, settings = self.linearisation, self.settings
         episode = self.model.measurements.episode
-        return Prewhitening.of(linear.residual, episode, linear.huber_delta, settings)
+        return Prewhitening.of(
+            linear.residual, episode, linear.huber_delta, settings, linear.jacobian
+        )
 
     @property
     def values(self) -> dict[str, float]:

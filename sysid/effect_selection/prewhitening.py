@@ -126,6 +126,7 @@ class Prewhitening:
         episode: NDArray[np.int64],
         huber_delta: float,
         settings: SelectionSettings,
+        columns: Array | None = None,
         fitted: int = 0,
     ) -> Self:
         """Returns what whitens a residual.
@@ -136,10 +137,12 @@ class Prewhitening:
             huber_delta: residual beyond which rows have less weight: one row that is
                 missed by far says nothing of how rows are correlated.
             settings: greatest order.
+            columns: (rows, channels, k) derivatives that show how fast what may be in
+                the residual changes; None if that is not known.
             fitted: number of parameters that all channels were fitted by.
         """
         bent = residual * huber_weights(residual, huber_delta)
-        cells = _cells(bent, episode, settings)
+        cells = _cells(bent, columns, episode, settings)
         means, of_cell = _means(bent, cells), episode[_begins(cells)]
         most = min(settings.max_ar_order, len(means) // settings.cells_per_ar_order)
         filters = tuple(
@@ -173,27 +176,59 @@ class Prewhitening:
 
 
 def _cells(
-    residual: Array, episode: NDArray[np.int64], settings: SelectionSettings
+    residual: Array,
+    columns: Array | None,
+    episode: NDArray[np.int64],
+    settings: SelectionSettings,
 ) -> NDArray[np.int64]:
     """Returns the cell (rows,) of each row: as long as means keep residuals' power.
 
     A residual that is sampled far more often than it changes is decimated, as is usual
     in the identification of arms (Gautier 1997): else its model is of frequencies
-    at which filters have left nothing.
+    at which filters have left nothing. White noise upon it, a sensor's own, is not
+    worth keeping where what may explain the rest is as slow: no effect is seen by it,
+    and so a verdict does not depend on how often a sensor was read.
     """
     power = np.mean(residual**2, axis=0)
-    used = power > 0.0
+    white = 2.0 * (power - _kept_power(residual, block_numbers(episode, 2)))
+    slow = power - np.clip(white, 0.0, power)
+    is_used, is_slow = power > 0.0, slow > settings.slow_power * power
     best = np.arange(len(episode))
     for length in settings.cell_lengths:
         cells = block_numbers(episode, length)
         if cells[-1] + 1 < settings.min_cells:
             break
-        sizes = np.bincount(cells)[:, None]
-        kept = np.sum(sizes * _means(residual, cells) ** 2, axis=0) / len(residual)
-        if (kept[used] < settings.cell_power * power[used]).any():
-            break
+        kept = _kept_power(residual, cells)
+        is_kept = kept >= settings.cell_power * power
+        if not is_kept[is_used].all():
+            left = kept - (power - slow) / length
+            is_kept = left >= settings.cell_power * slow
+            is_wanted = is_slow.any() and is_kept[is_slow].all()
+            if not (is_wanted and _are_smooth(columns, cells, settings)):
+                break
         best = cells
     return best
+
+
+def _are_smooth(
+    columns: Array | None, cells: NDArray[np.int64], settings: SelectionSettings
+) -> bool:
+    """Returns whether means of cells keep the power of each column."""
+    if columns is None:
+        return False
+    flat = columns.reshape(len(columns), -1)
+    kept, power = (
+        part.reshape(columns.shape[1:]).sum(axis=0)
+        for part in (_kept_power(flat, cells), np.mean(flat**2, axis=0))
+    )
+    return bool((kept >= settings.cell_power * power).all())
+
+
+def _kept_power(values: Array, cells: NDArray[np.int64]) -> Array:
+    """Returns the power (k,) of values (rows, k) whose cells are taken for means."""
+    sizes = np.bincount(cells)[:, None]
+    kept = np.sum(sizes * _means(values, cells) ** 2, axis=0) / len(values)
+    return np.asarray(kept)
 
 
 def _means(values: Array, cells: NDArray[np.int64]) -> Array:

@@ -89,6 +89,14 @@ class SelectionSettings:
         "of a real arm at 200 Hz, filtered at 8 Hz: friction is found in 3 s "
         "(docs/closing-the-loop.md)",
     )
+    slow_power: float = _setting(
+        0.3,
+        "share of a channel's power",
+        "that is not white, for its means to have to keep that alone: of a hundred "
+        "rows of white noise half that much seems slow",
+        "a real arm's torque with white noise of 0.1 and 0.3 N m at 200 and 1000 Hz: "
+        "dry friction of seven joints had p = 1.0, and has 0.005 to 0.009",
+    )
     cell_lengths: tuple[int, ...] = _setting(
         (2, 3, 5, 8, 12, 20, 30, 50, 80, 120, 200),
         "rows",

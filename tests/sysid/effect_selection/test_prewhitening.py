@@ -78,6 +78,30 @@ def test_what_is_sampled_too_often_is_averaged():
     assert kept == pytest.approx(rows / 2000, rel=0.01)
 
 
+@pytest.mark.parametrize("noise", [0.02, 0.7, 1.0])
+def test_a_sensors_white_noise_does_not_keep_rows_from_being_averaged(noise):
+    """Where columns are smooth; in rows that have nothing to do with the next, it does.
+
+    As where a sensor is read at rest in many poses.
+    """
+    random = np.random.default_rng(2)
+    smooth = lfilter(np.hanning(40), [1.0], random.standard_normal((8000, 2)), axis=0)
+    smooth /= smooth.std()
+    columns = np.sin(np.outer(np.arange(8000), [0.01, 0.03]))[:, None].repeat(2, axis=1)
+    one = np.zeros(8000, dtype=np.int64)
+    read = smooth + noise * random.standard_normal((8000, 2))
+
+    def rows(columns):
+        """Returns how many rows a cell has."""
+        found = Prewhitening.of(read, one, np.inf, SelectionSettings(), columns)
+        return 8000 / len(found.episode)
+
+    assert 5 <= rows(columns) <= 20
+    rough = columns + 0.5 * random.standard_normal(columns.shape)
+    assert rows(rough) == rows(None)
+    assert rows(None) == 1 or noise < 0.1
+
+
 def test_columns_are_filtered_as_residuals_are():
     """Linear: what explains a residual explains it after the filter."""
     random = np.random.default_rng(3)
