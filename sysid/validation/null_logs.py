@@ -54,6 +54,16 @@ def autoregressive(rho: float) -> Noise:
     return _draw
 
 
+def both(first: Noise, second: Noise) -> Noise:
+    """Returns the sum of two noises, of equal power: slow errors, and a sensor's."""
+
+    def _draw(random: np.random.Generator, predicted: Array) -> Array:
+        parts = [noise(random, predicted) for noise in (first, second)]
+        return np.asarray(sum(parts) / np.sqrt(2.0))
+
+    return _draw
+
+
 def sieve(residual: Array) -> Noise:
     """Returns noise like a residual (rows, channels): an autoregressive sieve.
 

@@ -54,7 +54,10 @@ MODELS: dict[str, Callable[[Path], LogModel]] = {"static": static, "arm": arm}
 
 
 def noise_of(name: str, model: LogModel) -> null_logs.Noise:
-    """Returns the noise of a name: white, t3, proportional, ar0.9, or sieve."""
+    """Returns the noise of a name: white, t3, proportional, ar0.9, sieve; or of two."""
+    if "+" in name:
+        first, second = (noise_of(part, model) for part in name.split("+", 1))
+        return null_logs.both(first, second)
     plain = {
         "white": null_logs.white,
         "t3": null_logs.heavy_tailed,
@@ -110,7 +113,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("model", choices=MODELS)
     parser.add_argument(
-        "noise", nargs="+", help="white, t3, proportional, ar0.9, sieve"
+        "noise", nargs="+", help="white, t3, proportional, ar0.9, sieve, ar0.98+white"
     )
     parser.add_argument("--logs", type=int, default=200)
     parser.add_argument("--out", type=Path, default=Path("out/null_alarms"))
