@@ -190,21 +190,22 @@ def _cells(
     and so a verdict does not depend on how often a sensor was read.
     """
     power = np.mean(residual**2, axis=0)
+    # Neighbours have in common what is slow; their mean loses half of what is white.
     white = 2.0 * (power - _kept_power(residual, block_numbers(episode, 2)))
-    slow = power - np.clip(white, 0.0, power)
-    is_used, is_slow = power > 0.0, slow > settings.slow_power * power
+    white = np.clip(white, 0.0, power)
+    slow = power - white
+    error = settings.ar_errors * np.sqrt(white * power / len(residual))
+    is_used, is_slow = power > 0.0, slow > error
     best = np.arange(len(episode))
     for length in settings.cell_lengths:
         cells = block_numbers(episode, length)
         if cells[-1] + 1 < settings.min_cells:
             break
         kept = _kept_power(residual, cells)
-        is_kept = kept >= settings.cell_power * power
-        if not is_kept[is_used].all():
-            left = kept - (power - slow) / length
-            is_kept = left >= settings.cell_power * slow
-            is_wanted = is_slow.any() and is_kept[is_slow].all()
-            if not (is_wanted and _are_smooth(columns, cells, settings)):
+        if (kept < settings.cell_power * power)[is_used].any():
+            lost = kept - white / length < settings.cell_power * slow - error
+            all_kept = is_slow.any() and not lost[is_slow].any()
+            if not (all_kept and _are_smooth(columns, cells, settings)):
                 break
         best = cells
     return best
