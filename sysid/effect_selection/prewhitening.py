@@ -137,8 +137,8 @@ class Prewhitening:
             huber_delta: residual beyond which rows have less weight: one row that is
                 missed by far says nothing of how rows are correlated.
             settings: greatest order.
-            columns: (rows, channels, k) derivatives that show how fast what may be in
-                the residual changes; None if that is not known.
+            columns: (rows, channels, k) derivatives by what may be in the residual,
+                which tell how fast that changes; None if that is not known.
             fitted: number of parameters that all channels were fitted by.
         """
         bent = residual * huber_weights(residual, huber_delta)
@@ -185,9 +185,9 @@ def _cells(
 
     A residual that is sampled far more often than it changes is decimated, as is usual
     in the identification of arms (Gautier 1997): else its model is of frequencies
-    at which filters have left nothing. White noise upon it, a sensor's own, is not
-    worth keeping where what may explain the rest is as slow: no effect is seen by it,
-    and so a verdict does not depend on how often a sensor was read.
+    at which filters have left nothing. Where columns are as slow, white noise upon it,
+    a sensor's own, is averaged, too: no autoregressive model of a usual order knows
+    both, and what is slow would pass for an effect.
     """
     power = np.mean(residual**2, axis=0)
     # Neighbours have in common what is slow; their mean loses half of what is white.
@@ -214,15 +214,17 @@ def _cells(
 def _are_smooth(
     columns: Array | None, cells: NDArray[np.int64], settings: SelectionSettings
 ) -> bool:
-    """Returns whether means of cells keep the power of each column."""
+    """Returns whether means of cells keep the power of columns, on average."""
     if columns is None:
         return False
     flat = columns.reshape(len(columns), -1)
     kept, power = (
         part.reshape(columns.shape[1:]).sum(axis=0)
-        for part in (_kept_power(flat, cells), np.mean(flat**2, axis=0))
+        for part in (_kept_power(flat, cells), np.einsum("nk,nk->k", flat, flat))
     )
-    return bool((kept >= settings.cell_power * power).all())
+    used = power > 0.0
+    share = len(flat) * kept[used] / power[used]
+    return bool(used.any() and share.mean() >= settings.cell_power)
 
 
 def _kept_power(values: Array, cells: NDArray[np.int64]) -> Array:

@@ -322,10 +322,11 @@ def _whitened(
         fitter: its settings.
     """
     settings, r = fitter.settings, linearisation.residual
-    J = np.concatenate([linearisation.jacobian, curves], axis=2)[..., known]
+    columns = np.concatenate([linearisation.jacobian, curves], axis=2)
+    J = columns[..., known]
     delta, weights = linearisation.huber_delta, linearisation.weights
     left = r - J @ _least_squares(J, r, weights)
-    filtered = Prewhitening.of(left, episode, delta, settings, J, len(known))
+    filtered = Prewhitening.of(left, episode, delta, settings, columns, len(known))
     few = settings.whitened_per_parameter * len(known)
     for _ in range(settings.whitening_steps):
         whitened = filtered(r)
@@ -333,7 +334,7 @@ def _whitened(
             break
         by = _least_squares(filtered(J), whitened, huber_weights(whitened, delta))
         left = r - J @ by
-        filtered = Prewhitening.of(left, episode, delta, settings, J, len(known))
+        filtered = Prewhitening.of(left, episode, delta, settings, columns, len(known))
     found = filtered.whitened(linearisation)
     most = settings.max_test_blocks
     blocks = blocks_of(filtered(left), filtered.episode, settings, most)
