@@ -196,19 +196,20 @@ def _cells(
     slow = power - white
     error = settings.ar_errors * np.sqrt(white * power / len(residual))
     is_used, is_slow = power > 0.0, slow > error
-    best = np.arange(len(episode))
+    found = [(np.arange(len(episode)), True)]
     for length in settings.cell_lengths:
         cells = block_numbers(episode, length)
         if cells[-1] + 1 < settings.min_cells:
             break
         kept = _kept_power(residual, cells)
-        if (kept < settings.cell_power * power)[is_used].any():
-            lost = kept - white / length < settings.cell_power * slow - error
-            all_kept = is_slow.any() and not lost[is_slow].any()
-            if not (all_kept and _are_smooth(columns, cells, settings)):
-                break
-        best = cells
-    return best
+        is_kept = not (kept < settings.cell_power * power)[is_used].any()
+        lost = kept - white / length < settings.cell_power * slow - error
+        if not is_kept and (lost[is_slow].any() or not is_slow.any()):
+            break
+        found.append((cells, is_kept))
+    while not (found[-1][1] or _are_smooth(columns, found[-1][0], settings)):
+        found.pop()
+    return found[-1][0]
 
 
 def _are_smooth(
@@ -217,13 +218,13 @@ def _are_smooth(
     """Returns whether means of cells keep the power of columns, on average."""
     if columns is None:
         return False
-    flat = columns.reshape(len(columns), -1)
-    kept, power = (
-        part.reshape(columns.shape[1:]).sum(axis=0)
-        for part in (_kept_power(flat, cells), np.einsum("nk,nk->k", flat, flat))
-    )
+    kept, power = np.zeros((2, columns.shape[2]))
+    for channel in range(columns.shape[1]):  # one at a time: of hundreds of columns
+        own = columns[:, channel]
+        kept += _kept_power(own, cells)
+        power += np.einsum("nk,nk->k", own, own) / len(own)
     used = power > 0.0
-    share = len(flat) * kept[used] / power[used]
+    share = kept[used] / power[used]
     return bool(used.any() and share.mean() >= settings.cell_power)
 
 
