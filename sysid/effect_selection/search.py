@@ -2,6 +2,7 @@
 
 import abc
 import dataclasses
+import itertools
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -275,13 +276,11 @@ class LinearSearch(ForwardSearch):
         What was chosen while others were missing may have stood for those in part, or
         for two of them. What has been exchanged does not come back in this way.
         """
-        present: dict[tuple[str, ...], Candidate] = {
-            (effect.name,): effect for effect in fit.effects
-        }
         for number, past in enumerate(self._rounds):
-            effect = present.get(past.chosen.effects)
-            if effect is None or self._is_over:
+            added = [e for e in fit.effects if (e.name,) == past.chosen.effects]
+            if not added or self._is_over:
                 continue
+            (effect,) = added
             self._report(f"{effect.name}: comparing it with what could be in its place")
             without = self._fit_without(fit, effect)
             survey = self._survey(without, self._whole_library)
@@ -289,19 +288,71 @@ class LinearSearch(ForwardSearch):
             if own is None:
                 continue
             rivals = linear_rivals(own, survey, [])
-            self._rounds[number] = dataclasses.replace(past, ties=ties(own, rivals))
+            past = dataclasses.replace(past, ties=ties(own, rivals))
+            self._rounds[number] = past
             trial = self._simplest(own, survey)
             if trial is own:
                 continue
             found = self._fit_chosen(without, survey, trial)
-            share = self._settings.tie_parsimony_tolerance
-            enough = fit.loss + share * (without.loss - fit.loss)
-            if found.loss <= enough and self._is_confirmed(without, found, trial):
-                self._replaced.add(own.effects)
-                del self._rounds[number]
-                self._record(trial, ties(trial, rivals), survey, found)
+            if self._is_as_good(fit, without, found, trial):
+                self._replace([past], trial, ties(trial, rivals), survey, found)
                 return found
+        return self._united(fit)
+
+    def _united(self, fit: Fit) -> Fit | None:
+        """Returns the fit with one effect in place of several that it is a rival of.
+
+        Several may stand for one that is missing: ripples of two joints, that were
+        chosen as a group or one by one, for the torque of one that comes late.
+        """
+        have = {effect.name for effect in fit.effects}
+        alone = [past for past in self._rounds if len(_present(past, fit)) == 1]
+        groups = [(past,) for past in self._rounds if len(_present(past, fit)) > 1]
+        for rounds in [*groups, *itertools.combinations(alone, 2)]:
+            gone = [name for past in rounds for name in _present(past, fit)]
+            shared = set.intersection(*({e.effects for e in r.ties} for r in rounds))
+            shared = {
+                names
+                for names in shared - self._replaced
+                if len(names) < len(gone) and not have & {*names}
+            }
+            if not shared or self._is_over:
+                continue
+            self._report(
+                f"{' and '.join(gone)}: comparing them with one in their place"
+            )
+            kept = tuple(effect for effect in fit.effects if effect.name not in gone)
+            without = self.fitter.fit(kept, fit)
+            survey = self._survey(without, self._whole_library)
+            accepted = [e for e in survey.effects if e.accepted]
+            for trial in trials(accepted, len(accepted)):
+                if trial.effects not in shared:
+                    continue
+                found = self._fit_chosen(without, survey, trial)
+                if self._is_as_good(fit, without, found, trial):
+                    rivals = linear_rivals(trial, survey, [])
+                    self._replace(rounds, trial, ties(trial, rivals), survey, found)
+                    return found
         return None
+
+    def _is_as_good(self, fit: Fit, without: Fit, found: Fit, trial: Evidence) -> bool:
+        """Returns whether what is in another's place explains nearly as much."""
+        share = self._settings.tie_parsimony_tolerance
+        enough = fit.loss + share * (without.loss - fit.loss)
+        return found.loss <= enough and self._is_confirmed(without, found, trial)
+
+    def _replace(
+        self,
+        gone: Sequence[SelectionRound],
+        trial: Evidence,
+        others: Sequence[Evidence],
+        survey: Survey,
+        found: Fit,
+    ) -> None:
+        """Keeps what has taken the place of what some rounds added."""
+        self._replaced |= {past.chosen.effects for past in gone}
+        self._rounds = [r for r in self._rounds if not any(r is past for past in gone)]
+        self._record(trial, others, survey, found)
 
     def _is_confirmed(self, before: Fit, after: Fit, trial: Evidence) -> bool:
         """Returns whether it is better, of rows to which nothing is fitted, too."""
@@ -321,6 +372,11 @@ class LinearSearch(ForwardSearch):
             if e.effects not in known and not set(own.effects) <= set(e.effects)
         ]
         return most_parsimonious(sorted([own, *others], key=lambda e: -e.gain))
+
+
+def _present(past: SelectionRound, fit: Fit) -> list[str]:
+    """Returns the names of what a round added that a fit still has."""
+    return [e.name for e in fit.effects if e.name in past.chosen.effects]
 
 
 def trials(accepted: Sequence[Evidence], count: int) -> list[Evidence]:

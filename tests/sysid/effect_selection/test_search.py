@@ -1,5 +1,6 @@
 """Once all effects are there, each is compared with what could be in its place."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,9 +8,11 @@ import pytest
 
 from drake_disasm.effects import (
     JointCoupling,
+    JointDelay,
     JointElasticity,
     JointViscousFriction,
     TorqueGain,
+    TorqueRipple,
 )
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence
@@ -24,6 +27,8 @@ _COUPLING, _NEXT_RUBS = (
     Candidate.of(JointCoupling(joint="j1")),
     Candidate.of(JointViscousFriction(joint="j2")),
 )
+_DELAY = Candidate.of(JointDelay(joint="j1"))
+_BOTH_RIPPLES = tuple(Candidate.of(TorqueRipple(joint=j)) for j in ("j1", "j2"))
 _SCATTER = np.random.default_rng(0).normal(size=40)
 
 
@@ -107,3 +112,34 @@ def test_what_stood_for_two_simpler_effects_makes_room_for_both():
     back = _Search([both, coupling], 10.0)
     back._replaced = search._replaced
     assert back._simplest(both, back._survey(None)) is both
+
+
+class _Ripples(_Search):
+    """Has ripples of two joints, chosen as a group, and a survey without them."""
+
+    def __init__(self, evidence, loss, ties):
+        super().__init__([_evidence(_BOTH_RIPPLES, 0.5, 0.0)], loss)
+        self._found = evidence
+        self._rounds = [dataclasses.replace(self._rounds[0], ties=tuple(ties))]
+        self.fitter.fit = lambda kept, fit: _fit(kept, 20.0)
+
+
+@pytest.mark.parametrize(("loss", "is_as_good"), [(10.9, True), (11.1, False)])
+def test_one_effect_takes_the_place_of_a_group_that_stood_for_it(loss, is_as_good):
+    """If it explains nearly as much: a tenth of what the group takes off is given."""
+    delay = _evidence((_DELAY,), 0.49, 0.0)
+    search = _Ripples([delay], loss, [delay])
+    found = search._exchanged(_fit((_RUBS, *_BOTH_RIPPLES), 10.0))
+    assert (found is not None) == is_as_good
+    (recorded,) = search._rounds
+    if is_as_good:
+        assert found.effects == (_RUBS, _DELAY) and recorded.chosen is delay
+        assert search._exchanged(_fit(found.effects, loss)) is None
+
+
+def test_what_is_no_rival_of_a_group_does_not_take_its_place():
+    delay, gain = _evidence((_DELAY,), 0.49, 0.0), _evidence((_GAIN,), 0.3, 0.0)
+    search = _Ripples([delay, gain], 10.0, [gain])
+    search._fit_chosen = lambda fit, survey, chosen: _fit(chosen.candidates, 15.0)
+    assert search._exchanged(_fit((_RUBS, *_BOTH_RIPPLES), 10.0)) is None
+    assert search._rounds[0].chosen.candidates == _BOTH_RIPPLES
