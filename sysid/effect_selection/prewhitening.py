@@ -215,7 +215,11 @@ def _cells(
 def _are_smooth(
     columns: Array | None, cells: NDArray[np.int64], settings: SelectionSettings
 ) -> bool:
-    """Returns whether means of cells keep the power of columns, on average."""
+    """Returns whether means of cells keep the power of columns: of nearly all of them.
+
+    Some of a whole library may be faster: friction that falls with speed within a
+    moment of a reversal.
+    """
     if columns is None:
         return False
     kept, power = np.zeros((2, columns.shape[2]))
@@ -225,7 +229,8 @@ def _are_smooth(
         power += np.einsum("nk,nk->k", own, own) / len(own)
     used = power > 0.0
     share = kept[used] / power[used]
-    return bool(used.any() and share.mean() >= settings.cell_power)
+    is_kept = share >= settings.cell_power
+    return bool(used.any() and is_kept.mean() >= settings.cell_power)
 
 
 def _kept_power(values: Array, cells: NDArray[np.int64]) -> Array:
