@@ -3,6 +3,8 @@
 import argparse
 import importlib.metadata
 import math
+import os
+import select
 import signal
 import subprocess
 import sys
@@ -21,6 +23,7 @@ from drake_disasm.common.progress import ProgressUpdate
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
+EXIT_UNREAD = 141
 EXIT_TERMINATED = 143
 
 _LINE_PERIOD = 30.0  # s, between lines of progress where stderr is no terminal
@@ -79,7 +82,15 @@ def _one_line_for_ours(usual: Callable[..., str]) -> Callable[..., str]:
 def status(main: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> int:
     """Returns the exit status of a program's main; errors are told on stderr."""
     try:
-        return main(arguments)
+        found = main(arguments)
+        sys.stdout.flush()
+        return found
+    except BrokenPipeError:
+        if not _is_unread(sys.stdout.fileno()):
+            raise
+        # Whoever read it has seen enough (`| head`). At exit Python would flush again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_UNREAD
     except DisasmError as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_BAD_INPUT
@@ -89,6 +100,13 @@ def status(main: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> in
     except KeyboardInterrupt:
         print("interrupted; what was finished is kept", file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def _is_unread(descriptor: int) -> bool:
+    """Returns whether a stream's other end is closed."""
+    poll = select.poll()
+    poll.register(descriptor, 0)
+    return any(event & select.POLLERR for _, event in poll.poll(0))
 
 
 class _Parser(argparse.ArgumentParser):

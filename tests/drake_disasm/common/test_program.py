@@ -1,15 +1,28 @@
 """Progress of library calls on the terminal, and how a program is ended."""
 
 import math
+import os
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 
 import pytest
 
 from drake_disasm.common import program
 from drake_disasm.common.program import ProgressBar
 from drake_disasm.common.progress import ProgressUpdate
+
+_PRINTS = """
+from drake_disasm.common import program
+
+def main(arguments):
+    for number in range(100_000):
+        print(number)
+    return 0
+
+program.run(main)
+"""
 
 
 @pytest.fixture
@@ -102,3 +115,30 @@ def test_a_program_that_is_stopped_tidies_up_and_says_so(
     assert process.returncode == status
     assert output == "tidied up\n"
     assert errors == f"{words}; what was finished is kept\n"
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_program_whose_output_nobody_reads_any_more_ends_quietly(
+    unbuffered: str,
+) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", _PRINTS],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
+    )
+    assert process.stdout and process.stderr
+    assert process.stdout.readline() == "0\n"
+    process.stdout.close()
+    assert process.wait() == 141
+    assert process.stderr.read() == ""
+
+
+def test_another_broken_pipe_is_an_error(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(BrokenPipeError, match="a worker's"):
+        program.status(_breaks, [])
+
+
+def _breaks(_: Sequence[str]) -> int:
+    raise BrokenPipeError("a worker's")
