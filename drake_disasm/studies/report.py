@@ -51,7 +51,7 @@ def write_report(study: Study, folder: Path, origin: Mapping[str, Any]) -> list[
     for kind in _FORMATS:
         text = _ENVIRONMENT.get_template(f"report.{kind}.j2").render(
             study=study,
-            own=study.options.provenance,
+            own=study.options.provenance or origin,
             origin=origin,
             machine=_machine(),
             tables=[*tables, everything],

@@ -325,9 +325,8 @@ class LinearSearch(ForwardSearch):
             without = self.fitter.fit(kept, fit)
             survey = self._survey(without, self._whole_library)
             accepted = [e for e in survey.effects if e.accepted]
-            for trial in trials(accepted, len(accepted)):
-                if trial.effects not in shared:
-                    continue
+            tried = trials(accepted, len(accepted))
+            for trial in (each for each in tried if each.effects in shared):
                 found = self._fit_chosen(without, survey, trial)
                 if self._is_as_good(fit, without, found, trial):
                     rivals = linear_rivals(trial, survey, [])

@@ -103,12 +103,7 @@ program.run(main)
 def test_a_program_that_is_stopped_tidies_up_and_says_so(
     number: signal.Signals, status: int, words: str
 ) -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-c", RUNS_UNTIL_STOPPED],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = _started(RUNS_UNTIL_STOPPED)
     assert process.stdout and process.stdout.readline() == "begun\n"
     process.send_signal(number)
     output, errors = process.communicate()
@@ -121,13 +116,7 @@ def test_a_program_that_is_stopped_tidies_up_and_says_so(
 def test_a_program_whose_output_nobody_reads_any_more_ends_quietly(
     unbuffered: str,
 ) -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-c", _PRINTS],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
-    )
+    process = _started(_PRINTS, PYTHONUNBUFFERED=unbuffered)
     assert process.stdout and process.stderr
     assert process.stdout.readline() == "0\n"
     process.stdout.close()
@@ -142,3 +131,14 @@ def test_another_broken_pipe_is_an_error(capfd: pytest.CaptureFixture[str]) -> N
 
 def _breaks(_: Sequence[str]) -> int:
     raise BrokenPipeError("a worker's")
+
+
+def _started(code: str, **environment: str) -> subprocess.Popen[str]:
+    """Returns a process of Python that runs some code."""
+    return subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | environment,
+    )

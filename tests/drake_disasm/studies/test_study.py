@@ -136,6 +136,8 @@ def test_a_report_says_which_command_it_is_of_and_which_began_the_folder(
         head = text[: text.index("Every seed")]
         assert head.index(own["command"]) < head.index("Commit def, now")
         assert "begun at commit abc, today, by" in head
+    write_report(small_precision(provenance={}), done, _ORIGIN)
+    assert "Commit abc" in (done / "report.md").read_text()
     write_report(small_precision(), done, _ORIGIN)
     assert "begun" not in (done / "report.md").read_text()
 
