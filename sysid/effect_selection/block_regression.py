@@ -77,19 +77,23 @@ class BlockRegression:
         """
         if extra is None:
             extra = np.zeros((*linearisation.residual.shape, 0))
-        order = np.argsort(blocks, kind="stable")
-        A = np.concatenate([linearisation.jacobian, extra], axis=2)[order]
-        scale = np.maximum(np.sqrt(np.mean(A**2, axis=(0, 1))), 1e-300)
-        A /= scale
+        A = np.concatenate([linearisation.jacobian, extra], axis=2)
+        r = linearisation.residual
+        if (np.diff(blocks) < 0).any():  # else there is no need of a copy of all
+            order = np.argsort(blocks, kind="stable")
+            A, r, blocks = A[order], r[order], blocks[order]
         rows, channels, count = A.shape
-        r = linearisation.residual[order].reshape(-1)
+        power = np.einsum("rcp,rcp->p", A, A) / max(rows * channels, 1)
+        scale = np.maximum(np.sqrt(power), 1e-300)
+        A /= scale
+        r = r.reshape(-1)
         side = (linearisation.u < _AT_BOUND).astype(float) - (
             linearisation.u > 1.0 - _AT_BOUND
         )
         return cls(
             A.reshape(rows * channels, count),
             r,
-            np.unique(blocks[order], return_index=True)[1] * channels,
+            np.unique(blocks, return_index=True)[1] * channels,
             scale,
             np.append(side, np.zeros(extra.shape[2])),
             channels,
@@ -140,7 +144,8 @@ class BlockRegression:
         H = (own.T @ weighted)[None]
         K = _solve(H, (weighted.T @ self.A)[None])[0]
         phi = -_solve(H, (weighted.T @ self.r)[None])[0]
-        projected = self.A - own @ K
+        projected = own @ K
+        np.subtract(self.A, projected, out=projected)  # of hundreds of columns
         left, size = (np.einsum("np,np->p", A, A) for A in (projected, self.A))
         projected *= left > self.settings.min_new_column**2 * size
         r = self.r + own @ phi

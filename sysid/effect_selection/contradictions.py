@@ -48,9 +48,9 @@ def contradictions(
     if not 1 < len(names) <= most or _is_noise(fit):
         return ()
     numbers = range(len(names)) if len(names) > 2 else [1]
-    found = []
+    found, raw = [], survey.raw()
     for number in numbers:
-        best = _difference(fit, survey, own, number, len(numbers))
+        best = _difference(fit, survey, raw, own, number, len(numbers))
         if best:
             which = (names[number],) if len(names) > 2 else names
             found.append(Contradiction(which, *best))
@@ -63,7 +63,12 @@ def _is_noise(fit: Fit) -> bool:
 
 
 def _difference(
-    fit: Fit, survey: LinearSurvey, own: int, number: int, tests: int
+    fit: Fit,
+    survey: LinearSurvey,
+    raw: BlockRegression,
+    own: int,
+    number: int,
+    tests: int,
 ) -> tuple[str, float] | None:
     """Returns what differs in an episode and how much that explains; else None.
 
@@ -72,8 +77,8 @@ def _difference(
     if its rows weigh little in a fit. (Rows that are missed by far in every episode are
     no contradiction.)
     """
-    limits, size, begin = fit.settings, len(survey.fields), len(survey.raw.scale)
-    both = survey.raw.with_own_parameters(survey.episodes == number, size)
+    limits, size, begin = fit.settings, len(survey.fields), len(raw.scale)
+    both = raw.with_own_parameters(survey.episodes == number, size)
     regression = both.project_out(np.arange(len(fit.theta)))
     sets = [(text, columns) for text, columns in survey.groups.items() if len(columns)]
     sets += [(e.text, fit.columns_of(e)) for e in fit.effects]

@@ -89,7 +89,7 @@ def _limits(
 
 def _in_unit_box(survey: LinearSurvey, group: Columns, critical: float) -> Array:
     """Returns what of parameters' ranges (k,) is found; infinite if none is."""
-    raw, settings = survey.regression, survey.raw.settings
+    raw, settings = survey.regression, survey.settings
     with np.errstate(divide="ignore"):
         power = np.sum(raw.A[:, group] ** 2, axis=0)
         of_use = np.sqrt(settings.min_gain * raw.block_losses.sum() / power)
@@ -108,7 +108,7 @@ def _certain(survey: LinearSurvey, group: Columns, critical: float) -> Array:
 
 def _by_blocks(survey: LinearSurvey, group: Columns, critical: float) -> Array:
     """Returns what of parameters' ranges (k,) the blocks' signs tell from chance."""
-    whitened, settings = survey.whitened, survey.raw.settings
+    whitened, settings = survey.whitened, survey.settings
     if whitened.least_p(group) >= settings.alpha:
         return np.full(len(group), np.inf)
     length = _needed(critical, len(group), settings)
@@ -118,7 +118,7 @@ def _by_blocks(survey: LinearSurvey, group: Columns, critical: float) -> Array:
 
 def _beyond_noise(survey: LinearSurvey, group: Columns) -> Array:
     """Returns what of parameters' ranges (k,) exceeds noise and error as stated."""
-    settings, linear = survey.raw.settings, survey.linearisation
+    settings, linear = survey.settings, survey.linearisation
     J = np.sqrt(linear.weights)[..., None] * linear.jacobian[..., group]
     size = np.sqrt(np.einsum("nck,nck->k", J, J))
     alpha = settings.alpha / len(survey.groups)

@@ -114,7 +114,7 @@ class Fit:
         linear, settings = self.linearisation, self.settings
         episode = self.model.measurements.episode
         return Prewhitening.of(
-            linear.residual, episode, linear.huber_delta, settings, linear.jacobian
+            linear.residual, episode, linear.huber_delta, settings, [linear.jacobian]
         )
 
     @property

@@ -126,7 +126,7 @@ class Prewhitening:
         episode: NDArray[np.int64],
         huber_delta: float,
         settings: SelectionSettings,
-        columns: Array | None = None,
+        columns: Sequence[Array] = (),
         fitted: int = 0,
     ) -> Self:
         """Returns what whitens a residual.
@@ -137,8 +137,8 @@ class Prewhitening:
             huber_delta: residual beyond which rows have less weight: one row that is
                 missed by far says nothing of how rows are correlated.
             settings: greatest order.
-            columns: (rows, channels, k) derivatives by what may be in the residual,
-                which tell how fast that changes; None if that is not known.
+            columns: (rows, channels, k) each, derivatives by what may be in the
+                residual, which tell how fast that changes; none if it is not known.
             fitted: number of parameters that all channels were fitted by.
         """
         bent = residual * huber_weights(residual, huber_delta)
@@ -177,7 +177,7 @@ class Prewhitening:
 
 def _cells(
     residual: Array,
-    columns: Array | None,
+    columns: Sequence[Array],
     episode: NDArray[np.int64],
     settings: SelectionSettings,
 ) -> NDArray[np.int64]:
@@ -213,24 +213,31 @@ def _cells(
 
 
 def _are_smooth(
-    columns: Array | None, cells: NDArray[np.int64], settings: SelectionSettings
+    columns: Sequence[Array], cells: NDArray[np.int64], settings: SelectionSettings
 ) -> bool:
     """Returns whether means of cells keep the power of columns: of nearly all of them.
 
     Some of a whole library may be faster: friction that falls with speed within a
     moment of a reversal.
     """
-    if columns is None:
+    if not columns:
         return False
+    parts = [_kept_and_power(each, cells) for each in columns]
+    kept, power = np.concatenate(parts, axis=1)
+    used = power > 0.0
+    share = kept[used] / power[used]
+    is_kept = share >= settings.cell_power
+    return bool(used.any() and is_kept.mean() >= settings.cell_power)
+
+
+def _kept_and_power(columns: Array, cells: NDArray[np.int64]) -> Array:
+    """Returns the power (2, k) of columns (rows, channels, k), in means and in all."""
     kept, power = np.zeros((2, columns.shape[2]))
     for channel in range(columns.shape[1]):  # one at a time: of hundreds of columns
         own = columns[:, channel]
         kept += _kept_power(own, cells)
         power += np.einsum("nk,nk->k", own, own) / len(own)
-    used = power > 0.0
-    share = kept[used] / power[used]
-    is_kept = share >= settings.cell_power
-    return bool(used.any() and is_kept.mean() >= settings.cell_power)
+    return np.stack([kept, power])
 
 
 def _kept_power(values: Array, cells: NDArray[np.int64]) -> Array:

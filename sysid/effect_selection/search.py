@@ -88,15 +88,18 @@ class ForwardSearch(abc.ABC):
         fit = first = self.fitter.fit((), known.first if known else None)
         self._report_fit("without effects", first)
         self._report(f"testing {len(self.library)} candidates")
-        survey = begin = self._survey(first)
+        survey = self._survey(first)
+        begin = survey.record()
         if known and known.rounds:
             fit = self._all_rows_of(known)
+            del survey  # one at a time: each has hundreds of columns
             survey = self._survey(fit)
         while not self._is_over:
             found = self._next(fit, survey) or self._exchanged(fit)
             if found is None:
                 break
             fit = self._without_misshapen(found)
+            del survey
             survey = self._survey(fit)
         rounds, is_complete = tuple(self._rounds), not self._is_over
         return SearchResult(first, fit, begin, survey, rounds, is_complete)

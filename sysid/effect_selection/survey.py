@@ -25,6 +25,7 @@ from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.prewhitening import Prewhitening
 from sysid.effect_selection.residual_curves import Dependence, dependence_curves
+from sysid.effect_selection.settings import SelectionSettings
 from sysid.identification.linearisation import Linearisation, extend
 from sysid.models.base import LogModel
 from sysid.objective import huber_weights
@@ -40,9 +41,11 @@ class LinearSurvey:
     Attributes:
         linearisation: at the fit, with the candidates' amplitudes as parameters.
         parameters: of the fit and of the candidates.
-        raw: the regression of the fit's and the candidates' parameters.
-        regression: the same with the fit's parameters projected out.
+        regression: of the candidates' parameters, by blocks, with the fit's projected
+            out.
         whitened: the same of the prewhitened residual, by short blocks.
+        blocks: (rows,) number of each row's block.
+        curves: (rows, channels, k) columns of dependence curves.
         groups: columns of each candidate, by its text; none of one that looks like
             another shape of the same effect.
         dependences: curves, and the columns of each.
@@ -55,15 +58,26 @@ class LinearSurvey:
 
     linearisation: Linearisation
     parameters: tuple[Parameter, ...]
-    raw: BlockRegression
     regression: BlockRegression
     whitened: BlockRegression
+    blocks: NDArray[np.int64]
+    curves: Array
     groups: Mapping[str, Columns]
     dependences: Sequence[tuple[Dependence, Columns]]
     episodes: NDArray[np.int64]
     is_further: bool
     noise_decides: bool
     model_error_share: Array | None
+
+    @property
+    def settings(self) -> SelectionSettings:
+        """Thresholds."""
+        return self.regression.settings
+
+    def raw(self) -> BlockRegression:
+        """Returns the regression of the fit's and the candidates' parameters."""
+        linear = self.linearisation
+        return BlockRegression.of(linear, self.blocks, self.settings, self.curves)
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -93,7 +107,7 @@ class LinearSurvey:
         for one in singles:
             if len(one.candidates) == 1:
                 promising.setdefault(one.candidates[0].name, one.candidates[0])
-        best = list(promising.values())[: self.regression.settings.pair_pool]
+        best = list(promising.values())[: self.settings.pair_pool]
         pairs = list(itertools.combinations(best, 2))
         tests = math.comb(len(promising), 2) / max(1, len(pairs))
         found = self._ranked(self._columns(pairs))
@@ -108,7 +122,7 @@ class LinearSurvey:
 
         Backward elimination: the amplitude that is missed least goes, one by one.
         """
-        tolerance = 1.0 + self.regression.settings.min_amplitude_gain
+        tolerance = 1.0 + self.settings.min_amplitude_gain
         kept = [int(c) for candidate in added for c in self.groups[candidate.text]]
         now = self._held_out_loss(kept)
         while len(kept) > 1:
@@ -248,10 +262,10 @@ def _linear_survey(fitter: Fitter, fit: Fit, tested: _Tested) -> LinearSurvey:
     episode = model.measurements.episode
     curves, dependences = dependence_curves(model, fitter.settings)
     blocks = blocks_of(linearisation.residual, episode, fitter.settings)
-    raw = BlockRegression.of(linearisation, blocks, fitter.settings, curves)
     columns = _distinct(library, tested.groups, linearisation.jacobian)
     of_curves = [(d, begin + np.array(d.columns, np.int64)) for d in dependences]
-    regression = raw.project_out(np.arange(count))
+    regression = BlockRegression.of(linearisation, blocks, fitter.settings, curves)
+    regression = regression.project_out(np.arange(count))
     sets = [columns[c.text] for c in library] + [c for _, c in of_curves]
     sets += [_of_group(group, columns) for group in joint_groups(library)]
     best = regression.best_of([group for group in sets if len(group)])
@@ -260,9 +274,10 @@ def _linear_survey(fitter: Fitter, fit: Fit, tested: _Tested) -> LinearSurvey:
     return LinearSurvey(
         linearisation,
         model.parameters,
-        raw,
         regression,
         whitened,
+        blocks,
+        curves,
         columns,
         of_curves,
         episode[np.unique(blocks, return_index=True)[1]],
@@ -283,7 +298,8 @@ def _distinct(
     found = dict[str, Columns]()
     shapes: dict[str, list[Array]] = {}
     for candidate, group in zip(library, groups, strict=True):
-        own, seen = jacobian[..., group], shapes.setdefault(candidate.name, [])
+        own = jacobian[..., group.start : group.stop]
+        seen = shapes.setdefault(candidate.name, [])
         adds = not seen or (own.any() and not any(np.array_equal(own, s) for s in seen))
         columns = group if adds else range(0)
         found[candidate.text] = np.array(columns, dtype=np.int64)
@@ -300,6 +316,16 @@ def _least_squares(J: Array, r: Array, weights: Array) -> Array:
     root = np.sqrt(weights)
     a, b = (root[..., None] * J).reshape(r.size, J.shape[2]), (root * r).reshape(-1)
     return np.asarray(np.linalg.lstsq(a, b, rcond=None)[0])
+
+
+def _of_both(first: Array, second: Array, columns: Columns) -> Array:
+    """Returns columns (rows, channels, k) of two arrays as if they were one."""
+    found = np.empty((*first.shape[:2], len(columns)))
+    count = first.shape[2]
+    is_first = columns < count
+    found[..., is_first] = first[..., columns[is_first]]
+    found[..., ~is_first] = second[..., columns[~is_first] - count]
+    return found
 
 
 def _whitened(
@@ -322,8 +348,8 @@ def _whitened(
         fitter: its settings.
     """
     settings, r = fitter.settings, linearisation.residual
-    columns = np.concatenate([linearisation.jacobian, curves], axis=2)
-    J = columns[..., known]
+    columns = (linearisation.jacobian, curves)
+    J = _of_both(*columns, known)
     delta, weights = linearisation.huber_delta, linearisation.weights
     left = r - J @ _least_squares(J, r, weights)
     filtered = Prewhitening.of(left, episode, delta, settings, columns, len(known))

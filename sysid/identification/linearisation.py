@@ -59,6 +59,8 @@ class Linearisation:
 
     def of_first(self, count: int) -> "Linearisation":
         """Returns the same of the first parameters alone."""
+        if count == len(self.u):
+            return self
         jacobian = self.jacobian[..., :count]
         return dataclasses.replace(self, u=self.u[:count], jacobian=jacobian)
 
@@ -124,19 +126,20 @@ def extend(
     points[:, known:] += np.diag(way)
     source, origin = objective.differences, linearisation.residual
     at_origin = u[None] if source is not objective else u[None][:0]
-    found: list[Array] = []
+    rows, channels, _ = linearisation.jacobian.shape
+    jacobian = np.empty((rows, channels, len(u)))  # once: of hundreds of columns
+    jacobian[..., :known] = linearisation.jacobian
+    done = known
     size = max(_BETWEEN_LOOKS, source.model.together)
     for part in parts_until(deadline, len(points), size):
         together = np.vstack([points[part], at_origin])
-        found += source.residuals(objective.scaling.from_unit(together))
+        found = list(source.residuals(objective.scaling.from_unit(together)))
         if len(at_origin):
             origin = found.pop()
-    columns = [(r - origin) / w for r, w in zip(found, way, strict=False)]
-    jacobian = np.concatenate(
-        [linearisation.jacobian, np.stack(columns, axis=-1)], axis=-1
-    )
-    u = u[: known + len(columns)]
-    return dataclasses.replace(linearisation, u=u, jacobian=jacobian)
+        for residual in found:
+            jacobian[..., done] = (residual - origin) / way[done - known]
+            done += 1
+    return dataclasses.replace(linearisation, u=u, jacobian=jacobian).of_first(done)
 
 
 def _first_steps(parameters: Sequence[Parameter]) -> Array:

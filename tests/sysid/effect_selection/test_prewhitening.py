@@ -91,15 +91,15 @@ def test_a_sensors_white_noise_does_not_keep_rows_from_being_averaged(noise):
     one = np.zeros(8000, dtype=np.int64)
     read = smooth + noise * random.standard_normal((8000, 2))
 
-    def rows(columns):
+    def rows(*columns):
         """Returns how many rows a cell has."""
         found = Prewhitening.of(read, one, np.inf, SelectionSettings(), columns)
         return 8000 / len(found.episode)
 
     assert 5 <= rows(columns) <= 20
     rough = columns + 0.5 * random.standard_normal(columns.shape)
-    assert rows(rough) == rows(None)
-    assert rows(None) == 1 or noise < 0.1
+    assert rows(rough) == rows()
+    assert rows() == 1 or noise < 0.1
 
 
 def test_columns_are_filtered_as_residuals_are():
