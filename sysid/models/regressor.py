@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,30 +123,32 @@ class ArmDynamics:
 
     def _links(self, q: Array, v: Array, vd: Array) -> "list[_LinkMotion]":
         """Returns how each link moves in states (n, joints)."""
-        parts = [self._at(*state) for state in zip(q, v, vd, strict=True)]
-        return [
-            _LinkMotion(*(np.array([row[i][k] for row in parts]) for k in range(5)))
-            for i in range(len(self._bodies))
-        ]
+        velocities = self._plant.num_velocities()
+        found = [_LinkMotion.empty(len(q), velocities) for _ in self._bodies]
+        for row, state in enumerate(zip(q, v, vd, strict=True)):
+            self._put(found, row, *state)
+        return found
 
-    def _at(self, q: Array, v: Array, vd: Array) -> list[tuple[Array, ...]]:
-        """Returns each link's J, R_WB, w, alpha and a in one state (joints,)."""
+    def _put(
+        self, links: "list[_LinkMotion]", row: int, q: Array, v: Array, vd: Array
+    ) -> None:
+        """Puts into a row of links' motions what they are in one state (joints,)."""
         plant, context = self._plant, self._context
         vdot = self._set_state(q, v, vd)
         A_W = plant.CalcSpatialAccelerationsFromVdot(context, vdot)
         g_W = plant.gravity_field().gravity_vector()
-        found: list[tuple[Array, ...]] = []
         zero, world = np.zeros(3), plant.world_frame()
-        for body in self._bodies:
+        for link, body in zip(links, self._bodies, strict=True):
             R_WB = plant.EvalBodyPoseInWorld(context, body).rotation().matrix()
             w_W = plant.EvalBodySpatialVelocityInWorld(context, body).rotational()
             A_WB, frame = A_W[int(body.index())], body.body_frame()
-            J = plant.CalcJacobianSpatialVelocity(
+            link.J[row] = plant.CalcJacobianSpatialVelocity(
                 context, JacobianWrtVariable.kV, frame, zero, world, frame
             )
-            alpha_B, a_B = A_WB.rotational() @ R_WB, (A_WB.translational() - g_W) @ R_WB
-            found.append((J, R_WB, w_W @ R_WB, alpha_B, a_B))
-        return found
+            link.R_WB[row] = R_WB
+            link.w[row] = w_W @ R_WB
+            link.alpha[row] = A_WB.rotational() @ R_WB
+            link.a[row] = (A_WB.translational() - g_W) @ R_WB
 
     def _set_state(self, q: Array, v: Array, vd: Array) -> Array:
         """Sets one state (joints,), and returns all the plant's accelerations."""
@@ -172,6 +175,12 @@ class _LinkMotion:
     w: Array
     alpha: Array
     a: Array
+
+    @classmethod
+    def empty(cls, count: int, velocities: int) -> Self:
+        """Returns room for `count` states of an arm with so many velocities."""
+        shapes = (6, velocities), (3, 3), (3,), (3,), (3,)
+        return cls(*(np.empty((count, *shape)) for shape in shapes))
 
     def to_joints(self, of_body: Array) -> Array:
         """Returns a regressor (n, 6, 10) of [tau; f] as (n, velocities, 10)."""
