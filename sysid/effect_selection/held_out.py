@@ -210,12 +210,14 @@ def _linear_residual(fit: Fit, folds: NDArray[np.int64]) -> Array:
     linearisation = fit.linearisation
     residual = linearisation.residual.copy()
     root = np.sqrt(linearisation.weights)
-    J, r = root[..., None] * linearisation.jacobian, root * linearisation.residual
-    channels = r.shape[1]
-    for fold in range(int(folds.max()) + 1):
-        own = folds == fold
-        A = J[~own].reshape((~own).sum() * channels, len(linearisation.u))
-        b = r[~own].reshape(-1)
+    both = np.concatenate([linearisation.jacobian, residual[..., None]], axis=2)
+    both *= root[..., None]
+    rows = [folds == fold for fold in range(int(folds.max()) + 1)]
+    # Least squares of all rows are those of each fold's triangular factor.
+    parts = [np.linalg.qr(both[own].reshape(-1, both.shape[2]), "r") for own in rows]
+    for fold, own in enumerate(rows):
+        others = np.concatenate([*parts[:fold], *parts[fold + 1 :]])
+        A, b = others[:, :-1], others[:, -1]
         step = -np.linalg.lstsq(A, b, rcond=fit.settings.held_out_rcond)[0]
         step = np.clip(linearisation.u + step, 0.0, 1.0) - linearisation.u
         residual[own] += linearisation.jacobian[own] @ step

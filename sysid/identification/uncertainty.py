@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import correlate
 
 from sysid import confidence
 from sysid.identification.linearisation import Linearisation
@@ -12,6 +13,7 @@ Array = NDArray[np.float64]
 
 _DRAWS = 2000
 _SMALL = 1e-2  # of the largest channel's power
+_UNCORRELATED = 0.05  # autocorrelation from which on there is none
 
 
 @dataclass(frozen=True)
@@ -86,25 +88,33 @@ def block_length(residual: Array, episode: NDArray[np.int64]) -> int:
     """Returns twice the rows over which residuals (rows, channels) are correlated.
 
     The longest over channels of the integrated autocorrelation time, summed until
-    it first falls below 0.05; at most a tenth of the rows. A channel with far less
-    power than the others has no weight in the estimate, and does not count.
+    it first falls to _UNCORRELATED; at most a tenth of the rows. A channel with far
+    less power than the others has no weight in the estimate, and does not count.
     """
     limit = max(1, len(residual) // 10)
-    longest = 1.0
     centred = residual - residual.mean(axis=0)
     power = np.mean(centred**2, axis=0)
-    time = np.ones(residual.shape[1])
-    falling = power > _SMALL * power.max()
-    for lag in range(1, limit):
-        same = episode[lag:] == episode[:-lag]
-        product = np.mean((centred[lag:] * centred[:-lag])[same], axis=0)
-        rho = product / np.maximum(power, 1e-300) if same.any() else 0.0 * power
-        falling &= rho > 0.05
-        if not falling.any():
-            break
-        time += 2.0 * np.where(falling, rho, 0.0)
-        longest = float(time.max())
+    rho = _products(centred, episode)[1:limit] / np.maximum(power, 1e-300)
+    falling = np.logical_and.accumulate(rho > _UNCORRELATED) & (
+        power > _SMALL * power.max()
+    )
+    longest = float(np.max(1.0 + 2.0 * np.sum(rho, axis=0, where=falling)))
     return int(np.clip(np.ceil(2.0 * longest), 1, limit)) if longest > 1.0 else 1
+
+
+def _products(values: Array, episode: NDArray[np.int64]) -> Array:
+    """Returns the mean products (rows, channels) of values that many rows apart.
+
+    Both of one episode; null where there are none.
+    """
+    sums, counts = np.zeros_like(values), np.zeros((len(values), 1))
+    for number in np.unique(episode):
+        part = values[episode == number]
+        n = len(part)
+        for channel, own in enumerate(part.T):
+            sums[:n, channel] += correlate(own, own)[n - 1 :]
+        counts[:n] += np.arange(n, 0, -1)[:, None]
+    return np.asarray(sums / np.maximum(counts, 1.0))
 
 
 def block_numbers(episode: NDArray[np.int64], length: int) -> NDArray[np.int64]:

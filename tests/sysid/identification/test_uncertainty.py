@@ -34,6 +34,19 @@ def test_blocks_are_longer_where_residuals_are_correlated():
     assert block_length(red, episode) >= 20
 
 
+def test_blocks_are_twice_the_time_over_which_residuals_are_correlated():
+    """(1 + rho) / (1 - rho) of a first-order process, in whatever episodes it lies."""
+    red = coloured(40_000, 0.8)[:, None]
+    for episodes in (1, 40):
+        episode = np.repeat(np.arange(episodes), 40_000 // episodes)
+        assert block_length(red, episode) == pytest.approx(18, abs=2)
+
+
+def test_what_lies_in_different_episodes_is_not_correlated():
+    both = np.tile([3.0, -3.0], 500) + coloured(1000, 0.0)
+    assert block_length(both[:, None], np.repeat(np.arange(500), 2)) == 1
+
+
 def test_blocks_never_span_two_episodes():
     episode = np.array([0] * 5 + [1] * 3)
     np.testing.assert_array_equal(block_numbers(episode, 2), [0, 0, 1, 1, 2, 3, 3, 4])
