@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import correlate
+from scipy.signal import fftconvolve
 
 from sysid import confidence
 from sysid.identification.linearisation import Linearisation
@@ -111,8 +111,7 @@ def _products(values: Array, episode: NDArray[np.int64]) -> Array:
     for number in np.unique(episode):
         part = values[episode == number]
         n = len(part)
-        for channel, own in enumerate(part.T):
-            sums[:n, channel] += correlate(own, own)[n - 1 :]
+        sums[:n] += fftconvolve(part, part[::-1], axes=0)[n - 1 :]
         counts[:n] += np.arange(n, 0, -1)[:, None]
     return np.asarray(sums / np.maximum(counts, 1.0))
 
