@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,10 @@ class PrecisionTransferStudy(Study):
         treatments = self.treatments(folder)
         yield Stage(treatments, self.options.seeds)
         results = finished(treatments, self.options.seeds, folder)
-        yield Stage(tests=[self._test(r, psi) for r in results for psi in _PSI])
+        tests = [
+            self._test(r, psi) for r in results for psi in _PSI if psi != _own_psi(r)
+        ]
+        yield Stage(tests=tests)
 
     def treatment(self, levels: dict[str, Level], folder: Path) -> Treatment:
         """See Study."""
@@ -107,7 +111,7 @@ class PrecisionTransferStudy(Study):
             row = [str(agent), f"{1e3 * psi:g}"]
             for i, on in enumerate(_PSI):
                 said = _THESIS[str(agent)][_PSI.index(psi)][i]
-                text = cell([t for r in own if (t := r.test(_name(on)))])
+                text = cell([t for r in own if (t := _figures(r, on))])
                 row.append(f"{text} ({said:g})" if thesis else text)
             rows.append(row)
         return rows
@@ -134,16 +138,10 @@ def _differences(
     """Returns changes on more and on less precise robots, a list for each training."""
     more, less = [], []
     for r in results:
-        trained = float(r.treatment.levels["psi"])
-        tests = {psi: r.test(_name(psi)) for psi in _PSI}
-        own = tests[trained]
-        if own is None:
-            continue
-        change = {
-            psi: test["performance"] - own["performance"]
-            for psi, test in tests.items()
-            if test is not None
-        }
+        trained = _own_psi(r)
+        tests = {psi: t for psi in _PSI if (t := _figures(r, psi))}
+        own = tests.pop(trained)["performance"]
+        change = {psi: test["performance"] - own for psi, test in tests.items()}
         more.append([d for psi, d in change.items() if psi < trained])
         less.append([d for psi, d in change.items() if psi > trained])
     return more, less
@@ -158,6 +156,17 @@ def _with_interval(changes: list[list[float]]) -> str:
     means = random.choice(own, (2000, len(own))).mean(axis=1)
     low, high = np.quantile(means, (0.025, 0.975))
     return f"{np.mean(own):+.2f} ({low:+.2f} to {high:+.2f})"
+
+
+def _own_psi(result: SeedResult) -> float:
+    """Returns the imprecision at which a policy was trained, and validated."""
+    return float(result.treatment.levels["psi"])
+
+
+def _figures(result: SeedResult, psi: float) -> dict[str, Any] | None:
+    """Returns a policy's greedy episodes at an imprecision, if they are finished."""
+    is_own = psi == _own_psi(result)
+    return result.validation if is_own else result.test(_name(psi))
 
 
 def _name(psi: float) -> str:

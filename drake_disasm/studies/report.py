@@ -12,9 +12,9 @@ from typing import Any
 import jinja2
 
 from drake_disasm.common.files import write_text
-from drake_disasm.studies.results import SEED_COLUMNS, aligned, seed_rows
+from drake_disasm.studies.results import aligned, every_seed, every_test
 from drake_disasm.studies.runner import SeedResult, finished
-from drake_disasm.studies.study import Study, Table
+from drake_disasm.studies.study import Stage, Study, Table
 
 _ENVIRONMENT = jinja2.Environment(
     loader=jinja2.PackageLoader("drake_disasm.studies", "."),
@@ -27,7 +27,7 @@ _FORMATS = ("md", "html")
 
 
 def write_report(study: Study, folder: Path, origin: Mapping[str, Any]) -> list[Table]:
-    """Writes report and figures of what is finished.
+    """Writes report, figures and all rows of what is finished.
 
     Args:
         study: what was studied.
@@ -38,7 +38,6 @@ def write_report(study: Study, folder: Path, origin: Mapping[str, Any]) -> list[
     Returns:
         The tables, for the terminal.
     """
-    results = finished_of(study, folder)
     tables = study.tables(folder)
     pictures = study.pictures(folder)
     for picture in pictures:
@@ -47,26 +46,31 @@ def write_report(study: Study, folder: Path, origin: Mapping[str, Any]) -> list[
         p.name: base64.b64encode((folder / p.name).read_bytes()).decode()
         for p in pictures
     }
-    everything = Table("Every seed", SEED_COLUMNS, seed_rows(results))
+    stages = list(study.stages(folder))
+    everything = {"results": every_seed(_finished_in(stages, folder))}
+    elsewhere = every_test([test for s in stages for test in s.tests], folder)
+    if elsewhere.rows:
+        everything["tests"] = elsewhere
     for kind in _FORMATS:
         text = _ENVIRONMENT.get_template(f"report.{kind}.j2").render(
             study=study,
             own=study.options.provenance or origin,
             origin=origin,
             machine=_machine(),
-            tables=[*tables, everything],
+            tables=[*tables, *everything.values()],
             pictures=pictures,
             images=images,
         )
         write_text(folder / f"report.{kind}", text)
-    write_text(folder / "results.csv", _csv(everything.columns, everything.rows))
+    for name, table in everything.items():
+        write_text(folder / f"{name}.csv", _csv(table.columns, table.rows))
     return tables
 
 
-def finished_of(study: Study, folder: Path) -> list[SeedResult]:
-    """Returns all trainings of a study that are finished."""
+def _finished_in(stages: Sequence[Stage], folder: Path) -> list[SeedResult]:
+    """Returns all trainings of some stages that are finished."""
     found = []
-    for stage in study.stages(folder):
+    for stage in stages:
         found += finished(list(stage.treatments), tuple(stage.seeds), folder)
     return found
 

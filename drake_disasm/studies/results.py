@@ -1,13 +1,16 @@
-"""Cells of tables: rates, means and their intervals, as text."""
+"""Tables of all that was measured, and cells: rates, means and their intervals."""
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import stats
 
 from drake_disasm.learning.statistics import wilson_interval
-from drake_disasm.studies.runner import SeedResult
+from drake_disasm.studies.runner import SeedResult, read_test
+from drake_disasm.studies.study import PolicyTest, Table
 
 
 def rate(successes: int, trials: int) -> str:
@@ -67,34 +70,56 @@ def instability_index(results: Sequence[SeedResult]) -> tuple[float, int]:
     return sum(v["instability"] / v["successes"] for v in own), len(own)
 
 
-def seed_rows(results: Sequence[SeedResult]) -> list[list[str]]:
-    """Returns a row for each seed, as in `SEED_COLUMNS`."""
+def every_seed(results: Sequence[SeedResult]) -> Table:
+    """Returns a table of what each seed of each treatment came to."""
     rows = []
     for r in results:
-        v, training = r.validation, r.figures.get("training")
+        training = r.figures.get("training")
         rows.append(
             [
                 r.treatment.folder,
                 str(r.seed),
                 str(r.figures.get("first_success") or "-"),
                 f"{training['performance']:.2f}" if training else "-",
-                f"{v['successes']}/{v['episodes']}",
-                f"{v['performance']:.2f}",
-                f"{v['instability']:.2f}",
-                f"{v['mean_force']:.2f}",
-                f"{v['peak_force']:.2f}",
-                f"{v['steps']:.1f}",
+                *_greedy_cells(r.validation),
             ]
         )
-    return rows
+    columns = ("treatment", "seed", "first success", "P", *_GREEDY_COLUMNS)
+    return Table("Every seed", columns, rows)
 
 
-#: Headings of `seed_rows`.
-SEED_COLUMNS = (
-    "treatment",
-    "seed",
-    "first success",
-    "P",
+def every_test(tests: Sequence[PolicyTest], folder: Path) -> Table:
+    """Returns a table of what each policy does elsewhere, of tests that are finished.
+
+    Args:
+        tests: of policies.
+        folder: of the study.
+    """
+    rows = [
+        [str(test.path.relative_to(folder).with_suffix("")), *_greedy_cells(figures)]
+        for test in tests
+        if (figures := read_test(test.path)) is not None
+    ]
+    note = "By the file of its figures: where it acts, and which policy of which seed."
+    return Table(
+        "Every policy elsewhere than on its twin",
+        ("test", *_GREEDY_COLUMNS),
+        rows,
+        note,
+    )
+
+
+def _greedy_cells(figures: Mapping[str, Any]) -> list[str]:
+    """Returns the cells of greedy episodes' figures, as in `_GREEDY_COLUMNS`."""
+    names = ("performance", "instability", "mean_force", "peak_force")
+    return [
+        f"{figures['successes']}/{figures['episodes']}",
+        *(f"{figures[name]:.2f}" for name in names),
+        f"{figures['steps']:.1f}",
+    ]
+
+
+_GREEDY_COLUMNS = (
     "greedy success",
     "greedy reward",
     "its spread",

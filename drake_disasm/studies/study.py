@@ -7,7 +7,7 @@ does the work, `report.py` writes it down. A study's folder::
     TREATMENT/                     one combination of levels: a training of all seeds
                                    (see learning/experiment.py)
     TREATMENT/seed_000/tests/      greedy episodes of its policy elsewhere
-    results.csv                    a row for each seed of each treatment
+    results.csv, tests.csv         a row for each seed of each treatment, each test
     report.md, report.html, *.png
 """
 
@@ -178,6 +178,14 @@ class Table:
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
+
+    @property
+    def kinds(self) -> list[str]:
+        """What each column is of: "words", or "numbers"."""
+        return [
+            "words" if any(cell[:1].isalpha() for cell in column) else "numbers"
+            for column in zip(*(self.rows or [self.columns]), strict=True)
+        ]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -45,7 +45,7 @@ class BranchTables:
             for own in self._rows()
         ]
         columns = ["mismatch", "agent", *map(str, branches)]
-        note = "; ".join(f"{name}: {text}" for name, text in self.texts.items())
+        note = "; ".join(f"{name}: {self.texts[str(name)]}" for name in branches)
         return Table(title, columns, rows, note)
 
     def gains(

@@ -1,6 +1,7 @@
 """Studies: their levels, what they train, and the same bits whatever does the work."""
 
 import hashlib
+import json
 from pathlib import Path
 from typing import Any
 
@@ -165,10 +166,34 @@ def test_policies_are_judged_on_robots_of_other_precision(tmp_path: Path) -> Non
     study = _study("precision_transfer", levels=levels, episodes=1)
     open_study(study, tmp_path / "out", resume=False)
     run_study(study, tmp_path / "out")
-    tables = study.tables(tmp_path / "out")
+    tables = write_report(study, tmp_path / "out", _ORIGIN)
     assert [row[:2] for row in tables[0].rows] == [["td3", "0"], ["td3", "0.5"]]
     assert all("(" in cell for row in tables[0].rows for cell in row[2:])
     assert tables[2].rows[0][2].startswith("0/4")
+    more, less = tables[3].rows[0][1:]
+    assert "to" in more and "to" in less  # two seeds make an interval
+
+
+def test_a_policy_is_not_tested_twice_at_its_own_precision(tmp_path: Path) -> None:
+    levels = {"agent": ["td3"], "psi": ["0.0005"]}
+    study = _study("precision_transfer", levels=levels, episodes=1, seeds=(0,))
+    open_study(study, tmp_path / "out", resume=False)
+    run_study(study, tmp_path / "out")
+    write_report(study, tmp_path / "out", _ORIGIN)
+    rows = (tmp_path / "out" / "tests.csv").read_text().splitlines()[1:]
+    own = "agent_td3__psi_0.0005/seed_000/tests"
+    assert [row.split(",")[0] for row in rows] == [f"{own}/psi_0", f"{own}/psi_0.0003"]
+    result = json.loads(
+        (tmp_path / "out/agent_td3__psi_0.0005/seed_000/result.json").read_text()
+    )
+    own_cell = study.tables(tmp_path / "out")[0].rows[0][4]
+    assert own_cell.startswith(f"{result['validation']['performance']:.1f}")
+
+
+def test_columns_of_words_are_told_from_those_of_numbers() -> None:
+    table = Table("", ["who", "P", "found"], [["ddpg", "1/2", "-"], ["sac", "-", "x"]])
+    assert table.kinds == ["words", "numbers", "words"]
+    assert Table("", ["who"], []).kinds == ["words"]
 
 
 def test_classical_control_stands_beside_every_agent(tmp_path: Path) -> None:
