@@ -31,6 +31,7 @@ from drake_disasm.scenario import Scenario
 from drake_disasm.stations.arm_mechanics import ArmMechanics, refuse_unknown_arm_effects
 from drake_disasm.stations.base import refuse_twins_contact
 from drake_disasm.stations.cell_models import add_adaptive_fingers, add_cell
+from drake_disasm.stations.contact import exclude_collisions
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.stations.wiring import export_ready_device, export_required
@@ -98,6 +99,9 @@ class CellStation(SimulatedStation):
         plant = self.plant
         models = add_cell(plant, frame_Gn, config, self._environment)
         self.iiwa, self.tool_models, self.lock = models.iiwa, models.tool, models.lock
+        # A groove that is tilted sinks into the bench, and the bolt in it.
+        inside = self.lock.bolt_ids.values()
+        exclude_collisions(self.scene_graph, inside, models.bench)
         arm = [e for e in self._default_effects if isinstance(e, ArmEffect)]
         self._mechanics = ArmMechanics(plant, self.iiwa, models.frame_F, arm)
         fingers = None

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.geometry import GeometryId
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, Frame, ModelInstanceIndex
@@ -28,12 +29,14 @@ class CellModels:
         frame_F: its flange.
         tool: sensor and gripper.
         lock: groove and bolt.
+        bench: collision geometries of its top.
     """
 
     iiwa: ModelInstanceIndex
     frame_F: Frame
     tool: ToolModels
     lock: Lock
+    bench: list[GeometryId]
 
 
 def add_adaptive_fingers(
@@ -81,16 +84,19 @@ def add_cell(
     iiwa, frame_F = add_arm(plant, scenario.arm.model)
     tool = add_tool(plant, frame_F, scenario)
     lock = add_lock(plant, frame_Gn, scenario.lock, scenario.contact, environment)
-    _add_bench(plant, frame_Gn, scenario)
+    bench = _add_bench(plant, frame_Gn, scenario)
     if scenario.gripper.hold == "weld":
         bolt = lock.bolt.body_frame()
         plant.WeldFrames(tool.frame_T, bolt, grasp_pose(scenario))
-    return CellModels(iiwa, frame_F, tool, lock)
+    return CellModels(iiwa, frame_F, tool, lock, bench)
 
 
-def _add_bench(plant: MultibodyPlant, frame_Gn: Frame, scenario: Scenario) -> None:
+def _add_bench(
+    plant: MultibodyPlant, frame_Gn: Frame, scenario: Scenario
+) -> list[GeometryId]:
     """Puts the bench's top under the plate, level whatever the groove's yaw."""
     bench = add_model(plant, _BENCH)
     p_WTop = bench_top(frame_Gn.GetFixedPoseInBodyFrame(), scenario.lock)
     top = plant.GetFrameByName("top", bench)
     plant.WeldFrames(plant.world_frame(), top, RigidTransform(p_WTop))
+    return list(plant.GetCollisionGeometriesForBody(top.body()))

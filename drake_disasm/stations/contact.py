@@ -7,11 +7,16 @@ its Context.
 
 import abc
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import ClassVar
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, SceneGraph
+from pydrake.geometry import (
+    CollisionFilterDeclaration,
+    GeometryId,
+    GeometrySet,
+    SceneGraph,
+)
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, OutputPort
@@ -179,7 +184,7 @@ class ImpactContactForce(ContactStrategy):
         super().__init__(plant, scene_graph, lock, outside_force)
         self._spring, self._contact = spring, contact
         self._p_BoTo_B, self._M = p_BoTo_B, spring.mass_matrix()
-        self._exclude_from_scene_graph()
+        exclude_collisions(scene_graph, lock.bolt_ids.values(), lock.groove_ids)
         self.system = ImpactContact(
             lock.bolt.index(), R_WGn, time_step, self._conditions(environment)
         )
@@ -226,14 +231,15 @@ class ImpactContactForce(ContactStrategy):
             p_BoTo_B=self._p_BoTo_B,
         )
 
-    def _exclude_from_scene_graph(self) -> None:
-        """Filters collisions of bolt and groove in the scene graph."""
-        bolt, groove = (
-            GeometrySet(list(ids))
-            for ids in (self._lock.bolt_ids.values(), self._lock.groove_ids)
-        )
-        declaration = CollisionFilterDeclaration().ExcludeBetween(bolt, groove)
-        self._scene_graph.collision_filter_manager().Apply(declaration)
+
+def exclude_collisions(
+    scene_graph: SceneGraph, one: Iterable[GeometryId], other: Iterable[GeometryId]
+) -> None:
+    """Has no geometry of one group meet one of the other, in any new Context."""
+    declaration = CollisionFilterDeclaration().ExcludeBetween(
+        GeometrySet(list(one)), GeometrySet(list(other))
+    )
+    scene_graph.collision_filter_manager().Apply(declaration)
 
 
 #: By the scenario's `contact.model`.

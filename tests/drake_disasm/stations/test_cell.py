@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
+from drake_disasm.effects import GroovePose
 from drake_disasm.ports import Health
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import CellStation
@@ -94,3 +96,25 @@ def test_pads_press_with_the_grip_force(force: float) -> None:
     ]
     assert len(across) == 2
     np.testing.assert_allclose(across, force, rtol=0.02)
+
+
+def test_a_bolt_in_a_groove_that_sinks_into_the_bench_meets_the_groove_alone() -> None:
+    station = CellStation(load_scenario("removal", [QUIET]))
+    context = station.settled([GroovePose(rz=-0.1)])  # 4 mm deeper at 40 mm
+    plant = station.plant
+    own = station.part_context(plant, context)
+    X_WG = plant.EvalBodyPoseInWorld(own, station.lock.groove)
+    X_GB = RigidTransform([0.04, 0.0, 0.0])
+    plant.SetFreeBodyPose(own, station.lock.bolt, X_WG @ X_GB)
+    inspector = station.GetOutputPort("query_object").Eval(context).inspector()
+    contacts = station.GetOutputPort("contact_results").Eval(context)
+    met = set()
+    for i in range(contacts.num_hydroelastic_contacts()):
+        surface = contacts.hydroelastic_contact_info(i).contact_surface()
+        met |= {inspector.GetName(surface.id_M()), inspector.GetName(surface.id_N())}
+    assert "bench::plate_collision" not in met
+    [bench] = plant.GetCollisionGeometriesForBody(plant.GetBodyByName("bench"))
+    parts = plant.GetCollisionGeometriesForBody(station.lock.bolt)
+    inside = set(station.lock.bolt_ids.values())
+    for part in parts:  # a bolt that is dropped beside the lock lies on its grip
+        assert inspector.CollisionFiltered(part, bench) == (part in inside)
