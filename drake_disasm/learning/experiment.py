@@ -139,6 +139,11 @@ def read_evaluation(path: Path) -> dict[str, Any]:
     return read_json(path, _AGAIN, _EVALUATION)
 
 
+def seed_folder(folder: Path, seed: int) -> Path:
+    """Returns the folder of one seed in that of all of them."""
+    return folder / f"seed_{seed:03d}"
+
+
 def read_result(path: Path, online: bool = False) -> dict[str, Any]:
     """Returns the content of a seed's `result.json`.
 

@@ -11,7 +11,7 @@ from drake_disasm.common.executors import WorkerPool
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.learning.checkpoint import load_memory
 from drake_disasm.learning.dataset import remember
-from drake_disasm.learning.experiment import Experiment
+from drake_disasm.learning.experiment import Experiment, seed_folder
 from drake_disasm.learning.lockstep import LockstepTraining
 from drake_disasm.learning.replay import Replay
 from drake_disasm.learning.run import learn_offline, run_in_lockstep, run_training
@@ -46,7 +46,7 @@ def seed_jobs(
     experiment: Experiment, seeds: Iterable[int], folder: Path
 ) -> list[SeedJob]:
     """Returns one job for each seed, in a folder of its own within the folder."""
-    return [SeedJob(experiment, s, folder / f"seed_{s:03d}") for s in seeds]
+    return [SeedJob(experiment, s, seed_folder(folder, s)) for s in seeds]
 
 
 def train_seeds(

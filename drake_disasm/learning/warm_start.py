@@ -15,7 +15,7 @@ from typing import Any
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import read_bytes
 from drake_disasm.learning.checkpoint import CHECKPOINT
-from drake_disasm.learning.experiment import Experiment, read_training
+from drake_disasm.learning.experiment import Experiment, read_training, seed_folder
 
 _NETWORKS = ("algorithm", "hidden", "layer_norm", "critics")
 _SCALES = ("position_scale", "rotation_scale", "force_scale", "torque_scale")
@@ -30,7 +30,7 @@ _NEEDED = {
 
 def start_checkpoint(folder: Path | str, seed: int) -> Path:
     """Returns the path of the checkpoint of one seed of a training."""
-    return Path(folder) / f"seed_{seed:03d}" / "checkpoint.npz"
+    return seed_folder(Path(folder), seed) / "checkpoint.npz"
 
 
 def start_hash(folder: Path | str, seed: int) -> str:

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from drake_disasm.learning.experiment import read_result
+from drake_disasm.learning.experiment import read_result, seed_folder
 from drake_disasm.learning.hyperparameters import Hyperparameters, override
 from drake_disasm.learning.learning_curve import plot_learning_curves
 from drake_disasm.learning.run import read_episodes
@@ -227,6 +227,11 @@ class TwinTransferStudy(Study):
         found = [
             self._found(folder),
             make.by_branch("Episodes on the robot that succeed", new, success_cell),
+            make.by_branch(
+                "The same, of policies that succeed on their own twin",
+                functools.partial(self._accepted, folder=folder),
+                success_cell,
+            ),
             make.by_branch("Mean episodic reward on the robot", new, performance_cell),
             make.gains("Reward that closing the loop adds", new, performance),
             make.gains("Success that closing the loop adds", new, success_share),
@@ -295,13 +300,24 @@ class TwinTransferStudy(Study):
         }
         return {seed: test for seed, test in found.items() if test is not None}
 
+    def _accepted(
+        self, levels: dict[str, Level], folder: Path
+    ) -> dict[int, dict[str, Any]]:
+        """Returns the same of those whose greedy episode on their own twin succeeds."""
+        own = folder / _name_on_twin(levels)
+        return {
+            seed: figures
+            for seed, figures in self._arrived(levels, folder).items()
+            if _result(own, seed)["validation"]["successes"]
+        }
+
     def _learned(
         self, levels: dict[str, Level], folder: Path
     ) -> dict[int, dict[str, Any]]:
         """Returns the figures of learning on the robot of the seeds that have."""
         found = {}
-        for seed, own in self._finished_there(levels, folder).items():
-            result = read_result(own / "result.json", online=True)
+        for seed in self._finished_there(levels, folder):
+            result = _result(folder / _name_there(levels), seed)
             first = {"first_success": result["first_success"]}
             found[seed] = result["training"] | first
         return found
@@ -311,7 +327,7 @@ class TwinTransferStudy(Study):
     ) -> dict[int, Path]:
         """Returns the folders of the seeds that have learned on the robot."""
         own = folder / _name_there(levels)
-        folders = {seed: own / f"seed_{seed:03d}" for seed in self.options.seeds}
+        folders = {seed: seed_folder(own, seed) for seed in self.options.seeds}
         return {s: f for s, f in folders.items() if (f / "result.json").exists()}
 
 
@@ -324,6 +340,11 @@ def _name_on_twin(levels: dict[str, Level]) -> str:
 def _name_there(levels: dict[str, Level]) -> str:
     """Returns the folder of the training on the robot."""
     return f"robot__{folder_name(levels)}"
+
+
+def _result(training: Path, seed: int) -> dict[str, Any]:
+    """Returns the figures of one seed of a training."""
+    return read_result(seed_folder(training, seed) / "result.json", online=True)
 
 
 def _test_path(folder: Path, levels: dict[str, Level], seed: int) -> Path:

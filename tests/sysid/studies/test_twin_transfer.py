@@ -14,6 +14,7 @@ from drake_disasm.common.files import write_text
 from drake_disasm.common.progress import ignore_progress
 from drake_disasm.effects import GroovePose, SensorBias
 from drake_disasm.learning.evaluation import Evaluation
+from drake_disasm.learning.experiment import seed_folder
 from drake_disasm.logs import read_log
 from drake_disasm.mdp import REWARD_TERMS
 from drake_disasm.policies import load_policy
@@ -26,7 +27,7 @@ from drake_disasm.studies.study import StudyOptions
 from sysid.studies import twin_transfer
 from sysid.studies.closed_twin import ClosedTwin, with_effects, with_intervals
 from sysid.studies.mismatches import MISMATCHES
-from sysid.studies.twin_transfer import TwinTransferStudy, _test_path
+from sysid.studies.twin_transfer import TwinTransferStudy, _name_on_twin, _test_path
 
 NOMINAL = load_scenario("chapter3")
 
@@ -99,6 +100,11 @@ def leave_figures(
     path.parent.mkdir(parents=True, exist_ok=True)
     figures = {"performance": P, "successes": successes, "episodes": 2}
     path.write_text(json.dumps(FIGURES | figures))
+    own = seed_folder(folder / _name_on_twin(levels), seed)
+    own.mkdir(parents=True, exist_ok=True)
+    on_twin = FIGURES | {"successes": int(seed != 1)}  # the second fails there, too
+    result = {"seed": seed, "validation": on_twin, "training": FIGURES}
+    (own / "result.json").write_text(json.dumps(result | {"first_success": 1}))
 
 
 def test_tables_compare_seed_by_seed(tmp_path: Path) -> None:
@@ -107,7 +113,8 @@ def test_tables_compare_seed_by_seed(tmp_path: Path) -> None:
         leave_figures(tmp_path, "nominal", seed, before, seed % 2)
         leave_figures(tmp_path, "closed", seed, after, 2)
     one = study(mismatch=["tilted"], agent=["ddpg"], branch=["nominal", "closed"])
-    found, success, reward, gain, more = one.tables(tmp_path)
+    found, success, accepted, reward, gain, more = one.tables(tmp_path)
+    assert accepted.rows[0][2:] == ["0/4 (0 to 49 %)", "4/4 (51 to 100 %)"]
     assert "GroovePose.rz 0.05 (0.04 to 0.06)" in found.rows[0][2]
     assert found.rows[0][3].startswith("provisional: The model lacks")
     assert success.rows == [["tilted", "ddpg", "1/6 (3 to 56 %)", "6/6 (61 to 100 %)"]]
