@@ -36,6 +36,7 @@ class BatchResult:
 
     Attributes:
         observation: (n, 12) the states after it.
+        place: (n, 3) of the bolts, as in `StepResult` [m].
         reward_terms: the weighted terms by name, (n,) each.
         outcome: (n,) numbers of `mdp.Outcome`.
         failure: (n) why the simulation of an environment failed, or "" where it did
@@ -43,6 +44,7 @@ class BatchResult:
     """
 
     observation: Array
+    place: Array
     reward_terms: dict[str, Array]
     outcome: Array
     failure: list[str]
@@ -196,7 +198,9 @@ class BatchedTwin:
         terms = {name: xp.where(has_failed, 0.0, term) for name, term in terms.items()}
         ends = outcomes(states[1], episodes.steps, numbers.task, numbers.geometry)
         reasons = self._reasons(has_failed, is_finite, is_solved)
-        return BatchResult(after, terms, ends, reasons)
+        return BatchResult(
+            after, numbers.geometry.place(states[1]), terms, ends, reasons
+        )
 
     def _reasons(
         self, has_failed: Array, is_finite: Array, is_solved: Array

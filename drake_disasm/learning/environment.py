@@ -54,7 +54,7 @@ class DisassemblyEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         bounds = self.simulation.bounds.astype(np.float32)
         self.action_space = gymnasium.spaces.Box(-bounds, bounds)
         terms = dict.fromkeys(REWARD_TERMS, 0.0)
-        self.result = StepResult(np.zeros(12), terms, Outcome.RUNNING)
+        self.result = StepResult(np.zeros(12), np.zeros(3), terms, Outcome.RUNNING)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -75,7 +75,7 @@ class DisassemblyEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             seed = int(self.np_random.integers(2**31))
         observation = self.simulation.reset(seed, effects)
         terms = dict.fromkeys(REWARD_TERMS, 0.0)
-        self.result = StepResult(observation, terms, Outcome.RUNNING)
+        self.result = StepResult(observation, np.zeros(3), terms, Outcome.RUNNING)
         return observation.astype(np.float32), self._info()
 
     def step(

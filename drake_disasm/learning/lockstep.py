@@ -290,4 +290,7 @@ def _result_of(result: BatchResult, row: int) -> StepResult:
     """Returns what a step returned of one environment."""
     terms = {n: float(to_numpy(t)[row]) for n, t in result.reward_terms.items()}
     outcome = Outcome(int(to_numpy(result.outcome)[row]))
-    return StepResult(np.array(to_numpy(result.observation)[row]), terms, outcome)
+    found, place = (
+        np.array(to_numpy(each)[row]) for each in (result.observation, result.place)
+    )
+    return StepResult(found, place, terms, outcome)

@@ -35,14 +35,17 @@ class TaskMonitor(LeafSystem):
     - outcome
     @endsystem
 
+    Attributes:
+        geometry: where the groove ends and the bolt is out.
+
     Args:
         task: the MDP.
-        geometry: where the groove ends and the bolt is out.
+        geometry: as above.
     """
 
     def __init__(self, task: TaskConfig, geometry: TaskGeometry) -> None:
         super().__init__()
-        self._task, self._geometry = task, geometry
+        self._task, self.geometry = task, geometry
         self._observation = self.DeclareVectorInputPort("observation", 12)
         self._before = self.DeclareDiscreteState(12)
         self._steps = self.DeclareDiscreteState(1)
@@ -70,13 +73,13 @@ class TaskMonitor(LeafSystem):
             BoltState.from_vector(before),
             self._state(context),
             self._task,
-            self._geometry,
+            self.geometry,
         )
         output.SetFromVector(np.array([terms[name] for name in REWARD_TERMS]))
 
     def _calc_outcome(self, context: Context, output: BasicVector) -> None:
         steps = int(context.get_discrete_state(self._steps).value()[0])
-        result = outcome(self._state(context), steps, self._task, self._geometry)
+        result = outcome(self._state(context), steps, self._task, self.geometry)
         output.SetFromVector([float(result)])
 
     def _state(self, context: Context) -> BoltState:

@@ -21,7 +21,8 @@ class EpisodeSummary:
         seed: of the episode.
         steps: taken.
         reward_terms: summed by name.
-        travel, rise: largest displacement of the bolt along x and y [m].
+        travel, rise: largest displacement of the bolt along x and y, as the reward
+            counts it: what it has yielded in the grip included [m].
         max_force, mean_force: on the bolt [N].
         max_torque, mean_torque: on the bolt [N m].
         outcome: how it ended.
@@ -51,8 +52,8 @@ class EpisodeSummary:
         self.steps += 1
         for name, value in result.reward_terms.items():
             self.reward_terms[name] = self.reward_terms.get(name, 0.0) + value
-        self.travel = max(self.travel, float(state.p[0]))
-        self.rise = max(self.rise, float(state.p[1]))
+        self.travel = max(self.travel, float(result.place[0]))
+        self.rise = max(self.rise, float(result.place[1]))
         self.max_force = max(self.max_force, state.force)
         self.max_torque = max(self.max_torque, state.torque)
         self.mean_force += (state.force - self.mean_force) / self.steps

@@ -20,7 +20,7 @@ from pydrake.systems.framework import (
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.timing import MOTION_DELAY, POLICY_DELAY, boundary
 from drake_disasm.effects import BoltMotion, Effect, is_local
-from drake_disasm.mdp import REWARD_TERMS, Outcome, action_bounds
+from drake_disasm.mdp import REWARD_TERMS, BoltState, Outcome, action_bounds
 from drake_disasm.scenario import Scenario, draw, with_values
 from drake_disasm.stations import SimulatedStation, Station, make_station
 from drake_disasm.stations.advance import advance
@@ -45,12 +45,15 @@ class StepResult:
 
     Attributes:
         observation: (12,) the state after it.
+        place: (3,) of the bolt since the start, in G, what it has yielded in the grip
+            included [m].
         reward_terms: the weighted terms by name; the reward is their sum.
         outcome: how the episode stands.
         is_whole: whether the station came to the step's end.
     """
 
     observation: np.ndarray
+    place: np.ndarray
     reward_terms: dict[str, float]
     outcome: Outcome
     is_whole: bool = True
@@ -66,7 +69,9 @@ class StepResult:
         Nobody can say what it would have been worth: its reward is 0.
         """
         nothing = dict.fromkeys(self.reward_terms, 0.0)
-        return StepResult(self.observation, nothing, Outcome.WORKSPACE, is_whole=False)
+        return dataclasses.replace(
+            self, reward_terms=nothing, outcome=Outcome.WORKSPACE, is_whole=False
+        )
 
 
 class TaskSimulation:
@@ -216,7 +221,9 @@ class TaskSimulation:
         terms = self.evaluate(self.systems.monitor, "reward_terms")
         code = self.evaluate(self.systems.monitor, "outcome")
         named = dict(zip(REWARD_TERMS, terms.tolist(), strict=True))
-        return StepResult(self.observation(), named, Outcome(int(code[0])))
+        found = self.observation()
+        place = self.systems.monitor.geometry.place(BoltState.from_vector(found))
+        return StepResult(found, place, named, Outcome(int(code[0])))
 
     def _set_action(self, action: np.ndarray) -> None:
         source = self.systems.action_source

@@ -139,7 +139,7 @@ def test_small_angle_observation_is_the_diagrams():
     _assert_same(np.array(found)[:, 0], _diagram(scenario, moves))
 
 
-def test_reward_and_end_are_the_diagrams():
+def test_reward_place_and_end_are_the_diagrams():
     """Up to the end of the episode: pressed too hard against a wall."""
     gentle = with_values(TURNED, {"task.reward.f_max": 3.0})
     simulation, twin = TaskSimulation(gentle, "twin"), BatchedTwin(gentle)
@@ -150,8 +150,11 @@ def test_reward_and_end_are_the_diagrams():
         assert int(found.outcome[0]) == int(expected.outcome)
         for name, term in expected.reward_terms.items():
             assert float(found.reward_terms[name][0]) == pytest.approx(term, abs=5e-3)
+        np.testing.assert_allclose(to_numpy(found.place)[0], expected.place, atol=1e-6)
         if expected.outcome:
             break
+    # The hand has gone on, the bolt has yielded.
+    assert expected.observation[0] - expected.place[0] > 1e-4
     assert expected.outcome.label == "force limit"
 
 

@@ -18,9 +18,11 @@ from drake_disasm.task.simulation import StepResult, TaskSimulation
 def _result(
     p_mm: list[float], f: list[float], t: float, outcome: Outcome = Outcome.RUNNING
 ) -> StepResult:
-    observation = np.concatenate([np.array(p_mm) / 1e3, np.zeros(3), f, [0, 0, t]])
+    place = np.array(p_mm) / 1e3
+    hand = place + np.array([0.001, 0.001, 0.0])  # the grip has given
+    observation = np.concatenate([hand, np.zeros(3), f, [0, 0, t]])
     terms = {"progress": p_mm[0], "force": -1.0, "torque": -0.5, "lift": 0.0}
-    return StepResult(observation, terms, outcome)
+    return StepResult(observation, place, terms, outcome)
 
 
 @pytest.fixture
