@@ -69,10 +69,15 @@ def evaluate(
 
 
 def validate_policy(
-    policy: Policy, scenario: Scenario, station: str, seeds: Sequence[int]
-) -> "Evaluation":
+    policy: Policy,
+    scenario: Scenario,
+    station: str,
+    seeds: Sequence[int],
+    progress: Progress = ignore_progress,
+) -> Evaluation:
     """Evaluates a policy in a diagram of its own, so that no training is affected."""
-    return summed_up(evaluate(TaskSimulation(scenario, station, policy), seeds))
+    simulation = TaskSimulation(scenario, station, policy)
+    return summed_up(evaluate(simulation, seeds, progress=progress))
 
 
 def summed_up(summaries: Sequence[EpisodeSummary]) -> Evaluation:

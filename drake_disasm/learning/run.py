@@ -69,7 +69,8 @@ def run_training(
         log: gets each episode before its checkpoint is written.
         provenance: where the policy is from.
         validation: greedy episodes at the end.
-        progress: called after each episode, or each round of them.
+        progress: called after each episode, or each round of them, and each greedy
+            one.
 
     Returns:
         The content of `result.json`.
@@ -88,7 +89,7 @@ def run_training(
                 log.write(number, recorded)
             training.save(checkpoint)
             progress(_update(training))
-        return finish(training, folder, provenance, validation)
+        return finish(training, folder, provenance, validation, progress)
 
 
 def run_in_lockstep(
@@ -165,17 +166,21 @@ def learn_offline(
             training.run_round(next_ - done)
             training.save(checkpoint)
             progress(ProgressUpdate("training", training.rounds, parts))
-        return finish(training, folder, provenance, validation)
+        return finish(training, folder, provenance, validation, progress)
 
 
 def finish(
-    training: Training, folder: Path, provenance: dict[str, Any], validation: int
+    training: Training,
+    folder: Path,
+    provenance: dict[str, Any],
+    validation: int,
+    progress: Progress,
 ) -> dict[str, Any]:
     """Validates the trained policy, and writes policy, episodes and result."""
     spec = training.spec
     seeds = [seed_for(spec.seed, Purpose.VALIDATION, i) for i in range(validation)]
     policy = trained_policy(training, provenance)
-    figures = validate_policy(policy, spec.scenario, spec.station, seeds)
+    figures = validate_policy(policy, spec.scenario, spec.station, seeds, progress)
     evaluation = dataclasses.asdict(figures)
     description = dataclasses.replace(policy.description, evaluation=evaluation)
     policy = dataclasses.replace(policy, description=description)

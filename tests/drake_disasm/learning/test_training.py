@@ -10,7 +10,7 @@ import torch
 from torch.utils._pytree import tree_leaves
 
 from drake_disasm.common.errors import DisasmError, DivergedError, UnreachableError
-from drake_disasm.common.progress import ignore_progress
+from drake_disasm.common.progress import ProgressUpdate, ignore_progress
 from drake_disasm.learning import run
 from drake_disasm.learning.dataset import remember
 from drake_disasm.learning.evaluation import validate_policy
@@ -162,6 +162,18 @@ def test_a_step_that_the_arm_can_not_do_ends_the_episode_and_not_the_training(
     bad.append(next(steps) + 1)
     with pytest.raises(failure):  # the first step of all: the start is not right
         train_seed(dataclasses.replace(job, folder=tmp_path / "other"), ignore_progress)
+
+
+def test_progress_goes_on_through_the_greedy_episodes(tmp_path: Path) -> None:
+    config = _training(episodes=2).spec.config
+    experiment = Experiment(SCENARIO, "twin", "chapter3", config, validation=3)
+    [job] = seed_jobs(dataclasses.replace(experiment, compiled=False), [0], tmp_path)
+    told: list[ProgressUpdate] = []
+    train_seed(job, told.append)
+    assert [(u.stage, u.done, u.total) for u in told] == [
+        *(("training", done, 2) for done in (1, 2)),
+        *(("evaluating", done, 3) for done in (1, 2, 3)),
+    ]
 
 
 def test_a_time_limit_is_not_remembered_as_an_end() -> None:
