@@ -12,6 +12,8 @@ from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.studies.runner import SeedResult, read_test
 from drake_disasm.studies.study import PolicyTest, Table
 
+_BEYOND = 1e6  # in whatever unit: no figure of a study is so large
+
 
 def rate(successes: int, trials: int) -> str:
     """Returns a rate with Wilson's 95 % interval."""
@@ -21,12 +23,21 @@ def rate(successes: int, trials: int) -> str:
     return f"{successes}/{trials} ({low:.0f} to {high:.0f} %)"
 
 
+def decimals(value: float, digits: int) -> str:
+    """Returns a number with so many decimals, or its order if it is out of all bounds.
+
+    It is where a twin's contact throws the bolt away.
+    """
+    return f"{value:.{digits}f}" if abs(value) < _BEYOND else f"{value:.1e}"
+
+
 def mean_of(values: Sequence[float], digits: int = 1) -> str:
     """Returns mean and standard deviation, if there are any values."""
     if not len(values):
         return "-"
-    mean, spread = np.mean(values), np.std(values, ddof=1) if len(values) > 1 else 0.0
-    return f"{mean:.{digits}f} ± {spread:.{digits}f}"
+    mean = float(np.mean(values))
+    spread = float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+    return f"{decimals(mean, digits)} ± {decimals(spread, digits)}"
 
 
 def mean_interval(values: Sequence[float]) -> tuple[float, tuple[float, float]]:
@@ -80,7 +91,7 @@ def every_seed(results: Sequence[SeedResult]) -> Table:
                 r.treatment.folder,
                 str(r.seed),
                 str(r.figures.get("first_success") or "-"),
-                f"{training['performance']:.2f}" if training else "-",
+                decimals(training["performance"], 2) if training else "-",
                 *_greedy_cells(r.validation),
             ]
         )
@@ -114,8 +125,8 @@ def _greedy_cells(figures: Mapping[str, Any]) -> list[str]:
     names = ("performance", "instability", "mean_force", "peak_force")
     return [
         f"{figures['successes']}/{figures['episodes']}",
-        *(f"{figures[name]:.2f}" for name in names),
-        f"{figures['steps']:.1f}",
+        *(decimals(figures[name], 2) for name in names),
+        decimals(figures["steps"], 1),
     ]
 
 

@@ -11,6 +11,7 @@ import pytest
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.studies import STUDIES
 from drake_disasm.studies.report import as_text, write_report
+from drake_disasm.studies.results import decimals, mean_of
 from drake_disasm.studies.runner import open_study, run_study
 from drake_disasm.studies.study import Study, StudyOptions, Table
 
@@ -188,6 +189,11 @@ def test_a_policy_is_not_tested_twice_at_its_own_precision(tmp_path: Path) -> No
     )
     own_cell = study.tables(tmp_path / "out")[0].rows[0][4]
     assert own_cell.startswith(f"{result['validation']['performance']:.1f}")
+
+
+def test_a_thrown_bolt_does_not_widen_a_table() -> None:
+    assert decimals(-12.345, 2) == "-12.35" and decimals(-1.1e94, 2) == "-1.1e+94"
+    assert mean_of([1e30, 3e30]) == "2.0e+30 ± 1.4e+30"
 
 
 def test_columns_of_words_are_told_from_those_of_numbers() -> None:
