@@ -100,7 +100,7 @@ def every_seed(results: Sequence[SeedResult]) -> Table:
 
 
 def every_test(tests: Sequence[PolicyTest], folder: Path) -> Table:
-    """Returns a table of what each policy does elsewhere, of tests that are finished.
+    """Returns a table of what each policy does in a test, of those that are finished.
 
     Args:
         tests: of policies.
@@ -111,13 +111,8 @@ def every_test(tests: Sequence[PolicyTest], folder: Path) -> Table:
         for test in tests
         if (figures := read_test(test.path)) is not None
     ]
-    note = "By the file of its figures: where it acts, and which policy of which seed."
-    return Table(
-        "Every policy elsewhere than on its twin",
-        ("test", *_GREEDY_COLUMNS),
-        rows,
-        note,
-    )
+    note = "By the file of its figures, which says what acts where."
+    return Table("Every test of a policy", ("test", *_GREEDY_COLUMNS), rows, note)
 
 
 def _greedy_cells(figures: Mapping[str, Any]) -> list[str]:

@@ -308,7 +308,7 @@ class TwinTransferStudy(Study):
         return {
             seed: figures
             for seed, figures in self._arrived(levels, folder).items()
-            if _result(own, seed)["validation"]["successes"]
+            if _result(seed_folder(own, seed))["validation"]["successes"]
         }
 
     def _learned(
@@ -316,8 +316,8 @@ class TwinTransferStudy(Study):
     ) -> dict[int, dict[str, Any]]:
         """Returns the figures of learning on the robot of the seeds that have."""
         found = {}
-        for seed in self._finished_there(levels, folder):
-            result = _result(folder / _name_there(levels), seed)
+        for seed, own in self._finished_there(levels, folder).items():
+            result = _result(own)
             first = {"first_success": result["first_success"]}
             found[seed] = result["training"] | first
         return found
@@ -342,9 +342,9 @@ def _name_there(levels: dict[str, Level]) -> str:
     return f"robot__{folder_name(levels)}"
 
 
-def _result(training: Path, seed: int) -> dict[str, Any]:
-    """Returns the figures of one seed of a training."""
-    return read_result(seed_folder(training, seed) / "result.json", online=True)
+def _result(seed: Path) -> dict[str, Any]:
+    """Returns the figures of one seed of a training, by its folder."""
+    return read_result(seed / "result.json", online=True)
 
 
 def _test_path(folder: Path, levels: dict[str, Level], seed: int) -> Path:

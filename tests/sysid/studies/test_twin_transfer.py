@@ -172,11 +172,7 @@ def test_agents_arrive_and_learn_and_the_report_says_so(
     run_study(learning, tmp_path)  # more may be asked for afterwards
     assert test.read_bytes() == arrived
     tables = {t.title: t for t in write_report(learning, tmp_path, small.provenance)}
-    elsewhere = (tmp_path / "tests.csv").read_text()
-    for seed in (0, 1):  # how each does on arrival
-        for branch in ("nominal", "closed"):
-            assert f"tests/tilted/ddpg__{branch}/seed_{seed:03d},0/1," in elsewhere
-    assert "ddpg__untrained" not in elsewhere
+    assert_each_arrival_is_listed((tmp_path / "tests.csv").read_text())
     [row] = tables["P, learning on the robot"].rows
     for branch, cell in zip(("untrained", "nominal", "closed"), row[2:], strict=True):
         name = f"robot__mismatch_tilted__agent_ddpg__branch_{branch}"
@@ -191,6 +187,13 @@ def test_agents_arrive_and_learn_and_the_report_says_so(
         assert cell == mean_of(rewards)
     assert tables["P that closing the loop adds"].rows[0][2:] != ["-", "-"]
     assert (tmp_path / "robot_tilted_ddpg.png").read_bytes().startswith(b"\x89PNG")
+
+
+def assert_each_arrival_is_listed(rows: str) -> None:
+    for seed in (0, 1):
+        for branch in ("nominal", "closed"):
+            assert f"tests/tilted/ddpg__{branch}/seed_{seed:03d},0/1," in rows
+    assert "ddpg__untrained" not in rows
 
 
 def _reward(episode: Any) -> float:
