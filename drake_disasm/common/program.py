@@ -5,6 +5,7 @@ import importlib.metadata
 import math
 import os
 import select
+import shlex
 import signal
 import subprocess
 import sys
@@ -125,12 +126,12 @@ def argument_parser(
     What it refuses is a DisasmError.
 
     Args:
-        name: of the program, without `.py`.
+        name: of the subcommand, or of a benchmark.
         description: its docstring.
         epilog: examples.
     """
     return _Parser(
-        prog=f"{name}.py",
+        prog=f"drake-disasm {name}",
         description=description,
         epilog=epilog,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -227,7 +228,7 @@ def provenance(program: str, arguments: Sequence[str], seed: int) -> dict[str, A
     packages = ("drake", "numpy", "torch", "drake_disasm")
     return {
         "program": program,
-        "command": " ".join(["python", f"tools/{program}.py", *arguments]),
+        "command": shlex.join(["drake-disasm", program, *arguments]),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "seed": seed,
         "versions": {name: _version(name) for name in packages},

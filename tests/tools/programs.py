@@ -1,7 +1,6 @@
 """Running the programs: where they are, to their end, and up to Ctrl-C."""
 
 import contextlib
-import importlib
 import io
 import os
 import signal
@@ -13,6 +12,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from drake_disasm.common import program
+from drake_disasm_cli.main import main_of
 from tests.progress import running, wait_until
 
 ROOT = Path(__file__).parents[2]
@@ -53,9 +53,8 @@ def _status(main: Callable[[Sequence[str]], int], words: Sequence[str]) -> int:
 
 
 def _main_of(name: str) -> Callable[[Sequence[str]], int]:
-    """Returns a program's main; pytest has tools/ on its path."""
-    main: Callable[[Sequence[str]], int] = importlib.import_module(name).main
-    return main
+    """Returns a subcommand's main."""
+    return main_of(name.replace("_", "-"))
 
 
 def start_program(

@@ -95,7 +95,7 @@ def _simulated_station(name: str) -> str:
     if _station(name) == "hardware":
         raise DisasmError(
             "--station hardware: this program simulates; use cell or twin, or run "
-            "a policy on the devices by tools/simulate.py --station hardware"
+            "a policy on the devices by `drake-disasm simulate` --station hardware"
         )
     return name
 

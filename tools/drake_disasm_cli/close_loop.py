@@ -1,0 +1,156 @@
+"""Finds which physical effect a model lacks to explain a measured log, and adds it.
+
+The kind of log decides what is modelled: transitions of the cell or the twin, readings
+of a force/torque sensor at rest, or joint torques of an arm. The model is fitted; every
+effect of the library is tested on what it explains of data that were not fitted; those
+that pass are added one by one. Prints what is missing, its parameters, and the error
+before and after. Writes the scenario with the effects, `result.json`, and a report
+that opens offline. After Ctrl-C the same command resumes.
+"""
+
+import argparse
+import math
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from drake_disasm.common import options, program
+from drake_disasm.common.cluster import executor_for
+from drake_disasm.common.files import make_folder, write_json, write_text
+from drake_disasm.logs import Log
+from drake_disasm.scenario import dump_scenario, load_scenario
+from drake_disasm_cli import common, data_arguments
+from sysid.data_checks import DataFinding
+from sysid.effect_selection.close_loop import ClosedLoop, close_loop
+from sysid.effect_selection.output import to_mapping
+from sysid.identification.split import split_episodes
+from sysid.models import LogModel
+from sysid.models.from_logs import ModelChoice, model_of
+from sysid.models.measurements import episode_names
+from sysid.report import closing_page
+from sysid.scenario_parameters import read_requests
+from sysid.workers import Workers
+
+_EXAMPLES = """examples:
+  drake-disasm close-loop --log out/log --scenario removal --out out/closed
+  drake-disasm close-loop --log readings --out out/sensor     a static_wrench log
+  drake-disasm close-loop --log run_1 run_2 --held-out run_2 --out out/arm
+"""
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    parser = program.argument_parser("close-loop", __doc__, _EXAMPLES)
+    add = parser.add_argument
+    add("--log", nargs="+", required=True, metavar="DIR", help="logs of one kind")
+    _add_model_arguments(add)
+    data_arguments.add_data_arguments(add)
+    add(
+        "--time-budget",
+        type=options.above_zero_or_inf,
+        default=math.inf,
+        metavar="MIN",
+        help="end the search after so many minutes, with a provisional verdict, that "
+        "the same command goes on from (default: none)",
+    )
+    common.add_import_argument(parser)
+    common.add_executor_arguments(parser)
+    add("--out", required=True, type=Path, metavar="DIR", help="a folder")
+    return parser.parse_args(arguments)
+
+
+def _add_model_arguments(add: Callable[..., object]) -> None:
+    data_arguments.add_nominal_arguments(add)
+    add(
+        "--held-out",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="logs or episodes to judge by instead of fitting them (default: a quarter "
+        "of the episodes of transitions; else contiguous blocks in turn)",
+    )
+    add(
+        "--parameters",
+        nargs="+",
+        default=[],
+        metavar="NAME|FILE",
+        help="parameters of the scenario that are fitted together with the effects, as "
+        "named by `drake-disasm identify` (default: none for transitions, else the "
+        "model's own)",
+    )
+    add(
+        "--huber",
+        type=options.above_zero_or_inf,
+        metavar="K",
+        help="residual, in standard deviations, beyond which the loss is linear; inf "
+        "for least squares (default: 3 for transitions, else inf)",
+    )
+
+
+#: The learned functions, beside the scenario that names them.
+_RESIDUAL_MODEL = "residual_model.npz"
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the program; returns its exit status."""
+    args = parse(arguments)
+    logs = common.named_logs(args.log)
+    if args.held_out:  # names, which are wrong more often than anything takes time
+        split_episodes(episode_names(logs), args.held_out)
+    model = _model(args, logs)
+    origin = program.provenance("close-loop", arguments, 0)
+    fits = args.out / "fits"
+    with (
+        program.ProgressBar(unit="run") as progress,
+        executor_for(args.executor, args.scheduler) as (executor, _),
+        Workers(args.workers, executor=executor, progress=progress) as workers,
+    ):
+        model, findings = data_arguments.checked(logs, model, args, workers)
+        share = model.held_out_share
+        train, test = split_episodes(model.measurements.names, args.held_out or share)
+        closed = close_loop(
+            model,
+            train=train,
+            test=test,
+            huber_delta=args.huber,
+            workers=workers,
+            progress=progress,
+            folder=fits,
+            time_budget=60.0 * args.time_budget,
+        )
+    _write(args.out, closed, findings, origin)
+    if not closed.is_provisional:
+        shutil.rmtree(fits, ignore_errors=True)
+    print(closed.text)
+    print(f"report: {args.out / 'report.html'}")
+    return 0
+
+
+def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
+    """Returns the model of the logs that the command line asks for."""
+    choice = ModelChoice(
+        scenario=load_scenario(args.scenario) if args.scenario else None,
+        requests=tuple(read_requests(args.parameters)) if args.parameters else (),
+        urdf=args.urdf,
+        fixed=True,
+    )
+    return model_of(logs, choice)
+
+
+def _write(
+    folder: Path,
+    closed: ClosedLoop,
+    findings: Sequence[DataFinding],
+    origin: dict[str, object],
+) -> None:
+    make_folder(folder)
+    learned = closed.verdict.residual_model
+    if learned is not None:
+        learned.functions.save(folder / _RESIDUAL_MODEL)
+    scenario = closed.scenario_with_residual_model(_RESIDUAL_MODEL)
+    if scenario is not None:
+        write_text(folder / "scenario.yaml", dump_scenario(scenario))
+    of_data = {"data_findings": [finding.to_mapping() for finding in findings]}
+    mapping = to_mapping(closed) | of_data | {"provenance": origin}
+    write_json(folder / "result.json", mapping)
+    write_text(folder / "report.html", closing_page(closed, origin, findings))

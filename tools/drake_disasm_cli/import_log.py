@@ -1,0 +1,191 @@
+"""Makes a log of what other programs recorded: tables, bags, datasets.
+
+Reads CSV, NPZ, NPY, MATLAB, Parquet, LeRobot datasets, ROS 1 and ROS 2 bags and MCAP.
+What is what is guessed from names and message types, or said by a small YAML map; both
+can be looked at with --show, and a guessed map can be saved and edited.
+
+Joint motion is brought to one even time line and filtered without phase shift, by one
+filter for all columns, whose cut-off is chosen from the data's spectrum; velocities and
+accelerations are the filter's own derivatives. All that was done stands in the log's
+provenance and is printed. --out also gets import.png: the spectrum and the filter.
+"""
+
+import argparse
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from drake_disasm.cell.parsing import movable_joints
+from drake_disasm.common import options, program
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import write_text
+from drake_disasm.common.resources import model_path
+from drake_disasm.importing import (
+    FieldMap,
+    Processing,
+    Source,
+    guessed_map,
+    import_recordings,
+    read_map,
+    read_source,
+    write_log,
+)
+from drake_disasm.importing.description import described, summary
+from drake_disasm.importing.plots import plot_import
+from drake_disasm.importing.units import factor
+from drake_disasm.logs.header import HEADER_NAME, read_header
+
+_EXAMPLES = """examples:
+  drake-disasm import-log run.mcap --show            what is in it, and the guess
+  drake-disasm import-log run.mcap --urdf arm.urdf --out out/log
+  drake-disasm import-log run.csv --save-map map.yaml --show      then edit it
+  drake-disasm import-log run_1.mat run_2.mat --map map.yaml --out out/log
+  drake-disasm import-log run.npz --urdf arm.urdf --cutoff 12 --out out/log
+then:
+  drake-disasm check-log out/log
+  drake-disasm close-loop out/log --out out/closed
+"""
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    parser = program.argument_parser("import-log", __doc__, _EXAMPLES)
+    add = parser.add_argument
+    add(
+        "sources",
+        nargs="+",
+        type=Path,
+        metavar="SOURCE",
+        help="a file, or the folder of a ROS 2 bag or a LeRobot dataset; several "
+        "become episodes of one log",
+    )
+    add(
+        "--kind",
+        default="joint_motion",
+        choices=["joint_motion", "joint_response", "static_wrench", "transitions"],
+        help="of log (default: joint_motion; joint_response: commanded and measured "
+        "positions; transitions need a map)",
+    )
+    add("--out", type=Path, metavar="DIR", help="folder of the log")
+    _add_map_arguments(add)
+    _add_processing_arguments(add)
+    return parser.parse_args(arguments)
+
+
+def _add_map_arguments(add: Callable[..., object]) -> None:
+    add(
+        "--show",
+        action="store_true",
+        help="print what is in the sources and the map, and stop",
+    )
+    add("--map", type=Path, metavar="FILE", help="what is what (default: guessed)")
+    add("--save-map", type=Path, metavar="FILE", help="write the map, to edit it")
+    add(
+        "--urdf",
+        default="",
+        metavar="FILE",
+        help="that describes the arm (default: of the log.yaml beside a table of ours)",
+    )
+    add(
+        "--joints",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="names of the joints, in the order of the columns (default: the URDF's)",
+    )
+    add("--task", metavar="NAME", help="name of the task (default: recorded)")
+
+
+def _add_processing_arguments(add: Callable[..., object]) -> None:
+    add(
+        "--cutoff",
+        type=_cutoff,
+        metavar="HZ|none",
+        help="of the low-pass filter (default: chosen from the spectrum)",
+    )
+    add(
+        "--decimate",
+        type=options.positive,
+        metavar="N",
+        help="keep every Nth row (default: what the cut-off asks for)",
+    )
+    add(
+        "--between",
+        nargs=2,
+        type=float,
+        default=[0.0, math.inf],
+        metavar=("S", "S"),
+        help="keep what was recorded between these times since its begin",
+    )
+    add(
+        "--keep-shifts",
+        action="store_true",
+        help="don't take away shifts in time between topics of a bag",
+    )
+
+
+def _cutoff(text: str) -> float:
+    return math.inf if text == "none" else options.above_zero(text)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the program; returns its exit status."""
+    args = parse(arguments)
+    if not (args.show or args.out or args.save_map):
+        raise DisasmError("--out: give a folder for the log, or --show to look first")
+    sources = [read_source(path) for path in args.sources]
+    fields = _fields(args, sources)
+    if args.save_map:
+        write_text(args.save_map, fields.to_yaml())
+        print(f"map: {args.save_map}")
+    if args.show:
+        unit = factor(fields.time_unit, "map: time")
+        print("\n".join(described(source, fields.time, unit) for source in sources))
+        print(f"map:\n{_indented(fields.to_yaml())}")
+    if args.show or not args.out:
+        return 0
+    imported = import_recordings(
+        sources,
+        fields,
+        Processing(args.cutoff, args.decimate, tuple(args.between)),
+        shifts=not args.keep_shifts,
+    )
+    write_log(
+        imported,
+        sources,
+        fields,
+        args.out,
+        program.provenance("import-log", arguments, 0),
+    )
+    if imported.done:
+        plot_import(imported, args.out / "import.png")
+    print(summary(imported))
+    print(f"log: {args.out}")
+    return 0
+
+
+def _fields(args: argparse.Namespace, sources: Sequence[Source]) -> FieldMap:
+    """Returns the map that is given, or guessed; the command line comes first."""
+    urdf = args.urdf or ("" if args.map else _urdf_of_log(args.sources[0]))
+    if urdf:
+        model_path(urdf, "give a file that is there by --urdf")
+    joints = args.joints or (movable_joints(urdf) if urdf else [])
+    if args.map:
+        fields = read_map(args.map)
+    else:
+        fields = guessed_map(sources[0], args.kind, joints, urdf)
+    changes = {"urdf": args.urdf, "joints": tuple(args.joints), "task": args.task}
+    return dataclasses.replace(fields, **{n: v for n, v in changes.items() if v})
+
+
+def _urdf_of_log(source: Path) -> str:
+    """Returns the URDF that the log of a table names; "" for a table of no log."""
+    folder = source.parent
+    if source.suffix != ".parquet" or not (folder / HEADER_NAME).exists():
+        return ""
+    return read_header(folder).urdf or ""
+
+
+def _indented(text: str) -> str:
+    return "".join(f"  {line}" for line in text.splitlines(keepends=True))
