@@ -21,7 +21,7 @@ _FAR = np.array([0.06, 0.01, 0.01, 0.05, 0.05, 0.05])
 #: What the cell's sensor reads of free motion, and the twin's does not: force along
 #: x, y and z by the commanded rate, and by its change since the step before [N s/m].
 #: The twin has no palm behind the sensor, and no command that comes in pieces. Measured
-#: with the shipped gripper under position control (`tests/physics/free_motion.py`).
+#: with the shipped gripper under position control (`benchmarks/sensor_in_motion.py`).
 _STEADY, _CHANGE = np.array([1.6, 2.0, 4.0]), np.array([3.5, 3.9, 3.3])
 _PALM = np.array([0.0, 0.0, 0.1])  # m, where that force acts, in S
 

@@ -19,7 +19,7 @@ from sysid.models.commands import bolt_path
 #: Rates of the bolt in the simulated pads by a load on it, along and about x, y and z
 #: of Gn [m/(N s), rad/(N m s)], in a point on the bolt about which it turns: Drake
 #: regularises friction in proportion to the lightest body. Measured in the cell with
-#: the shipped gripper and time step (`tests/physics/compliance.py`). Of rigid fingers
+#: the shipped gripper and time step (`benchmarks/compliance.py`). Of rigid fingers
 #: it is two thirds, but micrometres decide there: logs are predicted worse with it.
 _MOBILITY = np.array([2.1e-6, 1.3e-6, 0.0, 0.0, 0.0, 20.5e-3])
 _PATCH = np.array([0.0, 0.0205, 0.0])  # m, that point, p_BoPo_B

@@ -1,10 +1,10 @@
 """The cell, built once."""
 
 import pytest
+from physics import QUIET
 
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation
-from tests.physics.measurements import QUIET
 
 
 @pytest.fixture(scope="session")

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from compliance import Push, stated, stiffness
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import make_station
 from tests.drake_disasm.conftest import QUIET
-from tests.physics.compliance import Push, stated, stiffness
 
 ORIGIN = np.zeros(3)
 

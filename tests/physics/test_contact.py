@@ -2,12 +2,7 @@
 
 import numpy as np
 import pytest
-
-from drake_disasm.effects import GroovePose
-from drake_disasm.policies import make_policy
-from drake_disasm.scenario import load_scenario
-from drake_disasm.task.simulation import TaskSimulation
-from tests.physics.measurements import (
+from physics import (
     QUIET,
     STIFF,
     action,
@@ -16,6 +11,11 @@ from tests.physics.measurements import (
     quiet,
     sliding,
 )
+
+from drake_disasm.effects import GroovePose
+from drake_disasm.policies import make_policy
+from drake_disasm.scenario import load_scenario
+from drake_disasm.task.simulation import TaskSimulation
 
 
 @pytest.mark.parametrize("model", ["cell", "twin"])

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from physics import QUIET, STIFF
 
 from drake_disasm.common.spatial import rotation_from_vector
 from drake_disasm.effects import GroovePose
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
-from tests.physics.measurements import QUIET, STIFF
 
 
 def _press(model: str, offset: np.ndarray, ry: float) -> TaskSimulation:

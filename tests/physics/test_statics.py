@@ -2,19 +2,19 @@
 
 import numpy as np
 import pytest
-from pydrake.math import RotationMatrix
-
-from drake_disasm.cell.twin_parameters import bolt_stiffness
-from drake_disasm.scenario import CONTROLS, load_scenario
-from drake_disasm.stations import CellStation
-from tests.physics.compliance import AWAY
-from tests.physics.measurements import (
+from compliance import AWAY
+from physics import (
     QUIET,
     STIFF,
     pushed,
     stated_stiffness,
     stiffness,
 )
+from pydrake.math import RotationMatrix
+
+from drake_disasm.cell.twin_parameters import bolt_stiffness
+from drake_disasm.scenario import CONTROLS, load_scenario
+from drake_disasm.stations import CellStation
 
 RESOLUTION = np.array([0.2, 0.2, 0.8, 0.010, 0.010, 0.002])  # HEX-E, noise-free
 G = 9.81

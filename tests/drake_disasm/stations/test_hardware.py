@@ -8,6 +8,7 @@ import numpy as np
 import psutil
 import pytest
 from drake import lcmt_iiwa_command
+from fault_runs import in_lockstep
 from pydrake.lcm import DrakeLcm
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -27,7 +28,6 @@ from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.recording import EpisodeRecorder
 from drake_disasm.task.simulation import TaskSimulation
-from tests.fakes.fault_runs import in_lockstep
 
 #: The fake arm follows a control period later than a simulated one: 0.05 mm at the 10
 #: mm/s of sliding, 0.15 mm of lifting, and the policy answers to contact that comes

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from fault_runs import in_lockstep
+from force_runs import run_push
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.mdp import Outcome
@@ -12,8 +14,6 @@ from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.task.simulation import TaskSimulation
 from tests.drake_disasm.conftest import QUIET
-from tests.fakes.fault_runs import in_lockstep
-from tests.fakes.force_runs import run_push
 
 IMPEDANCE = [control for control in CONTROLS if control != "position"]
 _STEPS = 25

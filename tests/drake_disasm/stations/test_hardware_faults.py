@@ -3,9 +3,9 @@
 import math
 
 import pytest
+from fault_runs import ALL, run_fault
 
 from drake_disasm.safety import Mode
-from tests.fakes.fault_runs import ALL, run_fault
 
 #: What each does: the words of the hold, and within what time [s] of virtual time.
 HARMLESS = {("iiwa", "reorder"), ("ft_sensor", "reorder")}

@@ -1,8 +1,7 @@
 """At the limit of force: a hold, and backing away from what presses."""
 
 import pytest
-
-from tests.fakes.force_runs import PUSHES, run_push
+from force_runs import PUSHES, run_push
 
 
 def test_the_arm_backs_away_from_what_presses() -> None:

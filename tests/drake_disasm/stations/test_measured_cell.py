@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fault_runs import in_lockstep
 from pydrake.geometry import Meshcat, QueryObject
 from pydrake.math import RigidTransform
 
@@ -12,7 +13,6 @@ from drake_disasm.policies import make_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations.measured_cell import MeasuredCell
 from drake_disasm.visualization import MeasuredView, MeshcatView, start_meshcat
-from tests.fakes.fault_runs import in_lockstep
 
 _ARM = "/drake/visualizer/iiwa14/iiwa_link_7"
 

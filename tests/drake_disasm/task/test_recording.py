@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fault_runs import in_lockstep
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.fakes.cell import FakeCell
@@ -12,7 +13,6 @@ from drake_disasm.logs import LogWriter, read_log
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
-from tests.fakes.fault_runs import in_lockstep
 
 STEPS = 3
 ROWS = ".episode_0000.unfinished.csv"

@@ -5,6 +5,7 @@ import itertools
 
 import numpy as np
 import pytest
+import sensor_in_motion
 from pydrake.math import RigidTransform
 
 from drake_disasm.cell.coordinates import BoltCoordinates
@@ -21,7 +22,6 @@ from drake_disasm.task.simulation import TaskSimulation
 from sysid.models.cell_arm import CellArm, Sway
 from sysid.models.transitions import FORCE_ERROR, POSE_ERROR
 from sysid.models.twin import TwinModel
-from tests.physics import free_motion
 
 _SCENARIO = load_scenario("removal")
 _IMPEDANCE = load_scenario("removal", ["arm.control=joint_impedance"])
@@ -161,10 +161,10 @@ def test_an_arm_whose_command_turns_back_is_where_the_twin_says(back_and_forth):
 
 def test_the_sway_is_what_cell_and_twin_read_of_free_motion():
     """Across the groove, within a newton second per metre; of other arms nothing."""
-    scenario = load_scenario("removal", free_motion.QUIET)
+    scenario = load_scenario("removal", sensor_in_motion.QUIET)
     first, steady = (
-        free_motion.responses(TaskSimulation(scenario, "cell"), 2, 3e-5)
-        - free_motion.responses(TaskSimulation(scenario, "twin"), 2, 3e-5)
+        sensor_in_motion.responses(TaskSimulation(scenario, "cell"), 2, 3e-5)
+        - sensor_in_motion.responses(TaskSimulation(scenario, "twin"), 2, 3e-5)
     )[:, 2]
     sway = Sway.of(_SCENARIO, "cell")
     assert sway.steady[2] == pytest.approx(steady, abs=0.2)

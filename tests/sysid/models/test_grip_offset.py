@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from compliance import Push
 
 from drake_disasm.cell.coordinates import BoltCoordinates
 from drake_disasm.cell.tool import Tool
@@ -16,7 +17,6 @@ from drake_disasm.task.simulation import TaskSimulation
 from sysid.models.commands import bolt_path
 from sysid.models.grip_offset import GripOffset, of_encoders
 from tests.drake_disasm.conftest import QUIET
-from tests.physics.compliance import Push
 
 _SCENARIO = load_scenario("removal", [QUIET])
 _PATCH = np.array([0.0, 0.0205, 0.0])  # about which the bolt turns in the pads

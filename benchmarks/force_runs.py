@@ -1,17 +1,20 @@
 """What the arm does at the limit of force: held, or backing away, in virtual time.
 
-`python -m tests.fakes.force_runs` prints the table of docs/hardware.md.
+The policy presses the gripped bolt against the groove until a hold. Prints the force at
+the fake sensor, as Markdown.
 """
 
 import dataclasses
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
+from fault_runs import in_lockstep
 
+from drake_disasm.common import program
 from drake_disasm.fakes.cell import FakeCell
 from drake_disasm.scenario import CONTROLS, load_scenario
 from drake_disasm.stations.hardware import HoldError
-from tests.fakes.fault_runs import in_lockstep
 
 #: Actions (6,) that press the bolt against the groove until a hold.
 PUSHES = {
@@ -108,7 +111,19 @@ def table(runs: list[ForceRun]) -> str:
     return "\n".join(lines)
 
 
-if __name__ == "__main__":
-    cases = itertools.product(PUSHES, CONTROLS, ("hold", "yield"))
+def main(arguments: Sequence[str]) -> int:
+    """Pushes and prints the table; returns the exit status."""
+    parser = program.argument_parser("force_runs", __doc__, "")
+    parser.add_argument(
+        "--control", nargs="+", choices=CONTROLS, default=CONTROLS, metavar="CONTROL",
+        help=f"of {', '.join(CONTROLS)} (default: all)",
+    )  # fmt: skip
+    controls = parser.parse_args(arguments).control
+    cases = itertools.product(PUSHES, controls, ("hold", "yield"))
     reached = [c for c in cases if c[0] != _TURN or c[1] == "position"]
     print(table([run_push(push, mode, c) for push, c, mode in reached]))
+    return 0
+
+
+if __name__ == "__main__":
+    program.run(main)

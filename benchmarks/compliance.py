@@ -1,6 +1,6 @@
 """How grip and arm yield: stated against measured, in cell and twin.
 
-`python -m tests.physics.compliance` prints the tables of docs/physics.md.
+Prints stiffness, release and creep, by the arm's control and the kind of fingers.
 """
 
 import dataclasses
@@ -16,12 +16,13 @@ from pydrake.systems.analysis import Simulator
 from drake_disasm.cell.grip import Springs, grip_springs
 from drake_disasm.cell.tool import Tool
 from drake_disasm.cell.twin_parameters import twin_of
+from drake_disasm.common import program
 from drake_disasm.common.spatial import rotation_vector, velocity_shift
 from drake_disasm.effects import GroovePose
 from drake_disasm.scenario import CONTROLS, Scenario, load_scenario
 from drake_disasm.stations import SimulatedStation, make_station
-from tests.drake_disasm.conftest import QUIET
 
+QUIET = "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"
 AWAY = GroovePose(y=-0.01)  # the groove drops away from the bolt
 
 LOADS = np.array([2.0, 2.0, 2.0, 0.05, 0.05, 0.05])  # N, N m
@@ -181,6 +182,13 @@ def _table(rows: np.ndarray) -> str:
     return " | ".join(" ".join(f"{value:.4g}" for value in row) for row in rows)
 
 
-if __name__ == "__main__":
+def main(arguments: Sequence[str]) -> int:
+    """Prints the tables; returns the exit status."""
+    program.argument_parser("compliance", __doc__, "").parse_args(arguments)
     for line in _lines():
         print(line, flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    program.run(main)

@@ -1,6 +1,7 @@
 """What each fault of each device does to the hardware station, in virtual time.
 
-`python -m tests.fakes.fault_runs` prints the table of docs/hardware.md.
+The cell moves, then one device fails. Prints what happened, and how long it took, as
+Markdown.
 """
 
 import contextlib
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from drake_disasm.common import program
 from drake_disasm.fakes import hex_box, robotiq_gripper
 from drake_disasm.fakes.cell import IIWA_FAULTS, FakeCell
 from drake_disasm.fakes.lockstep import fake_hardware
@@ -138,5 +140,18 @@ def table(runs: list[FaultRun]) -> str:
     return "\n".join(lines)
 
 
+def main(arguments: Sequence[str]) -> int:
+    """Runs into the faults and prints the table; returns the exit status."""
+    parser = program.argument_parser("fault_runs", __doc__, "")
+    devices = tuple(dict.fromkeys(device for device, _ in ALL))
+    parser.add_argument(
+        "--only", nargs="+", choices=devices, default=devices, metavar="DEVICE",
+        help=f"of {', '.join(devices)} (default: all)",
+    )  # fmt: skip
+    wanted = parser.parse_args(arguments).only
+    print(table([run_fault(*which) for which in ALL if which[0] in wanted]))
+    return 0
+
+
 if __name__ == "__main__":
-    print(table([run_fault(*which) for which in ALL]))
+    program.run(main)

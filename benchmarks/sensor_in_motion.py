@@ -1,14 +1,17 @@
 """What the sensor reads of steady motion in the groove's play, by cell and twin.
 
-    python -m tests.physics.free_motion
+    python benchmarks/sensor_in_motion.py
 
 Prints the force (fx, fy, fz) over the commanded rate, along x, y and z in turn: after
 the first step, which begins from rest, and when nothing changes any more [N s/m].
 `sysid/models/cell_arm.py` holds the differences.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from drake_disasm.common import program
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
 
@@ -26,15 +29,17 @@ def responses(simulation: TaskSimulation, axis: int, step: float) -> np.ndarray:
     return np.array([forces[0], forces[-1]])
 
 
-def main() -> None:
-    """Prints the table."""
+def main(arguments: Sequence[str]) -> int:
+    """Prints the table; returns the exit status."""
+    program.argument_parser("sensor_in_motion", __doc__, "").parse_args(arguments)
     scenario = load_scenario("removal", QUIET)
     for station in ("cell", "twin"):
         simulation = TaskSimulation(scenario, station)
         for axis, (name, step) in enumerate(_STEPS.items()):
             first, steady = responses(simulation, axis, step).round(2).tolist()
             print(f"{station}, along {name}: first {first}, steady {steady}")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    program.run(main)
