@@ -416,7 +416,7 @@ def comparison(before: Path, after: Path) -> str:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("mutants", __doc__, _EXAMPLES)
+    parser = program.argument_parser("python benchmarks/mutants.py", __doc__, _EXAMPLES)
     commands = parser.add_subparsers(dest="command", required=True)
     here = Path(__file__).resolve().parents[1]
     sample = commands.add_parser("sample", help="draw mutants")

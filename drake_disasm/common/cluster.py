@@ -32,12 +32,14 @@ def executor_for(name: str, scheduler: str) -> Iterator[tuple[Executor | None, s
     """
     if name == "local":
         if scheduler:
-            raise DisasmError(f"--scheduler {scheduler}: add --executor dask")
+            raise DisasmError(
+                f"`scheduler` {scheduler}: is for `executor` dask; give both"
+            )
         yield None, ""
         return
     if not scheduler:
         raise DisasmError(
-            "--executor dask: give the scheduler's address, --scheduler tcp://HOST:8786"
+            "`executor` dask: give the address of its `scheduler`, tcp://HOST:8786"
         )
     with contextlib.ExitStack() as stack:
         stack.enter_context(_silent())
@@ -64,7 +66,7 @@ def _client(scheduler: str) -> Iterator["Client"]:
         import distributed
     except ImportError:
         raise DisasmError(
-            "--executor dask: Dask is not installed; "
+            "`executor` dask: Dask is not installed; "
             "pip install 'drake_disasm[cluster]'"
         ) from None
     try:

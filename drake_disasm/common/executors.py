@@ -23,6 +23,7 @@ from functools import partial
 from queue import SimpleQueue
 from typing import Any, Self, TypeVar
 
+from drake_disasm.common import drake_warnings
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.progress import (
     CombinedProgress,
@@ -205,6 +206,7 @@ class WorkerPool:
                 min(self._count, jobs) if self._process_per_job else self._count,
                 multiprocessing.get_context("spawn"),
                 _begin_worker,
+                (drake_warnings.are_kept_back(),),
                 max_tasks_per_child=1 if self._process_per_job else None,
             )
         return self._own
@@ -218,7 +220,7 @@ class WorkerPool:
         if failures == _ATTEMPTS:
             raise DisasmError(
                 f"worker processes died {failures} times over the same work (out of "
-                "memory?); give fewer --workers, then resume"
+                "memory?); give fewer `workers`, then resume"
             ) from error
         self.notes.append("a worker process died; its work was done again")
         self.close()
@@ -277,8 +279,14 @@ def _abandon(futures: Collection[Future[Any]], server: ProgressServer | None) ->
         wait(futures)
 
 
-def _begin_worker() -> None:
-    """Leaves Ctrl-C to the main process, and ends this one with it."""
+def _begin_worker(quiet: bool) -> None:
+    """Leaves Ctrl-C to the main process, and ends this one with it.
+
+    Args:
+        quiet: whether Drake's warnings, which the main process counts, are kept back.
+    """
+    if quiet:
+        drake_warnings.keep_back()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

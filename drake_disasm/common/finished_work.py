@@ -56,7 +56,7 @@ def is_resumed(folder: Path, marker: str, what: str, resume: bool) -> bool:
         return False
     if not resume:
         raise DisasmError(
-            f"{folder}: holds {what} already; add --resume, or name a new folder"
+            f"{folder}: holds {what} already; set `resume`, or name a new folder"
         )
     return True
 

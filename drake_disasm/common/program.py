@@ -4,9 +4,9 @@ import argparse
 import importlib.metadata
 import math
 import os
+import re
 import select
 import shlex
-import signal
 import subprocess
 import sys
 import time
@@ -14,58 +14,30 @@ import warnings
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from types import FrameType
-from typing import Any, NoReturn, Self
+from typing import Any, ClassVar, NoReturn, Self
 
 from tqdm import tqdm
 
+from drake_disasm.common import drake_warnings, stopping
 from drake_disasm.common.errors import DisasmError, DisasmWarning
 from drake_disasm.common.progress import ProgressUpdate
 
 EXIT_BAD_INPUT = 2
-EXIT_INTERRUPTED = 130
 EXIT_UNREAD = 141
-EXIT_TERMINATED = 143
 
 _LINE_PERIOD = 30.0  # s, between lines of progress where stderr is no terminal
-
-
-class Terminated(KeyboardInterrupt):
-    """SIGTERM came; a program ends by it as by Ctrl-C."""
-
-
-class _Stop:
-    """Remembers Ctrl-C or SIGTERM, since what is raised can get lost on its way.
-
-    Python raises it wherever it happens to be; in a callback that some library calls
-    from C++, or in a finaliser, it is printed or dropped there and the run goes on.
-    """
-
-    error: KeyboardInterrupt | None = None
-
-    def __call__(self, number: int, _: FrameType | None) -> None:
-        is_ctrl_c = number == signal.SIGINT
-        self.error = KeyboardInterrupt() if is_ctrl_c else Terminated("terminated")
-        raise self.error
-
-
-_stop = _Stop()
-
-
-def stop_if_interrupted() -> None:
-    """Raises Ctrl-C or SIGTERM once more if it came; call it in a loop."""
-    if _stop.error:
-        raise _stop.error
+_ARGUMENT = re.compile(r"`([a-z_]+)`")
 
 
 def run(main: Callable[[Sequence[str]], int]) -> None:
     """Calls a program's main and exits; bad input is one line and status 2."""
-    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
-    for number, handler in usual.items():
-        if signal.getsignal(number) is handler:
-            signal.signal(number, _stop)
+    stopping.handle_signals()
     warnings.formatwarning = _one_line_for_ours(warnings.formatwarning)
-    sys.exit(status(main, sys.argv[1:]))
+    drake_warnings.keep_back()
+    code = status(main, sys.argv[1:])
+    if summary := drake_warnings.summary():
+        print(summary, file=sys.stderr)
+    sys.exit(code)
 
 
 def _one_line_for_ours(usual: Callable[..., str]) -> Callable[..., str]:
@@ -93,14 +65,19 @@ def status(main: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> in
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_UNREAD
     except DisasmError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {_with_options(str(error))}", file=sys.stderr)
         return EXIT_BAD_INPUT
-    except Terminated:
-        print("terminated; what was finished is kept", file=sys.stderr)
-        return EXIT_TERMINATED
-    except KeyboardInterrupt:
-        print("interrupted; what was finished is kept", file=sys.stderr)
-        return EXIT_INTERRUPTED
+    except KeyboardInterrupt as error:
+        return stopping.report(error)
+
+
+def _with_options(message: str) -> str:
+    """Returns a message in which a library's arguments are the program's options.
+
+    What a library calls `held_out` is --held-out to whoever typed the command.
+    """
+    names = _Parser.option_names
+    return _ARGUMENT.sub(lambda found: names.get(found[1], found[0]), message)
 
 
 def _is_unread(descriptor: int) -> bool:
@@ -111,11 +88,33 @@ def _is_unread(descriptor: int) -> bool:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Refuses a command line as everything else is refused: in one line."""
+    """Refuses a command line as everything else is refused: in one line.
+
+    Attributes:
+        option_names: by the names of their values, of the parser that was last used.
+    """
+
+    option_names: ClassVar[dict[str, str]] = {}
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Returns what argparse does; remembers the options for messages."""
+        _Parser.option_names = {
+            action.dest: action.option_strings[-1]
+            for action in self._actions
+            if action.option_strings
+        }
+        return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Raises DisasmError."""
         raise DisasmError(f"{' '.join(message.split())}; see --help")
+
+
+class _Verbose(argparse.Action):
+    """Shows Drake's warnings from here on."""
+
+    def __call__(self, *_: object) -> None:
+        drake_warnings.show()
 
 
 def argument_parser(
@@ -126,16 +125,23 @@ def argument_parser(
     What it refuses is a DisasmError.
 
     Args:
-        name: of the subcommand, or of a benchmark.
+        name: as it is typed, such as "drake-disasm simulate".
         description: its docstring.
         epilog: examples.
     """
-    return _Parser(
-        prog=f"drake-disasm {name}",
+    parser = _Parser(
+        prog=name,
         description=description,
         epilog=epilog,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument(
+        "--verbose",
+        action=_Verbose,
+        nargs=0,
+        help="show Drake's warnings about model files (default: their number)",
+    )
+    return parser
 
 
 class ProgressBar:
@@ -170,7 +176,7 @@ class ProgressBar:
 
     def __call__(self, update: ProgressUpdate) -> None:
         """Shows an update."""
-        stop_if_interrupted()
+        stopping.stop_if_interrupted()
         if not (update.done or update.total):
             if update.message:
                 tqdm.write(update.message)
@@ -228,7 +234,7 @@ def provenance(program: str, arguments: Sequence[str], seed: int) -> dict[str, A
     packages = ("drake", "numpy", "torch", "drake_disasm")
     return {
         "program": program,
-        "command": shlex.join(["drake-disasm", program, *arguments]),
+        "command": shlex.join([*program.split(), *arguments]),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "seed": seed,
         "versions": {name: _version(name) for name in packages},

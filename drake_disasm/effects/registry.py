@@ -24,9 +24,8 @@ from drake_disasm.effects.definition import refuse_faulty
 
 _GROUP = "drake_disasm.effects"
 _REMEDY = (
-    "an effect of your own must be imported before it is used: import its module, "
-    "give --import FILE.py|MODULE, or declare an entry point of the group "
-    f"{_GROUP}"
+    "an effect of your own must be imported before it is used (`imports`), or be an "
+    f"entry point of the group {_GROUP}"
 )
 
 _Kind = TypeVar("_Kind", bound=type[Effect])

@@ -92,7 +92,7 @@ def summary(imported: Imported) -> str:
                 f"off by {1e3 * s.seconds:+.2f} ms (95 %: {1e3 * s.low:+.2f} to "
                 f"{1e3 * s.high:+.2f}), taken away"
                 if s.is_seen
-                else "not compared: --urdf tells what its sensor should read"
+                else "not compared: `urdf` tells what its sensor should read"
             )
             lines.append(f"{each.name}: the clock of {name} is {words}")
     if done := imported.done:

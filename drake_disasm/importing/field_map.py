@@ -43,7 +43,7 @@ _KEYS = (
     "columns",
 )
 _COLUMN_KEYS = ("from", "unit", "scale", "sign", "offset")
-_REMEDY = "see docs/your-robot.md, or let --show guess one and --save-map write it"
+_REMEDY = "see docs/your-robot.md, or let `show` guess one and `save_map` write it"
 
 Scale = float | str
 

@@ -73,7 +73,7 @@ def guessed_map(
     if kind == "static_wrench":
         return _static_wrench(source)
     raise DisasmError(
-        f"a map of kind {kind} is not guessed; write one and give it by --map, see "
+        f"a map of kind {kind} is not guessed; write one and give it by `map`, see "
         "docs/your-robot.md"
     )
 
@@ -91,14 +91,14 @@ def _joint_motion(
     if stream is None:
         raise DisasmError(
             f"{source.path}: no channel is called as joint positions are; write a map "
-            "and give it by --map; --show prints the channels"
+            "and give it by `map`; `show` prints the channels"
         )
     count = len(columns["q"].channels)
     columns = {n: c for n, c in columns.items() if len(c.channels) == count}
     if kind == "joint_response" and "q_commanded" not in columns:
         raise DisasmError(
             f"{source.path}: no channel is called as commanded joint positions are; "
-            "write a map and give it by --map; --show prints the channels"
+            "write a map and give it by `map`; `show` prints the channels"
         )
     return FieldMap(
         kind=kind,
@@ -297,6 +297,6 @@ def _static_wrench(source: Source) -> FieldMap:
     if len(columns) < 2:
         raise DisasmError(
             f"{source.path}: no wrench with an orientation is found by its names; "
-            "write a map and give it by --map"
+            "write a map and give it by `map`"
         )
     return FieldMap("static_wrench", columns, time, frames={"wrench": "S"})

@@ -107,7 +107,7 @@ def process(
         longest = max(len(part.time) for part in parts)
         raise DisasmError(
             f"no stretch without gaps is longer than the filter: {longest} rows, and "
-            f"it takes {2 * low.reach if low else 0}; give a higher --cutoff, or none"
+            f"it takes {2 * low.reach if low else 0}; give a higher `cutoff`, or none"
         )
     resampled = sum(not clock.is_even for clock in clocks)
     done = Done(
@@ -130,7 +130,7 @@ def _cutoff_of(
         cutoff = max(chosen_cutoff(part.columns["q"], period) for part in parts)
     if math.isfinite(cutoff) and cutoff >= 0.5 / period:
         raise DisasmError(
-            f"--cutoff {cutoff:g}: is not below half the sampling rate, "
+            f"`cutoff` {cutoff:g}: is not below half the sampling rate, "
             f"{0.5 / period:.4g} Hz; give a lower one, or none"
         )
     return cutoff

@@ -135,7 +135,7 @@ def read_logs(folders: Iterable[str | Path]) -> tuple[Log, ...]:
 
 def _unfinished(folder: Path) -> Iterator[str]:
     for number, path in unfinished_files(folder).items():
-        what = "was cut off by a kill; recording with --resume keeps its rows"
+        what = "was cut off by a kill; recording with `resume` keeps its rows"
         if is_being_written(path):
             what = "is being recorded"
         yield f"{folder}: episode {number} is left out: it {what}"

@@ -12,6 +12,7 @@ from drake_disasm.scenario.files import (
     scenario_path,
     scenario_to_mapping,
     shipped_scenarios,
+    with_hidden_effects,
 )
 from drake_disasm.scenario.randomisation import corner, draw, with_values
 from drake_disasm.scenario.schema import (
@@ -60,5 +61,6 @@ __all__ = [
     "scenario_to_mapping",
     "shipped_scenarios",
     "validate",
+    "with_hidden_effects",
     "with_values",
 ]

@@ -66,9 +66,42 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     _find_files(scenario, path.parent)
     for override in overrides:
         scenario = _override(scenario, override)
-        _checked(check, scenario, f"--set {override}")
-    _checked(validate, scenario, " with --set ".join([str(path), *overrides]))
+        _checked(check, scenario, f"`overrides` {override}")
+    _checked(validate, scenario, " with `overrides` ".join([str(path), *overrides]))
     return scenario
+
+
+def with_hidden_effects(nominal: Scenario, name: str) -> Scenario:
+    """Returns a scenario with the effects of another added, which stay undeclared.
+
+    Args:
+        nominal: what is declared.
+        name: of a shipped scenario, or of a file that has `effects` and may repeat
+            what the nominal scenario states.
+
+    Raises:
+        DisasmError: missing file, bad value, no effect in it, or something other than
+            effects that differs from the nominal scenario.
+    """
+    path = scenario_path(name)
+    text = read_text(path, "give a scenario in YAML", MOST_BYTES)
+    declared = dataclasses.replace(nominal, effects=[])
+    hidden = parse(upgraded(text), copy.deepcopy(declared), str(path))
+    for field in dataclasses.fields(Scenario):
+        differs = getattr(hidden, field.name) != getattr(declared, field.name)
+        if differs and field.name not in ("name", "effects"):
+            raise DisasmError(
+                f"{path}: `hidden` adds effects alone, and its '{field.name}' is not "
+                f"that of scenario '{nominal.name}'; take it out, or change both by "
+                "`overrides`"
+            )
+    if not hidden.effects:
+        raise DisasmError(f"{path}: `hidden` has no effects; list some under `effects`")
+    _find_files(hidden, path.parent)
+    real = dataclasses.replace(nominal, effects=[*nominal.effects, *hidden.effects])
+    _checked(check, real, str(path))
+    _checked(validate, real, str(path))
+    return real
 
 
 def _find_files(scenario: Scenario, folder: Path) -> None:
@@ -141,8 +174,8 @@ def _checked(
 def _override(scenario: Scenario, override: str) -> Scenario:
     key, separator, value = override.partition("=")
     if not separator or not key:
-        raise DisasmError(f"--set {override}: write it as key=value")
-    source = f"--set {override}"
+        raise DisasmError(f"`overrides` {override}: write it as key=value")
+    source = f"`overrides` {override}"
     try:
         scenario, path = resolve(copy.deepcopy(scenario), key.strip())
         find_field(scenario, path, key.strip())

@@ -3,7 +3,7 @@
 Says how the data were sampled, what is wrong with them (gaps, stuck or dead channels,
 units, signs, frames, delays, spikes, filters), which parameters the motion determines,
 which effects it could show at all and from which size on, and what to record in
-addition. `drake-disasm identify` and `drake-disasm close-loop` make the same check of the data.
+addition. `drake-disasm identify` and `close-loop` make the same check of the data.
 
 The exit status is 0 if fits to these logs mean something, and 2 if not.
 """
@@ -28,18 +28,18 @@ from sysid.report.next_recordings import LimitRow, limit_rows
 from sysid.workers import Workers
 
 _EXAMPLES = """examples:
-  drake-disasm check-log out/log
-  drake-disasm check-log out/run_1 out/run_2 --urdf arm.urdf
-  drake-disasm check-log out/log --quick                  what is wrong alone
-  drake-disasm check-log out/log --json out/check.json
+  drake-disasm check-log --log out/log
+  drake-disasm check-log --log out/run_1 out/run_2 --urdf arm.urdf
+  drake-disasm check-log --log out/log --quick            what is wrong alone
+  drake-disasm check-log --log out/log --json out/check.json
 """
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("check-log", __doc__, _EXAMPLES)
+    parser = program.argument_parser("drake-disasm check-log", __doc__, _EXAMPLES)
     add = parser.add_argument
-    add("logs", nargs="+", type=Path, metavar="DIR", help="logs of one kind")
+    common.add_log_argument(add)
     data_arguments.add_nominal_arguments(add)
     add(
         "--quick",
@@ -55,7 +55,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
-    logs = common.named_logs(args.logs)
+    logs = common.named_logs(args.log)
     print("\n".join(line for log in logs for line in _of_log(log)))
     model = _model(args, logs)
     with (
@@ -76,7 +76,9 @@ def main(arguments: Sequence[str]) -> int:
             {
                 "findings": [finding.to_mapping() for finding in findings],
                 "excitation": found.to_mapping() if found else None,
-                "provenance": program.provenance("check-log", arguments, 0),
+                "provenance": program.provenance(
+                    "drake-disasm check-log", arguments, 0
+                ),
             },
         )
     return 0

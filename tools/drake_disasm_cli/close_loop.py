@@ -40,9 +40,9 @@ _EXAMPLES = """examples:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("close-loop", __doc__, _EXAMPLES)
+    parser = program.argument_parser("drake-disasm close-loop", __doc__, _EXAMPLES)
     add = parser.add_argument
-    add("--log", nargs="+", required=True, metavar="DIR", help="logs of one kind")
+    common.add_log_argument(add)
     _add_model_arguments(add)
     data_arguments.add_data_arguments(add)
     add(
@@ -98,7 +98,7 @@ def main(arguments: Sequence[str]) -> int:
     if args.held_out:  # names, which are wrong more often than anything takes time
         split_episodes(episode_names(logs), args.held_out)
     model = _model(args, logs)
-    origin = program.provenance("close-loop", arguments, 0)
+    origin = program.provenance("drake-disasm close-loop", arguments, 0)
     fits = args.out / "fits"
     with (
         program.ProgressBar(unit="run") as progress,

@@ -104,6 +104,37 @@ def _former_model(name: str) -> str:
     raise DisasmError(f"--model {name}: is --station {name} now")
 
 
+def add_log_argument(add: Callable[..., Any]) -> None:
+    """Adds --log, which is required."""
+    add(
+        "--log",
+        nargs="+",
+        required=True,
+        type=Path,
+        metavar="DIR",
+        help="folders of logs of one kind",
+    )
+
+
+def add_hidden_argument(add: Callable[..., Any]) -> None:
+    """Adds --hidden."""
+    add(
+        "--hidden",
+        metavar="NAME|FILE",
+        help="simulate --scenario with the effects of this scenario or file of effects "
+        "added, while the log states --scenario alone: a reality with effects that "
+        "nobody declared",
+    )
+
+
+def wait_for_enter(prompt: str) -> None:
+    """Waits until somebody presses Enter, or Ctrl-D."""
+    try:
+        input(prompt)
+    except EOFError:
+        print()
+
+
 def add_view_arguments(add: Callable[..., Any]) -> None:
     """Adds --no-meshcat, --meshcat-host and --realtime-rate.
 

@@ -56,7 +56,7 @@ class Row:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("evaluate", __doc__, _EXAMPLES)
+    parser = program.argument_parser("drake-disasm evaluate", __doc__, _EXAMPLES)
     common.add_scenario_arguments(parser)
     add = parser.add_argument
     add(
@@ -115,7 +115,9 @@ def main(arguments: Sequence[str]) -> int:
             print(table(ordered))
     if args.json:
         _write_json(
-            args.json, ordered, program.provenance("evaluate", arguments, args.seed)
+            args.json,
+            ordered,
+            program.provenance("drake-disasm evaluate", arguments, args.seed),
         )
     return 0
 

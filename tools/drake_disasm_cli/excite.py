@@ -33,7 +33,7 @@ _URDF = "arm.urdf"  # of a cell, beside the motion
 _EXAMPLES = """examples:
   drake-disasm excite --urdf arm.urdf --out out/motion
   drake-disasm excite --urdf package://disasm_models/iiwa14/iiwa14.urdf \\
-      --floor 0.1 --show JointCoulombFriction JointViscousFriction --out out/motion
+      --floor 0.1 --effects JointCoulombFriction JointViscousFriction --out out/motion
   drake-disasm excite --scenario removal --out out/cell_motion
                                   for the cell: see `drake-disasm play-motion`
   drake-disasm excite --urdf arm.urdf --duration 10 --harmonics 8 --margin 0.3 \\
@@ -43,7 +43,7 @@ _EXAMPLES = """examples:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("excite", __doc__, _EXAMPLES)
+    parser = program.argument_parser("drake-disasm excite", __doc__, _EXAMPLES)
     add = parser.add_argument
     arm = parser.add_mutually_exclusive_group(required=True)
     arm.add_argument("--urdf", metavar="FILE", help="that describes the arm")
@@ -62,7 +62,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         help="that move (default: all that the URDF has)",
     )
     add(
-        "--show",
+        "--effects",
         nargs="+",
         default=["JointCoulombFriction", "JointViscousFriction"],
         metavar="EFFECT",
@@ -105,7 +105,7 @@ def _add_motion_arguments(add: Callable[..., object]) -> None:
         help="of the table, and of the recording (default: 200)",
     )
     add(
-        "--noise",
+        "--torque-noise",
         type=options.above_zero,
         default=0.01,
         metavar="SHARE",
@@ -164,8 +164,8 @@ def _design(args: argparse.Namespace, arguments: Sequence[str], urdf: str) -> No
     workspace = Workspace(urdf, joints, limits)
     if not workspace.has_geometry:
         print("the URDF has no collision geometry: collisions are not looked for")
-    noise = args.noise * np.array(limits.effort)
-    experiment = ArmExperiment(urdf, joints, args.show, noise, args.duration)
+    noise = args.torque_noise * np.array(limits.effort)
+    experiment = ArmExperiment(urdf, joints, args.effects, noise, args.duration)
     settings = DesignSettings(
         duration=args.duration,
         harmonics=args.harmonics,
@@ -177,7 +177,7 @@ def _design(args: argparse.Namespace, arguments: Sequence[str], urdf: str) -> No
     )
     with program.ProgressBar(unit="step") as progress:
         design = design_motion(experiment, limits, workspace, settings, progress)
-    provenance = program.provenance("excite", arguments, args.seed)
+    provenance = program.provenance("drake-disasm excite", arguments, args.seed)
     write_design(design, experiment, limits, args.rate, args.out, provenance)
     if args.scenario:
         write_text(args.out / _URDF, Path(urdf).read_text())

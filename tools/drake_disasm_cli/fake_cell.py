@@ -2,7 +2,7 @@
 
 A simulated cell runs in real time behind the LCM channels of an iiwa driver, an OnRobot
 HEX and a Robotiq gripper on the loopback. The program writes the configuration file for
-simulate.py --hardware-config, then runs until Ctrl-C. Type a device and a fault to
+simulate --hardware-config, then runs until Ctrl-C. Type a device and a fault to
 cause the fault, and an empty line to end it:
 
   ft_sensor: delay, loss, reorder, short, header, status, frozen, jump
@@ -26,7 +26,7 @@ import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
 from pydrake.lcm import DrakeLcm
 
-from drake_disasm.common import options, program
+from drake_disasm.common import options, program, stopping
 from drake_disasm.common.files import write_text
 from drake_disasm.fakes import hex_box, robotiq_gripper
 from drake_disasm.fakes.cell import IIWA_FAULTS, FakeCell
@@ -42,7 +42,7 @@ _BEHIND = (
     "try --set simulation.cell_time_step=0.005"
 )
 _EXAMPLES = """examples:
-  drake-disasm fake-cell --config out/fake.yaml             in one terminal
+  drake-disasm fake-cell --hardware-config out/fake.yaml             in one terminal
   drake-disasm simulate --station hardware --hardware-config out/fake.yaml
   drake-disasm fake-cell --scenario removal_turned          with a hidden effect
   ft_sensor loss                                               while it runs
@@ -51,15 +51,15 @@ _EXAMPLES = """examples:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("fake-cell", __doc__, _EXAMPLES)
+    parser = program.argument_parser("drake-disasm fake-cell", __doc__, _EXAMPLES)
     common.add_scenario_arguments(parser)
     add = parser.add_argument
     add(
-        "--config",
+        "--hardware-config",
         type=Path,
         default=Path("fake_cell.yaml"),
         metavar="FILE",
-        help="is written, for simulate.py --hardware-config (default: fake_cell.yaml)",
+        help="is written, for the same option of simulate (default: fake_cell.yaml)",
     )
     add("--lcm-url", default=_LCM, metavar="URL", help=f"(default: {_LCM})")
     add(
@@ -80,8 +80,8 @@ def main(arguments: Sequence[str]) -> int:
         config = cell.config()
         config.iiwa.lcm_url = args.lcm_url
         text = yaml_dump_typed(config, schema=HardwareConfig)
-        write_text(args.config, text)
-        print(f"playing a cell; --hardware-config {args.config}", flush=True)
+        write_text(args.hardware_config, text)
+        print(f"playing a cell; --hardware-config {args.hardware_config}", flush=True)
         _play(cell)
     return 0
 
@@ -131,7 +131,7 @@ def _play(cell: FakeCell) -> None:
     """Advances the cell in real time; does what is typed."""
     pace, console = RealTime(cell), _Console(cell)
     while True:
-        program.stop_if_interrupted()
+        stopping.stop_if_interrupted()
         cell.advance()
         pace.keep()
         if pace.lost > _LATE:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from drake_disasm.common import program
+from drake_disasm.common import stopping
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.reading import Reading
 from drake_disasm.ports import Health
@@ -111,7 +111,7 @@ def _pump(station: HardwareStation, duration: float) -> None:
     """Receives the arm's messages for a time [s]."""
     end = time.monotonic() + duration
     while time.monotonic() < end:
-        program.stop_if_interrupted()
+        stopping.stop_if_interrupted()
         station.pump()
         time.sleep(_POLL)
 

@@ -59,7 +59,7 @@ A file of parameters has lines like
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("identify", __doc__, _EXAMPLES)
+    parser = program.argument_parser("drake-disasm identify", __doc__, _EXAMPLES)
     _add_input_arguments(parser.add_argument)
     _add_search_arguments(parser.add_argument)
     common.add_import_argument(parser)
@@ -73,7 +73,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _add_input_arguments(add: Callable[..., object]) -> None:
-    add("--log", nargs="+", required=True, metavar="DIR", help="logs of one kind")
+    common.add_log_argument(add)
     add(
         "--scenario",
         metavar="NAME|FILE",
@@ -193,7 +193,9 @@ def main(arguments: Sequence[str]) -> int:
     split_episodes(episode_names(logs), _held_out(args))  # names, before any work
     model = model_of(logs, _choice(args))
     settings = _settings(args)
-    origin = program.provenance("identify", arguments, args.seed) | _data(logs)
+    origin = program.provenance("drake-disasm identify", arguments, args.seed) | _data(
+        logs
+    )
     journal = Journal(args.out, _identity(args, logs), args.resume)
     with (
         program.ProgressBar("evaluation") as bar,

@@ -43,14 +43,14 @@ _EXAMPLES = """examples:
   drake-disasm import-log run_1.mat run_2.mat --map map.yaml --out out/log
   drake-disasm import-log run.npz --urdf arm.urdf --cutoff 12 --out out/log
 then:
-  drake-disasm check-log out/log
-  drake-disasm close-loop out/log --out out/closed
+  drake-disasm check-log --log out/log
+  drake-disasm close-loop --log out/log --out out/closed
 """
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("import-log", __doc__, _EXAMPLES)
+    parser = program.argument_parser("drake-disasm import-log", __doc__, _EXAMPLES)
     add = parser.add_argument
     add(
         "sources",
@@ -156,7 +156,7 @@ def main(arguments: Sequence[str]) -> int:
         sources,
         fields,
         args.out,
-        program.provenance("import-log", arguments, 0),
+        program.provenance("drake-disasm import-log", arguments, 0),
     )
     if imported.done:
         plot_import(imported, args.out / "import.png")

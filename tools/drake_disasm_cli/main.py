@@ -5,6 +5,7 @@ needs PyTorch does not make the others wait for it.
 """
 
 import importlib
+import re
 from collections.abc import Callable, Sequence
 
 from drake_disasm.common import program
@@ -38,6 +39,7 @@ SUBCOMMANDS = {
     name: text for group in COMMANDS.values() for name, text in group.items()
 }
 
+_SHARED_LIBRARY = re.compile(r"(lib[\w.+-]+\.so[\w.]*): cannot open shared object")
 _USAGE = """usage: drake-disasm COMMAND [ARGUMENTS]
 
 A toolkit for robotic disassembly on Drake.
@@ -50,14 +52,14 @@ def run(name: str | None = None) -> None:
     Args:
         name: of the subcommand; the first word of the command line if None.
     """
-    program.run(main if name is None else main_of(name))
+    program.run(main if name is None else lambda words: main([name, *words]))
 
 
 def main(arguments: Sequence[str]) -> int:
     """Runs the subcommand that the first argument names; returns its exit status.
 
     Raises:
-        DisasmError: there is none of that name.
+        DisasmError: there is none of that name, or Drake can't be imported.
     """
     if not arguments or arguments[0] in ("-h", "--help"):
         print(overview())
@@ -71,8 +73,20 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def main_of(name: str) -> Callable[[Sequence[str]], int]:
-    """Returns the function that runs a subcommand."""
-    module = importlib.import_module(f"drake_disasm_cli.{name.replace('-', '_')}")
+    """Returns the function that runs a subcommand.
+
+    Raises:
+        DisasmError: a library of the system that Drake needs is missing.
+    """
+    try:
+        module = importlib.import_module(f"drake_disasm_cli.{name.replace('-', '_')}")
+    except ImportError as error:
+        if library := _SHARED_LIBRARY.match(str(error)):
+            raise DisasmError(
+                f"{library[1]} is missing, which Drake needs; "
+                "apt-get install libglib2.0-0 libx11-6 libsm6"
+            ) from error
+        raise
     found: Callable[[Sequence[str]], int] = module.main
     return found
 

@@ -24,7 +24,12 @@ from drake_disasm.free_motion.cell_urdf import cell_urdf
 from drake_disasm.free_motion.playing import MotionPlayer
 from drake_disasm.free_motion.table import read_motion, refuse_beyond_limits
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns
-from drake_disasm.scenario import Scenario, load_scenario, scenario_to_mapping
+from drake_disasm.scenario import (
+    Scenario,
+    load_scenario,
+    scenario_to_mapping,
+    with_hidden_effects,
+)
 from drake_disasm.stations import Station, make_station
 from drake_disasm.visualization import add_cell_view, start_meshcat
 from drake_disasm_cli import common, hardware
@@ -47,7 +52,7 @@ _EXAMPLES = """examples:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("play-motion", __doc__, _EXAMPLES)
+    parser = program.argument_parser("drake-disasm play-motion", __doc__, _EXAMPLES)
     add = parser.add_argument
     add("motion", type=Path, metavar="MOTION", help="CSV file")
     common.add_scenario_arguments(parser)
@@ -65,12 +70,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         action="store_true",
         help="with --record: add an episode to the log in the folder",
     )
-    add(
-        "--hidden",
-        metavar="NAME|FILE",
-        help="simulate this scenario instead, while the log states --scenario: an arm "
-        "with effects that nobody declared (--set applies to both)",
-    )
+    common.add_hidden_argument(add)
     common.add_view_arguments(add)
     return parser.parse_args(arguments)
 
@@ -120,7 +120,7 @@ def _station(
 ) -> AbstractContextManager[Station]:
     if args.station == "hardware":
         return hardware.open_station(scenario, args.hardware_config, False)
-    real = load_scenario(args.hidden, args.overrides) if args.hidden else scenario
+    real = with_hidden_effects(scenario, args.hidden) if args.hidden else scenario
     return nullcontext(make_station(args.station, real))
 
 
@@ -136,7 +136,7 @@ def _open_log(
     args: argparse.Namespace, arguments: Sequence[str], scenario: Scenario
 ) -> LogWriter:
     is_real = args.station == "hardware"
-    provenance = program.provenance("play-motion", arguments, 0) | {
+    provenance = program.provenance("drake-disasm play-motion", arguments, 0) | {
         "motion": str(args.motion),
         "hidden": bool(args.hidden),
         "simulated": not is_real,

@@ -21,7 +21,7 @@ _EXAMPLES = """example:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("plot-training", __doc__, _EXAMPLES)
+    parser = program.argument_parser("drake-disasm plot-training", __doc__, _EXAMPLES)
     parser.add_argument(
         "trainings",
         nargs="+",

@@ -12,12 +12,12 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from drake_disasm.common import options, program
+from drake_disasm.common import options, program, stopping
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder
 from drake_disasm.logs import LogWriter, flat_columns
 from drake_disasm.policies import Exploring
-from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.scenario import Scenario, load_scenario, with_hidden_effects
 from drake_disasm.stations import Station
 from drake_disasm.task.episode import EpisodeSummary, run_episode, summary_table
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
@@ -42,7 +42,7 @@ _EXAMPLES = """examples:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("simulate", __doc__, _EXAMPLES)
+    parser = program.argument_parser("drake-disasm simulate", __doc__, _EXAMPLES)
     common.add_scenario_arguments(parser)
     _add_run_arguments(parser.add_argument)
     _add_hardware_arguments(parser.add_argument)
@@ -107,12 +107,7 @@ def _add_log_arguments(add: Callable[..., object]) -> None:
         help="add Gaussian noise to the policy's actions, so that the log shows more: "
         "standard deviation in mm, and in tenths of a degree (default: 0)",
     )
-    add(
-        "--hidden",
-        metavar="NAME|FILE",
-        help="simulate this scenario instead, while the log states --scenario: a "
-        "reality with effects that nobody declared (--set applies to both)",
-    )
+    common.add_hidden_argument(add)
 
 
 def _add_view_arguments(add: Callable[..., object]) -> None:
@@ -133,7 +128,7 @@ def main(arguments: Sequence[str]) -> int:
     scenario = load_scenario(args.scenario, args.overrides)
     if args.station == "hardware":
         return _on_hardware(args, arguments, scenario)
-    real = load_scenario(args.hidden, args.overrides) if args.hidden else scenario
+    real = with_hidden_effects(scenario, args.hidden) if args.hidden else scenario
     policy = common.named_policy(args.policy, scenario)
     writer = _open_log(args, arguments, scenario) if args.record else None
     done = writer.next_number if writer else 0
@@ -205,7 +200,7 @@ def _run_one(
     view: MeshcatView | None,
 ) -> EpisodeSummary:
     """Runs, shows and records one episode."""
-    program.stop_if_interrupted()
+    stopping.stop_if_interrupted()
     if view:
         view.begin_episode()
     with (
@@ -255,7 +250,9 @@ def _open_log(
     args: argparse.Namespace, arguments: Sequence[str], scenario: Scenario
 ) -> LogWriter:
     origin = {"policy": args.policy, "explore_mm": args.explore}
-    provenance = program.provenance("simulate", arguments, args.seed) | origin
+    provenance = (
+        program.provenance("drake-disasm simulate", arguments, args.seed) | origin
+    )
     provenance["hidden"] = bool(args.hidden)
     header = transitions_header(scenario, args.station, provenance)
     writer = LogWriter(args.record, header, resume=args.resume)
@@ -293,4 +290,4 @@ def _finish(args: argparse.Namespace, view: MeshcatView | None) -> None:
         view.save_html(args.html)
         print(f"page: {args.html}")
     if view and not args.no_meshcat and sys.stdin.isatty():
-        input("press Enter to close the page ")
+        common.wait_for_enter("press Enter to close the page ")

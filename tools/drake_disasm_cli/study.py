@@ -41,7 +41,7 @@ _EXAMPLES = """examples:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("study", __doc__, _EXAMPLES)
+    parser = program.argument_parser("drake-disasm study", __doc__, _EXAMPLES)
     parser.add_argument(
         "name",
         nargs="?",
@@ -167,7 +167,7 @@ def _study(args: argparse.Namespace, arguments: Sequence[str]) -> Study:
         lockstep=not args.diagram,
         compiled=not args.eager,
         compare=args.compare,
-        provenance=program.provenance("study", arguments, first),
+        provenance=program.provenance("drake-disasm study", arguments, first),
     )
     return kind(chosen)
 

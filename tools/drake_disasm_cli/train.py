@@ -41,7 +41,7 @@ _EXAMPLES = """examples:
   drake-disasm train --scenario removal_randomised --out out/randomised
   drake-disasm train --agent sac --preset chapter4 --out out/sac \\
       --hyper layer_norm=true 'hidden=[64, 64]'
-  drake-disasm train --from-logs out/chapter3/seed_*/log --scenario chapter3 \\
+  drake-disasm train --log out/chapter3/seed_*/log --scenario chapter3 \\
       --preset chapter3 --out out/offline                      without acting
   drake-disasm train --station cell --start-from out/turned --scenario \\
       removal_turned --hyper demonstrations=0.5 --out out/in_the_cell    twin to cell
@@ -51,7 +51,7 @@ _EXAMPLES = """examples:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("train", __doc__, _EXAMPLES)
+    parser = program.argument_parser("drake-disasm train", __doc__, _EXAMPLES)
     common.add_scenario_arguments(parser)
     _add_task_arguments(parser.add_argument)
     _add_batch_argument(parser.add_argument)
@@ -123,7 +123,7 @@ def _add_agent_arguments(add: Callable[..., object]) -> None:
 
 def _add_data_arguments(add: Callable[..., object]) -> None:
     add(
-        "--from-logs",
+        "--log",
         nargs="+",
         type=Path,
         default=[],
@@ -134,7 +134,7 @@ def _add_data_arguments(add: Callable[..., object]) -> None:
         "--updates",
         type=options.positive,
         metavar="N",
-        help="with --from-logs: gradient updates (default: one per transition)",
+        help="with --log: gradient updates (default: one per transition)",
     )
     add(
         "--demonstrations",
@@ -209,7 +209,7 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
     overrides = list(args.overrides)
     if args.psi is not None:
         overrides.append(f"imprecision={args.psi}")
-    refuse_envs(args.envs, args.station, not args.from_logs, args.lockstep)
+    refuse_envs(args.envs, args.station, not args.log, args.lockstep)
     changes = list(args.hyper)
     if args.episodes is not None:
         changes.append(f"episodes={args.episodes}")
@@ -221,13 +221,13 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
         compiled=not args.eager,
         threads=args.threads,
         validation=args.validation,
-        logs=_hashes(args.from_logs),
+        logs=_hashes(args.log),
         updates=args.updates or 0,
         demonstrations=_hashes(args.demonstrations),
         start=str(args.start_from or ""),
         envs=args.envs,
         lockstep=args.lockstep,
-        provenance=program.provenance("train", arguments, args.first_seed),
+        provenance=program.provenance("drake-disasm train", arguments, args.first_seed),
     )
 
 
