@@ -8,22 +8,23 @@ PIP := $(BIN)/python -m pip install --quiet --constraint constraints.txt
 # One thread per process: parallel work is done by processes.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help simulate test test-all test-loaded lint format docs benchmark check-install clean
+.PHONY: help simulate test test-all test-loaded lint format docs results benchmark \
+	check-install check-libraries clean
 .DEFAULT_GOAL := help
 
 help:  ## Show this list
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*## /\t/' | expand -t 16
 
-simulate: $(VENV)/.run  ## Run the task in Meshcat (ARGS="--policy straight ...")
+simulate: check-libraries $(VENV)/.run  ## Run the task in Meshcat (ARGS="--policy straight ...")
 	$(BIN)/python tools/simulate.py $(ARGS)
 
-test: $(VENV)/.dev  ## Run the tests, without the slow proofs
+test: check-libraries $(VENV)/.dev  ## Run the tests, without the slow proofs
 	$(PYTEST) -m "not slow" $(ARGS)
 
-test-all: $(VENV)/.dev  ## Run every test
+test-all: check-libraries $(VENV)/.dev  ## Run every test
 	$(PYTEST) $(ARGS)
 
-test-loaded: $(VENV)/.dev  ## Run the tests beside four busy processes
+test-loaded: check-libraries $(VENV)/.dev  ## Run the tests beside four busy processes
 	@for i in 1 2 3 4; do \
 	$(BIN)/python -c "while True: pass" & busy="$$busy $$!"; done; \
 	trap "kill $$busy" EXIT INT TERM; $(PYTEST) -m "not slow" $(ARGS)
@@ -37,14 +38,17 @@ format: $(VENV)/.dev  ## Put the code in shape
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-docs: $(VENV)/.docs  ## Build the site: build/docs/index.html
+docs: check-libraries $(VENV)/.docs  ## Build the site: build/docs/index.html
 	$(BIN)/python -m sphinx -q -W --keep-going -j auto -d build/doctrees docs build/docs
 	@echo "build/docs/index.html"
 
-benchmark: $(VENV)/.dev  ## Measure speed (ARGS="--only cell_reset_ms ...")
+results: check-libraries $(VENV)/.dev  ## Write docs/results from its data
+	$(BIN)/python benchmarks/results_pages.py
+
+benchmark: check-libraries $(VENV)/.dev  ## Measure speed (ARGS="--only cell_reset_ms ...")
 	$(BIN)/python benchmarks/benchmark.py $(ARGS)
 
-check-install: $(VENV)/.dev  ## Install into an empty environment, import elsewhere
+check-install: check-libraries $(VENV)/.dev  ## Install into an empty environment, import elsewhere
 	rm -rf build/empty && $(PYTHON) -m venv build/empty
 	build/empty/bin/python -m pip install --quiet --constraint constraints.txt .
 	cd / && $(CURDIR)/build/empty/bin/python -c "import drake_disasm, drake_disasm.logs; \
@@ -60,6 +64,10 @@ $(BIN)/python:
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and \
 	'error: Python 3.11 or newer is needed; set PYTHON=python3.11')"
 	$(PYTHON) -m venv $(VENV)
+
+# Drake's wheel needs libraries of the system: one line names those that are missing.
+check-libraries: | $(BIN)/python
+	@$(BIN)/python -I drake_disasm/common/system_libraries.py
 
 $(VENV)/.run: pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP) --editable .
