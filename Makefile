@@ -29,10 +29,11 @@ test-loaded: check-libraries $(VENV)/.dev  ## Run the tests beside four busy pro
 	$(BIN)/python -c "while True: pass" & busy="$$busy $$!"; done; \
 	trap "kill $$busy" EXIT INT TERM; $(PYTEST) -m "not slow" $(ARGS)
 
-lint: $(VENV)/.dev  ## Check style and types
+lint: $(VENV)/.dev  ## Check style, types and the rules of the house
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python .ci/lint.py
 
 format: $(VENV)/.dev  ## Put the code in shape
 	$(BIN)/ruff check --fix .

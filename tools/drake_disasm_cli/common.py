@@ -64,7 +64,7 @@ def add_import_argument(parser: argparse.ArgumentParser) -> None:
 def add_station_argument(
     add: Callable[..., Any], default: str, text: str, hardware: bool = False
 ) -> None:
-    """Adds --station, and the refusal of --model, its name of old.
+    """Adds --station.
 
     Args:
         add: a parser's `add_argument`.
@@ -79,7 +79,6 @@ def add_station_argument(
         type=_station if hardware else _simulated_station,
         help=f"{text} (default: {default})",
     )
-    add("--model", type=_former_model, help=argparse.SUPPRESS)
 
 
 def _station(name: str) -> str:
@@ -95,13 +94,9 @@ def _simulated_station(name: str) -> str:
     if _station(name) == "hardware":
         raise DisasmError(
             "--station hardware: this program simulates; use cell or twin, or run "
-            "a policy on the devices by `drake-disasm simulate` --station hardware"
+            "a policy on the devices by `drake-disasm simulate --station hardware`"
         )
     return name
-
-
-def _former_model(name: str) -> str:
-    raise DisasmError(f"--model {name}: is --station {name} now")
 
 
 def add_log_argument(add: Callable[..., Any]) -> None:
