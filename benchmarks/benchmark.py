@@ -407,7 +407,7 @@ MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
     keys = [key for group in MEASUREMENTS for key in group]
-    parser = program.argument_parser("benchmark", __doc__, f"keys: {', '.join(keys)}")
+    parser = program.argument_parser("python benchmarks/benchmark.py", __doc__, f"keys: {', '.join(keys)}")
     parser.add_argument("--only", nargs="+", metavar="KEY", help="run a part")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write figures")
     parser.add_argument(

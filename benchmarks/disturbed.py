@@ -158,7 +158,7 @@ def run(minutes: float, folder: Path, seed: int) -> Tally:
     tally, end = Tally(), time.monotonic() + 60 * minutes
     scenario = load_scenario("removal", [f"task.steps={_STEPS}"])
     header = transitions_header(
-        scenario, "hardware", program.provenance("disturbed", [], seed)
+        scenario, "hardware", program.provenance("python benchmarks/disturbed.py", [], seed)
     )
     writer = LogWriter(folder / "log", header)
     with (
@@ -220,7 +220,7 @@ def rows_lost(folder: Path, tally: Tally) -> int:
 def main(arguments: Sequence[str]) -> int:
     """Runs, and prints what happened; returns the exit status."""
     tqdm.monitor_interval = 0  # a thread of its own
-    parser = program.argument_parser("disturbed", __doc__, "")
+    parser = program.argument_parser("python benchmarks/disturbed.py", __doc__, "")
     add = parser.add_argument
     add("--minutes", type=options.above_zero, default=10.0, metavar="N")
     add("--seed", type=options.seed, default=0)

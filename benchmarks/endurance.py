@@ -163,7 +163,7 @@ def _open() -> tuple[int, int]:
 def main(arguments: Sequence[str]) -> int:
     """Plays the cell in another process, and runs; returns the exit status."""
     tqdm.monitor_interval = 0  # a thread of its own
-    parser = program.argument_parser("endurance", __doc__, "")
+    parser = program.argument_parser("python benchmarks/endurance.py", __doc__, "")
     parser.add_argument("--minutes", type=options.above_zero, default=10.0, metavar="N")
     parser.add_argument("--meshcat", action="store_true", help="with a page, unwatched")
     args = parser.parse_args(arguments)

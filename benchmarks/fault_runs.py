@@ -142,7 +142,7 @@ def table(runs: list[FaultRun]) -> str:
 
 def main(arguments: Sequence[str]) -> int:
     """Runs into the faults and prints the table; returns the exit status."""
-    parser = program.argument_parser("fault_runs", __doc__, "")
+    parser = program.argument_parser("python benchmarks/fault_runs.py", __doc__, "")
     devices = tuple(dict.fromkeys(device for device, _ in ALL))
     parser.add_argument(
         "--only", nargs="+", choices=devices, default=devices, metavar="DEVICE",

@@ -113,7 +113,7 @@ def table(runs: list[ForceRun]) -> str:
 
 def main(arguments: Sequence[str]) -> int:
     """Pushes and prints the table; returns the exit status."""
-    parser = program.argument_parser("force_runs", __doc__, "")
+    parser = program.argument_parser("python benchmarks/force_runs.py", __doc__, "")
     parser.add_argument(
         "--control", nargs="+", choices=CONTROLS, default=CONTROLS, metavar="CONTROL",
         help=f"of {', '.join(CONTROLS)} (default: all)",

@@ -115,7 +115,7 @@ Worker = Callable[[Job, str, Connection], None]
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = program.argument_parser("fuzz", __doc__, _EXAMPLES)
+    parser = program.argument_parser("python benchmarks/fuzz.py", __doc__, _EXAMPLES)
     add = parser.add_argument
     names = ", ".join((*READERS, *CODECS))
     usual = {"files": (1000, "reader"), "datagrams": (10_000, "codec")}

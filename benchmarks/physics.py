@@ -307,7 +307,7 @@ PARTS = {
 
 def main(arguments: Sequence[str]) -> int:
     """Prints the tables; returns the exit status."""
-    parser = program.argument_parser("physics", __doc__, "")
+    parser = program.argument_parser("python benchmarks/physics.py", __doc__, "")
     parser.add_argument(
         "--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART",
         help=f"of {', '.join(PARTS)} (default: all)",

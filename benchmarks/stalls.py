@@ -317,7 +317,7 @@ def table(runs: Sequence[StallRun]) -> str:
 
 def main(arguments: Sequence[str]) -> int:
     """Runs, and prints the table; returns the exit status."""
-    parser = program.argument_parser("stalls", __doc__, "")
+    parser = program.argument_parser("python benchmarks/stalls.py", __doc__, "")
     add = parser.add_argument
     add(
         "--repeats",
