@@ -4,7 +4,7 @@ The groove is rigid and the bolt's neck and head are compliant. Drake takes the
 contact's normals from the rigid side: from the groove they are those of its flat
 faces, while a rigid round neck would offer its facets' normals, and the discrete
 solver then resists sliding by a tenth of the normal force at the shipped time step
-even without friction (docs/physics.md).
+even without friction (docs/explanation/physics.md).
 """
 
 import dataclasses
@@ -45,7 +45,7 @@ def _surface(environment: Environment) -> ProximityProperties:
         properties=properties,
     )
     # Speculative contact within a margin would be a quarter of the play here, and it
-    # changes nothing but the speed (docs/physics.md).
+    # changes nothing but the speed (docs/explanation/physics.md).
     properties.AddProperty("hydroelastic", "margin", 0.0)
     return properties
 

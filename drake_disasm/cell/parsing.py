@@ -4,6 +4,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, ModelInstanceIndex
 
+from drake_disasm.cell.arm_description import BASE, FLANGE, refuse_unfit_arm
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.resources import model_path, package_map
 
@@ -21,7 +22,14 @@ def add_model(plant: MultibodyPlant, url: str) -> ModelInstanceIndex:
         instances = parser.AddModels(str(path))
     except RuntimeError as error:
         reason = " ".join(str(error).split())
-        raise DisasmError(f"model file {url} can't be read: {reason}") from None
+        remedy = (
+            "name it relative to the model's folder, or take that shape out"
+            if "URI" in reason
+            else "give a URDF of one robot"
+        )
+        raise DisasmError(
+            f"model file {url} can't be read: {reason.rstrip('.')}; {remedy}"
+        ) from None
     if len(instances) != 1:
         raise DisasmError(f"model file {url} holds {len(instances)} models; give one")
     return instances[0]
@@ -37,7 +45,9 @@ def movable_joints(url: str) -> tuple[str, ...]:
     instance = add_model(plant, url)
     plant.Finalize()
     joints = [plant.get_joint(index) for index in plant.GetJointIndices(instance)]
-    return tuple(joint.name() for joint in joints if joint.num_velocities() == 1)
+    moving = [joint for joint in joints if joint.num_velocities() == 1]
+    moving.sort(key=lambda joint: joint.velocity_start())  # not as the file has them
+    return tuple(joint.name() for joint in moving)
 
 
 def model_frame(
@@ -66,9 +76,15 @@ def add_arm(plant: MultibodyPlant, url: str) -> tuple[ModelInstanceIndex, Frame]
         Its model instance and its flange frame F.
 
     Raises:
-        DisasmError: the file is missing or is not an arm.
+        DisasmError: the file is missing, or is not an arm that a station can take.
     """
+    constraints = plant.num_constraints()
     instance = add_model(plant, url)
-    base = model_frame(plant, instance, "iiwa_link_0", url)
+    refuse_unfit_arm(plant, instance, url)
+    if plant.num_constraints() > constraints:
+        raise DisasmError(
+            f"arm.model: {url} has a joint that follows another; take its <mimic> out"
+        )
+    base = model_frame(plant, instance, BASE, url)
     plant.WeldFrames(plant.world_frame(), base)
-    return instance, model_frame(plant, instance, "iiwa_link_ee", url)
+    return instance, model_frame(plant, instance, FLANGE, url)

@@ -12,6 +12,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, InputPort
 from pydrake.systems.primitives import PassThrough
 
 from drake_disasm.cell.arm_control import yielding
+from drake_disasm.cell.arm_description import refuse_unlimited_arm
 from drake_disasm.cell.coordinates import ArmCoordinates
 from drake_disasm.cell.parsing import add_arm
 from drake_disasm.common.errors import DisasmError
@@ -103,6 +104,7 @@ class HardwareStation(Station):
         lcm: to reach the arm by, instead of the configured one.
     """
 
+    kind = "hardware"
     table = CELL_PORTS
     arm = "iiwa"
     has_velocity_input = False
@@ -368,8 +370,9 @@ def _supervisor(
 ) -> Supervisor:
     """Returns the supervisor of an arm, by its model's limits and the file's."""
     plant = MultibodyPlant(0.0)
-    add_arm(plant, arm.model)
+    instance, _ = add_arm(plant, arm.model)
     plant.Finalize()
+    refuse_unlimited_arm(plant, instance, arm.model)
     limits = config.safety
     fastest = plant.GetVelocityUpperLimits() * limits.velocity_share
     return Supervisor(
