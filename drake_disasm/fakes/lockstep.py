@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from pydrake.lcm import DrakeLcm
@@ -10,6 +11,7 @@ from pydrake.systems.analysis import Simulator
 
 from drake_disasm.fakes.cell import FakeCell, arrival, in_step
 from drake_disasm.scenario import Scenario
+from drake_disasm.scenario.given import scenario_of
 from drake_disasm.stations.hardware import HardwareStation
 
 
@@ -33,16 +35,19 @@ class FakeHardware:
 
 @contextlib.contextmanager
 def fake_hardware(
-    scenario: Scenario, seed: int = 0, limits: Mapping[str, Any] | None = None
+    scenario: Scenario | str | Path,
+    seed: int = 0,
+    limits: Mapping[str, Any] | None = None,
 ) -> Iterator[FakeHardware]:
     """Yields a hardware station with fake devices, in virtual time.
 
     Args:
-        scenario: of the task; effects in it are refused, as by any hardware station.
+        scenario: of the task, an object, a shipped name, or a file; effects in it are
+            refused, as by any hardware station.
         seed: of the fake sensor's noise.
         limits: fields of the safety limits that differ from the defaults, by name.
     """
-    lcm = DrakeLcm("memq://")
+    scenario, lcm = scenario_of(scenario), DrakeLcm("memq://")
     with FakeCell(scenario, lcm, seed) as cell:
 
         def wait(_: float) -> None:

@@ -1,6 +1,6 @@
 """Motions of the arm away from the lock, played on the cell, simulated or real.
 
-From `motion.csv` of tools/excite.py to a log of kind `joint_response`: the bolt is
+From `motion.csv` of `drake-disasm excite` to a log of kind `joint_response`: the bolt is
 taken out of the groove, the arm goes to where the motion begins, and plays it.
 
 Modules:

@@ -56,7 +56,7 @@ class MotionPlayer:
         add_view: Callable[[DiagramBuilder, Station], object] | None = None,
     ) -> None:
         if station.arm != "iiwa":
-            raise DisasmError("the twin has no arm to move; use --station cell")
+            raise DisasmError("the twin has no arm to move; use `station` cell")
         self.station, self.period = station, station.control_period
         whole, self.begin = with_way(station, motion)
         self.end = float(whole.time[-1])

@@ -11,7 +11,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import read_bytes
 from drake_disasm.logs.tables import MOST_BYTES, read_table
 
-_REMEDY = "give a table as tools/excite.py writes it: time, q.0, q.1, ... in SI"
+_REMEDY = "give a table as drake-disasm excite writes it: time, q.0, q.1, ... in SI"
 
 
 @dataclass(frozen=True)

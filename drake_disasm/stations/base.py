@@ -9,19 +9,28 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, Frame
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context, Diagram, System
+from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort, System
 from pydrake.systems.primitives import RandomSource
 
 from drake_disasm.cell.coordinates import ArmCoordinates, Coordinates
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
 from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.devices.sensor_chain import Payload
 from drake_disasm.effects import BoltMotion, Effect
 from drake_disasm.ports import Port
 from drake_disasm.scenario import Scenario
 from drake_disasm.systems.observation import Mounting
+
+#: Ports that simulated stations have besides their table, and hardware has not.
+SIMULATION_ONLY = (
+    "applied_spatial_force",
+    "bolt_pose",
+    "contact_results",
+    "query_object",
+)
 
 #: Returns the Context of a part of a station.
 Parts = Callable[[System], Context]
@@ -48,7 +57,11 @@ class Station(Diagram):
 
     Attributes:
         scenario: what it was built from.
+        kind: its name among STATIONS.
         table: its port table.
+        simulation_only: ports that every simulated station has besides its table, and
+            hardware has not: ask `HasOutputPort` or `HasInputPort` before using one in
+            a diagram that is to run on both.
         arm: the device whose position is commanded ("iiwa", or "bolt").
         has_velocity_input: whether `<arm>.velocity` is an input as well.
         control_period: at which `<arm>.position` is read [s].
@@ -64,7 +77,9 @@ class Station(Diagram):
     """
 
     scenario: Scenario
+    kind: str
     table: tuple[Port, ...]
+    simulation_only: tuple[str, ...] = SIMULATION_ONLY
     arm: str
     has_velocity_input: bool
     control_period: float
@@ -77,6 +92,40 @@ class Station(Diagram):
     p_SoScm_S: np.ndarray
     X_WG: RigidTransform
     g_W: np.ndarray
+
+    def GetOutputPort(self, port_name: str) -> OutputPort:
+        """Returns an output port by its name.
+
+        Raises:
+            DisasmError: the station has no such output; names those that it has.
+        """
+        if not self.HasOutputPort(port_name):
+            ports = map(self.get_output_port, range(self.num_output_ports()))
+            self._refuse_port(port_name, "output", [port.get_name() for port in ports])
+        return super().GetOutputPort(port_name)
+
+    def GetInputPort(self, port_name: str) -> InputPort:
+        """Returns an input port by its name.
+
+        Raises:
+            DisasmError: the station has no such input; names those that it has.
+        """
+        if not self.HasInputPort(port_name):
+            ports = map(self.get_input_port, range(self.num_input_ports()))
+            self._refuse_port(port_name, "input", [port.get_name() for port in ports])
+        return super().GetInputPort(port_name)
+
+    def _refuse_port(self, name: str, direction: str, own: Sequence[str]) -> None:
+        """Raises DisasmError for a port that the station lacks."""
+        near = closest(name, list(own))
+        guess = f" {near}" if near.startswith("did you mean") else ""
+        has = f"it has: {', '.join(own)}"
+        if self.kind == "hardware":
+            ask = f"station.Has{direction.capitalize()}Port"
+            has += (
+                f"; only in simulation: {', '.join(self.simulation_only)} (ask {ask})"
+            )
+        raise DisasmError(f"{self.kind} has no {direction} '{name}';{guess} {has}")
 
     @property
     def payload(self) -> Payload:
@@ -192,7 +241,7 @@ def refuse_twins_contact(scenario: Scenario) -> None:
     if scenario.contact.model != "hydroelastic":
         raise DisasmError(
             f"contact.model: '{scenario.contact.model}' is available on the twin only; "
-            "use hydroelastic for the cell, or --station twin"
+            "use hydroelastic, or `station` twin"
         )
 
 

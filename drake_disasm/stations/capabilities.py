@@ -39,7 +39,7 @@ def refuse_arm_effects(effects: Sequence[ArmEffect]) -> None:
     if effects:
         raise DisasmError(
             f"{type(effects[0]).__name__}: acts on the arm, and the twin has none; "
-            "take it out of effects, or use --station cell"
+            "take it out of effects, or use `station` cell"
         )
 
 
@@ -52,5 +52,5 @@ def refuse_on_hardware(effects: Sequence[Effect]) -> None:
     if effects:
         raise DisasmError(
             f"effects.0 (!{type(effects[0]).__name__}): acts on a simulated plant; "
-            "hardware has its own effects; remove it for --station hardware"
+            "hardware has its own effects; take it out of the scenario"
         )

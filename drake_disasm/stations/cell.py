@@ -78,6 +78,7 @@ class CellStation(SimulatedStation):
     @endsystem
     """
 
+    kind = "cell"
     table = CELL_PORTS
     arm = "iiwa"
     has_velocity_input = False

@@ -177,7 +177,7 @@ class CellDevices:
         ]
         return (
             f"not ready after {self._config.ready_timeout:g} s: {'; '.join(each)}; "
-            "see docs/hardware.md, what to check first"
+            "see docs/guides/hardware.md, what to check first"
         )
 
 

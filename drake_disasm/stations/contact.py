@@ -98,7 +98,7 @@ class HydroelasticContact(ContactStrategy):
             "force_Gn",
         )
     )
-    remedy = "set contact.model to impact, and use --station twin"
+    remedy = "set contact.model to impact, and use `station` twin"
 
     def add_forces(self, builder: DiagramBuilder, forces: OutputPort) -> OutputPort:
         """See ContactStrategy."""

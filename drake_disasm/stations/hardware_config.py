@@ -1,4 +1,4 @@
-"""Where the devices are and what they may do: the file of --hardware-config."""
+"""Where the devices are and what they may do: a hardware configuration."""
 
 import dataclasses
 from pathlib import Path
@@ -133,5 +133,5 @@ def refuse_another_control(scenario: Scenario, config: HardwareConfig) -> None:
         raise DisasmError(
             f"iiwa.control: the cabinet is said to run '{declared}', the scenario's "
             f"arm.control is '{wanted}'; start the Sunrise application in that mode "
-            "(docs/hardware.md), then say so in the file, or change the scenario"
+            "(docs/guides/hardware.md), then say so in the file, or change the scenario"
         )

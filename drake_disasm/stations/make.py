@@ -5,7 +5,9 @@ from typing import Any, Literal, overload
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
+from drake_disasm.common.text import clipped
 from drake_disasm.scenario import Scenario
+from drake_disasm.scenario.given import scenario_of
 from drake_disasm.stations.base import Station
 from drake_disasm.stations.cell import CellStation
 from drake_disasm.stations.simulated import SimulatedStation
@@ -19,40 +21,43 @@ _SIMULATED: dict[str, type[SimulatedStation]] = {
 #: What can be simulated.
 SIMULATED_STATIONS = tuple(_SIMULATED)
 
-#: What `--station` may name.
+#: The names of all stations.
 STATIONS = (*SIMULATED_STATIONS, "hardware")
 
 
 @overload
 def make_station(
-    name: Literal["cell", "twin"], scenario: Scenario
+    name: Literal["cell", "twin"], scenario: Scenario | str | Path
 ) -> SimulatedStation: ...
 
 
 @overload
-def make_station(name: str, scenario: Scenario, **options: Any) -> Station: ...
+def make_station(
+    name: str, scenario: Scenario | str | Path, **options: Any
+) -> Station: ...
 
 
-def make_station(name: str, scenario: Scenario, **options: Any) -> Station:
+def make_station(name: str, scenario: Scenario | str | Path, **options: Any) -> Station:
     """Returns the station of a name.
 
     Args:
         name: one of STATIONS.
-        scenario: of the task.
+        scenario: of the task: an object, a shipped name, or a file.
         options: of hardware alone, and those of `HardwareStation`: `config`, a
             HardwareConfig or the path of a file such as models/hardware/cell.yaml,
             which is needed; and `dry_run`, `clock`, `wait`, `lcm`.
 
     Raises:
-        DisasmError: there is no such station; an option is missing or not the
-            station's; the station can't carry one of the scenario's effects.
+        DisasmError: there is no such station or scenario; an option is missing or not
+            the station's; the station can't carry one of the scenario's effects, or
+            take its arm.
     """
+    if not isinstance(name, str) or name not in STATIONS:
+        known = closest(str(name), list(STATIONS))
+        raise DisasmError(f"there is no station '{clipped(str(name))}'; {known}")
+    scenario = scenario_of(scenario)
     if name == "hardware":
         return _make_hardware(scenario, options)
-    if name not in _SIMULATED:
-        raise DisasmError(
-            f"there is no station '{name}'; {closest(name, list(STATIONS))}"
-        )
     if options:
         raise DisasmError(
             f"station '{name}': takes no option '{next(iter(options))}'; only hardware "

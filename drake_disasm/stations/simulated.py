@@ -51,8 +51,9 @@ class SimulatedStation(Station):
     at A and rests there, with the scenario's effects in force. An optional input that
     is not connected is at rest.
 
-    Beside the table's ports it has what only a simulation knows: `bolt_pose`
-    (X_GnB, true), `contact_results`, and the applied spatial forces input.
+    Besides the table's ports it has those of `simulation_only`: the outputs `bolt_pose`
+    (X_GnB, true), `contact_results` and `query_object`, and the input
+    `applied_spatial_force`.
     """
 
     #: Time to settle at the start, before an episode begins [s].

@@ -76,6 +76,7 @@ class TwinStation(SimulatedStation):
     @endsystem
     """
 
+    kind = "twin"
     table = TWIN_PORTS
     arm = "bolt"
     has_velocity_input = True

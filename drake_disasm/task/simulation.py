@@ -3,6 +3,7 @@
 import copy
 import dataclasses
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -22,7 +23,8 @@ from drake_disasm.common.timing import MOTION_DELAY, POLICY_DELAY, boundary
 from drake_disasm.effects import BoltMotion, Effect, is_local
 from drake_disasm.mdp import REWARD_TERMS, BoltState, Outcome, action_bounds
 from drake_disasm.scenario import Scenario, draw, with_values
-from drake_disasm.stations import SimulatedStation, Station, make_station
+from drake_disasm.scenario.given import scenario_of
+from drake_disasm.stations import Station, make_station
 from drake_disasm.stations.advance import advance
 from drake_disasm.systems.imprecision import clamped
 from drake_disasm.systems.policy import Policy
@@ -82,7 +84,7 @@ class TaskSimulation:
     learning does; with one, `step()` lets the policy act.
 
     Attributes:
-        scenario: as given.
+        scenario: that is simulated.
         station: of the running episode's scenario.
         systems: the task's, as `add_task` wired them.
         drawn: values drawn from the scenario's ranges for the running episode, by
@@ -90,7 +92,7 @@ class TaskSimulation:
         steps: taken in the running episode.
 
     Args:
-        scenario: what is simulated.
+        scenario: what is simulated: an object, a shipped name, or a file.
         station: "cell" or "twin", or what makes a station of a scenario (hardware).
         policy: observation (12,) to action (6,), or a System (see `add_task`), or
             None.
@@ -99,18 +101,18 @@ class TaskSimulation:
 
     def __init__(
         self,
-        scenario: Scenario,
+        scenario: Scenario | str | Path,
         station: str | StationFactory = "cell",
         policy: Policy | System | None = None,
         observers: Sequence[Observer] = (),
     ) -> None:
-        self.scenario = scenario
+        self.scenario = scenario_of(scenario)
         self.drawn: dict[str, float] = {}
         self.steps = 0
         self._make, self._policy = station, policy
         self._observers = tuple(observers)
         self._rate = 0.0
-        self._build(scenario)
+        self._build(self.scenario)
 
     def _build(self, scenario: Scenario) -> None:
         """Makes the diagram of a scenario whose ranges are drawn, or left alone.
@@ -153,9 +155,7 @@ class TaskSimulation:
     @property
     def station_name(self) -> str:
         """The station's name: "cell", "twin" or "hardware"."""
-        if not isinstance(self.station, SimulatedStation):
-            return "hardware"
-        return "cell" if self.station.arm == "iiwa" else "twin"
+        return self.station.kind
 
     def reset(self, seed: int, effects: Sequence[Effect] | None = None) -> np.ndarray:
         """Starts an episode in place and returns its first observation (12,).

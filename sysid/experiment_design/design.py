@@ -219,7 +219,7 @@ class _Search:
         if not self._is_allowed(motion.scaled(low)):
             raise DisasmError(
                 "no motion: even at rest in the best posture found a torque, the "
-                "clearance or the floor is violated; relax --clearance or --floor"
+                "clearance or the floor is violated; relax `clearance` or `floor`"
             )
         for _ in range(_SHRINKS):
             middle = 0.5 * (low + high)

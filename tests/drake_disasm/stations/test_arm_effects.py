@@ -212,7 +212,7 @@ def test_refuses_what_the_cell_cannot_carry(
 
 @pytest.mark.parametrize("effect", EVERY)
 def test_the_twin_has_no_arm(effect: Effect, twin: TwinStation) -> None:
-    with pytest.raises(DisasmError, match=r"acts on the arm.* use --station cell"):
+    with pytest.raises(DisasmError, match=r"acts on the arm.* use `station` cell"):
         twin.set_effects(twin.CreateDefaultContext(), [effect])
 
 

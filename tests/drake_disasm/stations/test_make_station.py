@@ -109,9 +109,9 @@ def test_bad_input_is_one_clear_error(name: str, options: dict, message: str) ->
 
 
 REFUSED = [
-    ("twin", "hydroelastic", TorqueOffset("iiwa_joint_4", 1.0), "--station cell"),
+    ("twin", "hydroelastic", TorqueOffset("iiwa_joint_4", 1.0), "`station` cell"),
     ("twin", "hydroelastic", ContactExponent(0.5), "contact.model to impact"),
-    ("cell", "hydroelastic", ContactExponent(0.5), "--station twin"),
+    ("cell", "hydroelastic", ContactExponent(0.5), "`station` twin"),
     ("twin", "impact", SoftHead(0.5), "head_modulus.*contact.model to hydroelastic"),
     ("twin", "hydroelastic", Magnetism(0.5), "derive it from one of"),
     ("cell", "hydroelastic", Magnetism(0.5), "derive it from one of"),
@@ -153,5 +153,5 @@ def test_the_same_effect_is_carried_where_it_belongs() -> None:
 
 
 def test_the_cell_names_the_station_that_has_the_contact() -> None:
-    with pytest.raises(DisasmError, match=r"contact\.model: 'impact'.*--station twin"):
+    with pytest.raises(DisasmError, match=r"contact\.model: 'impact'.*`station` twin"):
         CellStation(_scenario(model="impact"))

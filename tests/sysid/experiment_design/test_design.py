@@ -110,7 +110,7 @@ def test_the_condition_number_is_the_scaled_regressors():
 
 def test_a_floor_above_the_arm_is_refused(urdf, experiment, limits):
     high = DesignSettings(duration=8.0, harmonics=4, starts=2, iterations=1, floor=5.0)
-    with pytest.raises(DisasmError, match=r"no motion.*--floor"):
+    with pytest.raises(DisasmError, match=r"no motion.*`floor`"):
         design_motion(experiment, limits, Workspace(urdf, JOINTS, limits), high)
 
 
