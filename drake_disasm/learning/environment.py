@@ -1,8 +1,11 @@
 """The task as a Gymnasium environment.
 
-import gymnasium
-import drake_disasm.learning.environment
-env = gymnasium.make("drake_disasm/Removal-v0", station="cell")
+::
+
+    import drake_disasm
+    import gymnasium
+
+    env = gymnasium.make("drake_disasm/Removal-v0", station="cell")
 """
 
 from pathlib import Path
@@ -62,7 +65,7 @@ class DisassemblyEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """Starts an episode.
 
         Args:
-            seed: of this episode, the same as `tools/simulate.py --seed`; without
+            seed: of this episode, the same as in `drake-disasm simulate`; without
                 one it is drawn from the environment's own generator.
             options: {"effects": [...]} replaces the scenario's effects.
 
@@ -131,31 +134,3 @@ def effects_in(options: dict[str, Any]) -> list[Effect] | None:
         if name != "effects":
             raise DisasmError(f"option '{name}' is not known; use effects=[...]")
     return options.get("effects")
-
-
-#: Registered ids and the scenario of each.
-IDS = {
-    "drake_disasm/Removal-v0": "removal",
-    "drake_disasm/RemovalTurned-v0": "removal_turned",
-    "drake_disasm/RemovalRandomised-v0": "removal_randomised",
-    "drake_disasm/Chapter3-v0": "chapter3",
-    "drake_disasm/Chapter3Impedance-v0": "chapter3_impedance",
-    "drake_disasm/Chapter3Stiff-v0": "chapter3_stiff",
-    "drake_disasm/Chapter4-v0": "chapter4",
-    "drake_disasm/Chapter4Impedance-v0": "chapter4_impedance",
-    "drake_disasm/Chapter4Stiff-v0": "chapter4_stiff",
-    "drake_disasm/Chapter5-v0": "chapter5",
-    "drake_disasm/Chapter5Impedance-v0": "chapter5_impedance",
-    "drake_disasm/Chapter5Stiff-v0": "chapter5_stiff",
-    "drake_disasm/Sliding-v0": "chapter3",  # its old name
-}
-
-for _name, _scenario in IDS.items():
-    gymnasium.register(
-        _name,
-        entry_point="drake_disasm.learning.environment:DisassemblyEnv",
-        vector_entry_point=(
-            "drake_disasm.learning.vector_environment:DisassemblyVectorEnv"
-        ),
-        kwargs={"scenario": _scenario},
-    )

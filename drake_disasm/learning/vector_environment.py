@@ -2,8 +2,8 @@
 
 ::
 
+    import drake_disasm
     import gymnasium
-    import drake_disasm.learning.environment
 
     envs = gymnasium.make_vec(
         "drake_disasm/Removal-v0", num_envs=256, vectorization_mode="vector_entry_point"
