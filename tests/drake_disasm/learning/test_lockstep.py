@@ -53,11 +53,8 @@ def test_a_round_is_the_diagrams_episodes_one_after_the_other():
     recorded = [records for _, records in together.run_episodes()]
     expected = [apart.run_episode()[1] for _ in range(3)]
     for one, other in zip(together.summaries, apart.summaries, strict=True):
-        assert (one.seed, one.steps, one.outcome) == (
-            other.seed,
-            other.steps,
-            other.outcome,
-        )
+        for name in ("seed", "steps", "outcome"):
+            assert getattr(one, name) == getattr(other, name)
         assert one.reward == pytest.approx(other.reward, abs=0.06)
         assert one.max_force == pytest.approx(other.max_force, abs=0.02)
     for one, other in zip(recorded, expected, strict=True):
@@ -123,17 +120,18 @@ def test_an_episode_whose_simulation_fails_is_not_learned_from():
     assert np.isfinite(training.replay.contents()[0]).all()
 
 
-@pytest.mark.parametrize(
-    ("station", "acts", "words"),
-    [
-        ("cell", True, "envs: station 'cell' has no batch"),
-        ("twin", False, "envs: 4 episodes"),
-    ],
-)
-def test_what_has_no_batch_is_refused(station: str, acts: bool, words: str) -> None:
+@pytest.mark.parametrize(("envs", "station", "acts", "lockstep", "words"), [
+    (4, "cell", True, False, "envs: station 'cell' has no batch"),
+    (4, "twin", False, False, "envs: 4 episodes"),
+    (4, "twin", True, True, "lockstep: "),
+    (1, "cell", True, True, "lockstep: "),
+    (1, "twin", False, True, "lockstep: "),
+])  # fmt: skip
+def test_what_has_no_batch_is_refused(envs, station, acts, lockstep, words):
     refuse_envs(1, station, acts)
+    refuse_envs(1, "twin", acts=True, lockstep=True)
     with pytest.raises(DisasmError, match=words):
-        refuse_envs(4, station, acts)
+        refuse_envs(envs, station, acts, lockstep=lockstep)
 
 
 def _side_by_side(count: int, **changes: Any) -> LockstepTrainings:
@@ -207,13 +205,3 @@ def test_a_program_that_was_stopped_goes_on_bit_for_bit(tmp_path: Path) -> None:
             np.testing.assert_array_equal(a, b)
         logs = [read_log(job.folder / "log") for job in (one, other)]
         assert [len(log.episodes) for log in logs] == [config.episodes] * 2
-
-
-@pytest.mark.parametrize(
-    ("envs", "station", "acts"),
-    [(4, "twin", True), (1, "cell", True), (1, "twin", False)],
-)
-def test_side_by_side_there_is_one_environment_each(envs, station, acts):
-    refuse_envs(1, "twin", acts=True, lockstep=True)
-    with pytest.raises(DisasmError, match="lockstep: agents side by side"):
-        refuse_envs(envs, station, acts, lockstep=True)

@@ -28,12 +28,9 @@ def test_the_oldest_gives_way() -> None:
     assert sorted(replay.contents()[0][:, 18]) == [2, 3, 4, 5, 6]
 
 
-def test_small_batches_are_drawn_as_they_are() -> None:
+def test_only_large_batches_are_merged_and_no_draw_is_lost() -> None:
     rows = _filled(10).sample(30, np.random.default_rng(0))
     assert rows.shape == (30, WIDTH) and (rows[:, -1] == 1.0).all()
-
-
-def test_large_batches_are_merged_without_losing_a_draw() -> None:
     replay = _filled(500)
     rows = replay.sample(2000, np.random.default_rng(0))
     draws = np.random.default_rng(0).integers(500, size=2000)

@@ -31,9 +31,6 @@ def test_the_interquartile_mean_ignores_the_outer_quarters() -> None:
     expected = (0.5 * 2 + 3 + 4 + 5 + 6 + 0.5 * 7) / 5
     assert interquartile_mean(np.arange(10.0)) == pytest.approx(expected)
     assert interquartile_mean(np.array([3.0])) == pytest.approx(3.0)
-
-
-def test_the_interquartile_mean_goes_along_an_axis() -> None:
     values = np.random.default_rng(0).normal(size=(8, 3))
     columns = [interquartile_mean(values[:, i]) for i in range(3)]
     np.testing.assert_allclose(interquartile_mean(values), columns)

@@ -155,16 +155,13 @@ def test_seeds_may_be_a_list_and_the_same_seeds_repeat():
     assert not np.allclose(other, again, atol=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("count", "options", "words"),
-    [
-        (0, {}, "num_envs: 0"),
-        (2, {"station": "cell"}, "station: 'cell' has no batch"),
-        (2, {"device": "cuda:7"}, "device: 'cuda:7' is not there"),
-        (2, {"scenario": ["removal"] * 3}, "scenario: 3 scenarios for 2"),
-        (2, {"autoreset_mode": "Disabled"}, "autoreset_mode: Disabled"),
-    ],
-)
+@pytest.mark.parametrize(("count", "options", "words"), [
+    (0, {}, "num_envs: 0"),
+    (2, {"station": "cell"}, "station: 'cell' has no batch"),
+    (2, {"device": "cuda:7"}, "device: 'cuda:7' is not there"),
+    (2, {"scenario": ["removal"] * 3}, "scenario: 3 scenarios for 2"),
+    (2, {"autoreset_mode": "Disabled"}, "autoreset_mode: Disabled"),
+])  # fmt: skip
 def test_bad_input_is_one_clear_error(count, options, words):
     with pytest.raises(DisasmError, match=words):
         _make(count, **options)

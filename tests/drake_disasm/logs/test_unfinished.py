@@ -239,14 +239,3 @@ def test_notes_belong_to_the_newest_episode(
     assert LogWriter(tmp_path, header, resume=True).header.notes == expected
     with pytest.raises(DisasmError, match="not plain data"):
         writer.note(load=np.zeros(6))
-
-
-@pytest.mark.parametrize("notes", ["[1]", "{a: {}}", "{-1: {}}", "{0: cut}", "yes"])
-def test_notes_that_are_none_are_refused(
-    written: Callable[..., Path], notes: str
-) -> None:
-    folder = written("transitions")
-    with (folder / "log.yaml").open("a") as file:
-        file.write(f"notes: {notes}\n")
-    with pytest.raises(DisasmError, match=r"log\.yaml: key 'notes' is not a mapping"):
-        read_log(folder)

@@ -64,8 +64,9 @@ def test_round_trip_bit_for_bit(policy: LearnedPolicy, file: Path) -> None:
     assert _contents(load_policy(file)) == _contents(policy)
 
 
-@pytest.mark.parametrize("base", [None, Straight()])
-@pytest.mark.parametrize("widths", [(12, 6), (12, 128, 128, 128, 6)])
+@pytest.mark.parametrize(
+    ("widths", "base"), [((12, 6), None), ((12, 128, 128, 128, 6), Straight())]
+)
 def test_round_trip_of_other_shapes(
     make_network: MakeNetwork, tmp_path: Path, widths: tuple, base: Straight | None
 ) -> None:
@@ -119,14 +120,14 @@ def test_flipped_bits_never_go_unnoticed(policy: LearnedPolicy, file: Path) -> N
     assert refused > 100
 
 
-@pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 0.7, 0.99])
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
 def test_truncated_file_is_refused(file: Path, share: float) -> None:
     data = file.read_bytes()
     file.write_bytes(data[: int(share * len(data))])
     _refusal(file)
 
 
-@pytest.mark.parametrize("name", ["weight_0", "bias_2", "action_scale", "text"])
+@pytest.mark.parametrize("name", ["weight_0", "text"])
 def test_flips_that_the_zip_would_accept_are_refused(file: Path, name: str) -> None:
     """Whoever rewrites an array with any tool has to know our checksum, too."""
     with np.load(file) as archive:
@@ -156,109 +157,70 @@ def test_unreadable_file_is_refused(file: Path) -> None:
     assert "Permission denied" in _refusal(file)
 
 
-Change = Callable[[Arrays, dict[str, Any]], Any]
+def _put(**changes: Any) -> Callable[[Arrays, dict[str, Any]], Any]:
+    """Puts arrays (float32 where a shape is given) and parts of the text in."""
+    made = {
+        k: np.ones(v, np.float32) if isinstance(v, tuple) else v
+        for k, v in changes.items()
+    }
+
+    def change(arrays: Arrays, text: dict[str, Any]) -> None:
+        for name, value in made.items():
+            target = text if name in text else arrays
+            target[name] = value
+
+    return change
+
+
+def _drop(*names: str) -> Callable[[Arrays, dict[str, Any]], Any]:
+    return lambda a, t: [a.pop(n) if n in a else t.pop(n) for n in names]
+
+
+_LAYERS = tuple(f"{kind}_{i}" for kind in ("weight", "bias") for i in range(3))
 
 #: What is done to a file before its checksum is made, and what is said about it.
-BROKEN: dict[str, tuple[Change, list[str]]] = {
-    "format": (
-        lambda a, t: t.update(format="drake_disasm/policy/2"),
-        ["drake_disasm/policy/2", FORMAT],
-    ),
-    "no format": (lambda a, t: t.pop("format"), ["None", FORMAT]),
-    "no weight": (lambda a, t: a.pop("weight_1"), ["lacks", "'weight_1'"]),
-    "no last layer": (lambda a, t: a.pop("bias_2"), ["lacks", "'bias_2'"]),
-    "no layers": (
-        lambda a, t: [a.pop(n) for n in [*a] if "scale" not in n],
-        ["lacks", "'bias_0'"],
-    ),
-    "no scale": (lambda a, t: a.pop("action_scale"), ["lacks", "'action_scale'"]),
-    "stranger": (lambda a, t: a.update(spam=np.ones(1)), ["unknown", "'spam'"]),
-    "no chain": (
-        lambda a, t: a.update(weight_1=np.ones((5, 9), np.float32)),
-        ["weight_1", "(5, 9)", "(5, 7)"],
-    ),
-    "wrong bias": (
-        lambda a, t: a.update(bias_2=np.ones(5, np.float32)),
-        ["bias_2", "(5,)", "(6,)"],
-    ),
-    "flat weight": (
-        lambda a, t: a.update(weight_1=np.ones(35, np.float32)),
-        ["weight_1", "(35,)"],
-    ),
-    "scalar bias": (
-        lambda a, t: a.update(bias_0=np.array(1.0, np.float32)),
-        ["shape", "train it again"],
-    ),
-    "11 inputs": (
-        lambda a, t: a.update(weight_0=np.ones((7, 11), np.float32)),
-        ["weight_0", "(7, 11)", "(7, 12)"],
-    ),
-    "5 outputs": (
-        lambda a, t: a.update(
-            weight_2=np.ones((5, 5), np.float32), bias_2=np.ones(5, np.float32)
-        ),
-        ["(5, 5)", "(6, 5)"],
-    ),
-    "short scale": (
-        lambda a, t: a.update(observation_scale=np.ones(6)),
-        ["observation_scale", "(6,)", "(12,)"],
-    ),
-    "NaN": (
-        lambda a, t: a["weight_1"].__setitem__((0, 0), np.nan),
-        ["NaN", "weight_1"],
-    ),
-    "infinity": (lambda a, t: a["bias_0"].__setitem__(0, np.inf), ["bias_0"]),
-    "zero scale": (
-        lambda a, t: a["observation_scale"].__setitem__(0, 0.0),
-        ["scale", "zero"],
-    ),
-    "negative reach": (
-        lambda a, t: a["action_scale"].__setitem__(0, -1.0),
-        ["scale", "negative"],
-    ),
-    "doubles": (
-        lambda a, t: a.update(weight_0=a["weight_0"].astype(float)),
-        ["weight_0", "float64", "float32"],
-    ),
-    "words": (
-        lambda a, t: a.update(bias_0=np.array(["a"] * 7)),
-        ["bias_0", "float32"],
-    ),
-    "unknown base": (
-        lambda a, t: t["base"].update(name="strait"),
-        ["'strait'", "'straight'"],
-    ),
-    "unknown parameter": (
-        lambda a, t: t["base"].update(parameters={"sped": 1.0}),
-        ["'sped'", "'speed'"],
-    ),
-    "parameter is a word": (
-        lambda a, t: t["base"]["parameters"].update(speed="fast"),
-        ["speed", "'fast'"],
-    ),
-    "parameter is NaN": (
-        lambda a, t: t["base"]["parameters"].update(speed=float("nan")),
-        ["speed", "nan"],
-    ),
-    "no parameters": (lambda a, t: t["base"].pop("parameters"), ["base"]),
-    "base is a word": (lambda a, t: t.update(base="straight"), ["base"]),
-    "no description": (lambda a, t: t.pop("description"), ["description"]),
-    "poor description": (lambda a, t: t["description"].pop("period"), ["description"]),
-    "odd description": (
-        lambda a, t: t["description"].update(period="0.1"),
-        ["description", "period", "float"],
-    ),
-}
+BROKEN: list[tuple[Callable[[Arrays, dict[str, Any]], Any], str]] = [
+    (_put(format="drake_disasm/policy/2"), f"drake_disasm/policy/2 {FORMAT}"),
+    (_drop("format"), f"None {FORMAT}"),
+    (_drop("weight_1"), "lacks 'weight_1'"),
+    (_drop("bias_2"), "lacks 'bias_2'"),
+    (_drop(*_LAYERS), "lacks 'bias_0'"),
+    (_drop("action_scale"), "lacks 'action_scale'"),
+    (_put(spam=(1,)), "unknown 'spam'"),
+    (_put(weight_1=(5, 9)), "weight_1 (5, 9) (5, 7)"),
+    (_put(bias_2=(5,)), "bias_2 (5,) (6,)"),
+    (_put(weight_1=(35,)), "weight_1 (35,)"),
+    (_put(bias_0=()), "shape train it again"),
+    (_put(weight_0=(7, 11)), "weight_0 (7, 11) (7, 12)"),
+    (_put(weight_2=(5, 5), bias_2=(5,)), "(5, 5) (6, 5)"),
+    (_put(observation_scale=np.ones(6)), "observation_scale (6,) (12,)"),
+    (lambda a, t: a["weight_1"].__setitem__((0, 0), np.nan), "NaN weight_1"),
+    (lambda a, t: a["bias_0"].__setitem__(0, np.inf), "bias_0"),
+    (lambda a, t: a["observation_scale"].__setitem__(0, 0.0), "scale zero"),
+    (lambda a, t: a["action_scale"].__setitem__(0, -1.0), "scale negative"),
+    (_put(weight_0=np.ones((7, 12))), "weight_0 float64 float32"),
+    (_put(bias_0=np.array(["a"] * 7)), "bias_0 float32"),
+    (_put(base={"name": "strait", "parameters": {}}), "'strait' 'straight'"),
+    (_put(base={"name": "straight", "parameters": {"sped": 1.0}}), "'sped' 'speed'"),
+    (_put(base={"name": "straight", "parameters": {"speed": "fast"}}), "speed 'fast'"),
+    (_put(base={"name": "straight", "parameters": {"speed": np.nan}}), "speed nan"),
+    (_put(base={"name": "straight"}), "base"),
+    (_put(base="straight"), "base"),
+    (_drop("description"), "description"),
+    (lambda a, t: t["description"].pop("period"), "description"),
+    (lambda a, t: t["description"].update(period="0.1"), "description period float"),
+]
 
 
-@pytest.mark.parametrize("name", BROKEN)
-def test_whole_file_with_broken_content_is_refused(file: Path, name: str) -> None:
-    change, words = BROKEN[name]
+@pytest.mark.parametrize(("change", "words"), BROKEN)
+def test_whole_file_with_broken_content_is_refused(
+    file: Path, change: Callable[..., Any], words: str
+) -> None:
     arrays, text = unpack(file.read_bytes(), POLICY)
     change(arrays, text)
     file.write_bytes(pack(arrays, text))
     message = _refusal(file)
-    assert all(word in message for word in words), message
+    assert all(word in message for word in words.split()), message
 
 
 def test_text_that_is_no_mapping_is_refused(file: Path) -> None:
@@ -277,15 +239,10 @@ def test_broken_policy_is_not_written(policy: LearnedPolicy, file: Path) -> None
     policy.network.biases[0][0] = 0.0
     with pytest.raises(DisasmError, match="a file can name straight, admittance"):
         save_policy(file, dataclasses.replace(policy, action_map=strange))
+    with pytest.raises(DisasmError, match="cannot be written"):
+        save_policy(file.parent / "no/such/policy.npz", policy)
     assert file.read_bytes() == before
     assert [path.name for path in file.parent.iterdir()] == [file.name]
-
-
-def test_folder_that_is_not_there_is_refused(
-    policy: LearnedPolicy, tmp_path: Path
-) -> None:
-    with pytest.raises(DisasmError, match="cannot be written"):
-        save_policy(tmp_path / "no/such/policy.npz", policy)
 
 
 def test_two_arrays_of_one_name_are_refused(file: Path) -> None:

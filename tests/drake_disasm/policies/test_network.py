@@ -10,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.mdp import Outcome, action_bounds
 from drake_disasm.policies import (
     ActionMap,
@@ -18,20 +17,18 @@ from drake_disasm.policies import (
     LearnedPolicy,
     Network,
     Straight,
-    load_policy,
     save_policy,
 )
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.systems.policy import ask
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.simulation import TaskSimulation
+from tests.refusals import refused
 
 MakeNetwork = Callable[..., Network]
 
 
-@pytest.mark.parametrize(
-    "widths", [(12, 128, 128, 128, 6), (12, 50, 50, 6), (12, 1, 6), (12, 6), (3, 4, 2)]
-)
+@pytest.mark.parametrize("widths", [(12, 128, 128, 6), (12, 6), (3, 1, 2)])
 def test_network_is_what_torch_computes(
     make_network: MakeNetwork, widths: tuple[int, ...]
 ) -> None:
@@ -80,9 +77,9 @@ def test_copies_of_a_used_network_work_on_their_own(
         np.testing.assert_array_equal(twin(x), output)
 
 
-@pytest.mark.parametrize("base", [None, Straight(), Admittance()])
+@pytest.mark.parametrize("base", [None, Admittance()])
 def test_policy_is_its_formula(
-    make_network: MakeNetwork, base: Straight | Admittance | None
+    make_network: MakeNetwork, base: Admittance | None
 ) -> None:
     scale, reach = np.linspace(0.01, 5.0, 12), np.linspace(1e-4, 3e-3, 6)
     policy = LearnedPolicy(make_network(12, 8, 6), scale, ActionMap(reach, base))
@@ -96,8 +93,8 @@ def test_policy_is_its_formula(
         np.testing.assert_array_equal(policy.to_action(s, chosen), expected)
 
 
-@pytest.mark.parametrize("base", [None, Straight(), Admittance()])
-def test_choice_comes_back_from_its_action(base: Straight | Admittance | None) -> None:
+@pytest.mark.parametrize("base", [None, Admittance()])
+def test_choice_comes_back_from_its_action(base: Admittance | None) -> None:
     mapping = ActionMap(np.array([1e-3, 2e-3, 1e-3, 0.01, 0.01, 0.02]), base)
     generator = np.random.default_rng(3)
     for _ in range(20):
@@ -162,48 +159,27 @@ def _described(policy: LearnedPolicy, **changes: object) -> LearnedPolicy:
     return dataclasses.replace(policy, description=description)
 
 
-@pytest.mark.parametrize(
-    ("changes", "overrides", "words"),
-    [
-        ({"period": 0.05}, [], ["task.period", "0.05", "0.1"]),
-        ({}, ["task.period=0.2"], ["task.period", "0.2", "set task.period=0.1"]),
-        (
-            {},
-            ["observation.variant=small_angle"],
-            ["observation.variant", "exact", "small_angle"],
-        ),
-        ({"max_translation": 0.004}, [], ["task.max_translation", "0.004", "0.003"]),
-        ({}, ["task.max_rotation=0.01"], ["task.max_rotation", "0.01", "0.0174533"]),
-        ({"state_names": ("x", "y")}, [], ["state", "('x', 'y')", "train anew"]),
-        ({"action_names": ("dx",)}, [], ["action", "('dx',)", "train anew"]),
-    ],
-)
+@pytest.mark.parametrize(("changes", "override", "words"), [
+    ({"period": 0.05}, "", ["task.period", "0.05", "0.1"]),
+    ({}, "task.period=0.2", ["task.period", "0.2", "set task.period=0.1"]),
+    ({}, "observation.variant=small_angle", ["observation.variant", "exact", "small"]),
+    ({"max_translation": 0.004}, "", ["task.max_translation", "0.004", "0.003"]),
+    ({}, "task.max_rotation=0.01", ["task.max_rotation", "0.01", "0.0174533"]),
+    ({"state_names": ("x", "y")}, "", ["state", "('x', 'y')", "train anew"]),
+    ({"action_names": ("dx",)}, "", ["action", "('dx',)", "train anew"]),
+])  # fmt: skip
 def test_policy_of_another_task_is_refused(
-    policy: LearnedPolicy, changes: dict, overrides: list[str], words: list[str]
+    policy: LearnedPolicy, changes: dict, override: str, words: list[str]
 ) -> None:
-    scenario = load_scenario("chapter4", overrides)
-    with pytest.raises(DisasmError) as caught:
+    scenario = load_scenario("chapter4", [override] if override else [])
+    with refused("chapter4", *words):
         _described(policy, **changes).check_fits(scenario)
-    message = str(caught.value)
-    assert "\n" not in message and "chapter4" in message
-    assert all(word in message for word in words), message
 
 
-@pytest.mark.parametrize(
-    "overrides",
-    [
-        ["lock.clearance=0.0003"],
-        ["effects=[!SensorBias {fx: 0.5}]"],
-        ["task.max_translation=0.005", "task.max_rotation=0.05"],
-        ["task.steps=200", "imprecision=0.0003"],
-    ],
-)
-def test_policy_carries_over(policy: LearnedPolicy, overrides: list[str]) -> None:
+def test_policy_carries_over_to_other_locks_errors_and_wider_bounds(
+    policy: LearnedPolicy,
+) -> None:
+    overrides = ["lock.clearance=0.0003", "effects=[!SensorBias {fx: 0.5}]"]
+    overrides += ["task.max_translation=0.005", "task.max_rotation=0.05"]
+    overrides += ["task.steps=200", "imprecision=0.0003"]
     policy.check_fits(load_scenario("chapter4", overrides))
-
-
-def test_load_policy_is_the_policy(policy: LearnedPolicy, tmp_path) -> None:
-    save_policy(tmp_path / "p.npz", policy)
-    loaded = load_policy(tmp_path / "p.npz")
-    for s in np.random.default_rng(4).normal(size=(5, 12)):
-        np.testing.assert_array_equal(loaded(s), policy(s))

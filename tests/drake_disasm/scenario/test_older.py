@@ -28,14 +28,13 @@ def _loaded(folder: Path, text: str):
     return load_scenario(str(path))
 
 
-def test_an_older_scenario_keeps_its_rigid_grip(tmp_path: Path) -> None:
+def test_an_older_scenario_keeps_its_grip_and_what_it_says_of_it(
+    tmp_path: Path,
+) -> None:
     scenario = _loaded(tmp_path, OLD)
     assert scenario.gripper.compliance == "rigid"
     assert scenario.effects[0].ry == 0.01
     assert [r.parameter for r in scenario.randomisation] == ["lock.clearance"]
-
-
-def test_what_it_says_of_the_gripper_stays(tmp_path: Path) -> None:
     text = OLD + "gripper: {hold: weld, compliance: adaptive}\n"
     scenario = _loaded(tmp_path, text)
     assert scenario.gripper.hold == "weld"
@@ -54,18 +53,3 @@ def test_an_older_logs_scenario_is_read() -> None:
 def test_an_unknown_section_is_still_refused(tmp_path: Path) -> None:
     with pytest.raises(DisasmError, match="twins"):
         _loaded(tmp_path, OLD.replace("twin:", "twins:"))
-
-
-@pytest.mark.parametrize(
-    ("override", "words"),
-    [
-        ("gripper.stiffness=[600, 600, 0, 10, 10, 10]", "gripper.stiffness"),
-        ("gripper.stiffness=[600, 600, -5, 10, 10, 10]", "gripper.stiffness"),
-        ("gripper.damping_ratio=0", "gripper.damping_ratio"),
-        ("gripper.compliance=soft", "adaptive"),
-    ],
-)
-def test_a_grip_that_can_not_be_is_one_line(override: str, words: str) -> None:
-    with pytest.raises(DisasmError, match=words) as error:
-        load_scenario("removal", [override])
-    assert "\n" not in str(error.value)

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.scenario import (
     Scenario,
     draw,
@@ -14,6 +13,7 @@ from drake_disasm.scenario import (
     scenario_to_mapping,
     with_values,
 )
+from tests.refusals import refused
 
 RANGE = "randomisation=[{{parameter: {}, low: {}, high: {}}}]"
 
@@ -56,27 +56,18 @@ def test_ranges_survive_files_and_mappings(tmp_path: Path) -> None:
     assert scenario_from_mapping(scenario_to_mapping(scenario)) == scenario
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (RANGE.format("lock.clearence", 0, 1), "did you mean 'clearance'"),
-        (RANGE.format("effects.3.ry", 0, 1), "there is no number 3 of 1"),
-        (RANGE.format("lock", 0, 1), "is not a number that can vary"),
-        (RANGE.format("gripper.hold", 0, 1), "is not a number that can vary"),
-        (RANGE.format("contact.friction", 0.3, 0.1), "is above high"),
-        (RANGE.format("contact.friction", 0.1, 5), "with every high end"),
-        (RANGE.format("contact.friction", "a", 5), "is not a number"),
-        (RANGE.format("lock.travel", 0.02, 0.01), "is above high"),
-        ("randomisation=3", "randomisation: is not a list"),
-        ("randomisation=[{paramter: a}]", "unknown key 'paramter'"),
-        (
-            "randomisation=[{parameter: imprecision, low: 0, high: 0},"
-            " {parameter: imprecision, low: 0, high: 0}]",
-            "is given twice",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("text", "message"), [
+    (RANGE.format("effects.3.ry", 0, 1), "there is no number 3 of 1"),
+    (RANGE.format("lock", 0, 1), "is not a number that can vary"),
+    (RANGE.format("gripper.hold", 0, 1), "is not a number that can vary"),
+    (RANGE.format("contact.friction", 0.3, 0.1), "is above high"),
+    (RANGE.format("contact.friction", 0.1, 5), "with every high end"),
+    (RANGE.format("contact.friction", "a", 5), "is not a number"),
+    ("randomisation=3", "randomisation: is not a list"),
+    ("randomisation=[{paramter: a}]", "unknown key 'paramter'"),
+    ("randomisation=[{parameter: imprecision, low: 0, high: 0},"
+     " {parameter: imprecision, low: 0, high: 0}]", "is given twice"),
+])  # fmt: skip
 def test_what_is_wrong_is_named(text: str, message: str) -> None:
-    with pytest.raises(DisasmError) as caught:
+    with refused(message):
         load_scenario("removal_turned", [text])
-    assert message in str(caught.value) and "\n" not in str(caught.value)
