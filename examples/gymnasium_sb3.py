@@ -1,69 +1,72 @@
-"""The task as a Gymnasium environment, with an agent of stable-baselines3.
+"""SAC of stable-baselines3 on a batch of twins, then one episode of its policy.
 
     pip install stable-baselines3
-    python examples/gymnasium_sb3.py [STEPS]
+    python examples/gymnasium_sb3.py [STEPS [ENVIRONMENTS [UPDATES]]]
 
-SAC with its defaults, and how long its episodes last (20000 steps: docs/learning.md).
-Wrappers scale m, rad, N and N m for a network; `tools/train.py` has our own agents.
+UPDATES are gradient steps after each step of the batch; -1 makes one for each
+transition, as with a single environment. The program prints the steps per second.
 """
 
 import sys
-from collections import Counter
-from collections.abc import Callable
+import time
+from collections import Counter, deque
+from typing import Any
 
 import gymnasium
-import numpy as np
 from stable_baselines3 import SAC
+from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
-#: The part before the colon is imported, and registers the environments.
-ENVIRONMENT = "drake_disasm.learning.environment:drake_disasm/Removal-v0"
-SCALE = np.array([0.01] * 3 + [0.1] * 3 + [5.0] * 3 + [0.5] * 3)  # m, rad, N, N m
-
-
-def make_environment(station: str) -> gymnasium.Env:
-    """Returns the default task, scaled to about [-1, 1]."""
-    env = gymnasium.make(ENVIRONMENT, station=station)
-    env = gymnasium.wrappers.RescaleAction(env, np.float32(-1), np.float32(1))
-    return gymnasium.wrappers.TransformObservation(
-        env, lambda s: (s / SCALE).astype(np.float32), env.observation_space
-    )
+from drake_disasm.learning.stable_baselines import DisassemblyVecEnv
 
 
-def episodes_every(steps: int) -> Callable[[dict, dict], bool]:
-    """Returns a callback that prints how long episodes last, and how they end."""
-    ended: list[tuple[int, float, str]] = []
+class Episodes:
+    """A callback that prints how the newest episodes ended.
 
-    def after_step(local: dict, _: dict) -> bool:
-        """Takes note of an episode that has ended; prints once in a while."""
-        info, done = local["infos"][0], local["self"].num_timesteps
-        if "episode" in info:  # by the Monitor that stable-baselines3 puts around
-            ended.append((*map(info["episode"].get, "lr"), info["outcome"]))
-        if done % steps == 0:
-            print(
-                f"{done:6d} steps: {len(ended)} episodes", Counter(e[2] for e in ended)
-            )
-            print("  lengths:", sorted(episode[0] for episode in ended))
-            print("  rewards:", [round(episode[1], 1) for episode in ended])
-            ended.clear()
+    Args:
+        period: steps of all environments between two lines.
+    """
+
+    def __init__(self, period: int) -> None:
+        self._period = self._next = period
+        self._newest: deque[dict[str, Any]] = deque(maxlen=50)
+
+    def __call__(self, local: dict[str, Any], _: dict[str, Any]) -> bool:
+        """Takes note of episodes that have ended; training goes on."""
+        self._newest += [i["episode"] for i in local["infos"] if "episode" in i]
+        steps = local["self"].num_timesteps
+        if steps >= self._next and self._newest:
+            self._next += self._period
+            outcomes = Counter(episode["outcome"] for episode in self._newest)
+            reward = sum(e["r"] for e in self._newest) / len(self._newest)
+            print(f"{steps:6d} steps: reward {reward:6.1f}", dict(outcomes), flush=True)
         return True
 
-    return after_step
+
+def main(steps: int = 200, environments: int = 16, updates: int = 1) -> None:
+    """Trains for a number of steps on the twin, then plays one episode on it."""
+    batch = DisassemblyVecEnv(environments, "removal")
+    monitored = VecMonitor(batch, info_keywords=("outcome",))
+    envs = VecNormalize(monitored, norm_reward=False)  # m, rad, N and N m to about 1
+    agent = SAC("MlpPolicy", envs, gradient_steps=updates, seed=0, device="cpu")
+    start = time.perf_counter()
+    agent.learn(steps, callback=Episodes(max(1, steps // 10)))
+    seconds = time.perf_counter() - start
+    print(f"{steps} steps in {seconds:.0f} s: {steps / seconds:.0f} steps/s")
+    play(agent, envs)
 
 
-def main(steps: int = 20) -> None:
-    """Trains for a number of steps on the twin, then plays one episode."""
-    env = make_environment("twin")
-    agent = SAC("MlpPolicy", env, seed=0, device="cpu")
-    agent.learn(steps, callback=episodes_every(min(steps, 2000)))
+def play(agent: SAC, envs: VecNormalize) -> None:
+    """Plays one episode without noise on the single environment."""
+    env = gymnasium.make("drake_disasm/Removal-v0", station="twin")
     observation, info = env.reset(seed=0)
     total = 0.0
     while info["outcome"] == "running":
-        action, _ = agent.predict(observation, deterministic=True)
+        scaled = envs.normalize_obs(observation)
+        action, _ = agent.predict(scaled, deterministic=True)
         observation, reward, _, _, info = env.step(action)
         total += float(reward)
-    print(f"trained for {steps} steps; then one episode without noise:")
-    print(f"reward {total:.2f}, outcome: {info['outcome']}", info["reward_terms"])
+    print(f"one episode: reward {total:.2f}, outcome: {info['outcome']}")
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:2]))
+    main(*map(int, sys.argv[1:4]))

@@ -43,7 +43,7 @@ _TERMINATED = np.array([outcome.terminated for outcome in Outcome])
 _TRUNCATED = np.array([outcome.truncated for outcome in Outcome])
 _LABELS = np.array([outcome.label for outcome in Outcome], dtype=object)
 
-_Scenarios = Scenario | str | Path | Sequence[Scenario | str | Path]
+Scenarios = Scenario | str | Path | Sequence[Scenario | str | Path]
 
 
 class DisassemblyVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
@@ -81,7 +81,7 @@ class DisassemblyVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     def __init__(
         self,
         num_envs: int = 1,
-        scenario: _Scenarios = "removal",
+        scenario: Scenarios = "removal",
         station: str = "twin",
         device: str = "auto",
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
@@ -315,7 +315,7 @@ def _device_of(name: str, count: int) -> str:
     return "cuda" if there else "numpy"
 
 
-def _scenarios_of(given: _Scenarios, count: int) -> list[Scenario]:
+def _scenarios_of(given: Scenarios, count: int) -> list[Scenario]:
     """Returns a scenario for each environment, with IMPACT contact."""
     if isinstance(given, Scenario | str | Path):
         return [_loaded(given)] * count
