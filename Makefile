@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --quiet --constraint constraints.txt
 # One thread per process: parallel work is done by processes.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help simulate test test-all test-loaded lint format docs results benchmark \
+.PHONY: help simulate test test-all test-loaded lint format docs reference results benchmark \
 	check-install check-libraries clean
 .DEFAULT_GOAL := help
 
@@ -43,6 +43,9 @@ docs: check-libraries $(VENV)/.docs  ## Build the site: build/docs/index.html
 	$(BIN)/python -m sphinx -q -W --keep-going -j auto -d build/doctrees docs build/docs
 	@echo "build/docs/index.html"
 
+reference: check-libraries $(VENV)/.dev  ## Write the pages of docs/reference that the code makes
+	$(BIN)/python docs/_ext/reference_pages.py
+
 results: check-libraries $(VENV)/.dev  ## Write docs/results from its data
 	$(BIN)/python benchmarks/results_pages.py
 
@@ -59,7 +62,7 @@ check-install: check-libraries $(VENV)/.dev  ## Install into an empty environmen
 	make_station('cell', load_scenario('removal')); print('installed:', models_dir())"
 
 clean:  ## Remove what was built
-	rm -rf $(VENV) build dist docs/api *.egg-info .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) build dist docs/reference/api *.egg-info .mypy_cache .ruff_cache .pytest_cache
 
 $(BIN)/python:
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and \

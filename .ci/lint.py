@@ -65,7 +65,11 @@ LONGEST_FUNCTION = 50  # lines without the docstring
 MEDIAN_FUNCTION, USUAL_FUNCTION = 8, 25  # lines, of all and of nine in ten
 #: Words of the manual by hand, and of one page.
 MOST_WORDS, LONGEST_PAGE = 20_000, 1500
-GENERATED = ("docs/api/", "docs/results/", "docs/reference/effects.md")
+GENERATED = (
+    *("docs/reference/api/", "docs/results/", "docs/reference/effects.md"),
+    *("docs/reference/command-line.md", "docs/reference/scenario.md"),
+    "docs/reference/settings.md",
+)
 _HASH = re.compile(r"\b(?=[0-9a-f]*\d)(?=[0-9a-f]*[a-f])[0-9a-f]{7,12}\b")
 _DIARY = re.compile(r"\b(used to|no longer|was mended|at this commit)\b")
 

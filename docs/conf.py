@@ -15,7 +15,7 @@ copyright = "the drake_disasm authors, BSD-3-Clause"
 release = "0.1.0"
 
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
@@ -25,8 +25,14 @@ extensions = [
     "docstrings",
     "repository_links",
 ]
-exclude_patterns = ["_ext", "_templates", "images"]
+exclude_patterns = ["_ext", "_templates", "images", "results/pages", "results/data"]
 templates_path = ["_templates"]
+
+# Notebooks are executed in every build; a cell that fails ends it.
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 600  # s
+nb_merge_streams = True
 
 # Pages: Markdown; `#heading` links work for headings down to ###.
 myst_enable_extensions = ["colon_fence", "dollarmath"]
@@ -39,7 +45,7 @@ lexers["csv"] = TextLexer()
 default_role = "py:obj"
 suppress_warnings = ["ref.python"]  # `effects` may be an attribute of several classes
 # Autosummary writes a page per module, and leaves those of modules that are gone.
-for page in (DOCS / "api").glob("*.rst"):
+for page in (DOCS / "reference" / "api").glob("*.rst"):
     module = ROOT / page.stem.replace(".", "/")
     if not (module.is_dir() or module.with_suffix(".py").is_file()):
         page.unlink()
@@ -66,6 +72,7 @@ html_theme_options = {
     "show_prev_next": False,
     "navigation_with_keys": False,
     "navbar_align": "left",
+    "header_links_before_dropdown": 6,
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
     "footer_end": [],

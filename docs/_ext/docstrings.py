@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 #: A bar outside of ``literals`` and `names`; |x| is an absolute value to us.
 _BAR = re.compile(r"(``.*?``|`[^`]*`)|\|")
 
+QUANTITY_HEAD = ("field", "default", "unit", "bounds", "meaning")
+SETTING_HEAD = ("setting", "default", "unit", "reason", "measured")
+
 
 def system_block(lines: Sequence[str]) -> list[str]:
     """Returns a docstring's lines with the `@system` block as reStructuredText.
@@ -75,20 +78,27 @@ def field_table(cls: type) -> list[str]:
     Those made by `quantity` have a `doc` and bounds, those of settings a `reason` and
     what was `measured`.
     """
-    if not dataclasses.is_dataclass(cls):
-        return []
-    fields = dataclasses.fields(cls)
-    quantities = [_quantity_row(f) for f in fields if "doc" in f.metadata]
-    settings = [_setting_row(f) for f in fields if "reason" in f.metadata]
     lines = []
-    if quantities:
-        head = ("field", "default", "unit", "bounds", "meaning")
-        lines += ["", *_list_table([head, *quantities], "quantities"), ""]
-    if settings:
-        head = ("setting", "default", "unit", "reason", "measured")
-        table = _list_table([head, *settings], "settings", "24 9 13 32 22")
+    if rows := quantity_rows(cls):
+        lines += ["", *_list_table([QUANTITY_HEAD, *rows], "quantities"), ""]
+    if rows := setting_rows(cls):
+        table = _list_table([SETTING_HEAD, *rows], "settings", "24 9 13 32 22")
         lines += ["", *table, ""]
     return lines
+
+
+def quantity_rows(cls: type) -> list[tuple[str, ...]]:
+    """Returns a row for each field made by `quantity`, as QUANTITY_HEAD says."""
+    return [_quantity_row(f) for f in _fields(cls) if "doc" in f.metadata]
+
+
+def setting_rows(cls: type) -> list[tuple[str, ...]]:
+    """Returns a row for each field made by `threshold`, as SETTING_HEAD says."""
+    return [_setting_row(f) for f in _fields(cls) if "reason" in f.metadata]
+
+
+def _fields(cls: type) -> tuple[dataclasses.Field[Any], ...]:
+    return dataclasses.fields(cls) if dataclasses.is_dataclass(cls) else ()
 
 
 def _quantity_row(field: dataclasses.Field[Any]) -> tuple[str, ...]:

@@ -20,8 +20,8 @@ _LINK = re.compile(r"(?<!!)(\[[^\]\[]*\])\(([^)\s:#]+)(#[^)\s]*)?\)")
 #: Files outside docs/ that are pages of the site.
 INCLUDED = {
     "README.md": "index.md",
-    "models/SOURCES.md": "models-sources.md",
-    "models/policies/README.md": "models-policies.md",
+    "models/SOURCES.md": "reference/models.md",
+    "models/policies/README.md": "reference/policies.md",
 }
 
 
@@ -38,10 +38,10 @@ def site_target(target: str, folder: str) -> str | None:
     if path in INCLUDED:
         return INCLUDED[path]
     if path.startswith(("drake_disasm", "sysid")) and not Path(path).suffix:
-        return f"api/{path.replace('/', '.')}.rst"
+        return f"reference/api/{path.replace('/', '.')}.rst"
     if path.startswith(("drake_disasm/", "sysid/")) and path.endswith(".py"):
         name = path.removesuffix(".py").removesuffix("/__init__")
-        return f"api/{name.replace('/', '.')}.rst"
+        return f"reference/api/{name.replace('/', '.')}.rst"
     if (ROOT / path).is_dir():
         return None
     return posixpath.relpath(path, _DOCS)
@@ -69,7 +69,7 @@ def rewrite(text: str, folder: str, page: str) -> str:
 
 
 def _source_read(app: "Sphinx", page: str, source: list[str]) -> None:
-    if not page.startswith("api/"):
+    if not page.startswith("reference/api/"):
         folder = posixpath.join(_DOCS, posixpath.dirname(page))
         source[0] = rewrite(source[0], folder, page)
 

@@ -12,7 +12,7 @@ from markdown_it.token import Token
 from mdit_py_plugins.anchors import anchors_plugin
 
 ROOT = Path(__file__).parents[2]
-_GENERATED = ROOT / "docs" / "api"
+_GENERATED = ROOT / "docs" / "reference" / "api"
 _OPERATORS = {"|", "||", "&", "&&", ";", "\n"}
 _REDIRECTIONS = {">", ">>", "<", "2>"}
 
@@ -64,11 +64,10 @@ class Block:
         return f"{name_of(self.page)}:{self.line}"
 
 
-def blocks(*languages: str) -> list[Block]:
-    """Returns the blocks of all pages in some languages."""
+def blocks(page: Path, *languages: str) -> list[Block]:
+    """Returns the blocks of a page in some languages."""
     return [
         Block(page, token.map[0] + 2, token.info.split()[0], token.content)
-        for page in pages()
         for token in tokens(page)
         if token.type == "fence" and token.map and token.info.split()
         if token.info.split()[0] in languages

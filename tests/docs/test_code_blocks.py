@@ -10,8 +10,10 @@ import re
 import subprocess
 import sys
 import types
+from pathlib import Path
 
 import pytest
+from drake_disasm_cli.main import SUBCOMMANDS
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.scenario import load_scenario, shipped_scenarios
@@ -19,14 +21,25 @@ from tests.docs.pages import ROOT, Block, blocks, commands, name_of, pages
 
 _PYTHON = {"python", "python3", ".venv/bin/python"}
 #: Programs that are not ours.
-_FOREIGN = {"cat", "cd", "dask", "git", "pip", "sha256sum"}
-_SHELL = blocks("sh", "bash", "console")
+_FOREIGN = {"apt-get", "cat", "cd", "dask", "git", "pip", "sha256sum", "source"}
+_SHELL = ("sh", "bash", "console")
+
+each_page = pytest.mark.parametrize("page", pages(), ids=name_of)
 
 
-@pytest.mark.parametrize("block", blocks("python"), ids=str)
-def test_python_compiles_and_its_imports_resolve(block: Block) -> None:
-    tree = ast.parse(block.text, filename=str(block))
-    for node in ast.walk(tree):
+@each_page
+def test_python_blocks_compile_and_their_names_resolve(page: Path) -> None:
+    for block in blocks(page, "python"):
+        _check_imports(block)
+        command = [sys.executable, "-m", "ruff", "check", "--isolated", "--select=F"]
+        ran = subprocess.run(
+            [*command, "-"], input=block.text, capture_output=True, text=True
+        )
+        assert ran.returncode == 0, f"{block}: {ran.stdout}"
+
+
+def _check_imports(block: Block) -> None:
+    for node in ast.walk(ast.parse(block.text, filename=str(block))):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 importlib.import_module(alias.name)
@@ -36,39 +49,49 @@ def test_python_compiles_and_its_imports_resolve(block: Block) -> None:
             assert not missing, f"{block}: {node.module} has no {missing}"
 
 
-@pytest.mark.parametrize("block", blocks("python"), ids=str)
-def test_python_defines_what_it_uses(block: Block) -> None:
-    command = [sys.executable, "-m", "ruff", "check", "--isolated", "--select=F", "-"]
-    checked = subprocess.run(command, input=block.text, capture_output=True, text=True)
-    assert checked.returncode == 0, f"{block}: {checked.stdout}"
-
-
-@pytest.mark.parametrize("block", _SHELL, ids=str)
-def test_commands_are_understood(block: Block, monkeypatch: pytest.MonkeyPatch) -> None:
+@each_page
+def test_commands_are_understood(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    for words in commands(block.text):
-        _check(words, f"{block}: {' '.join(words)}")
+    for block in blocks(page, *_SHELL):
+        for words in commands(block.text):
+            _check(words, f"{block}: {' '.join(words)}")
 
 
 def _check(words: list[str], where: str) -> None:
-    program, *arguments = words
+    program, *arguments = words[1:] if words[0] == "sudo" else words
     if program == "make":
         assert set(arguments) <= _make_targets(), where
+    elif program == "drake-disasm":
+        _check_subcommand(arguments, where)
     elif program in _PYTHON and arguments[0] == "-m":
         assert importlib.util.find_spec(arguments[1]), where
     elif program in _PYTHON:
         _check_program(arguments[0], arguments[1:], where)
     else:
-        assert program in _FOREIGN, f"{where}: neither make nor python"
+        assert program in _FOREIGN, f"{where}: neither make nor a program of ours"
+
+
+def _check_subcommand(arguments: list[str], where: str) -> None:
+    name, *rest = arguments
+    if name != "--help":
+        assert name in SUBCOMMANDS, f"{where}: no such subcommand"
+        module = f"drake_disasm_cli.{name.replace('-', '_')}"
+        _check_arguments(importlib.import_module(module), rest, where)
 
 
 def _check_program(path: str, arguments: list[str], where: str) -> None:
     assert (ROOT / path).is_file(), where
-    if not path.startswith(("tools/", "benchmarks/")):
-        return
-    parse = _program(path).parse
+    if path.startswith("tools/"):
+        _check_subcommand([Path(path).stem.replace("_", "-"), *arguments], where)
+    elif path.startswith("benchmarks/"):
+        module = importlib.import_module(Path(path).stem)
+        if hasattr(module, "parse"):
+            _check_arguments(module, arguments, where)
+
+
+def _check_arguments(module: types.ModuleType, rest: list[str], where: str) -> None:
     try:
-        parsed = parse(arguments)
+        parsed = module.parse(rest)
     except SystemExit as exit_:
         assert not exit_.code, f"{where}: refused by its own parser"
         return
@@ -80,29 +103,22 @@ def _check_program(path: str, arguments: list[str], where: str) -> None:
 
 
 @functools.cache
-def _program(path: str) -> types.ModuleType:
-    folder, _, name = path.rpartition("/")
-    sys.path.insert(0, str(ROOT / folder))
-    try:
-        return importlib.import_module(name.removesuffix(".py"))
-    finally:
-        sys.path.remove(str(ROOT / folder))
-
-
-@functools.cache
 def _make_targets() -> set[str]:
     makefile = (ROOT / "Makefile").read_text()
     return set(re.findall(r"^([a-z-]+):", makefile, flags=re.M))
 
 
 def test_pages_have_blocks_to_check() -> None:
-    assert len(_SHELL) > 10 and len(blocks("python")) > 3
-    assert {"README.md", "docs/hardware.md"} <= {name_of(p) for p in pages()}
+    assert sum(len(blocks(page, *_SHELL)) for page in pages()) > 10
+    assert sum(len(blocks(page, "python")) for page in pages()) > 3
+    assert {"README.md", "docs/get-started.md"} <= {name_of(p) for p in pages()}
 
 
 @pytest.mark.parametrize(
     "command, message",
     [
+        ("drake-disasm simulate --no-such-flag", "refused"),
+        ("drake-disasm simulat", "no such subcommand"),
         ("python tools/simulate.py --no-such-flag", "refused"),
         ("python tools/no_such.py", "no_such"),
         ("make no-such-target", "no-such-target"),

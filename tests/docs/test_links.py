@@ -15,15 +15,11 @@ _PATH = re.compile(rf"(?:{'|'.join((*_FOLDERS, 'tests', 'tools'))})/[\w./*-]*")
 _DOTTED = re.compile(r"(?:drake_disasm|sysid|tests|benchmarks)(?:\.\w+)+")
 _MEMBER = re.compile(r"([A-Z]\w+)\.(\w+)(?:\(.*\))?")
 _SOURCES = [f for top in ("drake_disasm", "sysid") for f in (ROOT / top).rglob("*.py")]
-#: The page of names that are gone; its old ones must not resolve.
-RENAMED = ROOT / "docs" / "renamed.md"
+_RESULTS = ROOT / "docs" / "results"
 #: Look like paths: the schema of logs, ids of Gymnasium.
 _NO_PATH = re.compile(r"drake_disasm/(log/1|\w+-v\d)")
 
 each_page = pytest.mark.parametrize("page", pages(), ids=name_of)
-each_current_page = pytest.mark.parametrize(
-    "page", [p for p in pages() if p != RENAMED], ids=name_of
-)
 
 
 @each_page
@@ -38,34 +34,18 @@ def test_links_lead_somewhere(page: Path) -> None:
             assert anchor in anchors(file), f"{name_of(page)} links to {link}"
 
 
-@each_current_page
-def test_named_paths_exist(page: Path) -> None:
+@each_page
+def test_named_files_modules_and_members_exist(page: Path) -> None:
+    if page.parent == _RESULTS:  # of the commits at which they were measured
+        return
     for literal in literals(page):
         for path in _PATH.findall(literal):
             exists = _NO_PATH.match(path) or any(ROOT.glob(path.rstrip("/.")))
             assert exists, f"{name_of(page)}: {path}"
-
-
-@each_current_page
-def test_named_modules_and_members_exist(page: Path) -> None:
-    for literal in literals(page):
         if _DOTTED.fullmatch(literal):
             assert _resolves(literal), f"{name_of(page)}: {literal}"
         elif match := _MEMBER.fullmatch(literal):
             assert _has_member(*match.groups()), f"{name_of(page)}: {literal}"
-
-
-def test_renamed_things_are_where_the_page_says() -> None:
-    rows = (line.split("|") for line in RENAMED.read_text("utf-8").splitlines())
-    new = [row[2] for row in rows if len(row) == 4 and "`" in row[2]]
-    assert len(new) > 30
-    for cell in new:
-        for literal in re.findall(r"`([^`]+)`", cell):
-            path = _PATH.fullmatch(literal)
-            assert not path or any(ROOT.glob(literal)), literal
-            assert not _DOTTED.fullmatch(literal) or _resolves(literal), literal
-            if member := _MEMBER.fullmatch(literal):
-                assert _has_member(*member.groups()), literal
 
 
 def _resolves(dotted: str) -> bool:

@@ -73,15 +73,25 @@ def test_what_is_indented_after_a_colon_is_code() -> None:
 @pytest.mark.parametrize(
     "markdown, folder, page, expected",
     [
-        ("[`mdp`](../drake_disasm/mdp.py)", "docs", "a.md", "api/drake_disasm.mdp.rst"),
+        (
+            "[`mdp`](../drake_disasm/mdp.py)",
+            "docs",
+            "a.md",
+            "reference/api/drake_disasm.mdp.rst",
+        ),
         (
             "[s](../../sysid/models)",
             "docs/guides",
             "guides/a.md",
-            "../api/sysid.models.rst",
+            "../reference/api/sysid.models.rst",
         ),
-        ("[p](docs/physics.md#contact)", ".", "index.md", "physics.md#contact"),
-        ("[s](models/SOURCES.md)", ".", "index.md", "models-sources.md"),
+        (
+            "[p](docs/explanation/physics.md#contact)",
+            ".",
+            "index.md",
+            "explanation/physics.md#contact",
+        ),
+        ("[s](models/SOURCES.md)", ".", "index.md", "reference/models.md"),
         ("[i](../README.md#the-idea)", "docs", "a.md", "index.md#the-idea"),
         ("[h](../models/x.yaml)", "docs", "a.md", "../models/x.yaml"),
         ("[d](https://drake.mit.edu)", "docs", "a.md", "https://drake.mit.edu"),
