@@ -11,7 +11,7 @@ _LOGGER = "drake"
 
 
 class _Filter(logging.Filter):
-    """Keeps warnings back and remembers those that differ."""
+    """Keeps warnings and remarks back; remembers the warnings that differ."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -20,9 +20,10 @@ class _Filter(logging.Filter):
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Returns whether a message is shown."""
-        if self.is_verbose or record.levelno != logging.WARNING:
+        if self.is_verbose or record.levelno > logging.WARNING:
             return True
-        self.messages.add(record.getMessage())
+        if record.levelno == logging.WARNING:
+            self.messages.add(record.getMessage())
         return False
 
 

@@ -67,8 +67,12 @@ def status(main: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> in
     except DisasmError as error:
         print(f"error: {_with_options(str(error))}", file=sys.stderr)
         return EXIT_BAD_INPUT
-    except KeyboardInterrupt as error:
-        return stopping.report(error)
+    except KeyboardInterrupt:
+        return stopping.report()
+    except Exception:
+        if stopping.is_stopping():
+            return stopping.report()
+        raise
 
 
 def _with_options(message: str) -> str:

@@ -1,5 +1,6 @@
 """Ctrl-C and SIGTERM: each ends a program in one line, whatever it is doing."""
 
+import multiprocessing
 import os
 import signal
 import sys
@@ -10,7 +11,9 @@ from types import FrameType
 EXIT_INTERRUPTED = 130
 EXIT_TERMINATED = 143
 
-_PATIENCE = 4.0  # s, after which SIGTERM ends a process that has not ended by itself
+#: After SIGTERM: s until workers are killed that finish what they do, and until the
+#: process is, if it has not ended then.
+_WORKERS_PATIENCE, _PATIENCE = 2.0, 4.5
 
 
 class Terminated(KeyboardInterrupt):
@@ -54,11 +57,19 @@ def stop_if_interrupted() -> None:
         raise _stop.error
 
 
-def report(error: KeyboardInterrupt) -> int:
+def is_stopping() -> bool:
+    """Returns whether Ctrl-C or SIGTERM came.
+
+    Then another error is what a library made of it, such as "initialization failed".
+    """
+    return _stop.error is not None
+
+
+def report() -> int:
     """Says once on stderr what ended the program; returns the exit status."""
-    is_terminated = isinstance(error, Terminated)
+    is_terminated = isinstance(_stop.error, Terminated)
     if not _stop.is_reported:
-        _stop.is_reported = True
+        _stop.is_reported = _stop.error is not None
         word = "terminated" if is_terminated else "interrupted"
         print(f"{word}; what was finished is kept", file=sys.stderr, flush=True)
     return EXIT_TERMINATED if is_terminated else EXIT_INTERRUPTED
@@ -79,5 +90,9 @@ def _watch_for_sigterm() -> None:
 def _end_in_time(reader: int) -> None:
     while os.read(reader, 1)[0] != signal.SIGTERM:
         pass
-    time.sleep(_PATIENCE)
-    os._exit(report(Terminated()))
+    time.sleep(_WORKERS_PATIENCE)
+    for worker in multiprocessing.active_children():
+        worker.kill()
+    time.sleep(_PATIENCE - _WORKERS_PATIENCE)
+    _stop.error = Terminated("terminated")
+    os._exit(report())

@@ -71,13 +71,16 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     return scenario
 
 
-def with_hidden_effects(nominal: Scenario, name: str) -> Scenario:
+def with_hidden_effects(
+    nominal: Scenario, name: str, stated: Scenario | None = None
+) -> Scenario:
     """Returns a scenario with the effects of another added, which stay undeclared.
 
     Args:
         nominal: what is declared.
         name: of a shipped scenario, or of a file that has `effects` and may repeat
             what the nominal scenario states.
+        stated: the nominal scenario as its file states it, without overrides.
 
     Raises:
         DisasmError: missing file, bad value, no effect in it, or something other than
@@ -85,7 +88,7 @@ def with_hidden_effects(nominal: Scenario, name: str) -> Scenario:
     """
     path = scenario_path(name)
     text = read_text(path, "give a scenario in YAML", MOST_BYTES)
-    declared = dataclasses.replace(nominal, effects=[])
+    declared = dataclasses.replace(stated or nominal, effects=[])
     hidden = parse(upgraded(text), copy.deepcopy(declared), str(path))
     for field in dataclasses.fields(Scenario):
         differs = getattr(hidden, field.name) != getattr(declared, field.name)

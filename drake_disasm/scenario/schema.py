@@ -11,7 +11,7 @@ CONTROLS = ("position", "joint_impedance", "cartesian_impedance")
 
 @dataclasses.dataclass
 class SimulationConfig:
-    """How the MultibodyPlant is discretised (how chosen: docs/physics.md)."""
+    """How the MultibodyPlant is discretised (how chosen: docs/explanation/physics.md)."""
 
     cell_time_step: float = quantity(0.0025, "s", "of the cell", low=1e-4, high=0.02)
     twin_time_step: float = quantity(0.005, "s", "of the twin", low=1e-4, high=0.02)
@@ -191,7 +191,7 @@ class GripperConfig:
     bolt: springs along and about the axes of the bolt as gripped (x along the groove,
     y out of the plate, z across, along which the fingers close) in the middle of the
     pads. No figure of the real gripper is known; these are assumed, as the ones with
-    which the thesis's numbers can be reproduced (docs/physics.md).
+    which the thesis's numbers can be reproduced (docs/explanation/physics.md).
     """
 
     model: str = quantity(

@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+from drake_disasm_cli.main import main_of
 
 from drake_disasm.common import program
-from drake_disasm_cli.main import main_of
 from tests.progress import running, wait_until
 
 ROOT = Path(__file__).parents[2]

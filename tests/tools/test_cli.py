@@ -32,7 +32,7 @@ def main(arguments):
         signal.raise_signal(signal.SIGINT)
     except KeyboardInterrupt:
         pass  # as a library's callback does
-    program.stop_if_interrupted()
+    stopping.stop_if_interrupted()
     return 0
 
 program.run(main)

@@ -29,7 +29,7 @@ from sysid.workers import Workers
 
 _EXAMPLES = """examples:
   drake-disasm check-log --log out/log
-  drake-disasm check-log --log out/run_1 out/run_2 --urdf arm.urdf
+  drake-disasm check-log --log out/arm_1 out/arm_2 --urdf arm.urdf
   drake-disasm check-log --log out/log --quick            what is wrong alone
   drake-disasm check-log --log out/log --json out/check.json
 """

@@ -33,8 +33,8 @@ from sysid.workers import Workers
 
 _EXAMPLES = """examples:
   drake-disasm close-loop --log out/log --scenario removal --out out/closed
-  drake-disasm close-loop --log readings --out out/sensor     a static_wrench log
-  drake-disasm close-loop --log run_1 run_2 --held-out run_2 --out out/arm
+  drake-disasm close-loop --log out/readings --out out/sensor     a static_wrench log
+  drake-disasm close-loop --log out/arm_1 out/arm_2 --held-out arm_2 --out out/arm
 """
 
 

@@ -1,27 +1,27 @@
 """What the command-line programs share: arguments, and policies by name."""
 
 import argparse
-import importlib
 import os
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from pydrake.systems.framework import System
+
 from drake_disasm.common import options
 from drake_disasm.common.cluster import EXECUTORS
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
-from drake_disasm.common.text import clipped
 from drake_disasm.effects import import_effects
 from drake_disasm.logs import Log, read_logs
-from drake_disasm.policies import (
-    SCRIPTED,
-    find_policy,
-    resolve_policy,
-    shipped_policies,
+from drake_disasm.policies import resolve_policy
+from drake_disasm.scenario import (
+    Scenario,
+    load_scenario,
+    shipped_scenarios,
+    with_hidden_effects,
 )
-from drake_disasm.scenario import Scenario, shipped_scenarios
 from drake_disasm.stations import SIMULATED_STATIONS, STATIONS
 from drake_disasm.systems.policy import Policy
 
@@ -122,6 +122,13 @@ def add_hidden_argument(add: Callable[..., Any]) -> None:
     )
 
 
+def real_scenario(args: argparse.Namespace, nominal: Scenario) -> Scenario:
+    """Returns what is simulated: the nominal scenario with the effects of --hidden."""
+    if not args.hidden:
+        return nominal
+    return with_hidden_effects(nominal, args.hidden, load_scenario(args.scenario))
+
+
 def wait_for_enter(prompt: str) -> None:
     """Waits until somebody presses Enter, or Ctrl-D."""
     try:
@@ -187,41 +194,9 @@ def add_executor_arguments(parser: argparse.ArgumentParser, more: str = "") -> N
     )
 
 
-def named_policy(name: str, scenario: Scenario) -> Policy:
-    """Returns a scripted or trained policy, or the callable of `package.module:name`.
-
-    Args:
-        name: of a scripted or a shipped policy, a path to an .npz, or a callable.
-        scenario: that it is to act on.
-
-    Raises:
-        DisasmError: there is none of that name, or it does not fit the scenario.
-    """
-    if name in SCRIPTED or find_policy(name):
-        return resolve_policy(name, scenario)
-    if ":" in name:
-        return _imported(name)
-    known, name = [*SCRIPTED, *shipped_policies()], clipped(name)
-    raise DisasmError(
-        f"policy '{name}' does not exist; {closest(name, known)} or give an .npz file "
-        "or module:callable"
-    )
-
-
-def _imported(name: str) -> Policy:
-    module, _, attribute = name.partition(":")
-    try:
-        if not all(word.isidentifier() for word in (*module.split("."), attribute)):
-            raise ImportError("is no module and a name in it")
-        policy = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
-        raise DisasmError(
-            f"policy {clipped(name)}: {clipped(str(error))}; write "
-            f"{'|'.join(SCRIPTED)}, an .npz file or module:callable"
-        ) from None
-    if not callable(policy):
-        raise DisasmError(f"policy {name}: is not callable; it maps (12,) to (6,)")
-    return policy
+def named_policy(name: str, scenario: Scenario) -> Policy | System:
+    """Returns the policy of a name, see `drake_disasm.policies.resolve_policy`."""
+    return resolve_policy(name, scenario)
 
 
 def named_logs(folders: Iterable[str | Path]) -> tuple[Log, ...]:

@@ -25,8 +25,8 @@ from drake_disasm_cli import common
 
 _EXAMPLES = """examples:
   drake-disasm evaluate --policy admittance straight --station cell --episodes 10
-  drake-disasm evaluate --policy out/chapter3/seed_000/policy.npz \\
-      --scenario chapter3 --station twin --sweep imprecision=0,0.0001,0.0003,0.0005
+  drake-disasm evaluate --policy out/first/seed_000/policy.npz my_policy.py:Mine \\
+      --station twin --sweep imprecision=0,0.0001,0.0003,0.0005
   drake-disasm evaluate --policy removal_randomised admittance \\
       --scenario removal_turned --sweep effects.0.ry=-0.0698,-0.0349,0,0.0349,0.0698
   drake-disasm evaluate --policy admittance --set 'effects=[!SensorBias {fx: 2}]'

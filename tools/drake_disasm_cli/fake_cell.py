@@ -42,10 +42,10 @@ _BEHIND = (
     "try --set simulation.cell_time_step=0.005"
 )
 _EXAMPLES = """examples:
-  drake-disasm fake-cell --hardware-config out/fake.yaml             in one terminal
+  drake-disasm fake-cell --hardware-config out/fake.yaml       in one terminal
+  drake-disasm fake-cell --scenario removal_turned             with a hidden effect
+in another terminal:
   drake-disasm simulate --station hardware --hardware-config out/fake.yaml
-  drake-disasm fake-cell --scenario removal_turned          with a hidden effect
-  ft_sensor loss                                               while it runs
 """
 
 

@@ -41,15 +41,14 @@ from sysid.workers import Workers
 
 _THESIS_CYCLES = 10
 _EXAMPLES = """examples:
-  drake-disasm simulate --station cell --policy admittance --explore 0.15 \\
-      --episodes 11 --no-meshcat --scenario removal --hidden removal_turned \\
-      --record out/log
+  drake-disasm simulate --policy admittance --explore 0.15 --episodes 11 \\
+      --no-meshcat --hidden removal_turned --record out/log
   drake-disasm identify --log out/log --out out/fit \\
       --parameters contact.friction lock.clearance GroovePose.ry
   drake-disasm simulate --scenario out/fit/scenario.yaml
-  drake-disasm identify --log out/log --parameters bounds.yaml --out out/fit2
-  drake-disasm identify --log readings --out out/sensor       a static_wrench log
-  drake-disasm identify --log run_1 run_2 --held-out run_2 --out out/arm
+  drake-disasm identify --log out/log --parameters bounds.yaml --out out/fit_2
+  drake-disasm identify --log out/readings --out out/sensor    a static_wrench log
+  drake-disasm identify --log out/arm_1 out/arm_2 --held-out arm_2 --out out/arm
 
 A file of parameters has lines like
   contact.friction: {low: 0.0, high: 0.6}

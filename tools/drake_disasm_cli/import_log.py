@@ -37,11 +37,11 @@ from drake_disasm.importing.units import factor
 from drake_disasm.logs.header import HEADER_NAME, read_header
 
 _EXAMPLES = """examples:
-  drake-disasm import-log run.mcap --show            what is in it, and the guess
-  drake-disasm import-log run.mcap --urdf arm.urdf --out out/log
+  drake-disasm import-log run.npz --show            what is in it, and the guess
+  drake-disasm import-log run.npz --urdf arm.urdf --out out/log
   drake-disasm import-log run.csv --save-map map.yaml --show      then edit it
-  drake-disasm import-log run_1.mat run_2.mat --map map.yaml --out out/log
-  drake-disasm import-log run.npz --urdf arm.urdf --cutoff 12 --out out/log
+  drake-disasm import-log run.csv --map map.yaml --out out/from_table
+  drake-disasm import-log run.npz --urdf arm.urdf --cutoff 12 --out out/filtered
 then:
   drake-disasm check-log --log out/log
   drake-disasm close-loop --log out/log --out out/closed

@@ -28,7 +28,6 @@ from drake_disasm.scenario import (
     Scenario,
     load_scenario,
     scenario_to_mapping,
-    with_hidden_effects,
 )
 from drake_disasm.stations import Station, make_station
 from drake_disasm.visualization import add_cell_view, start_meshcat
@@ -120,7 +119,7 @@ def _station(
 ) -> AbstractContextManager[Station]:
     if args.station == "hardware":
         return hardware.open_station(scenario, args.hardware_config, False)
-    real = with_hidden_effects(scenario, args.hidden) if args.hidden else scenario
+    real = common.real_scenario(args, scenario)
     return nullcontext(make_station(args.station, real))
 
 

@@ -3,7 +3,7 @@
 One scenario file gives one Drake diagram: an iiwa slides a bolt along a door-chain
 groove under hydroelastic contact. Watch it in the browser page whose address is
 printed, record it as a log, or save a page that plays offline. The same diagram runs
-on the devices of a real cell; read docs/hardware.md first.
+on the devices of a real cell; read docs/guides/hardware.md first.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder
 from drake_disasm.logs import LogWriter, flat_columns
 from drake_disasm.policies import Exploring
-from drake_disasm.scenario import Scenario, load_scenario, with_hidden_effects
+from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import Station
 from drake_disasm.task.episode import EpisodeSummary, run_episode, summary_table
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
@@ -29,13 +29,15 @@ _MM = 1e-3
 _EXAMPLES = """examples:
   drake-disasm simulate                              the default, in Meshcat
   drake-disasm simulate --policy straight --scenario removal_turned
+  drake-disasm simulate --policy my_policy.py:Mine   a class of your own
   drake-disasm simulate --station twin --no-meshcat --episodes 10 --record out/log
+  drake-disasm simulate --station twin --no-meshcat --episodes 20 --record out/log \\
+      --resume                                       ten more
   drake-disasm simulate --set lock.clearance=0.0002 --set contact.friction=0.3
   drake-disasm simulate --html out/removal.html      a page that plays offline
-  drake-disasm simulate --no-meshcat --episodes 100 --record out/log --resume
-  drake-disasm simulate --no-meshcat --episodes 11 --record out/log \
+  drake-disasm simulate --no-meshcat --episodes 11 --record out/hidden \\
       --policy admittance --explore 0.15 --hidden removal_turned
-                                  a log that states removal and measured another
+                               a log that states removal and measured another
   drake-disasm simulate --station hardware --hardware-config cell.yaml --dry-run
 """
 
@@ -128,7 +130,7 @@ def main(arguments: Sequence[str]) -> int:
     scenario = load_scenario(args.scenario, args.overrides)
     if args.station == "hardware":
         return _on_hardware(args, arguments, scenario)
-    real = with_hidden_effects(scenario, args.hidden) if args.hidden else scenario
+    real = common.real_scenario(args, scenario)
     policy = common.named_policy(args.policy, scenario)
     writer = _open_log(args, arguments, scenario) if args.record else None
     done = writer.next_number if writer else 0

@@ -28,12 +28,13 @@ STUDIES: dict[str, type[Study]] = OF_LEARNING | OF_TWINS
 
 _EXAMPLES = """examples:
   drake-disasm study --list                       the studies and their factors
-  drake-disasm study precision --out out/precision
   drake-disasm study precision --levels agent=ddpg psi=0,0.0003 --seeds 3 \\
       --episodes 50 --out out/small                              a small one
-  drake-disasm study hyperparameters --compare ../shared/reference/table_a1.csv \\
-      --out out/chapter5                     beside the thesis's own 243 trainings
-  drake-disasm study precision --out out/precision --resume   continue after Ctrl-C
+  drake-disasm study precision --levels agent=ddpg psi=0,0.0003 --seeds 3 \\
+      --episodes 50 --out out/small --resume                     after Ctrl-C
+  drake-disasm study precision --out out/precision               at its own size
+  drake-disasm study hyperparameters --compare table_a1.csv --out out/chapter5
+                                     beside the thesis's own 243 trainings
   drake-disasm study precision --out /nfs/precision --executor dask \\
       --scheduler tcp://head:8786                                on a cluster
 """

@@ -34,6 +34,7 @@ from drake_disasm_cli import common
 
 _EXAMPLES = """examples:
   drake-disasm train --out out/first --episodes 30          a first look
+  drake-disasm train --out out/first --episodes 30 --resume      after Ctrl-C
   drake-disasm train --agent ddpg --preset chapter3 --scenario chapter3 \\
       --psi 0.0003 --seeds 10 --out out/chapter3                the thesis's chapter 3
   drake-disasm train --agent ddpg --preset chapter3 --scenario chapter3 \\
@@ -41,11 +42,10 @@ _EXAMPLES = """examples:
   drake-disasm train --scenario removal_randomised --out out/randomised
   drake-disasm train --agent sac --preset chapter4 --out out/sac \\
       --hyper layer_norm=true 'hidden=[64, 64]'
-  drake-disasm train --log out/chapter3/seed_*/log --scenario chapter3 \\
+  drake-disasm train --log out/chapter3/seed_000/log --scenario chapter3 \\
       --preset chapter3 --out out/offline                      without acting
-  drake-disasm train --station cell --start-from out/turned --scenario \\
-      removal_turned --hyper demonstrations=0.5 --out out/in_the_cell    twin to cell
-  drake-disasm train ... --out out/chapter3 --resume         continue after Ctrl-C
+  drake-disasm train --station cell --start-from out/first \\
+      --scenario removal_turned --hyper demonstrations=0.5 --out out/in_the_cell
 """
 
 
