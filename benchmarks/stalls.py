@@ -3,7 +3,8 @@
 A fake cell plays the devices in a process of its own. In another one the station slides
 the bolt, and stands still once: in its policy, its inverse kinematics, its sender, or
 anywhere (SIGSTOP). Commands are counted on the wire, by the time at which the operating
-system received them. `python benchmarks/stalls.py` prints docs/hardware.md's table.
+system received them. `python benchmarks/stalls.py` prints the table of
+docs/results/hardware-timing.md.
 """
 
 import dataclasses

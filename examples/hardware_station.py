@@ -4,8 +4,8 @@
 
 The hardware station has the cell's ports, so the same diagram runs on it. A fake cell
 plays the arm behind LCM, the sensor behind UDP and the gripper behind Modbus, here in
-virtual time. With real devices, read docs/hardware.md first, then build the station by
-`make_station("hardware", scenario, config=load_hardware_config(path))`.
+virtual time. With real devices, read docs/guides/hardware.md first, then build the
+station by `make_station("hardware", scenario, config=load_hardware_config(path))`.
 """
 
 import sys

@@ -1,5 +1,5 @@
 """System identification: measured logs, and what a model of them is missing.
 
 `drake_disasm.logs` is the format in which measurements enter and leave the toolkit
-(`docs/log-format.md`).
+(`docs/reference/log-format.md`).
 """

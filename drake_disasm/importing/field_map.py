@@ -43,7 +43,7 @@ _KEYS = (
     "columns",
 )
 _COLUMN_KEYS = ("from", "unit", "scale", "sign", "offset")
-_REMEDY = "see docs/your-robot.md, or let `show` guess one and `save_map` write it"
+_REMEDY = "see docs/guides/import-log.md, or `show` guesses one and `save_map` writes it"
 
 Scale = float | str
 

@@ -74,7 +74,7 @@ def guessed_map(
         return _static_wrench(source)
     raise DisasmError(
         f"a map of kind {kind} is not guessed; write one and give it by `map`, see "
-        "docs/your-robot.md"
+        "docs/guides/import-log.md"
     )
 
 

@@ -1,7 +1,7 @@
 """Measured logs: a folder with `log.yaml` and one table per episode.
 
-The format is described in `docs/log-format.md`, so that anybody can write a log
-without this code; `drake_disasm.logs.schema` declares it as data. In short::
+The format is described in `docs/reference/log-format.md`, so that anybody can write a
+log without this code; `drake_disasm.logs.schema` declares it as data. In short::
 
     with LogWriter(folder, LogHeader("joint_motion", ...)) as writer:
         writer.write_episode(flat_columns("joint_motion", {"time": t, "q": q}))

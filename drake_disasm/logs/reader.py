@@ -88,7 +88,7 @@ class Log:
 
 
 def read_log(folder: str | Path) -> Log:
-    """Reads the log in a folder; `docs/log-format.md` describes the format.
+    """Reads the log in a folder; `docs/reference/log-format.md` describes the format.
 
     Temporary files that a killed writer left behind are ignored. An episode that is
     being recorded, or that a kill cut off, is left out with a remark.

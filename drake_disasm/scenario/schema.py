@@ -11,7 +11,7 @@ CONTROLS = ("position", "joint_impedance", "cartesian_impedance")
 
 @dataclasses.dataclass
 class SimulationConfig:
-    """How the MultibodyPlant is discretised (how chosen: docs/explanation/physics.md)."""
+    """How the MultibodyPlant is discretised, see docs/explanation/physics.md."""
 
     cell_time_step: float = quantity(0.0025, "s", "of the cell", low=1e-4, high=0.02)
     twin_time_step: float = quantity(0.005, "s", "of the twin", low=1e-4, high=0.02)

@@ -42,8 +42,8 @@ def processing_findings(subject: Subject) -> list[DataFinding]:
     what = f"wrench is not what ft_sensor processed gives in {100 * share:.2g} % of the"
     what += f" rows{_reason(subject)}"
     remedy = (
-        "process the raw reading as docs/log-format.md says, or leave the rows out: "
-        "--drop-flagged-rows"
+        "process the raw reading as docs/reference/log-format.md says, or leave the "
+        "rows out: --drop-flagged-rows"
     )
     severity = Severity.REFUSE if _RAW in what else Severity.WARN
     return [DataFinding("processing", what, remedy, severity, rows_of(masks))]

@@ -38,7 +38,7 @@ POSE_NOISE = (2e-5, 1e-4)
 #: of commands that come in pieces and a bolt that creeps in the pads, and a share of
 #: the force's change in the step, of contacts that are made a moment sooner or later.
 #: Measured on three logs of the cell with nothing hidden, so that 99 % of the rows are
-#: within about three standard deviations (docs/physics.md, "Twin against cell").
+#: within about three standard deviations (docs/explanation/physics.md).
 FORCE_ERROR = (0.02, 0.15)
 
 #: And of where the arm is [m, rad], beyond what its encoders say: its posture is taken
