@@ -3,7 +3,7 @@
 Without the hydroelastic query a step of this twin is a small system of equations
 (`ImpactStep`); for all measured steps together, and for all parameter sets of which a
 search asks at once, it is a few array operations, and one evaluation of the objective
-takes a fraction of the diagram's time (docs/identification.md has the figures).
+takes a fraction of the diagram's time (docs/results/identification.md has the figures).
 """
 
 import dataclasses

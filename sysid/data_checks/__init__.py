@@ -8,7 +8,7 @@
     refuse(findings)
     model = without_flagged_rows(logs, model, findings)
 
-Each kind of finding is listed in `KINDS`; `docs/identification.md` says what each one
+Each kind of finding is listed in `KINDS`; `docs/guides/identify.md` says what each one
 looks at. `DataSettings` has the thresholds.
 """
 

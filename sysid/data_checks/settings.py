@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from sysid.thresholds import threshold
 
-_FALSE_ALARMS = "false alarms: docs/identification.md"
+_FALSE_ALARMS = "false alarms: docs/guides/identify.md"
 
 
 @dataclass(frozen=True)

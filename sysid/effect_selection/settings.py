@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 from sysid.thresholds import threshold as _setting
 
-#: What was measured with all thresholds at their defaults: docs/closing-the-loop.md.
+#: What was measured with all thresholds at their defaults: docs/results.
 _NULL_LOGS = (
     "a wrong name in 3 of 983 null logs of a sensor and in 0 of 389 of an arm "
-    "(docs/closing-the-loop.md)"
+    "(docs/results/false-alarms.md)"
 )
 _BLIND_LOGS = (
     "not alone; with the other defaults 351 of 375 hidden effects are named first "
-    "(docs/closing-the-loop.md)"
+    "(docs/results/verdicts-blind.md)"
 )
 
 
@@ -87,7 +87,7 @@ class SelectionSettings:
         "means of so many rows are taken as keep this much of each channel: a residual "
         "that is sampled far too often has no noise at most frequencies",
         "of a real arm at 200 Hz, filtered at 8 Hz: friction is found in 3 s "
-        "(docs/closing-the-loop.md)",
+        "(docs/results/verdicts-real.md)",
     )
     cell_lengths: tuple[int, ...] = _setting(
         (2, 3, 5, 8, 12, 20, 30, 50, 80, 120, 200),
@@ -213,7 +213,7 @@ class SelectionSettings:
         "share of the loss",
         "an amplitude that gains less takes up what the model does a little "
         "differently from the device",
-        "without it the groove turned in docs/closing-the-loop.md came with a shift "
+        "without it the groove turned in docs/guides/close-loop.md came with a shift "
         "of 66 micrometres that nobody had put in",
     )
     curve_step_width: float = _setting(
@@ -395,7 +395,7 @@ class SelectionSettings:
         "rows",
         "a hundred evaluations of a model that takes seconds for all rows then take "
         "minutes; so do hundreds of fits far from the data",
-        "130 s from 883 transitions to the verdict (docs/closing-the-loop.md)",
+        "130 s from 883 transitions to the verdict (docs/results/identification.md)",
     )
     refit_min_linear_gain: float = _setting(
         0.02,
@@ -596,7 +596,7 @@ class SelectionSettings:
         "share of what could be explained",
         "effects must explain three quarters of it, or the ending is unexplained",
         "19 of 25 effects that are not in the library end unexplained "
-        "(docs/closing-the-loop.md)",
+        "(docs/results/verdicts-blind.md)",
     )
     max_listed: int = _setting(
         3, "items", "of anything in the text of a verdict, which has three lines"

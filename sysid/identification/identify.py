@@ -36,7 +36,7 @@ def identify(
     """Fits a model to some episodes of its log and evaluates it on the others.
 
     Two global searches, which check each other, are followed by Gauss-Newton on more
-    and more rows; docs/identification.md has the reasons.
+    and more rows; docs/explanation/identification.md has the reasons.
 
     Args:
         model: of the whole log.

@@ -407,7 +407,7 @@ def _with_impact_as_stiff(scenario: Scenario) -> Scenario:
 
     That is the head's, the softer part, with its edge against a wall: an elastic
     foundation as deep as the radius under diameter times thickness, k = 2 E t. On three
-    logs of the cell that is near the best there is (docs/closing-the-loop.md).
+    logs of the cell that is near the best there is (docs/results/verdicts-blind.md).
     """
     contact, lock = scenario.contact, scenario.lock
     most = find_field(scenario, "contact.impact.stiffness").metadata["high"]
