@@ -9,16 +9,13 @@ declares an entry point of the group `drake_disasm.effects`:
     my_effects = "my_package.effects"
 """
 
-import importlib
-import sys
 from importlib.metadata import entry_points
-from pathlib import Path
-from types import ModuleType
 from typing import TypeVar
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.executors import import_in_workers
 from drake_disasm.common.quantity import closest
+from drake_disasm.common.user_code import import_module, import_named
 from drake_disasm.effects.base import Effect
 from drake_disasm.effects.definition import refuse_faulty
 
@@ -90,9 +87,8 @@ def import_effects(name: str) -> str:
     Raises:
         DisasmError: there is no such file or module, it fails, or it registers nothing.
     """
-    path = Path(name).resolve() if name.endswith(".py") else None
     before = set(_effects.values())
-    module = _import_file(path) if path else _import_module(name)
+    module = import_named(name, "effects")
     new = set(_effects.values()) - before
     if not new and module.__name__ not in {e.__module__ for e in _effects.values()}:
         raise DisasmError(
@@ -105,35 +101,6 @@ def _place(effect: type[Effect]) -> str:
     return f"{effect.__module__}.{effect.__qualname__}"
 
 
-def _import_file(path: Path) -> ModuleType:
-    """Imports a file by its stem, the name by which pickle finds it in a worker."""
-    if not path.is_file():
-        raise DisasmError(f"{path}: no such file; name a Python file with effects")
-    if str(path.parent) not in sys.path:
-        sys.path.append(str(path.parent))
-    module = _import_module(path.stem)
-    if Path(module.__file__ or "").resolve() != path:
-        raise DisasmError(
-            f"{path}: another module has the name {path.stem} ({module.__file__}); "
-            "rename the file"
-        )
-    return module
-
-
-def _import_module(name: str, source: str = "") -> ModuleType:
-    source = source or name
-    try:
-        return importlib.import_module(name)
-    except DisasmError as error:
-        raise DisasmError(f"{source}: {error}") from None
-    except Exception as error:  # whatever a user's module does wrong
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise DisasmError(
-            f"{source}: can't be imported ({reason}); name a Python file or an "
-            "installed module that works"
-        ) from None
-
-
 def _load_plugins() -> None:
     """Imports what entry points name, once."""
     global _plugins_are_loaded
@@ -143,7 +110,7 @@ def _load_plugins() -> None:
     try:
         for point in entry_points(group=_GROUP):
             package = point.dist.name if point.dist else "an unknown package"
-            _import_module(point.module, f"entry point {point.name} of {package}")
+            import_module(point.module, f"entry point {point.name} of {package}")
     except DisasmError:
         _plugins_are_loaded = False
         raise

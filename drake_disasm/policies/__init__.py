@@ -1,14 +1,14 @@
-"""Policies: scripted ones, and trained ones from files."""
+"""Policies: scripted ones, trained ones from files, and a user's own."""
 
 from drake_disasm.policies.exploring import Exploring
 from drake_disasm.policies.files import (
     find_policy,
     load_policy,
-    resolve_policy,
     save_policy,
     scenario_hash,
     shipped_policies,
 )
+from drake_disasm.policies.named import resolve_policy
 from drake_disasm.policies.network import (
     ActionMap,
     LearnedPolicy,

@@ -3,6 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
+from pydrake.systems.framework import System
+
+from drake_disasm.common.errors import DisasmError
 
 _STREAM = 0x4558504C  # separates it from sensor noise and imprecision
 _TURN = np.deg2rad(0.1) / 1e-3  # rad of rotation noise per m of translation noise
@@ -17,6 +20,9 @@ class Exploring:
             per mm.
         seed: of the first episode; the next ones count on, so that an interrupted
             recording continues with the same noise.
+
+    Raises:
+        DisasmError: the policy is a System, whose actions are not its caller's.
     """
 
     def __init__(
@@ -25,6 +31,11 @@ class Exploring:
         deviation: float,
         seed: int,
     ) -> None:
+        if isinstance(policy, System):
+            raise DisasmError(
+                f"policy {type(policy).__name__}: is a System, to whose actions no "
+                "noise is added; leave `explore` out, or give a callable"
+            )
         self._policy, self._seed = policy, seed
         self._deviation = deviation * np.array([1.0, 1.0, 1.0, _TURN, _TURN, _TURN])
         self._generator = np.random.default_rng([seed, _STREAM])

@@ -35,15 +35,15 @@ from drake_disasm.policies.network import (
     Network,
     PolicyDescription,
 )
-from drake_disasm.policies.scripted import SCRIPTED, Admittance, Straight, make_policy
+from drake_disasm.policies.scripted import SCRIPTED, Admittance, Straight
 from drake_disasm.scenario import Scenario, scenario_to_mapping
 
 FORMAT = "drake_disasm/policy/1"
 
-AGAIN = "copy it again, or train it again (tools/train.py)"
+AGAIN = "copy it again, or train it again (drake-disasm train)"
 #: Two hundred layers, and 64 MiB: a hundred times what the shipped ones have.
 POLICY = ArchiveKind(
-    "policy", "give one that tools/train.py wrote", AGAIN, 2**26, most_members=400
+    "policy", "give one that drake-disasm train wrote", AGAIN, 2**26, most_members=400
 )
 
 _PARTS = ("weight_", "bias_")  # of each layer
@@ -97,25 +97,6 @@ def load_policy(path: Path) -> LearnedPolicy:
         return _policy(arrays, text)
     except DisasmError as error:
         raise DisasmError(f"policy {path}: {error}") from None
-
-
-def resolve_policy(
-    name: str, scenario: Scenario
-) -> Straight | Admittance | LearnedPolicy:
-    """Returns a scripted policy, a shipped one, or that of a path.
-
-    Args:
-        name: of a scripted or a shipped policy, or a path.
-        scenario: that it is to act on.
-
-    Raises:
-        DisasmError: no such file, it is damaged, or it does not fit the scenario.
-    """
-    if name in SCRIPTED:
-        return make_policy(name, scenario)
-    policy = load_policy(find_policy(name) or Path(name))
-    policy.check_fits(scenario)
-    return policy
 
 
 def find_policy(name: str) -> Path | None:

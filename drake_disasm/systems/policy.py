@@ -3,11 +3,19 @@
 from collections.abc import Callable
 
 import numpy as np
-from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
+from pydrake.systems.framework import (
+    Context,
+    DiscreteValues,
+    EventStatus,
+    LeafSystem,
+    OutputPort,
+    System,
+)
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.common.timing import POLICY_DELAY
+from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 from drake_disasm.systems.imprecision import clamped
 
 #: Observation (12,) to action (6,), both in the groove's nominal frame.
@@ -90,6 +98,36 @@ class ActionHold(LeafSystem):
             action = self._action.Eval(context)
         state.set_value(self._held, checked(action, self._bounds))
         return EventStatus.Succeeded()
+
+
+def action_port(policy: System) -> OutputPort:
+    """Returns the output port `action` (6) of a policy that is a System.
+
+    Raises:
+        DisasmError: it lacks that port or the input port `observation` (12).
+    """
+    inputs, outputs = policy.HasInputPort, policy.HasOutputPort
+    _refuse_port(policy, "input", "observation", len(STATE_NAMES), inputs)
+    _refuse_port(policy, "output", "action", len(ACTION_NAMES), outputs)
+    return policy.GetOutputPort("action")
+
+
+def _refuse_port(
+    policy: System, kind: str, name: str, size: int, has: Callable[[str], bool]
+) -> None:
+    """Refuses a System without a port of a policy, or with one of another size."""
+    where = f"policy {type(policy).__name__}"
+    if not has(name):
+        raise DisasmError(
+            f"{where}: has no {kind} port '{name}' of size {size}; declare it, or give "
+            "a callable from (12,) to (6,)"
+        )
+    get = policy.GetInputPort if kind == "input" else policy.GetOutputPort
+    if get(name).size() != size:
+        raise DisasmError(
+            f"{where}: its {kind} port '{name}' has size {get(name).size()}; make it "
+            f"{size}"
+        )
 
 
 def ask(policy: Policy, observation: np.ndarray, bounds: np.ndarray) -> np.ndarray:

@@ -25,14 +25,19 @@ from pydrake.systems.primitives import (
     RandomSource,
 )
 
-from drake_disasm.common.errors import DisasmError, DisasmWarning
+from drake_disasm.common.errors import DisasmWarning
 from drake_disasm.effects import Effect, motion_chain
-from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES, TaskGeometry, action_bounds
+from drake_disasm.mdp import ACTION_NAMES, TaskGeometry, action_bounds
 from drake_disasm.scenario import Scenario, TaskConfig
 from drake_disasm.stations import InitialState, Station
 from drake_disasm.systems.imprecision import ImprecisionNoise
 from drake_disasm.systems.observation import ObservationProcessor
-from drake_disasm.systems.policy import ActionHold, Policy, PolicySystem
+from drake_disasm.systems.policy import (
+    ActionHold,
+    Policy,
+    PolicySystem,
+    action_port,
+)
 from drake_disasm.systems.pose_target import PoseTarget
 from drake_disasm.systems.task_monitor import TaskMonitor
 
@@ -332,7 +337,7 @@ def _add_policy_system(
     builder: DiagramBuilder, policy: System, observation: OutputPort, task: TaskConfig
 ) -> ActionHold:
     """Returns what holds a policy system's action for a period at a time."""
-    chosen = _policy_ports(policy)
+    chosen = action_port(policy)
     if policy not in builder.GetSystems():
         builder.AddNamedSystem("policy", policy)
     hold = builder.AddNamedSystem(
@@ -341,27 +346,3 @@ def _add_policy_system(
     builder.Connect(observation, policy.GetInputPort("observation"))
     builder.Connect(chosen, hold.get_input_port())
     return hold
-
-
-def _policy_ports(policy: System) -> OutputPort:
-    """Returns a policy's output port `action`.
-
-    Raises:
-        DisasmError: it has not the two ports of a policy.
-    """
-    ports = (
-        ("input", "observation", len(STATE_NAMES)),
-        ("output", "action", len(ACTION_NAMES)),
-    )
-    for kind, name, size in ports:
-        has, get = (
-            (policy.HasInputPort, policy.GetInputPort)
-            if kind == "input"
-            else (policy.HasOutputPort, policy.GetOutputPort)
-        )
-        if not has(name) or get(name).size() != size:
-            raise DisasmError(
-                f"policy {type(policy).__name__}: has no {kind} port '{name}' of size "
-                f"{size}; declare it, or give a callable from (12,) to (6,)"
-            )
-    return policy.GetOutputPort("action")

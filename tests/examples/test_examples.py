@@ -15,7 +15,7 @@ PRINTED = {
     "own_diagram": ["watch at http://", "0.20", "the bolt is held at A"],
     "own_policy": ["twin        12", "cell        12"],
     "own_effect": ["MagneticCatch.force = 4.0", "[MagneticCatch(force=4.0"],
-    "gymnasium_sb3": ["trained for 20 steps", "outcome: ", "progress"],
+    "gymnasium_sb3": ["200 steps in ", "steps/s", "outcome: "],
     "own_log_model": ["missing: JointCoulombFriction.pivot", "size = 0.150"],
     "record_bag": ["bag: ", "wrench 12 ms late"],
     "hardware_station": ["step  x [mm]", "iiwa: READY", "ft_sensor: READY"],
