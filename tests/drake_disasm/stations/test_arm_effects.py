@@ -8,7 +8,6 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     Effect,
     FlangePayload,
@@ -24,8 +23,9 @@ from drake_disasm.effects import (
     TorqueOffset,
 )
 from drake_disasm.scenario import load_scenario
-from drake_disasm.stations import CellStation, TwinStation
+from drake_disasm.stations import CellStation
 from tests.drake_disasm.conftest import QUIET
+from tests.refusals import refused
 
 LIFT = np.array([0, -0.3, 0, 0, 0, 0, 0])  # rad, of the arm out of the lock
 JOINT = 3  # carries much of the weight
@@ -184,36 +184,27 @@ def test_nothing_stays_of_effects_that_are_gone(
     np.testing.assert_array_equal(_parameters(station, context), nominal)
 
 
-@pytest.mark.parametrize("effect", EVERY)
-def test_each_effect_changes_the_arm(effect: Effect, station: CellStation) -> None:
+def test_each_effect_changes_the_arm_which_the_twin_has_not(station, twin):
     context = station.CreateDefaultContext()
     station.set_effects(context, [])
     nominal = _parameters(station, context)
-    station.set_effects(context, [effect])
-    found = _parameters(station, context)
-    assert not np.array_equal(found, nominal, equal_nan=True)  # NaN: the world's mass
+    for effect in EVERY:
+        station.set_effects(context, [effect])
+        found = _parameters(station, context)  # NaN: the world's mass
+        assert not np.array_equal(found, nominal, equal_nan=True), effect
+        with refused("acts on the arm", "cell"):
+            twin.set_effects(twin.CreateDefaultContext(), [effect])
 
 
-@pytest.mark.parametrize(
-    ("effects", "message"),
-    [
-        ([TorqueOffset("iiwa_join_4", 1.0)], "did you mean 'iiwa_joint_4'"),
-        ([RotorInertia("iiwa_join_4", 1.0)], "did you mean 'iiwa_joint_4'"),
-        ([JointLoadFriction(NAME, 0.1)] * 2, "acts twice on iiwa_joint_4.* merge"),
-        ([FlangePayload(cx=0.1)], "no mass; give it a mass"),
-    ],
-)
-def test_refuses_what_the_cell_cannot_carry(
-    effects: list[Effect], message: str, station: CellStation
-) -> None:
-    with pytest.raises(DisasmError, match=message):
+@pytest.mark.parametrize(("effects", "words"), [
+    ([TorqueOffset("iiwa_join_4", 1.0)], ["did you mean 'iiwa_joint_4'"]),
+    ([RotorInertia("iiwa_join_4", 1.0)], ["did you mean 'iiwa_joint_4'"]),
+    ([JointLoadFriction(NAME, 0.1)] * 2, ["twice on iiwa_joint_4", "merge"]),
+    ([FlangePayload(cx=0.1)], ["no mass", "give it a mass"]),
+])  # fmt: skip
+def test_refuses_what_the_cell_cannot_carry(effects, words, station):
+    with refused(*words):
         station.set_effects(station.CreateDefaultContext(), effects)
-
-
-@pytest.mark.parametrize("effect", EVERY)
-def test_the_twin_has_no_arm(effect: Effect, twin: TwinStation) -> None:
-    with pytest.raises(DisasmError, match=r"acts on the arm.* use `station` cell"):
-        twin.set_effects(twin.CreateDefaultContext(), [effect])
 
 
 def test_a_torque_sensor_reads_what_its_effects_say(station: CellStation) -> None:

@@ -10,8 +10,6 @@ from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import CellStation
 from tests.drake_disasm.conftest import QUIET
 
-PORTS = ("position_commanded", "position_measured")
-
 
 @pytest.fixture(scope="module", params=["friction", "weld"])
 def held(request: pytest.FixtureRequest) -> CellStation:
@@ -26,10 +24,17 @@ def _rest(station: CellStation, *ports: str) -> list[np.ndarray]:
     return [station.GetOutputPort(port).Eval(context) for port in ports]
 
 
-def test_arm_stands_where_it_is_commanded(held: CellStation) -> None:
-    commanded, measured = _rest(held, *(f"iiwa.{port}" for port in PORTS))
+def test_arm_and_tool_rest_where_they_are_commanded(held):
+    """Nothing touches the tool, and the bolt is part of it, however it is held."""
+    ports = ("position_commanded", "position_measured", "torque_external")
+    commanded, measured, external = _rest(held, *(f"iiwa.{port}" for port in ports))
     np.testing.assert_array_equal(commanded, held.start)
     np.testing.assert_allclose(measured, held.start, atol=1e-6)
+    np.testing.assert_allclose(external, 0.0, atol=0.05)
+    for device in ("iiwa", "gripper", "ft_sensor"):
+        health, time = _rest(held, f"{device}.health", f"{device}.time_measured")
+        assert health[0] == Health.READY
+        assert time[0] == pytest.approx(held.settling_time)
 
 
 def test_measured_torque_carries_the_weight(held: CellStation) -> None:
@@ -61,27 +66,6 @@ def _joint_torque(station: CellStation, p_W: np.ndarray, weight: float) -> np.nd
     return np.array(torques)
 
 
-def test_no_external_torque_at_rest(held: CellStation) -> None:
-    """Nothing touches the tool, and the bolt is part of it, however it is held."""
-    (external,) = _rest(held, "iiwa.torque_external")
-    np.testing.assert_allclose(external, 0.0, atol=0.05)
-
-
-def test_pads_stand_at_the_grips_width() -> None:
-    station = CellStation(load_scenario("removal", [QUIET]))
-    (state,) = _rest(station, "gripper.state_measured")
-    np.testing.assert_allclose(state, [0.012, 0.0], atol=1e-4)
-
-
-@pytest.mark.parametrize("device", ["iiwa", "gripper", "ft_sensor"])
-def test_devices_are_ready_and_their_samples_new(
-    device: str, cell: CellStation
-) -> None:
-    health, time = _rest(cell, f"{device}.health", f"{device}.time_measured")
-    assert health[0] == Health.READY
-    assert time[0] == pytest.approx(cell.settling_time)
-
-
 @pytest.mark.parametrize("force", [30.0, 90.0])
 def test_pads_press_with_the_grip_force(force: float) -> None:
     scenario: Scenario = load_scenario(
@@ -89,6 +73,8 @@ def test_pads_press_with_the_grip_force(force: float) -> None:
     )
     station = CellStation(scenario)
     context = station.settled([])
+    state = station.GetOutputPort("gripper.state_measured").Eval(context)
+    np.testing.assert_allclose(state, [0.012, 0.0], atol=1e-4)  # the grip's width
     contacts = station.GetOutputPort("contact_results").Eval(context)
     across = [
         abs(contacts.hydroelastic_contact_info(i).F_Ac_W().translational()[1])

@@ -28,6 +28,7 @@ from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.recording import EpisodeRecorder
 from drake_disasm.task.simulation import TaskSimulation
+from tests.refusals import refused
 
 #: The fake arm follows a control period later than a simulated one: 0.05 mm at the 10
 #: mm/s of sliding, 0.15 mm of lifting, and the policy answers to contact that comes
@@ -68,30 +69,14 @@ def test_a_dry_run_has_nothing_that_sends(station: HardwareStation) -> None:
     assert port_differences(dry, CELL_PORTS) == []
 
 
-@pytest.mark.parametrize(
-    ("override", "words"),
-    [
-        ("effects=[!GroovePose {ry: 0.01}]", "effects.0 (!GroovePose)"),
-        ("effects=[!CommandGain {x: 0.01}]", "effects.0 (!CommandGain)"),
-        (
-            "contact.model=impact",
-            "contact.model: 'impact' is available on the twin",
-        ),
-    ],
-)
-def test_what_hardware_cannot_do_is_named_when_it_is_built(
-    override: str, words: str
-) -> None:
-    with pytest.raises(DisasmError) as caught:
+@pytest.mark.parametrize(("override", "words"), [
+    ("effects=[!GroovePose {ry: 0.01}]", ["effects.0", "!GroovePose"]),
+    ("effects=[!CommandGain {x: 0.01}]", ["effects.0", "!CommandGain"]),
+    ("contact.model=impact", ["contact.model", "'impact'", "twin"]),
+])  # fmt: skip
+def test_what_hardware_cannot_do_is_named_when_it_is_built(override, words):
+    with refused(*words):
         HardwareStation(load_scenario("removal", [override]), HardwareConfig())
-    assert words in str(caught.value)
-
-
-def test_devices_that_do_not_answer_are_named(station: HardwareStation) -> None:
-    with station, pytest.raises(DisasmError) as caught:
-        station.begin(station.CreateDefaultContext())
-    for words in ("iiwa is NO_DATA", "gripper is NO_DATA", "ft_sensor is NO_DATA"):
-        assert words in str(caught.value)
 
 
 def _simulated(station: HardwareStation, *left_out: str) -> Simulator:
@@ -107,22 +92,19 @@ def _simulated(station: HardwareStation, *left_out: str) -> Simulator:
 
 def test_it_does_not_run_before_it_is_connected(station: HardwareStation) -> None:
     """One clear error, neither NaN nor a hang; its default Context knows no start."""
-    with pytest.raises(DisasmError, match=r"not connected.*station\.begin\(context\)"):
+    with refused("effects.0"):
+        station.begin(station.CreateDefaultContext(), [GroovePose(ry=0.01)])
+    with station, refused("iiwa is NO_", "gripper is NO_", "ft_sensor is NO_DATA"):
+        station.begin(station.CreateDefaultContext())
+    with refused("not connected", "station.begin(context)"):
         _simulated(station).AdvanceTo(0.1)
-    with pytest.raises(DisasmError, match=r"where its arm is.*station\.begin"):
+    with refused("where its arm is", "station.begin"):
         _ = station.initial_state
 
 
-def test_it_does_not_run_without_the_grippers_command(
-    station: HardwareStation,
-) -> None:
-    with pytest.raises(DisasmError, match=r"gripper\.position is not connected"):
+def test_it_does_not_run_without_the_grippers_command(station: HardwareStation) -> None:
+    with refused("gripper.position is not connected"):
         _simulated(station, "gripper.position").Initialize()
-
-
-def test_effects_cannot_be_set_later_either(station: HardwareStation) -> None:
-    with pytest.raises(DisasmError, match=r"effects\.0"):
-        station.begin(station.CreateDefaultContext(), [GroovePose(ry=0.01)])
 
 
 @pytest.mark.slow
@@ -229,7 +211,7 @@ def test_the_driver_gets_no_command_before_it_listens() -> None:
         assert cell.commands == 0  # and it asserts that none comes within 0.25 s
 
 
-@pytest.mark.parametrize("stall", [0.05, 0.1, 0.24])
+@pytest.mark.parametrize("stall", [0.05, 0.24])
 def test_time_that_was_lost_stays_lost(stall: float) -> None:
     """After a stall commands go on at their rate, and the joints at their speed."""
     stalled: list[float] = []

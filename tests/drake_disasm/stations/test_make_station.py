@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 from pydrake.lcm import DrakeLcm
 
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     BoltMotion,
     ContactExponent,
@@ -24,12 +23,12 @@ from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import (
     STATIONS,
     CellStation,
-    SimulatedStation,
     TwinStation,
     make_station,
 )
 from drake_disasm.stations.hardware import HardwareStation
 from drake_disasm.stations.hardware_config import HardwareConfig
+from tests.refusals import refused
 
 
 @pytest.fixture(autouse=True)
@@ -82,66 +81,48 @@ def test_every_name_makes_its_station() -> None:
         "hardware", _scenario(), config=HardwareConfig(), lcm=DrakeLcm("memq://")
     )
     assert isinstance(hardware, HardwareStation)
+    file = Path(__file__).parents[3] / "models" / "hardware" / "cell.yaml"
+    options = {"config": file, "dry_run": True, "lcm": DrakeLcm("memq://")}
+    assert make_station("hardware", _scenario(), **options).dry_run
     assert isinstance(make_station("twin", _scenario(model="impact")), TwinStation)
 
 
-def test_hardware_takes_the_path_of_a_file() -> None:
-    file = Path(__file__).parents[3] / "models" / "hardware" / "cell.yaml"
-    station = make_station(
-        "hardware", _scenario(), config=file, dry_run=True, lcm=DrakeLcm("memq://")
-    )
-    assert isinstance(station, HardwareStation) and station.dry_run
-
-
-@pytest.mark.parametrize(
-    ("name", "options", "message"),
-    [
-        ("twinn", {}, r"no station 'twinn'; did you mean 'twin'\?"),
-        ("robot", {}, "no station 'robot'; known: cell, twin, hardware"),
-        ("hardware", {}, r"where its devices are; give config.*models/hardware"),
-        ("hardware", {"config": "none.yaml"}, r"none\.yaml: can't be read"),
-        ("cell", {"dry_run": True}, "station 'cell': takes no option 'dry_run'"),
-    ],
-)
-def test_bad_input_is_one_clear_error(name: str, options: dict, message: str) -> None:
-    with pytest.raises(DisasmError, match=message):
+@pytest.mark.parametrize(("name", "options", "words"), [
+    ("twinn", {}, ["no station 'twinn'", "did you mean 'twin'"]),
+    ("robot", {}, ["no station 'robot'", "cell, twin, hardware"]),
+    ("hardware", {}, ["give config", "models/hardware"]),
+    ("hardware", {"config": "none.yaml"}, ["none.yaml: can't be read"]),
+    ("cell", {"dry_run": True}, ["station 'cell'", "'dry_run'"]),
+])  # fmt: skip
+def test_bad_input_is_one_clear_error(name, options, words):
+    with refused(*words):
         make_station(name, _scenario(), **options)
 
 
 REFUSED = [
-    ("twin", "hydroelastic", TorqueOffset("iiwa_joint_4", 1.0), "`station` cell"),
-    ("twin", "hydroelastic", ContactExponent(0.5), "contact.model to impact"),
-    ("cell", "hydroelastic", ContactExponent(0.5), "`station` twin"),
-    ("twin", "impact", SoftHead(0.5), "head_modulus.*contact.model to hydroelastic"),
+    ("twin", "hydroelastic", TorqueOffset("iiwa_joint_4", 1.0), "cell"),
+    ("twin", "hydroelastic", ContactExponent(0.5), "impact"),
+    ("cell", "hydroelastic", ContactExponent(0.5), "twin"),
+    ("twin", "impact", SoftHead(0.5), "head_modulus"),
     ("twin", "hydroelastic", Magnetism(0.5), "derive it from one of"),
-    ("cell", "hydroelastic", Magnetism(0.5), "derive it from one of"),
     ("cell", "hydroelastic", HotGear(size=0.5), "the cell does not simulate"),
-    ("hardware", "hydroelastic", GroovePose(ry=0.1), "hardware has its own effects"),
+    ("hardware", "hydroelastic", GroovePose(ry=0.1), "own effects"),
 ]
 
 
-@pytest.mark.parametrize(
-    ("name", "model", "effect", "remedy"),
-    REFUSED,
-    ids=lambda value: value if isinstance(value, str) else type(value).__name__,
-)
-def test_an_effect_that_a_station_cannot_carry_is_named(
-    name: str, model: str, effect: Effect, remedy: str
-) -> None:
+@pytest.mark.parametrize(("name", "model", "effect", "remedy"), REFUSED)
+def test_an_effect_that_a_station_cannot_carry_is_named(name, model, effect, remedy):
     options = {"config": HardwareConfig()} if name == "hardware" else {}
-    with pytest.raises(DisasmError, match=f"{type(effect).__name__}.*{remedy}"):
+    with refused(type(effect).__name__, remedy):
         make_station(name, _scenario(effect, model=model), **options)
 
 
-@pytest.mark.parametrize("effect", [Magnetism(0.5), ContactExponent(0.5)])
 @pytest.mark.parametrize("name", ["cell", "twin"])
-def test_neither_can_it_be_set_later(
-    name: str, effect: Effect, request: pytest.FixtureRequest
-) -> None:
-    station: SimulatedStation = request.getfixturevalue(name)
+def test_neither_can_it_be_set_later(name, request):
+    station = request.getfixturevalue(name)
     for change in (station.set_effects, station.begin):
-        with pytest.raises(DisasmError, match=type(effect).__name__):
-            change(station.CreateDefaultContext(), [effect])
+        with refused("ContactExponent"):
+            change(station.CreateDefaultContext(), [ContactExponent(0.5)])
 
 
 def test_the_same_effect_is_carried_where_it_belongs() -> None:
@@ -153,5 +134,5 @@ def test_the_same_effect_is_carried_where_it_belongs() -> None:
 
 
 def test_the_cell_names_the_station_that_has_the_contact() -> None:
-    with pytest.raises(DisasmError, match=r"contact\.model: 'impact'.*`station` twin"):
+    with refused("contact.model", "'impact'", "twin"):
         CellStation(_scenario(model="impact"))
