@@ -50,36 +50,32 @@ def test_the_usual_passes():
     assert objection(q_before=np.full(7, np.nan)) == ""
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"readings": of("iiwa", time=np.nan)}, "iiwa has sent nothing yet"),
-        ({"readings": of("iiwa", time=0.95)}, "iiwa has stopped sending for 0.060 s"),
-        ({"readings": of("ft_sensor", time=0.9)}, "ft_sensor has stopped sending"),
-        ({"readings": of("gripper", time=0.4)}, "gripper has stopped sending"),
-        ({"readings": of("gripper", error="fault 0x0E")}, "gripper: fault 0x0E"),
-        ({"q_wanted": joint(Q, 2, np.nan)}, "iiwa.position is not finite"),
-        ({"load": np.full(6, np.nan)}, "ft_sensor.wrench is not finite"),
-        ({"q_before": joint(Q, 3, -0.06)}, "joint 3 jumped by 0.060 rad"),
-        ({"overdue": 0.3}, "0.300 s late: the program stood still"),
-        (
-            {"overdue": 0.3, "lag": Lag(took={"policy": 0.2})},
-            "0.300 s late: policy took 0.200 s",
-        ),
-        (
-            {"lag": Lag(2.0, 0.9, {"view": 0.3, "policy": 1.4})},
-            "lost 0.90 s within 2.00 s, it is too slow; of its time take: "
-            "policy 140 %, view 30 %",
-        ),
-        ({"q_wanted": joint(Q, 4, -0.68)}, "joint 4 is sent 0.015 rad into"),
-        ({"q_wanted": joint(Q, 5, 0.03)}, "joint 5 is sent 0.030 rad from where"),
-        ({"q_wanted": joint(Q, 6, -0.11)}, "0.110 rad from where it is, 0.100 are"),
-        ({"X_GB": RigidTransform([0.0, 0.029, 0.0])}, "workspace at y = 29.0 mm"),
-        ({"load": np.array([0, 20.1, 0, 0, 0, 0])}, "force 20.1 N"),
-        ({"load": np.array([0, 0, 0, 3.0, 3.0, 0])}, "torque 4.2 N m"),
-        ({"load": np.array([0, 0, 0, 0, 0, -2.5])}, "torque about z 2.5 N m"),
-    ],
-)
+def push(**components: float) -> np.ndarray:
+    """A wrench (6,) at the gripper [N, N m]."""
+    return np.array([components.get(n, 0.0) for n in ("x", "y", "z", "a", "b", "c")])
+
+
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"readings": of("iiwa", time=np.nan)}, "iiwa has sent nothing yet"),
+    ({"readings": of("iiwa", time=0.95)}, "iiwa has stopped sending for 0.060 s"),
+    ({"readings": of("ft_sensor", time=0.9)}, "ft_sensor has stopped sending"),
+    ({"readings": of("gripper", time=0.4)}, "gripper has stopped sending"),
+    ({"readings": of("gripper", error="fault 0x0E")}, "gripper: fault 0x0E"),
+    ({"q_wanted": joint(Q, 2, np.nan)}, "iiwa.position is not finite"),
+    ({"load": np.full(6, np.nan)}, "ft_sensor.wrench is not finite"),
+    ({"q_before": joint(Q, 3, -0.06)}, "joint 3 jumped by 0.060 rad"),
+    ({"overdue": 0.3}, "0.300 s late: the program stood still"),
+    ({"overdue": 0.3, "lag": Lag(took={"policy": 0.2})}, "late: policy took 0.200 s"),
+    ({"lag": Lag(2.0, 0.9, {"view": 0.3, "policy": 1.4})}, "lost 0.90 s within 2.00 s"),
+    ({"lag": Lag(2.0, 0.9, {"view": 0.3, "policy": 1.4})}, "policy 140 %, view 30 %"),
+    ({"q_wanted": joint(Q, 4, -0.68)}, "joint 4 is sent 0.015 rad into"),
+    ({"q_wanted": joint(Q, 5, 0.03)}, "joint 5 is sent 0.030 rad from where"),
+    ({"q_wanted": joint(Q, 6, -0.11)}, "0.110 rad from where it is, 0.100 are"),
+    ({"X_GB": RigidTransform([0.0, 0.029, 0.0])}, "workspace at y = 29.0 mm"),
+    ({"load": push(y=20.1)}, "force 20.1 N"),
+    ({"load": push(a=3.0, b=3.0)}, "torque 4.2 N m"),
+    ({"load": push(c=-2.5)}, "torque about z 2.5 N m"),
+])  # fmt: skip
 def test_what_must_stop_the_robot(changes, words):
     assert words in objection(**changes)
 

@@ -61,9 +61,7 @@ def test_a_second_station_of_a_program_is_told_so(tmp_path: Path) -> None:
         pass
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"{", b"[1]", b'{"pid": "x"}', b"[" * 9999, b"\xff" * 9999]
-)
+@pytest.mark.parametrize("content", [b"", b"[1]", b'{"pid": "x"}', b"[" * 9999])
 def test_what_a_lock_says_need_not_be_readable(tmp_path: Path, content: bytes) -> None:
     with _locks(tmp_path, ARM):
         (file,) = tmp_path.iterdir()
@@ -72,15 +70,10 @@ def test_what_a_lock_says_need_not_be_readable(tmp_path: Path, content: bytes) -
             _locks(tmp_path, ARM).acquire()
 
 
-def test_every_user_can_lock(tmp_path: Path) -> None:
+def test_every_user_can_lock_and_no_link_is_followed(tmp_path: Path) -> None:
     with _locks(tmp_path, ARM):
         (file,) = tmp_path.iterdir()
         assert stat.S_IMODE(file.stat().st_mode) == 0o666
-
-
-def test_what_cannot_be_locked_is_not_used(tmp_path: Path) -> None:
-    with _locks(tmp_path, ARM):
-        (file,) = tmp_path.iterdir()
     file.unlink()
     file.symlink_to(tmp_path / "elsewhere")
     with pytest.raises(DisasmError, match=r"\.lock: cannot be locked .*; see whose"):

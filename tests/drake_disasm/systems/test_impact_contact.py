@@ -6,7 +6,6 @@ from pydrake.math import RotationMatrix
 from pydrake.multibody.tree import BodyIndex
 
 from drake_disasm.cell.twin_parameters import bolt_stiffness
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.impact import (
     ImpactConditions,
     ImpactLaw,
@@ -16,7 +15,6 @@ from drake_disasm.impact import (
 from drake_disasm.impact.equations import normal_force
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import LockConfig, load_scenario
-from drake_disasm.stations import CellStation
 from drake_disasm.systems.impact_contact import ImpactContact
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.replay import TwinReplay
@@ -46,9 +44,7 @@ def pressed(overrides):
     return 1e3 * (z - 0.2e-3), -state[8], springs
 
 
-@pytest.mark.parametrize(
-    ("stiffness", "exponent"), [(100.0, 1.0), (1e3, 1.5), (1e5, 2.2), (50.0, 0.7)]
-)
+@pytest.mark.parametrize(("stiffness", "exponent"), [(1e3, 1.5), (50.0, 0.7)])
 def test_the_neck_rests_where_law_and_spring_balance(stiffness, exponent):
     """Two circles touch: 2 k p^e = K (0.4 mm - p), and the sensor reads it."""
     text = f"{{stiffness: {stiffness}, exponent: {exponent}, damping: 1, depth: 0.1}}"
@@ -59,7 +55,7 @@ def test_the_neck_rests_where_law_and_spring_balance(stiffness, exponent):
     assert force == pytest.approx(expected, rel=0.02)
 
 
-@pytest.mark.parametrize("time_step", [0.00125, 0.005, 0.01])
+@pytest.mark.parametrize("time_step", [0.00125, 0.01])
 def test_the_stiffest_corner_of_the_thesis_box_does_not_explode(time_step):
     text = "{stiffness: 1.0e+5, exponent: 1, damping: 1000, depth: 0.0}"
     depth, force, springs = pressed(
@@ -94,11 +90,6 @@ def test_an_episode_ends_as_with_hydroelastic_contact():
     assert first.bolt_is_out and second.bolt_is_out
     assert first.reward == pytest.approx(second.reward, rel=0.03)
     assert first.mean_force == pytest.approx(second.mean_force, rel=0.2)
-
-
-def test_it_is_of_the_twin_alone():
-    with pytest.raises(DisasmError, match="on the twin only"):
-        CellStation(load_scenario("removal", ["contact.model=impact"]))
 
 
 def test_a_step_without_a_balance_is_an_error():

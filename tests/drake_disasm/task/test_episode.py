@@ -1,5 +1,7 @@
 """An episode's summary and table, by hand."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -35,15 +37,11 @@ def summary() -> EpisodeSummary:
     return summary
 
 
-def test_reward_is_the_sum_of_its_terms() -> None:
-    result = _result([3, 0, 0], [0, 0, 0], 0.0)
-    assert result.reward == pytest.approx(3 - 1.0 - 0.5)
-
-
 def test_terms_add_up_by_name(summary: EpisodeSummary) -> None:
     expected = {"progress": 8.0, "force": -3.0, "torque": -1.5, "lift": 0.0}
     assert summary.reward_terms == pytest.approx(expected)
     assert summary.reward == pytest.approx(3.5)
+    assert _result([3, 0, 0], [0, 0, 0], 0.0).reward == pytest.approx(1.5)
 
 
 def test_greatest_and_mean_values(summary: EpisodeSummary) -> None:
@@ -62,9 +60,10 @@ def test_table_says_what_the_summary_does(summary: EpisodeSummary) -> None:
     assert row.split()[:4] == ["0", "7", "3", "3.50"]
     assert row.endswith("force limit")
     assert total == "0 of 1 episodes succeeded"
-
-
-def test_a_bolt_that_is_out_is_said(summary: EpisodeSummary) -> None:
+    other = dataclasses.replace(summary, outcome=Outcome.SUCCESS)
+    table = summary_table([summary, other]).splitlines()
+    assert len(table) == 5 and table[3].endswith("success")
+    assert table[-1] == "1 of 2 episodes succeeded"
     summary.bolt_is_out = True
     assert "(the bolt is out)" in summary_table([summary])
 

@@ -43,19 +43,18 @@ def _episode(policy: object, seed: int = 1) -> EpisodeSummary:
     return run_episode(TaskSimulation(SCENARIO, "twin", policy), seed)
 
 
+def test_cheating_pays_less_than_removing_the_bolt() -> None:
+    honest = _episode(make_policy("admittance", SCENARIO))
+    assert honest.outcome is Outcome.SUCCESS
+    ends = {"fly on": Outcome.WORKSPACE, "up and down": Outcome.STEP_LIMIT}
+    for then, end in ends.items():
+        cheat = _episode(Cheat(then))
+        assert cheat.outcome is end and cheat.reward < honest.reward, then
+
+
 @pytest.mark.parametrize(
-    ("then", "end"),
-    [("fly on", Outcome.WORKSPACE), ("up and down", Outcome.STEP_LIMIT)],
+    ("axis", "station"), [(0, "twin"), (1, "twin"), (2, "twin"), (1, "cell")]
 )
-def test_cheating_pays_less_than_removing_the_bolt(then: str, end: Outcome) -> None:
-    """Before: 183 for flying on, 213 for going up and down, 132 for the task."""
-    honest, cheat = _episode(make_policy("admittance", SCENARIO)), _episode(Cheat(then))
-    assert honest.outcome is Outcome.SUCCESS and cheat.outcome is end
-    assert cheat.reward < honest.reward
-
-
-@pytest.mark.parametrize("station", ["twin", "cell"])
-@pytest.mark.parametrize("axis", [0, 1, 2])
 def test_pulling_at_a_bolt_that_is_stuck_is_no_success(axis: int, station: str) -> None:
     """In a grip that yields the arm goes on; the bolt's place is judged."""
     action = np.zeros(6)
