@@ -43,7 +43,7 @@ _KEYS = (
     "columns",
 )
 _COLUMN_KEYS = ("from", "unit", "scale", "sign", "offset")
-_REMEDY = "see docs/guides/import-log.md, or `show` guesses one and `save_map` writes it"
+_REMEDY = "see docs/guides/import-log.md, or let `show` guess and `save_map` write one"
 
 Scale = float | str
 

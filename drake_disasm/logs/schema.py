@@ -1,7 +1,7 @@
 """The log format as data: the kinds of log, their quantities, columns and frames.
 
 `docs/reference/log-format.md` says the same in prose; a test holds the two together.
-Frames: W world (z up), G groove (nominal), B bolt, S sensor; Bo and So are their origins.
+Frames: W world (z up), G groove (nominal), B bolt, S sensor; Bo, So their origins.
 """
 
 import enum
