@@ -174,7 +174,7 @@ def _chapter5(algorithm: str) -> Hyperparameters:
 
 
 def _best(algorithm: str) -> Hyperparameters:
-    """The best of all that was tried; see docs/learning.md.
+    """The best of all that was tried; see docs/explanation/learning.md.
 
     A bounded residual on the admittance policy: it works from the first episode, and
     the bounds keep the agent's correction, times the arm's stiffness, below the safety

@@ -41,16 +41,17 @@ def refuse_envs(envs: int, station: str, acts: bool, lockstep: bool = False) -> 
     if lockstep and (envs > 1 or station != "twin" or not acts):
         raise DisasmError(
             "lockstep: agents side by side have one environment each, on a batch of "
-            "twins; leave out --envs, --station and --from-logs, or --lockstep"
+            "twins; leave out `envs`, `station` and logs to learn from, or `lockstep`"
         )
     if envs > 1 and station != "twin":
         raise DisasmError(
-            f"envs: station '{station}' has no batch; use --station twin, or --envs 1"
+            f"envs: station '{station}' has no batch; give `station` twin, or one of "
+            "`envs`"
         )
     if envs > 1 and not acts:
         raise DisasmError(
             f"envs: {envs} episodes at a time, but learning from logs runs none; leave "
-            "--envs out"
+            "`envs` out"
         )
 
 

@@ -117,7 +117,7 @@ class Training:
         if config.demonstrations and not (demonstrations and demonstrations.size):
             raise DisasmError(
                 f"demonstrations: {config.demonstrations:g} of each batch are to come "
-                "from logs; give some by --demonstrations DIR"
+                "from logs; give some by `demonstrations`"
             )
         self.agent = Agent(
             config, seed_for(spec.seed, Purpose.PARAMETERS), spec.compiled

@@ -58,7 +58,8 @@ class DisassemblyVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     its first one, and `infos["final_obs"]`, `infos["final_info"]` have the last of the
     one before (gymnasium's AutoresetMode.SAME_STEP). An environment whose simulation
     fails (an action that is not finite, contact without a balance) is truncated, with
-    reward 0 and the reason in `infos["final_info"]["failure"]`; the others go on.
+    reward 0, the outcome "failed" and the reason in `infos["final_info"]["failure"]`;
+    the others go on.
 
     Units are in `metadata`: m, rad, N, N m. The spaces bound actions, rotations, and
     positions by how far all actions lead together; forces have no bound.
@@ -271,7 +272,7 @@ class _Rows:
         values: dict[str, Any] = {
             "reward_terms": _with_masks(self.reward_terms, mask),
             "wrench": self.observation[:, 6:],
-            "outcome": _LABELS[self.outcome],
+            "outcome": np.where(self._has_failed, "failed", _LABELS[self.outcome]),
             "is_success": self.outcome == Outcome.SUCCESS,
             "failure": self.failure,
         }

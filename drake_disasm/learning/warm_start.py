@@ -55,7 +55,7 @@ def check_start(experiment: Experiment, seeds: Sequence[int]) -> None:
         ):
             raise DisasmError(
                 f"{experiment.start}: has not finished seed {seed}; train it there "
-                "first (tools/train.py), or give another folder"
+                "first (drake-disasm train), or give another folder"
             )
     before = read_training(Path(experiment.start), _NEEDED)
     for name, then, now in _compared(before, experiment.to_mapping()):

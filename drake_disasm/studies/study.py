@@ -235,8 +235,8 @@ class Study(abc.ABC):
         self.options = options
         if options.robot_episodes and not self.has_robot:
             raise DisasmError(
-                f"--robot-episodes: there is no robot in study '{self.name}'; leave it "
-                "out"
+                f"robot_episodes: there is no robot in study '{self.name}'; leave "
+                "`robot_episodes` out"
             )
         known = [factor.name for factor in self.factors]
         for name in options.levels:

@@ -55,7 +55,7 @@ _STATION = "cell"  # which stands for the robot
 _LOG_SEED = 500_000  # not one of any training
 _TIME_BUDGET = 1200.0  # s, of closing the loop
 #: What lets an agent without a base policy learn: with the thesis's numbers alone DDPG
-#: seldom does (docs/learning.md).
+#: seldom does (docs/explanation/learning.md).
 _LAYER_NORM = ("layer_norm=true",)
 #: Ranges that surely have the robot in them, for who does not know it.
 _WIDE = (

@@ -235,7 +235,7 @@ def test_a_start_that_does_not_fit_is_named(undisturbed: Path, tmp_path: Path) -
         (["--psi=0.3"], "imprecision: 0.3 m is out of range"),
         (["--hyper", "gama=1"], "did you mean 'gamma'"),
         (["--from-logs", "nowhere"], "nowhere"),
-        (["--hyper", "demonstrations=0.5"], "--demonstrations DIR"),
+        (["--hyper", "demonstrations=0.5"], "--demonstrations"),
         (["--episodes=0"], "--episodes: '0' is not a whole number from 1"),
     ],
 )
