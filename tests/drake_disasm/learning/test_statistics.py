@@ -17,12 +17,9 @@ def test_wilson_is_what_the_literature_tabulates() -> None:
     low, high = wilson_interval(7, 10)
     assert (low, high) == pytest.approx((0.3968, 0.8922), abs=1e-4)
     assert wilson_interval(0, 10) == pytest.approx((0.0, 0.2775), abs=1e-4)
-
-
-@pytest.mark.parametrize(("won", "of"), [(1, 0), (3, 2), (-1, 5)])
-def test_impossible_rates_are_refused(won: int, of: int) -> None:
-    with pytest.raises(ValueError, match="no success rate"):
-        wilson_interval(won, of)
+    for won, of in ((1, 0), (3, 2), (-1, 5)):
+        with pytest.raises(ValueError, match="no success rate"):
+            wilson_interval(won, of)
 
 
 def test_the_interquartile_mean_ignores_the_outer_quarters() -> None:
@@ -39,11 +36,11 @@ def test_the_interquartile_mean_ignores_the_outer_quarters() -> None:
 def test_the_bootstrap_interval_covers_the_truth_about_as_often_as_it_says() -> None:
     generator = np.random.default_rng(1)
     hits = 0
-    for _ in range(200):
+    for _ in range(150):
         sample = generator.normal(size=(20, 1))
-        low, high = bootstrap_interval(sample, generator, resamples=300)
+        low, high = bootstrap_interval(sample, generator, resamples=100)
         hits += bool(low[0] <= 0.0 <= high[0])
-    assert 0.85 <= hits / 200 <= 0.99
+    assert 0.85 <= hits / 150 <= 0.99
 
 
 def test_the_moving_mean_looks_back_only() -> None:

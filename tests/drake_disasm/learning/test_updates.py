@@ -46,13 +46,8 @@ class _Fed:
     def sample(self, size: int, env: Any = None) -> ReplayBufferSamples:
         b = split(torch.from_numpy(next(self._batches)))
         column = lambda x: x[:, None]  # noqa: E731
-        return ReplayBufferSamples(
-            b.observation,
-            b.action,
-            b.next_observation,
-            column(b.terminated),
-            column(b.reward),
-        )
+        states = (b.observation, b.action, b.next_observation)
+        return ReplayBufferSamples(*states, column(b.terminated), column(b.reward))
 
 
 def _reference(algorithm: str, config: Hyperparameters, env: DisassemblyEnv) -> Any:
@@ -162,21 +157,13 @@ def _train_reference(reference: Any, batches: list[np.ndarray]) -> None:
     reference.train(len(batches), reference.batch_size)
 
 
-@pytest.mark.parametrize(
-    ("algorithm", "changes"),
-    [
-        ("ddpg", {}),
-        ("td3", {"target_noise": 0.3, "target_noise_limit": 0.2}),
-        ("sac", {}),
-        ("sac", {"adapt_entropy": True}),
-    ],
-)
-def test_updates_are_those_of_stable_baselines3(
-    algorithm: str,
-    changes: dict[str, Any],
-    env: DisassemblyEnv,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+@pytest.mark.parametrize(("algorithm", "changes"), [
+    ("ddpg", {}),
+    ("td3", {"target_noise": 0.3, "target_noise_limit": 0.2}),
+    ("sac", {}),
+    ("sac", {"adapt_entropy": True}),
+])  # fmt: skip
+def test_updates_are_those_of_stable_baselines3(algorithm, changes, env, monkeypatch):
     config = dataclasses.replace(
         preset("chapter3", algorithm), tau=0.3, batch=20, **changes
     )
