@@ -129,7 +129,7 @@ class TwinBatch:
         twins, motion = self.twins(episodes), at_A(goal)
         if twins.effects.is_local:
             X_GB = twins.numbers.coordinates.poses(episodes.state.q)
-            motion = BoltMotion(X_GB.p, v)
+            motion = BoltMotion(X_GB.p, v, episodes.steps * self.period)
         conditions = twins.conditions(motion)
         rate = (goal - episodes.goal) / self.period
         steps = round(self.period / self.h)

@@ -102,7 +102,7 @@ def _results(effect: Effect, like: Array, row: int | None) -> list[Array]:
             impact_stiffness=each(1e3),
             impact_exponent=each(1.0),
         )
-        bolt = BoltMotion(given(_PLACES), given(0.3 * _PLACES))
+        bolt = BoltMotion(given(_PLACES), given(0.3 * _PLACES), each(0.4))
         return leaves_of(effect.apply(environment, bolt))
     if isinstance(effect, MotionEffect):
         pose_vector, memory = given(0.01 * _WRENCHES), given(0.009 * _WRENCHES)

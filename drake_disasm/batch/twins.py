@@ -72,7 +72,7 @@ class Twins:
 def at_A(like: Array) -> BoltMotion:
     """Returns bolts at rest at A, as many as an array (n, ...) has rows."""
     nothing = 0.0 * like[:, :3]
-    return BoltMotion(nothing, nothing)
+    return BoltMotion(nothing, nothing, nothing[:, 0])
 
 
 def _around(environment: Environment, like: Array) -> Surroundings:

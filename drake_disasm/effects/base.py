@@ -13,7 +13,9 @@ arrays (n,) of n environments: `BatchedTwin` refuses an effect whose equation do
 
 To write one: derive a dataclass from the place where it acts (EnvironmentEffect,
 MotionEffect, PoseEffect, SensorEffect or JointEffect), give it a docstring and
-fields, define the place's method, and put `@register_effect` above it.
+fields, define the place's method, and put `@register_effect` above it. A model of logs
+of one's own may have places of its own: a class derived from Effect, which is given as
+`@register_effect(place=...)`.
 """
 
 import abc
@@ -75,17 +77,19 @@ class Environment:
 
 @dataclasses.dataclass(frozen=True)
 class BoltMotion:
-    """Position and commanded velocity of the bolt, which its surroundings depend on.
+    """What the bolt's surroundings may depend on: its position, its velocity, the time.
 
     As at the beginning of a step of the MDP; constant for the whole step.
 
     Attributes:
         p: (..., 3) Bo in Gn [m].
         v: (..., 3) its commanded velocity in Gn [m/s].
+        time: (...,) seconds since the episode began.
     """
 
     p: Array
     v: Array
+    time: float | Array = 0.0
 
 
 #: As an episode starts: at A, at rest.
@@ -175,6 +179,15 @@ class Effect:
         return value[..., None] if getattr(value, "ndim", 0) else value
 
     @classmethod
+    def places(cls, joints: Sequence[str]) -> list[dict[str, str]]:
+        """Returns where it can act: the fields that say so, for each place.
+
+        Args:
+            joints: of the arm, or of the model of a log, from the base on.
+        """
+        return [{"joint": joint} for joint in joints] if acts_at_joint(cls) else [{}]
+
+    @classmethod
     def grids(cls, duration: float) -> dict[str, tuple[float, ...]]:
         """Returns values of each shape parameter from which a search starts, by name.
 
@@ -216,7 +229,7 @@ class EnvironmentEffect(Effect, abc.ABC):
     """Acts on the world around the bolt.
 
     Attributes:
-        is_local: whether it depends on where the bolt is or how fast it goes.
+        is_local: whether it depends on where the bolt is, how fast it goes, or when.
         contact_models: the scenario's `contact.model` in which it acts.
     """
 
@@ -392,15 +405,6 @@ class ArmEffect(Effect):
 
     is_common: ClassVar[bool] = True
     moves_the_arm: ClassVar[bool] = True
-
-    @classmethod
-    def places(cls, joints: Sequence[str]) -> list[dict[str, str]]:
-        """Returns where on an arm it can act: the fields that say so, for each.
-
-        Args:
-            joints: of the arm, from its base on.
-        """
-        return [{"joint": joint} for joint in joints] if acts_at_joint(cls) else [{}]
 
 
 class ArmTorqueEffect(ArmEffect, abc.ABC):

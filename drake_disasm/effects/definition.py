@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+import itertools
 import math
 import typing
 from collections.abc import Iterator
@@ -27,23 +28,40 @@ PLACES: tuple[type[Effect], ...] = (
     SensorEffect,
     ArmEffect,
 )
-_BASES = "EnvironmentEffect, MotionEffect, PoseEffect, SensorEffect or JointEffect"
+_BASES = (
+    "EnvironmentEffect, MotionEffect, PoseEffect, SensorEffect or JointEffect, or give "
+    "the base that says where it acts as `place`"
+)
 
 
-def refuse_faulty(effect: type[Effect]) -> None:
+def refuse_faulty(effect: type[Effect], place: type[Effect] | None = None) -> None:
     """Checks that a class is complete as an effect.
+
+    Args:
+        effect: the class.
+        place: a base of one's own that says where it acts, besides `PLACES`.
 
     Raises:
         DisasmError: names the class, what it lacks, and the remedy.
     """
-    for fault in _faults(effect):
+    for fault in itertools.chain(_faults_of_place(place), _faults(effect, place)):
         raise DisasmError(f"effect {getattr(effect, '__name__', effect)}: {fault}")
 
 
-def _faults(effect: Any) -> Iterator[str]:
+def _faults_of_place(place: Any) -> Iterator[str]:
+    """Yields what is wrong with a place of one's own."""
+    if place is not None and not (
+        isinstance(place, type) and issubclass(place, Effect) and place is not Effect
+    ):
+        yield "its `place` says not where it acts; give a class derived from Effect"
+
+
+def _faults(effect: Any, place: type[Effect] | None) -> Iterator[str]:
     """Yields what is wrong with a class; each check relies on those before it."""
-    if not isinstance(effect, type) or not issubclass(effect, PLACES):
-        yield f"is not an effect; derive the class from {_BASES}"
+    places = PLACES if place is None else (place,)
+    if not isinstance(effect, type) or not issubclass(effect, places):
+        bases = _BASES if place is None else f"{place.__name__}, its `place`"
+        yield f"is not an effect; derive the class from {bases}"
     if "__dataclass_fields__" not in vars(effect):
         yield (
             "is not a dataclass; put @dataclasses.dataclass between @register_effect "

@@ -9,8 +9,10 @@ declares an entry point of the group `drake_disasm.effects`:
     my_effects = "my_package.effects"
 """
 
+import functools
+from collections.abc import Callable
 from importlib.metadata import entry_points
-from typing import TypeVar
+from typing import TypeVar, overload
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.executors import import_in_workers
@@ -30,16 +32,34 @@ _effects: dict[str, type[Effect]] = {}
 _plugins_are_loaded = False
 
 
-def register_effect(effect: _Kind) -> _Kind:
+@overload
+def register_effect(effect: _Kind, *, place: None = None) -> _Kind: ...
+@overload
+def register_effect(*, place: type[Effect]) -> Callable[[_Kind], _Kind]: ...
+def register_effect(
+    effect: _Kind | None = None, *, place: type[Effect] | None = None
+) -> _Kind | Callable[[_Kind], _Kind]:
     """Adds an effect to YAML, simulation, identification and effect selection.
 
     A class decorator, above `@dataclasses.dataclass`. A class that is defined once
     more at the same place (a notebook's cell) replaces the one before.
 
+    Args:
+        effect: the class.
+        place: where it acts, if that is a place of one's own: a class derived from
+            Effect, which a model of logs names in its `effect_types`. Stations know
+            nothing of it, and refuse such an effect by name.
+
     Raises:
         DisasmError: not a complete effect, or another one has its name.
     """
-    refuse_faulty(effect)
+    if effect is None:
+        return functools.partial(_register, place=place)
+    return _register(effect, place)
+
+
+def _register(effect: _Kind, place: type[Effect] | None) -> _Kind:
+    refuse_faulty(effect, place)
     other = _effects.get(effect.__name__)
     if other is not None and _place(other) != _place(effect):
         raise DisasmError(

@@ -54,7 +54,7 @@ class LocalEffectsMonitor:
     def _begin(self, context: Context, time: float) -> None:
         self._command = None
         self._period = int(np.ceil(time / self._task_period - _ROUNDING))
-        self._update(context, np.zeros(3))
+        self._update(context, np.zeros(3), time)
 
     def _measure(self, context: Context, time: float) -> None:
         """Samples the command twice, a control period apart, then updates."""
@@ -64,9 +64,11 @@ class LocalEffectsMonitor:
             return
         since, earlier = self._command
         if time - since >= self._station.control_period - _ROUNDING:
-            self._update(context, (p_GnB - earlier) / (time - since))
+            steps = int(np.floor(time / self._task_period + _ROUNDING))
+            v_GnB = (p_GnB - earlier) / (time - since)
+            self._update(context, v_GnB, steps * self._task_period)
             self._command = None
-            self._period = int(np.floor(time / self._task_period + _ROUNDING)) + 1
+            self._period = steps + 1
 
     def _commanded_position(self, context: Context) -> np.ndarray:
         """Returns where the bolt is commanded to be (3,) in Gn [m]."""
@@ -74,9 +76,9 @@ class LocalEffectsMonitor:
         command = station.GetInputPort(f"{station.arm}.position").Eval(context)
         return station.coordinates.pose(command).translation()
 
-    def _update(self, context: Context, v_GnB: np.ndarray) -> None:
+    def _update(self, context: Context, v_GnB: np.ndarray, time: float) -> None:
         station = self._station
         X_GnB = station.GetOutputPort("bolt_pose").Eval(context)
-        motion = BoltMotion(X_GnB.translation(), v_GnB)
+        motion = BoltMotion(X_GnB.translation(), v_GnB, time)
         effects = station.effects_in_force(context)
         station.update_local_effects(context, effects, motion)

@@ -137,7 +137,10 @@ class _EvenReplay:
         numbers = twins[self._time_steps[-1]].numbers
         q_bolt = steps.q + numbers.deflection(steps.wrench)
         p_BoTo_B = numbers.body.p_BoTo_B
-        motion = bolt_motion(numbers.coordinates, p_BoTo_B, q_bolt, steps.qd_rate)
+        begin, end = (self._period * (steps.index + i) for i in (0, 1))
+        motion = bolt_motion(
+            numbers.coordinates, p_BoTo_B, q_bolt, steps.qd_rate, begin
+        )
         conditions = {h: twins[h].conditions(motion) for h in set(self._time_steps)}
         arm = np.hstack([steps.q, steps.v])
         state = TwinState(arm, q_bolt, steps.v + steps.give_rate, steps.qd)
@@ -146,8 +149,7 @@ class _EvenReplay:
             arm_step, body = twins[h].numbers.arm, numbers.body
             step = plant_step(state, steps.qd_rate, arm_step, body, conditions[h])
             state, is_solved = step.state, is_solved & step.is_solved
-        time = (steps.index + 1) * self._period
-        found = _observed(twins[h], step, time, self._offset[which])
+        found = _observed(twins[h], step, end, self._offset[which])
         return np.where(is_solved[:, None], found, np.nan)
 
 

@@ -188,9 +188,10 @@ class TwinReplay:
             RuntimeError: Drake's contact solver did not converge.
         """
         begin, end = (boundary(self._step + i, self._period) for i in (0, 1))
+        time = self._step * self._period
         self._step += 1
         state = self._state or self._diagram.state()
-        motion = self._diagram.motion(state.q_bolt, qd_rate)
+        motion = self._diagram.motion(state.q_bolt, qd_rate, time)
         self._diagram.update_local_effects(motion)
         if self._state:
             self._diagram.start(begin, state)
@@ -233,16 +234,19 @@ class ReplayDiagram:
         self.reading_at_zeroing = reading
         self.processor.zero(self.processor_context, reading)
 
-    def motion(self, q_bolt: np.ndarray, qd_rate: np.ndarray) -> BoltMotion:
+    def motion(
+        self, q_bolt: np.ndarray, qd_rate: np.ndarray, time: float
+    ) -> BoltMotion:
         """Returns the bolt's motion in a step, for local effects.
 
         Args:
             q_bolt: (6,) coordinates of the bolt.
             qd_rate: (6,) rate of the commanded coordinates.
+            time: of the step's beginning [s].
         """
         station = self.station
         p_BoTo_B = station.parameters.p_BoTo_B
-        return bolt_motion(station.coordinates, p_BoTo_B, q_bolt, qd_rate)
+        return bolt_motion(station.coordinates, p_BoTo_B, q_bolt, qd_rate, time)
 
     def update_local_effects(self, motion: BoltMotion) -> None:
         """Brings effects that depend on the bolt's motion up to date."""
@@ -310,7 +314,11 @@ class ReplayDiagram:
 
 
 def bolt_motion(
-    coordinates: BoltCoordinates, p_BoTo_B: Array, q_bolt: Array, qd_rate: Array
+    coordinates: BoltCoordinates,
+    p_BoTo_B: Array,
+    q_bolt: Array,
+    qd_rate: Array,
+    time: float | Array,
 ) -> BoltMotion:
     """Returns the bolt's motion in a step, on which local effects depend.
 
@@ -319,11 +327,13 @@ def bolt_motion(
         p_BoTo_B: (3,) see `BoltCoordinates`.
         q_bolt: (..., 6) coordinates of the bolt.
         qd_rate: (..., 6) rate of the commanded coordinates.
+        time: (...,) of the step's beginning [s].
     """
     X_GB = coordinates.poses(q_bolt)
     p_BoTo = apply_matrix(X_GB.R, p_BoTo_B)
     rate_of_turn = qd_rate[..., :2:-1]  # roll, pitch, yaw: about x, y, z while small
-    return BoltMotion(X_GB.p, qd_rate[..., :3] - cross(rate_of_turn, p_BoTo))
+    v = qd_rate[..., :3] - cross(rate_of_turn, p_BoTo)
+    return BoltMotion(X_GB.p, v, time)
 
 
 def _with_rotation_vector(observation: np.ndarray, X_GB: RigidTransform) -> np.ndarray:

@@ -243,7 +243,7 @@ class TaskSimulation:
         self.simulator.AdvanceTo(boundary(self.steps, period) + between)
         X_GnB: RigidTransform = self.evaluate(self.station, "bolt_pose")
         action = self.evaluate(self.systems.imprecision, "action_executed")
-        motion = BoltMotion(X_GnB.translation(), action[:3] / period)
+        motion = BoltMotion(X_GnB.translation(), action[:3] / period, self.time)
         context = self.station.GetMyMutableContextFromRoot(self.context)
         self.station.update_local_effects(context, self._effects, motion)
 

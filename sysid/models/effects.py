@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.effects import ArmEffect, Effect, JointEffect
+from drake_disasm.effects import Effect, JointEffect
 from sysid.parameters import Parameter
 
 _RESTS = 0.05  # of the greatest speed: noise of a filtered velocity is no motion
@@ -27,7 +27,7 @@ def at_null(
         duration: of the longest episode [s]; infinite if it is not known.
     """
     make: Callable[..., Effect] = kind
-    places = kind.places(joints) if issubclass(kind, ArmEffect) else [{}]
+    places = kind.places(joints)
     grids = kind.grids(duration)
     return [
         make(**place, **dict(zip(grids, shape, strict=True)))
