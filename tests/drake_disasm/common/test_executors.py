@@ -17,6 +17,7 @@ from drake_disasm.common import executors
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.executors import WorkerPool, import_in_workers
 from drake_disasm.common.progress import Progress, ProgressUpdate
+from tests.refusals import refusal
 
 
 def _square(job: int, progress: Progress) -> int:
@@ -69,17 +70,16 @@ def _pool(kind: str, **options: object) -> Iterator[WorkerPool]:
             yield pool
 
 
-KINDS = ["here", "processes", "threads", "network"]
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_results_and_progress_come_through(kind: str) -> None:
+@pytest.mark.parametrize("kind", ["here", "processes", "threads", "network"])
+def test_results_progress_and_errors_come_through(kind: str) -> None:
     seen: list[ProgressUpdate] = []
     with _pool(kind, progress=seen.append) as pool:
         results = dict(pool.run(_square, [1, 2, 3]))
-    assert results == {1: 1, 2: 4, 3: 9}
-    assert len(seen) == 1 + 2 + 3
-    assert seen[-1] == ProgressUpdate("squaring", 1 + 2 + 3, 9, value=2.0)
+        assert results == {1: 1, 2: 4, 3: 9}
+        assert len(seen) == 1 + 2 + 3
+        assert seen[-1] == ProgressUpdate("squaring", 1 + 2 + 3, 9, value=2.0)
+        with pytest.raises(DisasmError, match="is bad; give another"):
+            list(pool.run(_refuses, [1, 2]))
 
 
 def test_map_keeps_the_order_and_counts() -> None:
@@ -96,19 +96,16 @@ def test_what_a_dead_worker_left_is_done_again(tmp_path: Path, reports: bool) ->
     jobs[1].touch()
     with WorkerPool(2) as pool:
         if reports:
-            assert dict(pool.run(_dies_once_reporting, jobs)) == {
-                jobs[0]: "a",
-                jobs[1]: "b",
-            }
+            done = dict(pool.run(_dies_once_reporting, jobs))
+            assert done == dict(zip(jobs, "ab", strict=True))
         else:
             assert pool.map(_dies_once, jobs) == ["a", "b"]
         assert pool.notes == ["a worker process died; its work was done again"]
 
 
 def test_workers_that_die_again_and_again_are_an_error() -> None:
-    match = r"died 3 times over the same work .* fewer --workers"
-    with WorkerPool(2) as pool, pytest.raises(DisasmError, match=match):
-        pool.map(_dies, [1])
+    with WorkerPool(2) as pool:
+        assert "died 3 times over the same work" in refusal(pool.map, _dies, [1])
 
 
 class KilledWorker(Exception):  # noqa: N818
@@ -116,29 +113,16 @@ class KilledWorker(Exception):  # noqa: N818
 
 
 @pytest.mark.parametrize("error", [BrokenExecutor, KilledWorker])
-def test_a_given_executor_that_lost_its_workers_is_an_error(
-    error: type[Exception],
-) -> None:
+def test_a_given_executor_that_lost_its_workers_is_an_error(error) -> None:
     def fail(job: int) -> None:
         raise error("gone")
 
-    with _pool("threads") as pool, pytest.raises(DisasmError, match="lost its workers"):
-        pool.map(fail, [1])
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_what_a_job_raises_is_raised(kind: str) -> None:
-    with (
-        _pool(kind) as pool,
-        pytest.raises(DisasmError, match="is bad; give another"),
-    ):
-        list(pool.run(_refuses, [1, 2]))
+    with _pool("threads") as pool:
+        assert "lost its workers" in refusal(pool.map, fail, [1])
 
 
 @pytest.mark.parametrize("kind", ["processes", "threads"])
-def test_ctrl_c_stops_running_jobs_at_their_next_update(
-    tmp_path: Path, kind: str
-) -> None:
+def test_ctrl_c_stops_jobs_at_their_next_update(tmp_path: Path, kind: str) -> None:
     jobs = [tmp_path / name for name in "abcd"]
 
     def press(update: ProgressUpdate) -> None:
@@ -195,14 +179,12 @@ def test_workers_import_what_they_are_told_to(
         import_in_workers("registers_something")
         assert pool.map(_is_imported, ["registers_something"]) == [True]
         import_in_workers("is_nowhere")
-        with pytest.raises(DisasmError, match=r"cannot import .* PYTHONPATH"):
-            pool.map(_is_imported, ["is_nowhere"])
+        assert "PYTHONPATH" in refusal(pool.map, _is_imported, ["is_nowhere"])
 
 
 def test_a_host_that_is_not_here_is_an_error() -> None:
     with (
         ThreadPoolExecutor(1) as threads,
         WorkerPool(executor=threads, host="192.0.2.1") as pool,
-        pytest.raises(DisasmError, match=r"192\.0\.2\.1: cannot listen"),
     ):
-        list(pool.run(_square, [1]))
+        assert "cannot listen" in refusal(lambda: list(pool.run(_square, [1])))

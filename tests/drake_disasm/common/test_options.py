@@ -2,7 +2,6 @@
 
 import argparse
 import math
-from collections.abc import Callable
 
 import pytest
 
@@ -29,18 +28,16 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("kind", "text", "value"), ACCEPTED)
-def test_accepted(kind: Callable[[str], float], text: str, value: float) -> None:
-    assert kind(text) == value
+def test_accepted() -> None:
+    for kind, text, value in ACCEPTED:
+        assert kind(text) == value
 
 
 @pytest.mark.parametrize(("kind", "texts"), REFUSED)
-def test_refused_in_one_short_line(
-    kind: Callable[[str], float], texts: tuple[str, ...]
-) -> None:
+def test_refused_in_one_short_line(kind, texts: tuple[str, ...]) -> None:
     for text in texts:
         with pytest.raises(argparse.ArgumentTypeError) as caught:
             kind(text)
         message = str(caught.value)
-        assert len(message) < 150 and "\n" not in message
         assert f"'{text[:40]}" in message
+        assert len(message) < 150 and "\n" not in message
