@@ -63,6 +63,7 @@ PRIVATE_PHRASES = re.compile(
 )
 LONGEST_FUNCTION = 50  # lines without the docstring
 MEDIAN_FUNCTION, USUAL_FUNCTION = 8, 25  # lines, of all and of nine in ten
+LONGEST_EXAMPLE = 100  # lines
 #: Words of the manual by hand, and of one page.
 MOST_WORDS, LONGEST_PAGE = 20_000, 1500
 GENERATED = (
@@ -209,6 +210,16 @@ def lengths() -> Iterator[str]:
         yield f"a tenth of the functions is over {USUAL_FUNCTION} lines"
 
 
+def examples() -> Iterator[str]:
+    """Yields examples that are long, or do not say how they are run."""
+    for file in (ROOT / "examples").glob("*.py"):
+        text = file.read_text("utf-8")
+        if len(text.splitlines()) > LONGEST_EXAMPLE:
+            yield f"{_path(file)}: over {LONGEST_EXAMPLE} lines"
+        if f"python {_path(file)}" not in text:
+            yield f"{_path(file)}: does not say `python {_path(file)}`"
+
+
 def words() -> Iterator[str]:
     """Yields private words in names, messages and docstrings; changes of sys.path."""
     for file in SOURCES:
@@ -246,7 +257,16 @@ def manual() -> Iterator[str]:
         yield f"the manual has {total} words; {MOST_WORDS} at most"
 
 
-RULES = (imports_of_parts, arrows, packages, docstrings, lengths, words, manual)
+RULES = (
+    imports_of_parts,
+    arrows,
+    packages,
+    docstrings,
+    lengths,
+    examples,
+    words,
+    manual,
+)
 
 
 def main() -> int:
