@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from results import Cell, add_results_argument, markdown, write_result
 
 from drake_disasm.common import options
-from drake_disasm.common.program import ProgressBar, run
+from drake_disasm.common.program import ProgressBar, argument_parser, run
 from drake_disasm.common.progress import ProgressUpdate
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.mdp import Outcome
@@ -28,6 +29,11 @@ from drake_disasm.scenario import draw, load_scenario
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.simulation import TaskSimulation
 
+_NAME = "benchmarks/against_baseline.py"
+COLUMNS = (
+    *("angle", "policy", "success (95 % interval)", "bolt out"),
+    *("mean force [N]", "mean peak force [N]", "greatest force [N]", "steps"),
+)
 _BASELINE, _ANGLE = "admittance", "effects.0.ry"
 _EDGES = np.array([0.0, 2.0, 4.0, 6.0])  # degrees either way
 _FIGURES = ("mean_force", "max_force", "steps")
@@ -45,43 +51,48 @@ def main(arguments: Sequence[str]) -> int:
         of = f"{Path(name).stem}_{Path(args.scenario).stem}_{args.station}"
         path = args.out / f"{of}.jsonl"
         found[name] = _episodes(path, name, args)
-    print("\n".join(table(found[args.policy], found[_BASELINE])))
+    own, baseline = found[args.policy], found[_BASELINE]
+    rows, note = table_rows(own, baseline), "; ".join(differences(own, baseline))
+    print(f"{markdown(COLUMNS, rows)}\n{note}")
+    title = f"{args.policy} and {_BASELINE} in the same episodes of the {args.station}"
+    note = f"Mean difference with its 95 % interval: {note}."
+    write_result(args.results, title, COLUMNS, rows, _NAME, arguments, note)
     return 0
 
 
-def table(own: Sequence[Row], baseline: Sequence[Row]) -> list[str]:
-    """Returns the lines of the table: by angle, and all.
+def table_rows(own: Sequence[Row], baseline: Sequence[Row]) -> list[tuple[Cell, ...]]:
+    """Returns the rows of the table, as COLUMNS says: by angle, and all.
 
     Args:
         own, baseline: of the same episodes.
     """
     degrees = np.abs(np.rad2deg([row["angle"] for row in own]))
-    lines = ["angle | policy | success | truly out | mean force | peak force | steps"]
+    rows: list[tuple[Cell, ...]] = []
     bins = [
         (f"{low:g} to {high:g} deg", (degrees >= low) & (degrees < high))
         for low, high in itertools.pairwise(_EDGES)
     ]
     for label, which in [*bins, ("all", np.ones(len(own), bool))]:
-        for name, rows in (("policy", own), (_BASELINE, baseline)):
-            part = [row for row, taken in zip(rows, which, strict=True) if taken]
+        for name, episodes in (("policy", own), (_BASELINE, baseline)):
+            part = [row for row, taken in zip(episodes, which, strict=True) if taken]
             if part:
-                lines.append(f"{label} | {name} | {_figures(part)}")
-    return [*lines, *_differences(own, baseline)]
+                rows.append((label, name, *_figures(part)))
+    return rows
 
 
-def _figures(rows: Sequence[Row]) -> str:
+def _figures(rows: Sequence[Row]) -> tuple[Cell, ...]:
     won = sum(row["success"] for row in rows)
     low, high = wilson_interval(won, len(rows))
     out = sum(row["bolt_is_out"] for row in rows)
     force, peak, steps = (np.array([row[f] for row in rows]) for f in _FIGURES)
-    return (
-        f"{won}/{len(rows)} ({100 * low:.1f} to {100 * high:.1f} %) | {out} | "
-        f"{force.mean():.3f} N | {peak.mean():.2f}, at most {peak.max():.1f} N | "
-        f"{steps.mean():.1f}"
-    )
+    success = f"{won} / {len(rows)} ({100 * low:.1f} to {100 * high:.1f} %)"
+    forces = (force.mean(), peak.mean(), peak.max())
+    mean, peaks, most = (round(float(value), 2) for value in forces)
+    return success, out, mean, peaks, most, round(float(steps.mean()), 1)
 
 
-def _differences(own: Sequence[Row], baseline: Sequence[Row]) -> list[str]:
+def differences(own: Sequence[Row], baseline: Sequence[Row]) -> list[str]:
+    """Returns the mean difference of each figure with its interval, in words."""
     lines = []
     for figure in _FIGURES:
         pairs = zip(own, baseline, strict=True)
@@ -118,7 +129,8 @@ def _episodes(path: Path, name: str, args: argparse.Namespace) -> list[Row]:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argument_parser(f"python {_NAME}", __doc__, "")
+    add_results_argument(parser)
     parser.add_argument("--policy", default="removal_randomised", metavar="NAME")
     parser.add_argument("--scenario", default="removal_randomised", metavar="NAME")
     parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE")

@@ -25,7 +25,14 @@ import endurance
 import numpy as np
 import psutil
 import training_speed
-from effect_matrix import COUNTS, LEVELS, closing_time, run_matrix
+from effect_matrix import (
+    COUNTS,
+    LEVELS,
+    closing_time,
+    counted,
+    in_words,
+    run_matrix,
+)
 from objective_speed import (
     SIZES,
     THESIS_S,
@@ -37,6 +44,7 @@ from objective_speed import (
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
+from results import Cell, add_results_argument, significant, write_result
 from tqdm import tqdm
 from update_speed import measure_updates
 
@@ -53,6 +61,7 @@ from drake_disasm.stations.hardware_config import load_hardware_config
 from drake_disasm.task.diagram import add_motion
 from drake_disasm.task.simulation import TaskSimulation
 
+_NAME = "benchmarks/benchmark.py"
 _REPEATS = 5
 _CLOSING_AIM_S = 300.0
 _LATENCY_MINUTES = 0.5
@@ -407,9 +416,11 @@ MEASUREMENTS: dict[tuple[str, ...], Callable[[], Iterator[Figure]]] = {
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
     keys = [key for group in MEASUREMENTS for key in group]
-    parser = program.argument_parser("python benchmarks/benchmark.py", __doc__, f"keys: {', '.join(keys)}")
+    known = f"keys: {', '.join(keys)}"
+    parser = program.argument_parser("python benchmarks/benchmark.py", __doc__, known)
     parser.add_argument("--only", nargs="+", metavar="KEY", help="run a part")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write figures")
+    add_results_argument(parser)
     parser.add_argument(
         "--effects",
         type=Path,
@@ -455,7 +466,11 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     if args.effects:
         counts = {name: getattr(args, name) for name, _, _ in COUNTS}
-        print(run_matrix(args.effects, counts, args.first_seed, args.levels))
+        found = run_matrix(args.effects, counts, args.first_seed, args.levels)
+        print(in_words(found))
+        head = ("logs", "counted", "passed", "of", "95 % interval [%]")
+        table_of = ("Blind tests of closing the loop", head, counted(found))
+        write_result(args.results, *table_of, _NAME, arguments)
         return 0
     wanted = set(args.only) if args.only else {k for g in MEASUREMENTS for k in g}
     groups = {g: m for g, m in MEASUREMENTS.items() if wanted & set(g)}
@@ -466,7 +481,22 @@ def main(arguments: Sequence[str]) -> int:
     if args.json:
         make_folder(args.json.parent)
         write_json(args.json, {f.key: f.value for f in figures})
+    write_result(args.results, *as_rows(figures), _NAME, arguments)
     return 0
+
+
+def as_rows(figures: list[Figure]) -> tuple[str, Sequence[str], list[Sequence[Cell]]]:
+    """Returns the figures as title, columns and rows of a result."""
+    columns = ("figure", "value", "unit", "compared with", "ratio")
+    rows = [
+        (f.key, significant(f.value), f.unit, f.reference, _ratio(f.ratio))
+        for f in figures
+    ]
+    return "Speed and memory", columns, rows
+
+
+def _ratio(ratio: float | None) -> str:
+    return "" if ratio is None else f"{ratio:.3g}"
 
 
 def table(figures: list[Figure]) -> str:
@@ -474,7 +504,7 @@ def table(figures: list[Figure]) -> str:
     width = max([26, *(len(figure.key) for figure in figures)])
     lines = [f"{'figure':{width}} {'value':>10} {'unit':5} {'ratio':>8}  compared with"]
     for f in figures:
-        ratio = "" if f.ratio is None else f"{f.ratio:8.3g}"
+        ratio = _ratio(f.ratio)
         lines.append(
             f"{f.key:{width}} {f.value:10.4g} {f.unit:5} {ratio:>8}  {f.reference}"
         )

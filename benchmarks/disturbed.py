@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from endurance import Shuttle, playing
+from results import Cell, add_results_argument, write_result
 from stalls import QUICK_ENOUGH, figures_left_out, go_first
 from tqdm import tqdm
 
@@ -33,6 +34,7 @@ from drake_disasm.task.episode import run_episode
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 from drake_disasm.task.simulation import TaskSimulation
 
+_NAME = "benchmarks/disturbed.py"
 _STEPS = 200  # of an episode that nothing ends
 _STALLS_EVERY, _FAULTS_EVERY = 3.0, 12.0  # s, on average
 _STALL = (0.01, 0.4)  # s, shortest and longest; their logarithm is uniform
@@ -158,7 +160,9 @@ def run(minutes: float, folder: Path, seed: int) -> Tally:
     tally, end = Tally(), time.monotonic() + 60 * minutes
     scenario = load_scenario("removal", [f"task.steps={_STEPS}"])
     header = transitions_header(
-        scenario, "hardware", program.provenance("python benchmarks/disturbed.py", [], seed)
+        scenario,
+        "hardware",
+        program.provenance(f"python {_NAME}", [], seed),
     )
     writer = LogWriter(folder / "log", header)
     with (
@@ -217,19 +221,38 @@ def rows_lost(folder: Path, tally: Tally) -> int:
     return sum(max(0, s - k) for s, k in zip(tally.steps, kept, strict=False))
 
 
+def table_rows(tally: Tally, lost: int) -> list[tuple[Cell, ...]]:
+    """Returns what happened as rows of a name and a figure."""
+    forces = tally.forces or [0.0]
+    usual = round(float(np.median(forces)), 1)
+    return [
+        ("episodes", len(tally.forces)),
+        ("steps", sum(tally.steps)),
+        *((f"ended by: {end}", count) for end, count in tally.ends.most_common()),
+        ("greatest force [N]", round(max(forces), 1)),
+        ("median of the episodes' greatest forces [N]", usual),
+        ("rows of the log lost", lost),
+    ]
+
+
 def main(arguments: Sequence[str]) -> int:
     """Runs, and prints what happened; returns the exit status."""
     tqdm.monitor_interval = 0  # a thread of its own
-    parser = program.argument_parser("python benchmarks/disturbed.py", __doc__, "")
+    parser = program.argument_parser(f"python {_NAME}", __doc__, "")
     add = parser.add_argument
     add("--minutes", type=options.above_zero, default=10.0, metavar="N")
     add("--seed", type=options.seed, default=0)
     add("--output", type=Path, default=Path("out/disturbed"), metavar="DIR")
+    add_results_argument(parser)
     args = parser.parse_args(arguments)
     go_first(1)
     args.output.mkdir(parents=True, exist_ok=True)
     tally = run(args.minutes, args.output, args.seed)
-    print(f"rows lost: {rows_lost(args.output, tally)}")
+    lost = rows_lost(args.output, tally)
+    print(f"rows lost: {lost}")
+    title = f"{args.minutes:g} minutes with stalls, losses and restarts"
+    rows = table_rows(tally, lost)
+    write_result(args.results, title, ("what", "figure"), rows, _NAME, arguments)
     return 0
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from objective_speed import recorded_log
+from results import Cell
 
 from drake_disasm.common.executors import WorkerPool
 from drake_disasm.common.files import make_folder, write_figure, write_text
@@ -54,8 +55,8 @@ def run_matrix(
     counts: Mapping[str, int],
     first: int = 0,
     levels: Sequence[float] = LEVELS,
-) -> str:
-    """Runs the blind tests; returns what they show, as Markdown.
+) -> dict[str, list[Answer]]:
+    """Runs the blind tests; returns the answers by what `COUNTS` lists.
 
     Answers that are in the folder already are not asked for again.
 
@@ -89,35 +90,45 @@ def run_matrix(
     if answers["seeds"]:
         figure = confusion_figure(answers["seeds"])
         write_figure(folder / "confusion.png", figure, dpi=110)
-    return text
+    return answers
 
 
 def in_words(found: Mapping[str, Sequence[Answer]]) -> str:
     """Returns what blind tests of each kind show, as Markdown."""
     singles, left = found["seeds"], found["left_out"]
     lines = [table(singles), "", errors_table(singles), ""] if singles else []
-    for level in sorted({a.case.level for a in singles}):
-        own = [a.named_first for a in singles if a.case.level == level]
-        lines += _counted(f"one effect, {level:g} times the noise: named first", own)
-    for name in ("pairs", "triples"):
-        lines += _counted(f"{name}: all named or tied", [a.in_tie for a in found[name]])
-    for rho in CORRELATIONS:
-        own = [a.ending != "none" for a in found["nulls"] if a.case.correlation == rho]
-        lines += _counted(f"nothing there, noise correlated by {rho:g}: alarms", own)
-    open_ = [a.ending != "explained" for a in left]
-    lines += _counted("an effect that the library lacks: not explained", open_)
+    lines += [
+        f"{logs}: {what}: {passed} of {count} ({interval} %)"
+        for logs, what, passed, count, interval in counted(found)
+    ]
     if left:
         ends = Counter(a.ending for a in left).items()
         lines.append(", ".join(f"{count} {end}" for end, count in ends))
     return "\n".join(lines)
 
 
-def _counted(what: str, passed: Sequence[bool]) -> list[str]:
-    """Returns a line with how many passed, and Wilson's interval; none of none."""
-    if not passed:
-        return []
+def counted(found: Mapping[str, Sequence[Answer]]) -> list[tuple[Cell, ...]]:
+    """Returns how many of each kind of log passed: kind, what, passed, of, interval."""
+    singles, nulls = found["seeds"], found["nulls"]
+    groups: list[tuple[str, str, list[bool]]] = []
+    for level in sorted({a.case.level for a in singles}):
+        own = [a.named_first for a in singles if a.case.level == level]
+        groups.append((f"one effect, {level:g} times the noise", "named first", own))
+    for name in ("pairs", "triples"):
+        tied = [a.in_tie for a in found[name]]
+        groups.append((name, "all named or tied", tied))
+    for rho in CORRELATIONS:
+        own = [a.ending != "none" for a in nulls if a.case.correlation == rho]
+        groups.append((f"no effect, noise correlated by {rho:g}", "false alarms", own))
+    open_ = [a.ending != "explained" for a in found["left_out"]]
+    groups.append(("an effect that the library lacks", "not explained", open_))
+    return [_row(*group) for group in groups if group[2]]
+
+
+def _row(logs: str, what: str, passed: Sequence[bool]) -> tuple[Cell, ...]:
+    """Returns how many passed, with Wilson's interval."""
     low, high = (100.0 * end for end in wilson_interval(sum(passed), len(passed)))
-    return [f"{what}: {sum(passed)} of {len(passed)} ({low:.0f} to {high:.0f} %)"]
+    return logs, what, sum(passed), len(passed), f"{low:.0f} to {high:.0f}"
 
 
 @contextmanager

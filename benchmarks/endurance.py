@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 from pydrake.systems.framework import Context
+from results import Cell, add_results_argument, markdown, write_result
 from tqdm import tqdm
 
 from drake_disasm.common import options, program
@@ -27,6 +28,8 @@ from drake_disasm.stations.hardware_config import load_hardware_config
 from drake_disasm.task.simulation import TaskSimulation
 from drake_disasm.visualization import MeshcatView, start_meshcat
 
+_NAME = "benchmarks/endurance.py"
+COLUMNS = ("time", "mean [ms]", "99 % [ms]", "greatest [ms]")
 _FAKE_CELL = str(Path(__file__).parents[1] / "tools" / "fake_cell.py")
 #: Not where another cell may be.
 _LCM = f"udpm://239.255.76.67:{20_000 + os.getpid() % 20_000}?ttl=0"
@@ -86,14 +89,14 @@ class Ages:
             rows[f"{name}, between samples"] = np.diff(np.unique(times)).tolist()
         return rows
 
-    def table(self) -> str:
-        """Returns mean, 99 % and greatest of each row, in ms, as Markdown."""
-        lines = ["| | mean | 99 % | greatest |", "|---|---|---|---|"]
+    def table_rows(self) -> list[tuple[Cell, ...]]:
+        """Returns name, mean, 99 % and greatest of each row, as COLUMNS says."""
+        rows: list[tuple[Cell, ...]] = []
         for name, values in self.rows().items():
             ms = 1e3 * np.array(values)
             figures = (ms.mean(), np.percentile(ms, 99), ms.max())
-            lines.append(f"| {name} | {' | '.join(f'{v:.1f} ms' for v in figures)} |")
-        return "\n".join(lines)
+            rows.append((name, *(round(float(figure), 1) for figure in figures)))
+        return rows
 
 
 def run(config: Path, minutes: float, views: Sequence[MeshcatView] = ()) -> Ages:
@@ -163,15 +166,19 @@ def _open() -> tuple[int, int]:
 def main(arguments: Sequence[str]) -> int:
     """Plays the cell in another process, and runs; returns the exit status."""
     tqdm.monitor_interval = 0  # a thread of its own
-    parser = program.argument_parser("python benchmarks/endurance.py", __doc__, "")
+    parser = program.argument_parser(f"python {_NAME}", __doc__, "")
     parser.add_argument("--minutes", type=options.above_zero, default=10.0, metavar="N")
     parser.add_argument("--meshcat", action="store_true", help="with a page, unwatched")
+    add_results_argument(parser)
     args = parser.parse_args(arguments)
     views = [MeshcatView(start_meshcat())] if args.meshcat else []
     with playing() as (config, _):
         before = _open()
-        print(run(config, args.minutes, views).table())
+        rows = run(config, args.minutes, views).table_rows()
+        print(markdown(COLUMNS, rows))
         print(f"threads and sockets before {before}, after {_open()}")
+    title = f"Ages of samples in {args.minutes:g} minutes of motion"
+    write_result(args.results, title, COLUMNS, rows, _NAME, arguments)
     return 0
 
 

@@ -135,6 +135,28 @@ def _json(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
+def markdown(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
+    """Returns a table as Markdown; columns of numbers are aligned to the right."""
+    ends = [
+        "---:" if _are_numbers(cells) else "---" for cells in zip(*rows, strict=True)
+    ]
+    lines = (columns, ends or ["---"] * len(columns), *rows)
+    return "\n".join(f"| {' | '.join(map(_cell, line))} |" for line in lines)
+
+
+def _are_numbers(cells: Sequence[Cell]) -> bool:
+    return all(not isinstance(cell, str) for cell in cells)
+
+
+def _cell(value: Cell) -> str:
+    return str(value).replace("|", "\\|").replace("\n", " ")
+
+
+def significant(value: float, digits: int = 4) -> float:
+    """Returns a number with so many significant digits, for a table."""
+    return float(f"{value:.{digits}g}")
+
+
 def machine() -> str:
     """Returns this machine's cores and architecture."""
     count = os.cpu_count() or 1

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from results import Cell, Result, read_result
+from results import Result, markdown, read_result
 
 from drake_disasm.common import bounded_yaml, program
 from drake_disasm.common.errors import DisasmError
@@ -200,24 +200,10 @@ def _data(folder: Path, page: Page, name: str) -> Result:
 def _table(result: Result) -> Iterator[str]:
     """Yields a result's heading, table, note and origin."""
     yield f"## {result.title}"
-    ends = ["---:" if _is_number(column) else "---" for column in _columns(result)]
-    lines = [result.columns, ends, *result.rows]
-    yield "\n".join(f"| {' | '.join(map(_cell, line))} |" for line in lines)
+    yield markdown(result.columns, result.rows)
     if result.note:
         yield result.note
     yield _origin(result)
-
-
-def _columns(result: Result) -> list[tuple[Cell, ...]]:
-    return list(zip(*result.rows, strict=True))
-
-
-def _is_number(cells: Sequence[Cell]) -> bool:
-    return all(not isinstance(cell, str) for cell in cells)
-
-
-def _cell(value: Cell) -> str:
-    return str(value).replace("|", "\\|").replace("\n", " ")
 
 
 def _origin(result: Result) -> str:

@@ -16,11 +16,13 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from results import Cell, add_results_argument, markdown, write_result
 
 from drake_disasm.common.files import write_json
-from drake_disasm.common.program import ProgressBar, run
+from drake_disasm.common.program import ProgressBar, argument_parser, run
 from drake_disasm.effects import (
     Effect,
     JointCoulombFriction,
@@ -42,6 +44,7 @@ from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.models.response.model import JointResponseModel
 from sysid.workers import Workers
 
+_NAME = "benchmarks/servo_friction.py"
 _JOINT = "servo"
 _MOTIONS = ("sin_sin", "sin_time_square", "lift_and_drop", "up_and_down")
 _FITTED = ("sin_sin", "lift_and_drop")
@@ -94,8 +97,7 @@ def main(arguments: Sequence[str]) -> int:
     logs = written_logs(args.data, args.out / "logs")
     fitted = [f"{motion}_kp{gain}" for motion in _FITTED for gain in (100, 200)]
     runs = _runs(logs, fitted)
-    table: dict[str, object] = {}
-    print("model | objective | " + " | ".join(runs) + "   (mrad)", flush=True)
+    table: dict[str, Any] = {}
     with ProgressBar(unit="run") as progress, Workers(args.workers) as workers:
         model = JointResponseModel([logs[name] for name in fitted])
         delta = model.default_huber_delta
@@ -104,7 +106,7 @@ def main(arguments: Sequence[str]) -> int:
         by_hand = _models() if args.only != "loop" else {}
         for name, kinds in by_hand.items():
             before = _best_fit(fitter, kinds, before)
-            table[name] = _row(name, before, runs)
+            table[name] = _row(before, runs)
             write_json(args.out / "result.json", table)
         if args.only != "by-hand":
             closed = close_loop(
@@ -113,18 +115,35 @@ def main(arguments: Sequence[str]) -> int:
                 progress=progress,
                 folder=args.out / "fits",
             )
-            table["the loop"] = _row("the loop", closed.last, runs)
+            table["the loop"] = _row(closed.last, runs)
             table["verdict"] = closed.text
             write_json(args.out / "result.json", table)
             print(closed.text)
+    columns = ("model", "objective", *(f"{name} [mrad]" for name in runs))
+    rows = table_rows(table)
+    print(markdown(columns, rows))
+    title = "Mean absolute error of a servo's position in free runs"
+    write_result(args.results, title, columns, rows, _NAME, arguments)
     return 0
+
+
+def table_rows(table: Mapping[str, Any]) -> list[tuple[Cell, ...]]:
+    """Returns a row for each model: name, objective, error of each group of runs."""
+    return [
+        (
+            name,
+            round(row["objective"], 2),
+            *(round(1e3 * error, 1) for error in row["errors"].values()),
+        )
+        for name, row in table.items()
+        if name != "verdict"
+    ]
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argument_parser(f"python {_NAME}", __doc__, "")
+    add_results_argument(parser)
     parser.add_argument("data", type=Path, help="folder of the servo's CSV files")
     parser.add_argument("--out", type=Path, required=True, help="folder")
     parser.add_argument("--workers", type=int, default=1, help="processes (default 1)")
@@ -164,17 +183,13 @@ def _best_fit(fitter: Fitter, kinds: Sequence[type[Effect]], before: Fit | None)
     return min(fits, key=lambda fit: fit.objective)
 
 
-def _row(
-    name: str, fit: Fit, runs: Mapping[str, JointResponseModel]
-) -> dict[str, object]:
-    """Returns the errors of free runs [rad], and prints them."""
+def _row(fit: Fit, runs: Mapping[str, JointResponseModel]) -> dict[str, Any]:
+    """Returns the objective, the errors of free runs [rad], and the values."""
     errors = {}
     for label, model in runs.items():
         run, _ = extended(model, fit.effects, with_shapes=True)
         error = run.predictions(fit.theta) - run.measurements.values
         errors[label] = float(np.mean(np.abs(error)))
-    numbers = " | ".join(f"{1e3 * error:.1f}" for error in errors.values())
-    print(f"{name} | {fit.objective:.2f} | {numbers}", flush=True)
     return {"objective": fit.objective, "errors": errors, "values": fit.values}
 
 

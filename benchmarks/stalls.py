@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 from drake import lcmt_iiwa_command
 from pydrake.lcm import DrakeLcm
+from results import Cell, add_results_argument, markdown, write_result
 from tqdm import tqdm
 
 from drake_disasm.common import options, program
@@ -36,6 +37,11 @@ from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.task.simulation import TaskSimulation
 
+_NAME = "benchmarks/stalls.py"
+COLUMNS = (
+    *("stall [s]", "where", "commands in 0.1 s", "least gap [ms]"),
+    *("joint speed [mrad/s]", "force [N]", "slipped [s]", "ended by"),
+)
 STALLS = (0.0, 0.01, 0.05, 0.1, 0.24, 1.0, 3.0)  # s
 PLACES = ("policy", "solver", "sender", "anywhere")
 _GROUP = "239.255.76.67"
@@ -295,30 +301,28 @@ def figures_left_out(reason: str) -> str:
     return re.sub(r"-?\d+(\.\d+)?", "#", reason.split(";")[0])
 
 
-def table(runs: Sequence[StallRun]) -> str:
-    """Returns a row for each stall and place, the worst of its runs, as Markdown."""
-    lines = [
-        "| stall | where | commands in 0.1 s | least gap | joint speed | force | "
-        "slipped | ended by |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+def table_rows(runs: Sequence[StallRun]) -> list[tuple[Cell, ...]]:
+    """Returns a row for each stall and place, the worst of its runs; see COLUMNS."""
+    rows: list[tuple[Cell, ...]] = []
     for stall, place in dict.fromkeys((run.stall, run.place) for run in runs):
         same = [run for run in runs if (run.stall, run.place) == (stall, place)]
         ends = [figures_left_out(run.ended) for run in same]
         ended = "; ".join(f"{ends.count(end)} {end}" for end in dict.fromkeys(ends))
-        lines.append(
-            f"| {stall:g} s | {place} | {max(run.rate for run in same)} "
-            f"| {1e3 * min(run.gap for run in same):.1f} ms "
-            f"| {1e3 * max(run.speed for run in same):.0f} mrad/s "
-            f"| {max(run.force for run in same):.1f} N "
-            f"| {np.mean([run.slipped for run in same]):.2f} s | {ended} |"
+        figures = (
+            1e3 * min(run.gap for run in same),
+            1e3 * max(run.speed for run in same),
+            max(run.force for run in same),
         )
-    return "\n".join(lines)
+        gap, speed, force = (round(value, 1) for value in figures)
+        slipped = round(float(np.mean([run.slipped for run in same])), 2)
+        rate = max(run.rate for run in same)
+        rows.append((stall, place, rate, gap, speed, force, slipped, ended))
+    return rows
 
 
 def main(arguments: Sequence[str]) -> int:
     """Runs, and prints the table; returns the exit status."""
-    parser = program.argument_parser("python benchmarks/stalls.py", __doc__, "")
+    parser = program.argument_parser(f"python {_NAME}", __doc__, "")
     add = parser.add_argument
     add(
         "--repeats",
@@ -336,8 +340,12 @@ def main(arguments: Sequence[str]) -> int:
         help="[s]",
     )
     add("--output", type=Path, metavar="FILE", help="JSON, written as runs end")
+    add_results_argument(parser)
     args = parser.parse_args(arguments)
-    print(table(run_all(args.stalls, args.repeats, args.output)))
+    rows = table_rows(run_all(args.stalls, args.repeats, args.output))
+    print(markdown(COLUMNS, rows))
+    title = "A stall of the hardware station's program"
+    write_result(args.results, title, COLUMNS, rows, _NAME, arguments)
     return 0
 
 

@@ -14,8 +14,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from results import Cell, add_results_argument, markdown, write_result
 
-from drake_disasm.common.program import ProgressBar, run
+from drake_disasm.common.program import ProgressBar, argument_parser, run
 from drake_disasm.logs import read_log
 from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.policies import Exploring, make_policy
@@ -26,21 +27,26 @@ from sysid.models.measurements import Measurements
 from sysid.models.twin import TwinModel
 from sysid.parameters import nominal_values
 
+_NAME = "benchmarks/twin_against_cell.py"
 _EXPLORATION = 1.5e-4  # m
 
 
 def main(arguments: Sequence[str]) -> int:
     """Records, predicts and prints the table."""
-    options = _parser().parse_args(arguments)
+    options = parse(arguments)
     scenarios = {name: load_scenario(name, options.set) for name in options.scenario}
-    print("scenario | quantile | " + " ".join(f"{name:>6}" for name in STATE_NAMES))
+    columns = ("scenario", "quantile", "unit", *STATE_NAMES)
+    rows: list[tuple[Cell, ...]] = []
     for name, scenario in scenarios.items():
         folder = options.log / name if options.log else None
         error, measured = errors(scenario, options.steps, folder, options.station)
         for unit, size in (("noise", measured.noise), ("stated", measured.sigma)):
             for label, row in _rows(error / size):
-                numbers = " ".join(f"{value:6.2f}" for value in row)
-                print(f"{name} | {label}, {unit} | {numbers}", flush=True)
+                numbers = (round(float(value), 2) for value in row)
+                rows.append((name, label, unit, *numbers))
+    print(markdown(columns, rows))
+    title = f"Residuals of the twin's predictions of the {options.station}"
+    write_result(options.results, title, columns, rows, _NAME, arguments)
     return 0
 
 
@@ -77,10 +83,10 @@ def _rows(residual: np.ndarray) -> list[tuple[str, np.ndarray]]:
     ]
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    parser = argument_parser(f"python {_NAME}", __doc__, "")
+    add_results_argument(parser)
     parser.add_argument("--scenario", nargs="+", default=["removal"], metavar="NAME")
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="of each"
@@ -95,7 +101,7 @@ def _parser() -> argparse.ArgumentParser:
         help="folder that keeps the logs, by the names of the scenarios; a log that is "
         "there already is not recorded again",
     )
-    return parser
+    return parser.parse_args(arguments)
 
 
 if __name__ == "__main__":

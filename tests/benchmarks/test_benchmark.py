@@ -3,16 +3,16 @@
 import json
 import math
 import subprocess
+import sys
 from pathlib import Path
 
 import benchmark
 import pytest
 
-from tests.tools.programs import run_program
-
 
 def _benchmark(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return run_program("benchmark", *arguments)
+    command = [sys.executable, benchmark.__file__, *arguments]
+    return subprocess.run(command, capture_output=True, text=True)
 
 
 def _figures(folder: Path, keys: list[str]) -> tuple[dict[str, float], str]:
