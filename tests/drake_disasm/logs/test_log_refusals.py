@@ -8,8 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from drake_disasm.logs import LogHeader, LogWriter, read_log, read_logs
-from tests.refusals import refused
+from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log, read_logs
+from tests.refusals import refusal, refused
 
 
 def _set(row, value):
@@ -96,6 +96,8 @@ def test_columns_that_are_not_written(
     writer = LogWriter(tmp_path / "log", headers[kind])
     with refused(*words):
         writer.write_episode(sample(kind) | {column: values})
+    with refused("wrench", "(12, 5)", "give (rows, 6)"):
+        flat_columns("transitions", {"wrench": np.zeros((12, 5))})
 
 
 @pytest.mark.parametrize("values", [["a"] * 12, [[1.0]] * 12])
@@ -229,18 +231,12 @@ def test_bad_headers(kind, key, value, words, written):
         read_log(folder)
 
 
-def test_units_may_be_spelt_otherwise(written):
-    folder = written("joint_motion")
+def test_units_may_be_spelt_otherwise_and_values_in_messages_are_short(written):
+    folder = written("transitions")
     _edit_header(folder, "units", _UNITS)
     assert read_log(folder).episodes
-
-
-def test_values_in_messages_are_short(written):
-    folder = written("transitions")
     path = _edit_header(folder, "task", list(range(3000)))
-    with pytest.raises(Exception, match="'task'") as caught:
-        read_log(folder)
-    assert len(str(caught.value)) < len(str(path)) + 300
+    assert len(refusal(read_log, folder)) < len(str(path)) + 300
 
 
 BOMB = "a0: &a0 [x]\n" + "".join(
@@ -280,6 +276,11 @@ def test_folders_that_are_no_logs(tmp_path, written):
         read_log(folder)
     with refused("no folder", "name at least one"):
         read_logs([])
+    folders = [written("joint_response"), written("static_wrench")]
+    with refused("static_wrench/log.yaml", "mixed kinds", "apart"):
+        read_logs(folders)
+    with refused("episode_0000.csv", "no column 'tau'", "measure"):
+        read_log(folders[1]).episodes[0]["tau"]
 
 
 @pytest.mark.parametrize(("name", "words"), [
@@ -305,18 +306,6 @@ def test_columns_that_differ_between_episodes(written, sample, headers):
     resumed = LogWriter(folder, headers["transitions"], resume=True)
     with refused("episode_0002.parquet", *words):
         resumed.write_episode(columns)
-
-
-def test_mixed_kinds(written):
-    folders = [written("joint_motion"), written("static_wrench")]
-    with refused("static_wrench/log.yaml", "mixed kinds", "apart"):
-        read_logs(folders)
-
-
-def test_a_quantity_that_was_not_measured(written):
-    episode = read_log(written("static_wrench")).episodes[0]
-    with refused("episode_0000.csv", "no column 'tau'", "measure"):
-        episode["tau"]
 
 
 def test_output_folders(tmp_path, headers, written):
