@@ -1,9 +1,10 @@
-"""Commands keep their pace, whatever stalls."""
+"""Commands keep their pace, whatever stalls, and it is known who is slow."""
 
 import numpy as np
 import pytest
 
-from drake_disasm.safety import CommandPacer
+from drake_disasm.common.stopwatch import Stopwatch
+from drake_disasm.safety import CommandPacer, LagMonitor
 
 PERIOD = 0.005  # s
 
@@ -22,13 +23,7 @@ class Time:
 
 
 def paced(stalls: dict[int, float], where: str, n: int = 200) -> tuple:
-    """Returns when commands left (m,), those that were held, and the pacer.
-
-    Args:
-        stalls: duration [s] by the number of the command.
-        where: "before" its turn, or "sending": between decision and sending.
-        n: turns taken.
-    """
+    """When commands left (m,), and the pacer; stalls [s] by the command's number."""
     time = Time()
     pacer = CommandPacer(PERIOD, time, time.wait, look=3 * PERIOD)
     sent = []
@@ -49,12 +44,10 @@ def paced(stalls: dict[int, float], where: str, n: int = 200) -> tuple:
 
 
 def test_without_stalls_it_keeps_the_period_and_loses_nothing() -> None:
+    """Jitter is made up for by gaps that are a little shorter."""
     sent, pacer = paced({}, "before")
     assert np.diff(sent)[1:] == pytest.approx(PERIOD, abs=1e-9)
     assert pacer.counts.slipped == 0.0 and pacer.counts.stalls == 0
-
-
-def test_jitter_is_made_up_for_by_gaps_that_are_little_shorter() -> None:
     sent, pacer = paced({20: 0.006, 40: 0.007, 41: 0.002}, "before")
     assert np.diff(sent).min() >= 0.9 * PERIOD - 1e-6
     assert sent[-1] - sent[0] == pytest.approx(199 * PERIOD, abs=1e-3)
@@ -104,3 +97,29 @@ def test_the_step_that_a_command_may_lead_is_of_the_time_since_the_last() -> Non
     pacer.sent()
     assert pacer.since_sent(time.now + 0.001) == pytest.approx(0.9 * PERIOD)
     assert pacer.since_sent(time.now + 3.0) == PERIOD
+
+
+def test_shares_are_of_the_diagrams_own_time() -> None:
+    """Each period of 0.1 s the policy takes 0.15 s, and 0.15 s slip."""
+    policy, now, slipped = Stopwatch(), 0.0, 0.0
+    monitor = LagMonitor(2.0)
+    monitor.stopwatches["policy"] = policy
+    lag = monitor.update(now, slipped, 0.0)
+    assert lag.slipped == 0.0
+    for _ in range(40):
+        now, slipped = now + 0.25, slipped + 0.15
+        policy.total += 0.15
+        lag = monitor.update(now, slipped, waited=now - slipped)
+    assert lag.window == pytest.approx(2.0, abs=0.3)
+    assert lag.slipped == pytest.approx(0.6 * lag.window)
+    assert lag.shares["policy"] == pytest.approx(1.5)
+    assert lag.shares_in_words.startswith("policy 150 %")
+    assert lag.slowest == ("policy", pytest.approx(0.15))
+    monitor.begin()
+    assert monitor.update(now, slipped, 0.0).slipped == 0.0
+    times = iter([1.0, 1.5, 7.0, 7.25])
+    policy.clock, before = lambda: next(times), policy.total
+    for _ in range(2):
+        with policy:
+            pass
+    assert policy.total == pytest.approx(before + 0.75)

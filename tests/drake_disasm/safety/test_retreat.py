@@ -65,17 +65,12 @@ def test_it_backs_away_until_half_of_the_limit_is_left() -> None:
         assert "too much; backed away 0." in supervisor.reason
 
 
-def test_it_stays_where_no_force_explains_the_hold() -> None:
+def test_it_stays_where_no_force_explains_the_hold_and_goes_no_further() -> None:
     for force in (15.0, 41.0, np.nan):
         retreat = Retreat(BoltCoordinates(), np.eye(3), LIMITS, PERIOD)
         x = np.zeros(6)
         retreat.begin(situation(x, force))
         assert np.array_equal(retreat.advance(x, situation(x, force)), x), force
-
-
-def test_it_goes_no_further_than_its_way() -> None:
-    retreat = Retreat(BoltCoordinates(), np.eye(3), LIMITS, PERIOD)
-    x = np.zeros(6)
     retreat.begin(situation(x, 25.0))
     for _ in range(100):
         x = retreat.advance(x, situation(x, 25.0))  # which does not fall

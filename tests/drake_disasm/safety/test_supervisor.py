@@ -24,15 +24,10 @@ def at(
     return dataclasses.replace(USUAL, q_measured=q, q_wanted=wanted, q_before=before)
 
 
-def test_nothing_is_sent_before_anything_is_measured():
-    nowhere = np.full(7, np.nan)
-    stop = ["no data"]
-    waiting = supervisor(stop)
-    assert np.isnan(waiting.command(at(nowhere, Q))).all()
-    assert waiting.mode is Mode.WAITING and waiting.reason == "no data"
-
-
 def test_waits_where_the_arm_is_until_the_command_is_there_too():
+    waiting = supervisor(["no data"])  # nothing is sent before anything is measured
+    assert np.isnan(waiting.command(at(np.full(7, np.nan), Q))).all()
+    assert waiting.mode is Mode.WAITING and waiting.reason == "no data"
     waiting = supervisor([])
     assert np.array_equal(waiting.command(at(Q, Q + 0.01)), Q)
     assert waiting.mode is Mode.WAITING and "0.0100 rad" in waiting.reason
@@ -45,6 +40,10 @@ def test_steps_are_clamped_and_counted():
     active.command(at(Q, Q))
     assert np.allclose(active.command(at(Q, Q + 0.01)), Q + STEP)
     assert active.clamped == 1 and active.mode is Mode.ACTIVE
+    active = supervisor([])
+    active.command(at(Q, Q))
+    soon = dataclasses.replace(at(Q, Q + 0.01), since_sent=0.5 * PERIOD)
+    assert np.allclose(active.command(soon), Q + 0.5 * STEP)  # a limit per second
 
 
 def test_a_trip_holds_at_the_measured_position_and_says_why():
@@ -77,6 +76,8 @@ def test_only_resume_ends_a_hold_and_then_it_waits_again():
     held = supervisor([])
     held.command(at(Q, Q))
     held.trip("stop", Q, 1.0)
+    held.begin()  # a new episode
+    assert held.mode is Mode.HOLD and held.reason == "stop"
     held.resume()
     assert held.mode is Mode.WAITING and np.isnan(held.held_since)
     away = Q + 0.05  # somebody pushed it
@@ -95,27 +96,12 @@ def test_an_arm_that_was_jogged_between_episodes_is_not_sent_back():
     assert active.mode is Mode.ACTIVE
 
 
-def test_a_new_episode_does_not_end_a_hold():
-    active = supervisor([])
-    active.command(at(Q, Q))
-    active.trip("stop", Q, 1.0)
-    active.begin()
-    assert active.mode is Mode.HOLD and active.reason == "stop"
-
-
 def test_a_command_that_was_not_sent_is_not_where_the_next_one_starts() -> None:
     active = supervisor([])
     active.command(at(Q, Q))
     active.command(at(Q, Q + STEP))
     active.withdraw()
     assert np.allclose(active.command(at(Q, Q + 2 * STEP)), Q + STEP)
-
-
-def test_the_limit_is_one_per_second() -> None:
-    active = supervisor([])
-    active.command(at(Q, Q))
-    soon = dataclasses.replace(at(Q, Q + 0.01), since_sent=0.5 * PERIOD)
-    assert np.allclose(active.command(soon), Q + 0.5 * STEP)
 
 
 def test_whoever_moves_is_held_where_nothing_can_be_sent() -> None:
