@@ -10,7 +10,6 @@ transition, as with a single environment. The program prints the steps per secon
 import sys
 import time
 from collections import Counter, deque
-from typing import Any
 
 import gymnasium
 from stable_baselines3 import SAC
@@ -20,17 +19,13 @@ from drake_disasm.learning.stable_baselines import DisassemblyVecEnv
 
 
 class Episodes:
-    """A callback that prints how the newest episodes ended.
-
-    Args:
-        period: steps of all environments between two lines.
-    """
+    """A callback that prints how the newest episodes ended, every `period` steps."""
 
     def __init__(self, period: int) -> None:
         self._period = self._next = period
-        self._newest: deque[dict[str, Any]] = deque(maxlen=50)
+        self._newest: deque[dict] = deque(maxlen=50)
 
-    def __call__(self, local: dict[str, Any], _: dict[str, Any]) -> bool:
+    def __call__(self, local: dict, _: dict) -> bool:
         """Takes note of episodes that have ended; training goes on."""
         self._newest += [i["episode"] for i in local["infos"] if "episode" in i]
         steps = local["self"].num_timesteps
@@ -48,10 +43,11 @@ def main(steps: int = 200, environments: int = 16, updates: int = 1) -> None:
     monitored = VecMonitor(batch, info_keywords=("outcome",))
     envs = VecNormalize(monitored, norm_reward=False)  # m, rad, N and N m to about 1
     agent = SAC("MlpPolicy", envs, gradient_steps=updates, seed=0, device="cpu")
-    start = time.perf_counter()
+    wall, processor = time.perf_counter(), time.process_time()
     agent.learn(steps, callback=Episodes(max(1, steps // 10)))
-    seconds = time.perf_counter() - start
-    print(f"{steps} steps in {seconds:.0f} s: {steps / seconds:.0f} steps/s")
+    wall, processor = time.perf_counter() - wall, time.process_time() - processor
+    print(f"{steps} steps in {wall:.0f} s: {steps / wall:.0f} steps/s "
+          f"({processor:.0f} s of processor time)")  # fmt: skip
     play(agent, envs)
 
 
@@ -61,8 +57,7 @@ def play(agent: SAC, envs: VecNormalize) -> None:
     observation, info = env.reset(seed=0)
     total = 0.0
     while info["outcome"] == "running":
-        scaled = envs.normalize_obs(observation)
-        action, _ = agent.predict(scaled, deterministic=True)
+        action, _ = agent.predict(envs.normalize_obs(observation), deterministic=True)
         observation, reward, _, _, info = env.step(action)
         total += float(reward)
     print(f"one episode: reward {total:.2f}, outcome: {info['outcome']}")
