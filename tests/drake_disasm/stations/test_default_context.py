@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.multibody.plant import CoulombFriction
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_disasm.effects import (
@@ -31,7 +31,6 @@ from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import SimulatedStation, TwinStation, make_station
 from drake_disasm.task.simulation import TaskSimulation
 from tests.drake_disasm.conftest import QUIET
-from tests.drake_disasm.stations.contexts import numbers
 from tests.refusals import refused
 
 JOINT = "iiwa_joint_4"
@@ -51,6 +50,19 @@ ON_ARM: list[Effect] = [
     TorqueOffset(JOINT, -2.0),
     FlangePayload(0.3, 0.01, 0.0, 0.02),
 ]
+
+
+def numbers(context: Context) -> np.ndarray:
+    """Returns all of a Context's time, discrete state and numeric parameters."""
+    state = [
+        context.get_discrete_state(i).value()
+        for i in range(context.num_discrete_state_groups())
+    ]
+    parameters = [
+        context.get_numeric_parameter(i).CopyToVector()
+        for i in range(context.num_numeric_parameter_groups())
+    ]
+    return np.concatenate([[context.get_time()], *state, *parameters])
 
 
 def _scenario(effects: list[Effect], *overrides: str) -> Scenario:
@@ -94,21 +106,14 @@ def station(simulator: Simulator) -> SimulatedStation:
     return next(each for each in systems if isinstance(each, SimulatedStation))
 
 
-def test_begin_leaves_it_as_it_is(
-    simulator: Simulator, station: SimulatedStation
-) -> None:
-    default = numbers(station.CreateDefaultContext())
+def test_begin_and_the_scenarios_effects_leave_it_and_come_back_to_it(station):
+    """What is declared at construction is what `set_effects` writes."""
     context = station.CreateDefaultContext()
+    default = numbers(context)
     begun = station.begin(context)
     np.testing.assert_array_equal(numbers(context), default)
     np.testing.assert_array_equal(begun.reading, station.initial_state.reading)
     np.testing.assert_array_equal(begun.position, station.start)
-
-
-def test_begin_and_the_scenarios_effects_come_back_to_it(station):
-    """What is declared at construction is what `set_effects` writes."""
-    context = station.CreateDefaultContext()
-    default = numbers(context)
     station.set_effects(context, [])
     assert not np.array_equal(numbers(context), default, equal_nan=True)
     station.set_effects(context, station.scenario.effects)
@@ -212,18 +217,13 @@ def test_an_unconnected_velocity_is_at_rest(twin: TwinStation) -> None:
     np.testing.assert_array_equal(*ends)
 
 
-@pytest.mark.parametrize(
-    ("name", "port", "remedy"),
-    [
-        ("cell", "gripper.position", "station.grip_command"),
-        ("cell", "iiwa.position", "station.start"),
-        ("twin", "bolt.position", "station.start"),
-    ],
-)
-def test_a_diagram_that_lacks_a_command_is_one_clear_error(
-    name: str, port: str, remedy: str, request: pytest.FixtureRequest
-) -> None:
-    station: SimulatedStation = request.getfixturevalue(name)
+@pytest.mark.parametrize(("name", "port", "remedy"), [
+    ("cell", "gripper.position", "station.grip_command"),
+    ("cell", "iiwa.position", "station.start"),
+    ("twin", "bolt.position", "station.start"),
+])  # fmt: skip
+def test_a_diagram_that_lacks_a_command_is_refused(name, port, remedy, request):
+    station = request.getfixturevalue(name)
     simulator = Simulator(station)
     context = simulator.get_mutable_context()
     for command in ({"gripper.position", f"{station.arm}.position"}) - {port}:

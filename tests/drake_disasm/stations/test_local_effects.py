@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder, EventStatus
 from pydrake.systems.primitives import Demultiplexer, TrajectorySource
@@ -59,13 +58,17 @@ class Pull:
         root = self.simulator.get_mutable_context()
         self.context = self.station.GetMyMutableContextFromRoot(root)
 
+    def to(self, time: float) -> "Pull":
+        """Attaches the station, and advances to a time [s]."""
+        self.station.attach(self.simulator)
+        self.simulator.AdvanceTo(time)
+        return self
+
     @property
     def bolt(self) -> np.ndarray:
         """Where the bolt is (3,) in Gn [m]."""
-        X_GnB: RigidTransform = self.station.GetOutputPort("bolt_pose").Eval(
-            self.context
-        )
-        return X_GnB.translation()
+        port = self.station.GetOutputPort("bolt_pose")
+        return port.Eval(self.context).translation()
 
     @property
     def force(self) -> np.ndarray:
@@ -104,9 +107,7 @@ def test_hydroelastic_materials_follow_too() -> None:
     """The scene graph's properties are changed while the simulation runs."""
     ratios = []
     for effects in ([RustyPatch(coefficient=0.3, position=0.005, width=0.05)], []):
-        pull = Pull(effects, model="hydroelastic")
-        pull.station.attach(pull.simulator)
-        pull.simulator.AdvanceTo(0.45)
+        pull = Pull(effects, model="hydroelastic").to(0.45)
         ratios.append(pull.force[0] / pull.force[2])
     assert ratios[1] == pytest.approx(0.2, rel=0.01)
     assert ratios[0] == pytest.approx(0.5, rel=0.01)  # in the middle of the patch
@@ -115,19 +116,16 @@ def test_hydroelastic_materials_follow_too() -> None:
 @pytest.mark.parametrize("has_velocity", [True, False])
 def test_the_commanded_velocity_is_seen(has_velocity: bool) -> None:
     """A drag of c v, in free motion, whether the rate is commanded too or not."""
-    forces = []
-    for effects in ([GrooveViscousFriction(400.0)], []):
-        pull = Pull(effects, across=0.0, has_velocity=has_velocity)
-        pull.station.attach(pull.simulator)
-        pull.simulator.AdvanceTo(0.3)
-        forces.append(pull.force[0])
-    assert forces[0] - forces[1] == pytest.approx(-400.0 * SPEED, rel=1e-3)
+    effects = ([GrooveViscousFriction(400.0)], [])
+    drag, free = (
+        Pull(each, across=0.0, has_velocity=has_velocity).to(0.3).force[0]
+        for each in effects
+    )
+    assert drag - free == pytest.approx(-400.0 * SPEED, rel=1e-3)
 
 
 def test_a_bend_turns_the_groove_under_the_bolt() -> None:
-    pull = Pull([GrooveBend(kz=0.5)], across=0.0)
-    pull.station.attach(pull.simulator)
-    pull.simulator.AdvanceTo(1.05)
+    pull = Pull([GrooveBend(kz=0.5)], across=0.0).to(1.05)
     X_GnG = pull.station.true_groove_pose(pull.context)
     assert X_GnG.rotation().matrix()[2, 0] == pytest.approx(0.5 * 0.01, rel=0.05)
 

@@ -43,23 +43,19 @@ def _poses(
     }
 
 
-def test_the_bolt_is_where_the_arm_holds_it(scenario: Scenario) -> None:
+def test_bolt_and_fingers_are_where_the_arm_holds_them(scenario: Scenario) -> None:
     X_WG = nominal_groove_pose(scenario.placement)
     X_FB = Tool.from_models(scenario).X_FB
     arm = ArmCoordinates(scenario.arm, X_WG, X_FB, scenario.task.period)
     q = arm.start(RigidTransform()) + 0.05 * np.arange(7)
     X_WB = X_WG @ arm.pose(q)
     assert _poses(scenario, q, 0.04)["bolt"].IsNearlyEqualTo(X_WB, 1e-9)
-
-
-def test_fingers_stand_as_far_apart_as_measured(scenario: Scenario) -> None:
-    def between(opening: float) -> float:
-        at = _poses(scenario, np.zeros(7), opening)
-        fingers = [X for name, X in at.items() if name.endswith("_finger")]
-        (a, b) = (X.translation() for X in fingers)
-        return float(np.linalg.norm(a - b))
-
-    assert between(0.06) - between(0.02) == pytest.approx(0.04)
+    apart = []
+    for opening in (0.06, 0.02):
+        at = _poses(scenario, q, opening)
+        a, b = (X.translation() for n, X in at.items() if n.endswith("_finger"))
+        apart.append(np.linalg.norm(a - b))
+    assert apart[0] - apart[1] == pytest.approx(0.04)
 
 
 def test_a_view_follows_what_is_measured(scenario: Scenario, meshcat: Meshcat) -> None:
@@ -73,12 +69,13 @@ def test_a_view_follows_what_is_measured(scenario: Scenario, meshcat: Meshcat) -
         assert meshcat._GetPackedTransform(_ARM)
 
 
-def test_a_run_on_hardware_is_seen_in_meshcat(
-    scenario: Scenario, meshcat: Meshcat
-) -> None:
+def test_a_run_on_hardware_is_seen_and_what_a_view_takes_is_counted(
+    scenario, meshcat, monkeypatch
+):
+    """Whatever draws between the first and the last of the view's systems."""
     view = MeshcatView(meshcat)
     with in_lockstep(scenario, make_policy("straight"), views=[view]) as parts:
-        simulation = parts[0]
+        simulation, station, cell = parts
         simulation.reset(0)
         view.begin_episode()
         begun = meshcat._GetPackedTransform(_ARM)
@@ -87,16 +84,6 @@ def test_a_run_on_hardware_is_seen_in_meshcat(
         assert meshcat._GetPackedTransform(_ARM) != begun
         assert meshcat.HasPath("path")
         assert not meshcat.HasPath("/drake/contact_forces")
-
-
-def test_what_a_view_takes_is_counted_as_the_views(
-    scenario: Scenario, meshcat: Meshcat, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Whatever draws between the first and the last of the view's systems."""
-    view = MeshcatView(meshcat)
-    with in_lockstep(scenario, make_policy("straight"), views=[view]) as parts:
-        simulation, station, cell = parts
-        simulation.reset(0)
         monkeypatch.setattr(view.wrench, "_draw", lambda *_: cell.skip(1))
         watches = station.lag.stopwatches
         before = {name: watch.total for name, watch in watches.items()}

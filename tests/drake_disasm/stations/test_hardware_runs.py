@@ -1,9 +1,11 @@
-"""The arm's controls on the hardware station, against a fake cell that plays them."""
+"""Controls, faults and forces on the hardware station, against a fake cell."""
+
+import math
 
 import numpy as np
 import pytest
-from fault_runs import in_lockstep
-from force_runs import run_push
+from fault_runs import ALL, in_lockstep, run_fault
+from force_runs import PUSHES, run_push
 
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
@@ -74,3 +76,50 @@ def test_a_cabinet_in_another_control_is_refused_when_it_is_built() -> None:
     scenario = load_scenario("removal", ["arm.control=cartesian_impedance"])
     with refused("iiwa.control", "'position'", "'cartesian_impedance'"):
         HardwareStation(scenario, HardwareConfig())
+
+
+#: What each does: the words of the hold, and within what time [s] of virtual time.
+HARMLESS = {("iiwa", "reorder"), ("ft_sensor", "reorder")}
+QUICK = [("iiwa", "jump"), ("iiwa", "reorder"), ("ft_sensor", "loss")]
+QUICK += [("gripper", "silent")]
+SLOW = [which for which in ALL if which not in QUICK]
+WORDS = {
+    "nan": ["not finite"],
+    "jump": ("jumped by 0.300 rad", "N on the gripper"),
+    "status": ("HEX status", "overcurrent"),
+    "short": ("not an lcmt_iiwa_status", "stopped sending"),
+    "header": ("not an lcmt_iiwa_status", "stopped sending"),
+}
+
+
+@pytest.mark.parametrize(
+    ("device", "fault"),
+    [*QUICK, *(pytest.param(*which, marks=pytest.mark.slow) for which in SLOW)],
+)
+def test_a_fault(device: str, fault: str) -> None:
+    """Of any device: a hold in time with its reason, or nothing at all."""
+    run = run_fault(device, fault)
+    if (device, fault) in HARMLESS:
+        assert run.mode is Mode.ACTIVE and math.isnan(run.until_hold)
+        assert "reordered" in run.counters
+        return
+    assert run.mode is Mode.HOLD
+    assert any(word in run.reason for word in WORDS.get(fault, ["stopped sending"]))
+    assert run.until_hold <= (0.6 if device == "gripper" else 0.08)
+    assert run.moved < 2e-3  # on the way to where it is held
+
+
+def test_the_arm_backs_away_from_what_presses() -> None:
+    run = run_push("across the groove (+z)", "yield")
+    assert "on the gripper, 20 are allowed; backed away 0." in run.reason
+    assert run.at_hold > 19.0 > 10.0 > run.soon
+    assert run.greatest < 1.2 * run.at_hold
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("push", PUSHES)
+def test_a_hold_leaves_less_than_the_limit(push: str) -> None:
+    run = run_push(push, "hold")
+    assert "on the gripper, 20 are allowed" in run.reason
+    assert "backed away" not in run.reason
+    assert run.late < 20.0
