@@ -19,7 +19,7 @@ from drake_disasm.scenario import GripperConfig, Scenario
 AXIS_ORDER = (0, 1, 2, 5, 4, 3)
 
 #: The simulated pads with rigid fingers behind them, as measured on the cell without
-#: adaptive fingers (docs/explanation/physics.md); along z the finger drives are in series.
+#: adaptive fingers; along z the finger drives are in series.
 _PADS = np.array([270e3, 300e3, np.nan, 430.0, 300.0, 430.0])
 
 

@@ -43,10 +43,26 @@ def movable_joints(url: str) -> tuple[str, ...]:
     """
     plant = MultibodyPlant(0.0)
     instance = add_model(plant, url)
+    return _movable(plant, instance)
+
+
+def arm_joints(url: str) -> tuple[str, ...]:
+    """Returns the names of an arm's joints from its base, if a station can take it.
+
+    Raises:
+        DisasmError: as of `add_arm`.
+    """
+    plant = MultibodyPlant(0.0)
+    instance, _ = add_arm(plant, url)
+    return _movable(plant, instance)
+
+
+def _movable(plant: MultibodyPlant, instance: ModelInstanceIndex) -> tuple[str, ...]:
+    """Returns the names of a model's joints in the order of their velocities."""
     plant.Finalize()
     joints = [plant.get_joint(index) for index in plant.GetJointIndices(instance)]
     moving = [joint for joint in joints if joint.num_velocities() == 1]
-    moving.sort(key=lambda joint: joint.velocity_start())  # not as the file has them
+    moving.sort(key=lambda joint: joint.velocity_start())  # a file may list them anyhow
     return tuple(joint.name() for joint in moving)
 
 

@@ -1,7 +1,7 @@
 """Motions of the arm away from the lock, played on the cell, simulated or real.
 
-From `motion.csv` of `drake-disasm excite` to a log of kind `joint_response`: the bolt is
-taken out of the groove, the arm goes to where the motion begins, and plays it.
+From `motion.csv` of `drake-disasm excite` to a log of kind `joint_response`: the bolt
+is taken out of the groove, the arm goes to where the motion begins, and plays it.
 
 Modules:
     table     a motion as a table of joint positions, checked against the arm's limits

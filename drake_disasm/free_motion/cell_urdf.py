@@ -5,12 +5,13 @@ from xml.etree import ElementTree
 
 from pydrake.multibody.tree import SpatialInertia
 
+from drake_disasm.cell.arm_description import BASE, FLANGE
+from drake_disasm.cell.parsing import arm_joints
 from drake_disasm.cell.placement import bench_top, nominal_groove_pose
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.resources import model_path
 from drake_disasm.scenario import Scenario
 
-_BASE, _FLANGE = "iiwa_link_0", "iiwa_link_ee"
 _DRAKE = "http://drake.mit.edu"
 _AROUND_TOOL = 0.09  # m, radius of a cylinder that has sensor, gripper and bolt in it
 _BEYOND_BOLT = 0.05  # m, from Bo to the cylinder's end
@@ -29,8 +30,9 @@ def cell_urdf(scenario: Scenario) -> str:
         scenario: of the cell.
 
     Raises:
-        DisasmError: a model file is missing.
+        DisasmError: a model file is missing, or the arm is none that a station takes.
     """
+    arm_joints(scenario.arm.model)
     ElementTree.register_namespace("drake", _DRAKE)
     root = ElementTree.parse(model_path(scenario.arm.model)).getroot()
     for link in root.iter("link"):
@@ -38,14 +40,14 @@ def cell_urdf(scenario: Scenario) -> str:
             link.remove(shape)
     tool, X_WG = Tool.from_models(scenario), nominal_groove_pose(scenario.placement)
     length = float(tool.X_FB.translation()[2]) + _BEYOND_BOLT
-    link = _add_link(root, "tool", _FLANGE)
+    link = _add_link(root, "tool", FLANGE)
     _add_inertia(link, tool.M_F)
     size = {"radius": _text(_AROUND_TOOL), "length": _text(length)}
     _add_collision(link, [0.0, 0.0, 0.5 * length], "cylinder", size)
     x, y, top = bench_top(X_WG, scenario.lock)
     height = top + _ABOVE_BENCH
     box = {"size": " ".join(map(_text, (*_BENCH, height)))}
-    _add_collision(_add_link(root, "bench", _BASE), [x, y, 0.5 * height], "box", box)
+    _add_collision(_add_link(root, "bench", BASE), [x, y, 0.5 * height], "box", box)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 

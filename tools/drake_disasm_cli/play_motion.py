@@ -16,7 +16,7 @@ from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 
-from drake_disasm.cell.parsing import movable_joints
+from drake_disasm.cell.parsing import arm_joints
 from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_text
@@ -79,7 +79,7 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     _refuse_contradictions(args)
     scenario = load_scenario(args.scenario, args.overrides)
-    joints = movable_joints(scenario.arm.model)
+    joints = arm_joints(scenario.arm.model)
     motion = read_motion(args.motion, len(joints))
     refuse_beyond_limits(motion, scenario.arm.model, args.motion)
     writer = _open_log(args, arguments, scenario) if args.record else None
@@ -146,7 +146,7 @@ def _open_log(
         task="free motion",
         provenance=provenance,
         period=scenario.arm.control_period,
-        joints=movable_joints(scenario.arm.model),
+        joints=arm_joints(scenario.arm.model),
         urdf=str((args.record / _URDF).absolute()),
         drive=_REAL if is_real else _SIMULATED,
         scenario=scenario_to_mapping(scenario),
