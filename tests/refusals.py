@@ -16,7 +16,7 @@ def refusal(call: Callable[..., object], *arguments: object, **options: object) 
         message = str(error)
     else:
         pytest.fail(f"not refused: {str((arguments, options))[:500]}")
-    assert "\n" not in message and len(message) < 500, message
+    assert "\n" not in message and len(message) < 1500, message
     return message
 
 
