@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.resources import models_dir
 from drake_disasm.effects import GrooveFriction, GroovePose
 from drake_disasm.mdp import action_bounds
@@ -17,6 +16,7 @@ from drake_disasm.scenario import (
     scenario_to_mapping,
 )
 from drake_disasm.stations import CellStation
+from tests.refusals import refused
 
 SHIPPED = sorted(path.stem for path in (models_dir() / "scenarios").glob("*.yaml"))
 
@@ -83,18 +83,58 @@ def test_overrides() -> None:
     assert replaced.effects == [GrooveFriction(coefficient=1.0)]
 
 
-def test_missing_scenario_suggests_a_name() -> None:
-    with pytest.raises(DisasmError, match=r"remval.*'removal'"):
+def test_missing_scenarios_and_models_are_named() -> None:
+    with refused("remval", "'removal'"):
         load_scenario("remval")
-
-
-def test_missing_model_names_file_and_key() -> None:
     url = "package://disasm_models/nothing.urdf"
     scenario = load_scenario("removal", [f"gripper.model={url}"])
-    with pytest.raises(DisasmError, match=r"nothing\.urdf is missing.*`model`"):
+    with refused("nothing.urdf is missing", "model"):
         CellStation(scenario)
 
 
 def test_defaults_are_valid(tmp_path: Path) -> None:
-    (tmp_path / "s.yaml").write_text("name: removal")
-    assert load_scenario(str(tmp_path / "s.yaml")) == Scenario()
+    assert _loaded(tmp_path, "name: removal") == Scenario()
+
+
+OLD = """\
+name: old
+twin: {mass: 3.0, stiffness: [550, 550, 550, 410, 280, 2000]}
+effects:
+  - !GroovePose {ry: 0.01}
+randomisation:
+  - {parameter: twin.mass, low: 2, high: 3}
+  - {parameter: lock.clearance, low: 0.0003, high: 0.0006}
+"""
+
+
+def _loaded(folder: Path, text: str) -> Scenario:
+    path = folder / "own.yaml"
+    path.write_text(text)
+    return load_scenario(str(path))
+
+
+def test_an_older_scenario_keeps_its_grip_and_what_it_says_of_it(
+    tmp_path: Path,
+) -> None:
+    scenario = _loaded(tmp_path, OLD)
+    assert scenario.gripper.compliance == "rigid"
+    assert scenario.effects[0].ry == 0.01
+    assert [r.parameter for r in scenario.randomisation] == ["lock.clearance"]
+    text = OLD + "gripper: {hold: weld, compliance: adaptive}\n"
+    scenario = _loaded(tmp_path, text)
+    assert scenario.gripper.hold == "weld"
+    assert scenario.gripper.compliance == "adaptive"
+
+
+def test_an_older_logs_scenario_is_read() -> None:
+    mapping = scenario_to_mapping(load_scenario("removal_turned"))
+    mapping["twin"] = {"mass": 2.0}
+    del mapping["gripper"]["compliance"]
+    scenario = scenario_from_mapping(mapping)
+    assert scenario.gripper.compliance == "rigid"
+    assert scenario.effects == load_scenario("removal_turned").effects
+
+
+def test_an_unknown_section_is_still_refused(tmp_path: Path) -> None:
+    with refused("twins"):
+        _loaded(tmp_path, OLD.replace("twin:", "twins:"))

@@ -1,10 +1,10 @@
-"""What the two scripted policies do on turned grooves."""
+"""What the two scripted policies do on turned grooves, and that no cheat pays more."""
 
 import numpy as np
 import pytest
 
 from drake_disasm.effects import GroovePose
-from drake_disasm.mdp import Outcome
+from drake_disasm.mdp import BoltState, Outcome, TaskGeometry
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.episode import EpisodeSummary, run_episode
@@ -12,6 +12,9 @@ from drake_disasm.task.simulation import TaskSimulation
 
 ANGLES_DEG = (0.0, 2.0, -2.0, 4.0, -4.0)
 F_MAX = 20.0  # N
+SCENARIO = load_scenario("removal")
+GEOMETRY = TaskGeometry.of(SCENARIO)
+HOVER = GEOMETRY.lift_needed - 0.001  # m, just below the height that counts as out
 
 
 def _episodes(
@@ -64,3 +67,61 @@ def test_ten_seeds_in_the_cell(angle_deg: float) -> None:
     assert sum(s.bolt_is_out for s in removed) > 5
     straight = _episodes("cell", "straight", angle_deg, range(10), "chapter4_stiff")
     _assert_jammed(straight, 0.055 if angle_deg else 0.062)
+
+
+class Cheat:
+    """Removes the bolt honestly up to just below success, then does something else.
+
+    Args:
+        then: gives the action (6,) for a height [m], step by step.
+    """
+
+    def __init__(self, then: str) -> None:
+        self._honest, self._then = make_policy("admittance", SCENARIO), then
+        self._steps = 0
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Returns the action (6,) for an observation (12,)."""
+        y = GEOMETRY.place(BoltState.from_vector(observation))[1]
+        if y < HOVER - 0.0003 and not self._steps:
+            action = self._honest(observation)
+            action[1] = min(action[1], 0.0004)
+            return action
+        self._steps += 1
+        if self._then == "fly on":
+            return np.array([0.003, 0.2 * (HOVER - y), 0.0, 0.0, 0.0, 0.0])
+        sign = -1.0 if self._steps % 2 else 1.0
+        return np.array([0.0, sign * 0.003, 0.0, 0.0, 0.0, 0.0])
+
+
+def _episode(policy: object, seed: int = 1) -> EpisodeSummary:
+    return run_episode(TaskSimulation(SCENARIO, "twin", policy), seed)
+
+
+def test_cheating_pays_less_than_removing_the_bolt() -> None:
+    honest = _episode(make_policy("admittance", SCENARIO))
+    assert honest.outcome is Outcome.SUCCESS
+    ends = {"fly on": Outcome.WORKSPACE, "up and down": Outcome.STEP_LIMIT}
+    for then, end in ends.items():
+        cheat = _episode(Cheat(then))
+        assert cheat.outcome is end and cheat.reward < honest.reward, then
+
+
+@pytest.mark.parametrize(
+    ("axis", "station"), [(0, "twin"), (1, "twin"), (2, "twin"), (1, "cell")]
+)
+def test_pulling_at_a_bolt_that_is_stuck_is_no_success(axis: int, station: str) -> None:
+    """In a grip that yields the arm goes on; the bolt's place is judged."""
+    action = np.zeros(6)
+    action[axis] = (-0.001, 0.001, 0.001)[axis]
+    scenario = load_scenario("removal", ["ft_sensor.noise=[0, 0, 0, 0, 0, 0]"])
+    simulation = TaskSimulation(scenario, station)
+    simulation.reset(1)
+    for step in range(11):  # and two at rest: a damper acts while the arm moves
+        result = simulation.step(action * (step < 9))
+        assert result.outcome is Outcome.RUNNING
+    X_GnB = simulation.evaluate(simulation.station, "bolt_pose")
+    state = BoltState.from_vector(result.observation)
+    assert abs(state.p[axis]) > 0.008
+    place = GEOMETRY.place(state)
+    np.testing.assert_allclose(place, X_GnB.translation(), atol=1e-4)

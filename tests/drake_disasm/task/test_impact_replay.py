@@ -108,11 +108,7 @@ def test_a_state_without_balance_is_nan_and_the_others_are_found():
 
 @dataclasses.dataclass
 class Wear(EnvironmentEffect):
-    """A groove worn at its beginning, by an equation of numbers, as users write it.
-
-    Equation: z -= depth exp(-x / 20 mm), mu += 0.1 where more than half is worn.
-    Where it acts: the groove.
-    """
+    """Groove: z -= depth exp(-x / 20 mm), mu += 0.1 where more than half is worn."""
 
     depth: float = amplitude("m", 0.0, 2e-3, "at A")
     is_local: ClassVar[bool] = True

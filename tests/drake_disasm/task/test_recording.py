@@ -1,8 +1,5 @@
 """Rows on hardware as they come: what ends an episode, and what is kept of it."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 from fault_runs import in_lockstep
@@ -18,36 +15,20 @@ STEPS = 3
 ROWS = ".episode_0000.unfinished.csv"
 
 
-def _rows_on_disk(folder: Path) -> int:
-    return max(0, (folder / ROWS).read_text().count("\n") - 1)
-
-
-def _interrupted(_: FakeCell) -> None:
-    raise KeyboardInterrupt
-
-
-def _jumps(cell: FakeCell) -> None:
-    cell.hex.fault = "jump"
-
-
-@pytest.mark.parametrize(("happens", "error", "reason"), [
-    (_interrupted, KeyboardInterrupt, "interrupted by Ctrl-C"),
-    (_jumps, DisasmError, "the robot is held: force "),
+@pytest.mark.parametrize(("error", "reason"), [
+    (KeyboardInterrupt, "interrupted by Ctrl-C"),
+    (DisasmError, "the robot is held: force "),
 ])  # fmt: skip
-def test_what_was_measured_is_kept_with_the_reason_of_the_end(
-    happens: Callable[[FakeCell], None],
-    error: type[BaseException],
-    reason: str,
-    tmp_path: Path,
-) -> None:
+def test_what_was_measured_is_kept_with_the_reason_of_the_end(error, reason, tmp_path):
     cells: list[FakeCell] = []
     seen: list[int] = []
 
     def policy(_: np.ndarray) -> np.ndarray:
         """Moves, and has something happen after some steps."""
-        if len(seen) == STEPS:
-            happens(cells[0])
-        seen.append(_rows_on_disk(tmp_path))
+        if len(seen) == STEPS and error is KeyboardInterrupt:
+            raise error
+        cells[0].hex.fault = "jump" if len(seen) == STEPS else ""
+        seen.append((tmp_path / ROWS).read_text().count("\n") - 1)
         return np.array([1e-3, 0, 0, 0, 0, 0])
 
     scenario = load_scenario("removal")
