@@ -16,14 +16,12 @@ from pydrake.systems.framework import DiagramBuilder
 from drake_disasm.common.timing import boundary
 from drake_disasm.fakes.lockstep import fake_hardware
 from drake_disasm.policies import make_policy
-from drake_disasm.scenario import load_scenario
 from drake_disasm.task.diagram import add_task
 
 
 def main(steps: int = 8) -> None:
     """Slides the bolt for a number of steps, and prints how the devices are."""
-    scenario = load_scenario("removal")
-    with fake_hardware(scenario) as fake:
+    with fake_hardware("removal") as fake:
         builder, station = DiagramBuilder(), fake.station
         builder.AddNamedSystem("station", station)
         task = add_task(builder, station, make_policy("straight"))
@@ -34,7 +32,7 @@ def main(steps: int = 8) -> None:
         task.begin(context)
         print("step  x [mm]  force along x [N]")
         for step in range(1, steps + 1):
-            simulator.AdvanceTo(boundary(step, scenario.task.period))
+            simulator.AdvanceTo(boundary(step, station.scenario.task.period))
             station.check()  # raises, with the reason, if the supervisor holds the arm
             s = task.processor.GetOutputPort("observation").Eval(
                 task.processor.GetMyContextFromRoot(context)

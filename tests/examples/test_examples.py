@@ -13,6 +13,8 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 #: What each of them must have printed.
 PRINTED = {
     "own_diagram": ["watch at http://", "0.20", "the bolt is held at A"],
+    "cartesian_command": ["1.00        10.00"],
+    "outside_force": ["bolt           -4.9", "-52.5"],
     "own_policy": ["twin        12", "cell        12"],
     "own_effect": ["MagneticCatch.force = 4.0", "[MagneticCatch(force=4.0"],
     "gymnasium_sb3": ["200 steps in ", "steps/s", "outcome: "],
@@ -48,3 +50,16 @@ def test_example_runs_and_prints(example: Path, tmp_path: Path) -> None:
     for words in PRINTED[example.stem]:
         assert words in done.stdout, done.stdout
     assert not re.search(r"\bnan\b", done.stdout, re.IGNORECASE), done.stdout
+
+
+@pytest.mark.parametrize("station", ["twin", "hardware"])
+def test_own_diagram_swaps_its_station(station: str) -> None:
+    done = subprocess.run(
+        [sys.executable, ROOT / "examples" / "own_diagram.py", "--station", station],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "the bolt is held at A" in done.stdout
+    assert ("truly" in done.stdout) == (station != "hardware")
