@@ -19,7 +19,7 @@ from sysid.models.base import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
-from tests.sysid.data_checks.damage import (
+from damaged_logs import (
     both,
     changed,
     damaged,

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
@@ -25,7 +24,6 @@ from sysid.models.static_wrench import StaticWrenchModel
 
 FORCE_NOISE, TORQUE_NOISE = 0.05, 0.002  # N, N m
 READINGS = 100
-_FORGETS = 500  # readings, after which a sieve knows nothing of its beginning
 _PAYLOAD = PayloadError(mass=1.2, cx=0.01, cy=-0.02, cz=0.06)
 _BIAS = SensorBias(fx=1.0, fy=-2.0, fz=3.0, tx=0.1, ty=-0.2, tz=0.05)
 
@@ -68,21 +66,16 @@ def static_log(
     effects = [_drawn(e, random, folder, R_WS, clean, level) for e in shaped]
     reading = _readings(folder / "with", R_WS, effects)
     noise = np.array([FORCE_NOISE] * 3 + [TORQUE_NOISE] * 3)
-    reading = reading + noise * autoregressive(random, READINGS, 6, correlation)
+    reading = reading + noise * _correlated(random, READINGS, correlation)
     write_static_wrench(folder / "log", R_WS, reading, "S", "weigh", {})
     return Drawn(tuple(kinds), folder / "log")
 
 
-def autoregressive(
-    random: np.random.Generator, rows: int, columns: int, rho: float
-) -> np.ndarray:
-    """Returns noise of unit variance (rows, columns), correlated from row to row."""
-    white = random.standard_normal((rows, columns))
-    noise = np.empty_like(white)
-    noise[0] = white[0]
-    for i in range(1, rows):
-        noise[i] = rho * noise[i - 1] + np.sqrt(1.0 - rho**2) * white[i]
-    return noise
+def _correlated(random: np.random.Generator, rows: int, rho: float) -> np.ndarray:
+    """Returns noise of unit variance (rows, 6), correlated from row to row."""
+    white = random.standard_normal((rows, 6))
+    white[1:] *= np.sqrt(1.0 - rho**2)
+    return np.asarray(lfilter([1.0], [1.0, -rho], white, axis=0))
 
 
 def verdict_of(folder: Path, library: Sequence[type[Effect]] | None = None) -> Verdict:
@@ -146,17 +139,3 @@ def _unexplained(change: np.ndarray, R_WS: np.ndarray) -> float:
         left = flat - A @ np.linalg.lstsq(A, flat, rcond=None)[0]
         parts.append(left / noise)
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
-
-
-def sieve(residual: np.ndarray, order: int, random: np.random.Generator) -> np.ndarray:
-    """Returns noise (n,) as correlated as a residual (n,): an autoregressive sieve.
-
-    Innovations of the autoregression that Yule and Walker fit, drawn anew.
-    """
-    n = len(residual)
-    centred = residual - residual.mean()
-    power = np.array([centred[k:] @ centred[: n - k] for k in range(order + 1)])
-    whitener = np.append(1.0, -solve_toeplitz(power[:-1], power[1:]))
-    innovations = lfilter(whitener, [1.0], centred)[order:]
-    drawn = random.choice(innovations - innovations.mean(), n + _FORGETS)
-    return np.asarray(lfilter([1.0], whitener, drawn)[_FORGETS:])

@@ -26,7 +26,7 @@ from sysid.objective import Objective
 from sysid.report import closing_page
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
-from tests.sysid.data_checks.damage import changed, damaged, with_episode
+from damaged_logs import changed, damaged, with_episode
 from tests.sysid.effect_selection.blind import closed, static_log, verdict_of
 
 _BIASED = ("SensorDrift", "SensorGain", "SensorMounting")

@@ -10,8 +10,9 @@ from drake_disasm.logs import read_logs
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.validation.null_logs import autoregressive
-from tests.sysid.effect_selection import arm_verdicts, null_alarms
-from tests.sysid.effect_selection.blind import sieve
+import arm_verdicts
+import null_alarms
+from sysid.validation.null_logs import autoregressive, sieve
 from tests.sysid.real_data import (
     write_arm,
     write_emps,

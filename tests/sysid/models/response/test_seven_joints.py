@@ -4,7 +4,7 @@ import pytest
 
 from sysid.effect_selection.close_loop import close_loop
 from sysid.models.response.model import JointResponseModel
-from tests.sysid.models.response.seven_joints import HIDDEN, write_log
+from seven_joints import HIDDEN, write_log
 
 
 def verdict(folder, name):

@@ -1,23 +1,21 @@
-"""What closing the loop says of logs of the cell: nothing hidden, and one effect each.
+"""What closing the loop says of logs of the cell: no effect hidden, or one in each.
 
-    python -m tests.sysid.effect_selection.cell_verdicts null --logs 50
-    python -m tests.sysid.effect_selection.cell_verdicts effect --logs 50
-
-Records each log (`removal`, `admittance` with 0.15 mm of exploration, six episodes) and
-judges it by the twin of the same scenario. Amplitudes of effects are four to ten times
-what the first null log that was judged would have shown with 80 % probability. Writes
-each answer to out/cell_verdicts as it comes, and goes on from there.
+Records each log (`removal`, `admittance` with 0.15 mm of exploration, 440 transitions)
+and judges it by the twin of the same scenario. Run `null` first: effects are four to
+ten times as large as the first null log would show with 80 % probability.
 """
 
-import argparse
 import copy
 import itertools
 import math
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from answers import Answer, Count, add_arguments, complete, read_answers, report
 
-from drake_disasm.common import options
+from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Effect
 from drake_disasm.logs import Log, read_log
@@ -28,12 +26,6 @@ from drake_disasm.task.simulation import TaskSimulation
 from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.validation.blind_tests import observable_effects
-from tests.sysid.effect_selection.answers import (
-    Answer,
-    complete,
-    counted,
-    read_answers,
-)
 
 _STEPS, _EPISODES = 440, 20  # recorded at least; seeds from one log to the next
 _SEEDS = {"null": 3000, "effect": 7000}
@@ -41,6 +33,11 @@ _EXPLORATION = 1.5e-4  # m
 _TIMES = (4.0, 10.0)  # the limit of detection
 _MOST = 0.5  # of the way to an amplitude's bound; beyond it the cell may not start
 _FAR = _MOST / _TIMES[1]
+_PROGRAM = "benchmarks/cell_verdicts.py"
+_EXAMPLES = """examples:
+  python benchmarks/cell_verdicts.py null --logs 50
+  python benchmarks/cell_verdicts.py effect --logs 50 --time-budget 30
+"""
 
 
 def record(folder: Path, scenario: Scenario, seed: int) -> Log:
@@ -53,7 +50,7 @@ def record(folder: Path, scenario: Scenario, seed: int) -> Log:
     return read_log(folder)
 
 
-def draw(number: int, limits: list[list[object]]) -> Effect:
+def draw(number: int, limits: list[list[Any]]) -> Effect:
     """Returns the effect of a case: another kind for each, as far as there are."""
     random = np.random.default_rng(_SEEDS["effect"])
     known = {str(row[0]) for row in limits if row[2] and row[3] < _FAR}
@@ -98,7 +95,7 @@ def _case(
     """Returns the answer to a case, within a time [s], with what was put in."""
     real, hidden, name = copy.deepcopy(scenario), "", ""
     if kind == "effect":
-        effect = draw(number, read_answers(out / "null.jsonl")[0]["limits"])
+        effect = draw(number, _limits(out / "null.jsonl"))
         real.effects, hidden, name = [effect], repr(effect), type(effect).__name__
     seed = _SEEDS[kind] + _EPISODES * number
     try:
@@ -108,11 +105,19 @@ def _case(
     return {"hidden": hidden, "kind": name} | answer(log, scenario, time_budget)
 
 
-def _summary(kind: str, answers: list[Answer]) -> str:
-    """Returns alarms of null logs, or effects named, with Wilson's intervals."""
+def _limits(path: Path) -> list[list[Any]]:
+    """Returns the limits of detection of the first null log that was judged."""
+    for each in read_answers(path):
+        if limits := each.get("limits"):
+            return list(limits)
+    raise DisasmError(f"{path}: no null log was judged; run `null --logs 1` first")
+
+
+def _counts(kind: str, answers: list[Answer]) -> list[Count]:
+    """Returns alarms of null logs, or effects named."""
     if kind != "effect":
         alarms = sum(bool(a["names"]) for a in answers)
-        return counted(kind, "name an effect", alarms, answers)
+        return [Count(kind, "name an effect (false alarm)", alarms, answers)]
     first = [a["names"][:1] == [a["kind"]] for a in answers]
     named = [a["kind"] in {*a["names"], *itertools.chain(*a["ties"])} for a in answers]
     explained = [a["ending"] == "explained" for a in answers]
@@ -121,14 +126,13 @@ def _summary(kind: str, answers: list[Answer]) -> str:
         ("named, or in a reported tie", named),
         ("the same, and explained", map(all, zip(named, explained, strict=True))),
     )
-    return "\n".join(counted(kind, what, sum(right), answers) for what, right in rows)
+    return [Count(kind, what, sum(right), answers) for what, right in rows]
 
 
-def main() -> None:
-    """Runs the program."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("kind", choices=sorted(_SEEDS))
-    parser.add_argument("--logs", type=int, default=50)
+def main(arguments: Sequence[str]) -> int:
+    """Judges logs of the cell and prints the table; returns the exit status."""
+    parser = program.argument_parser(f"python {_PROGRAM}", __doc__, _EXAMPLES)
+    parser.add_argument("kind", choices=sorted(_SEEDS), help="what is hidden")
     parser.add_argument(
         "--time-budget",
         type=options.above_zero_or_inf,
@@ -136,9 +140,8 @@ def main() -> None:
         metavar="MIN",
         help="of each log; its answer may be provisional, and stays (default: none)",
     )
-    parser.add_argument("--out", type=Path, default=Path("out/cell_verdicts"))
-    args = parser.parse_args()
-    args.out.mkdir(parents=True, exist_ok=True)
+    add_arguments(parser, 50, "cell_verdicts")
+    args = parser.parse_args(arguments)
     scenario, path = load_scenario("removal"), args.out / f"{args.kind}.jsonl"
     seconds = 60.0 * args.time_budget
     answers = complete(
@@ -146,8 +149,10 @@ def main() -> None:
         args.logs,
         lambda number: _case(args.kind, number, args.out, scenario, seconds),
     )
-    print(_summary(args.kind, answers), flush=True)
+    counts = _counts(args.kind, answers)
+    report(counts, "Verdicts on logs of the cell", _PROGRAM, arguments, args.results)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    program.run(main)

@@ -1,18 +1,21 @@
-"""An iiwa that is told where to go and says where it is: what the loop finds.
+"""What close-loop says of an iiwa's commanded and measured positions, without torques.
 
-    python -m tests.sysid.models.response.seven_joints --out out/seven_joints
-
-The logs are simulated, in steps five times finer than the model's. Closes the loop on
-one after the other, in this process, and prints a row of each.
+The logs are simulated, in steps five times finer than the model's, each with other
+hidden effects. Prints the verdict on each, and how long it took.
 """
 
-import argparse
 import time as clock
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from answers import Answer, complete
+from results import add_results_argument, write_result
 
+from drake_disasm.common import program
 from drake_disasm.effects import (
+    ArmEffect,
     ArmTilt,
     FlangePayload,
     JointBacklash,
@@ -36,7 +39,14 @@ DAMPING = np.array([120.0, 120.0, 90.0, 80.0, 40.0, 25.0, 12.0])
 DELAY = 0.008
 NOISE, QUANTUM = 3e-5, 2e-5  # rad
 POSTURE = np.array([0.0, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0])
-DURATION, PERIOD = 15.0, 0.01
+DURATION, PERIOD = 15.0, 0.01  # s
+_PROGRAM = "benchmarks/seven_joints.py"
+_EXAMPLES = """examples:
+  python benchmarks/seven_joints.py                    # 10 minutes on one core
+  python benchmarks/seven_joints.py --only payload tilt
+"""
+_TITLE = "Verdicts on an arm of seven joints, by its positions"
+_COLUMNS = ("hidden effect", "ending", "verdict", "time [s]")
 
 
 def goals(time: np.ndarray, random: np.random.Generator) -> np.ndarray:
@@ -50,13 +60,13 @@ def goals(time: np.ndarray, random: np.random.Generator) -> np.ndarray:
     return POSTURE + share**2 * (3.0 - 2.0 * share) * goal
 
 
-def write_log(folder: Path, *effects, seed: int = 0) -> Log:
+def write_log(folder: Path, *effects: ArmEffect, seed: int = 0) -> Log:
     """Writes what an iiwa with effects does behind its drives, and reads it."""
     random = np.random.default_rng(seed)
-    time = PERIOD * np.arange(round(DURATION / PERIOD) + 1)
+    time = np.arange(round(DURATION / PERIOD) + 1, dtype=np.float64) * PERIOD
     goal, one = goals(time, random), np.ones((len(time), len(JOINTS)))
     bodies = RigidBodies(URDF, JOINTS)
-    start = POSTURE - bodies.holding(POSTURE[None])[0] / STIFFNESS
+    start = np.array(POSTURE - bodies.holding(POSTURE[None])[0] / STIFFNESS)
     inputs = Inputs(goal, 0.0 * one, one, one, one)
     segment = Segment(0.0, start, np.zeros(7), time, inputs, np.zeros(7))
     own = ParameterSet(Drive(STIFFNESS, DAMPING, np.inf), DELAY, effects)
@@ -72,7 +82,7 @@ def write_log(folder: Path, *effects, seed: int = 0) -> Log:
 
 
 #: What is hidden, by name, and the seed of its motion and noise.
-HIDDEN = {
+HIDDEN: dict[str, tuple[tuple[ArmEffect, ...], int]] = {
     "nothing": ((), 1),
     "payload": ((FlangePayload(mass=1.5, cy=0.02, cz=0.12),), 2),
     "friction": (
@@ -89,21 +99,45 @@ HIDDEN = {
 }
 
 
-def main() -> None:
+def verdict(name: str, folder: Path) -> Answer:
+    """Returns what closing the loop says of a log, and how long it took [s]."""
+    effects, seed = HIDDEN[name]
+    log = write_log(folder, *effects, seed=seed)
+    begin = clock.perf_counter()
+    closed = close_loop(JointResponseModel([log]))
+    found = closed.verdict
+    took = round(clock.perf_counter() - begin)
+    names = ", ".join(found.names) or "-"
+    return {"ending": found.ending, "names": names, "text": closed.text, "s": took}
+
+
+def _numbered(name: str, folder: Path, _: int) -> Answer:
+    return verdict(name, folder)
+
+
+def main(arguments: Sequence[str]) -> int:
     """Prints the verdict on each log, and how long it took."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--only", nargs="+", choices=HIDDEN, default=list(HIDDEN))
-    parsed = parser.parse_args()
-    out = parsed.out
-    for name in parsed.only:
-        effects, seed = HIDDEN[name]
-        log = write_log(out / name, *effects, seed=seed)
-        begin = clock.perf_counter()
-        closed = close_loop(JointResponseModel([log]))
-        took = clock.perf_counter() - begin
-        print(f"{name}: {took:.0f} s\n{closed.text}\n", flush=True)
+    parser = program.argument_parser(f"python {_PROGRAM}", __doc__, _EXAMPLES)
+    parser.add_argument(
+        "--only", nargs="+", choices=HIDDEN, default=list(HIDDEN), metavar="NAME",
+        help=f"of {', '.join(HIDDEN)} (default: all)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/seven_joints"), metavar="DIR",
+        help="keeps logs and verdicts; a run that was stopped goes on from there "
+        "(default: out/seven_joints)",
+    )  # fmt: skip
+    add_results_argument(parser)
+    args = parser.parse_args(arguments)
+    rows = []
+    for name in args.only:
+        log, kept = args.out / name, args.out / f"{name}.jsonl"
+        [found] = complete(kept, 1, partial(_numbered, name, log))
+        print(f"{name}: {found['s']} s\n{found['text']}\n", flush=True)
+        rows.append([name, found["ending"], found["names"], found["s"]])
+    write_result(args.results, _TITLE, _COLUMNS, rows, _PROGRAM, arguments)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    program.run(main)

@@ -1,26 +1,37 @@
-"""What the first version of closing the loop got wrong, and what it says today.
+"""What close-loop says of logs that are hard to judge: short, damaged or ambiguous.
 
-    python -m tests.sysid.effect_selection.verdict_table --out out/verdict_table
-
-Makes a log for each row of `../shared/reference/verdicts-2.md` whose recording is at
-hand, or can be simulated, runs `tools/close_loop.py` on it as a user would, and prints
-a table in Markdown: what was said at 796ad0f, and what is said now. Writes each answer
-as it comes, and goes on from there; rows by name run alone.
+Makes a log for each row, real (`../shared/data`) or simulated, runs
+`tools/close_loop.py` on it as a user would, and prints a table in Markdown.
 """
 
-import argparse
 import dataclasses
 import json
 import resource
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from answers import complete
+from cell_verdicts import record
+from damaged_logs import (
+    Damage,
+    changed,
+    damaged,
+    late,
+    rounded,
+    scaled,
+    swapped,
+    with_episode,
+)
+from real_data import write_arm, write_emps, write_motion, write_slide, write_static
+from results import Cell, add_results_argument, write_result
 from scipy.spatial.transform import Rotation
 
+from drake_disasm.common import program
 from drake_disasm.common.arrays import Array
 from drake_disasm.effects import (
     Effect,
@@ -39,27 +50,19 @@ from drake_disasm.logs import Log, LogWriter, read_log, write_static_wrench
 from drake_disasm.scenario import dump_scenario, load_scenario
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
-from tests.sysid.data_checks.damage import (
-    Damage,
-    changed,
-    damaged,
-    late,
-    rounded,
-    scaled,
-    swapped,
-    with_episode,
-)
-from tests.sysid.effect_selection.cell_verdicts import record
-from tests.sysid.real_data import (
-    write_arm,
-    write_emps,
-    write_motion,
-    write_slide,
-    write_static,
-)
 
 SENSOR = ("wrench", "ft_sensor")
-_PROGRAM = "tools/close_loop.py"
+_TITLE = "Verdicts on logs that are hard to judge"
+_COLUMNS = ("log", "answer", "CPU time [s]")
+_PROGRAM = "benchmarks/verdict_table.py"
+_CLOSE_LOOP = Path(__file__).parents[1] / "tools" / "close_loop.py"
+_EXAMPLES = """examples:
+  python benchmarks/verdict_table.py                # a quarter of an hour on one core
+  python benchmarks/verdict_table.py sensor stroke
+"""
+
+#: Writes a log or logs to a folder; returns the options of close-loop.
+Make = Callable[[Path], list[str]]
 _SAID = ("data:", "error:")  # begins of lines on stderr that are part of an answer
 _SEED = 8001  # of the logs of this table
 
@@ -79,24 +82,7 @@ class Hum(SensorEffect):
         return wrench_S + self.fy * sine[..., None] * np.eye(6)[1]
 
 
-@dataclasses.dataclass(frozen=True)
-class Row:
-    """A row of the table.
-
-    Attributes:
-        what: the log, in words.
-        then: what was said of it.
-        make: writes the log or logs to a folder; returns the program's options.
-    """
-
-    what: str
-    then: str
-    make: Callable[[Path], list[str]]
-
-
-def _transitions(
-    effects: Sequence[Effect] = (), damage: Damage | None = None
-) -> Callable[[Path], list[str]]:
+def _transitions(effects: Sequence[Effect] = (), damage: Damage | None = None) -> Make:
     """Returns what writes a log of the twin, maybe with columns that are damaged."""
 
     def make(folder: Path) -> list[str]:
@@ -146,7 +132,7 @@ def _moving(folder: Path) -> list[str]:
     return ["--log", str(folder / "log")]
 
 
-def _arm(rows: int | None) -> Callable[[Path], list[str]]:
+def _arm(rows: int | None) -> Make:
     """Returns what writes the begin of a real arm's recording 1, or both recordings."""
 
     def make(folder: Path) -> list[str]:
@@ -197,7 +183,7 @@ def _static(folder: Path) -> list[str]:
     return ["--log", str(write_static(100, folder / "log"))]
 
 
-def _cell(*effects: Effect) -> Callable[[Path], list[str]]:
+def _cell(*effects: Effect) -> Make:
     """Returns what records the cell, with effects that its log does not state."""
 
     def make(folder: Path) -> list[str]:
@@ -216,102 +202,51 @@ def _wrong_name(folder: Path) -> list[str]:
 _THREE = [GrooveFriction(coefficient=0.1), SensorGain(fx=0.2), MotionLag(delay=0.05)]
 _SPIKES = changed("wrench.fy", [3, 9, 15], lambda values: values + 5.0)
 
-#: By a name that the command line takes.
-ROWS: dict[str, Row] = {
-    "arm": Row(
-        "a real arm (KUKA LWR 4+), recording 1, held out: 2",
-        "6.7 to 2.1 %: friction of six joints, offsets of four",
-        _arm(None),
-    ),
-    "arm_10s": Row(
-        "row 1; its first 10.4 s (in place of the Franka's, which is kept apart)",
-        "the Franka's: none, though friction halves the error",
-        _arm(2080),
-    ),
-    "arm_8s": Row("row 1; its first 8 s", "refused as too short", _arm(1600)),
-    "arm_4s": Row("row 1; its first 4 s", "refused as too short", _arm(800)),
-    "arm_2s": Row("row 1; its first 2 s", "refused as too short", _arm(400)),
-    "sensor": Row(
-        "a real force/torque sensor, 100 poses",
-        "0.334 to 0.064 N: a drift of fz that ends",
-        _static,
-    ),
-    "emps": Row(
-        "rows 2, 3 and 6; EMPS, record 1, held out: 2",
-        "68 to 7.1 %, explained; units of a rotary joint",
-        _emps,
-    ),
-    "stroke": Row(
-        "row 8; one stroke of EMPS",
-        "of a rack and pinion's: JointLoadFriction, a tie of four",
-        _stroke,
-    ),
-    "cell": Row(
-        "row 4; the cell, nothing hidden",
-        "unexplained: 4.2 times the noise",
-        _cell(),
-    ),
-    "moving": Row(
-        "row 5; readings at rest that move, 0.1 s apart", "none, 0.178 N", _moving
-    ),
-    "wrong_name": Row(
-        "row 7; a wrong name after --held-out", "refused after 30 s", _wrong_name
-    ),
-    "dead": Row(
-        "row 9; the wrench zero everywhere",
-        "SensorSaturation, RustyPatch, SensorGain",
-        _transitions(damage=scaled(0.0, *SENSOR)),
-    ),
-    "hum": Row("row 10; 0.15 N at 1.3 Hz on fy", "none", _transitions([Hum(fy=0.15)])),
-    "hum_loud": Row("row 10; 0.3 N at 1.3 Hz on fy", "-", _transitions([Hum(fy=0.3)])),
-    "spikes": Row(
-        "row 10; three rows of each episode with +5 N on fy",
-        "none",
+#: The log in words, and what makes it, by a name that the command line takes.
+ROWS: dict[str, tuple[str, Make]] = {
+    "arm": ("a real arm (KUKA LWR 4+), recording 1; held out: 2", _arm(None)),
+    "arm_10s": ("the same, its first 10.4 s", _arm(2080)),
+    "arm_8s": ("the same, its first 8 s", _arm(1600)),
+    "arm_4s": ("the same, its first 4 s", _arm(800)),
+    "arm_2s": ("the same, its first 2 s", _arm(400)),
+    "sensor": ("a real force/torque sensor, 100 poses", _static),
+    "emps": ("a real linear drive (EMPS), record 1; held out: 2", _emps),
+    "stroke": ("the same, one stroke", _stroke),
+    "cell": ("the cell, nothing hidden", _cell()),
+    "moving": ("readings at rest that move, 0.1 s apart", _moving),
+    "wrong_name": ("a wrong name after --held-out", _wrong_name),
+    "dead": ("the wrench zero everywhere", _transitions(damage=scaled(0.0, *SENSOR))),
+    "hum": ("0.15 N at 1.3 Hz on fy", _transitions([Hum(fy=0.15)])),
+    "hum_loud": ("0.3 N at 1.3 Hz on fy", _transitions([Hum(fy=0.3)])),
+    "spikes": (
+        "three rows of each episode with +5 N on fy",
         _transitions(damage=_SPIKES),
     ),
-    "late_wrench": Row(
-        "row 11; the wrench a row late",
-        "unexplained, nearest MotionLag",
-        _transitions(damage=late(1, *SENSOR)),
-    ),
-    "late_pose": Row(
-        "row 11; the pose a row late",
-        "unexplained, nearest Backlash",
+    "late_wrench": ("the wrench a row late", _transitions(damage=late(1, *SENSOR))),
+    "late_pose": (
+        "the pose a row late",
         _transitions(damage=late(1, "X_GB_measured")),
     ),
-    "swapped": Row(
-        "row 11; fy and fz exchanged",
-        "unexplained, nearest CrossTalk",
+    "swapped": (
+        "fy and fz exchanged",
         _transitions(damage=swapped("wrench.fy", "wrench.fz")),
     ),
-    "turned": Row(
-        "row 12; the twin, groove turned by ry = 0.034907",
-        "0.03488 (0.03487 to 0.0349), rz -17 (-48 to -6) urad",
+    "turned": (
+        "the twin, groove turned by ry = 0.034907",
         _transitions([GroovePose(ry=0.034907)]),
     ),
-    "turned_cell": Row(
-        "row 12; the cell, rx = 0.02, rz = -0.015, and 50 g of payload",
-        "rz -0.01456 (-0.01484 to -0.01423), y = 22 um",
+    "turned_cell": (
+        "the cell, groove turned by rx = 0.02, rz = -0.015, and 50 g of payload",
         _cell(GroovePose(rx=0.02, rz=-0.015), PayloadError(mass=0.05)),
     ),
-    "three": Row(
-        "row 13; friction, gain of fx, and a lag at once, 300 rows",
-        "two of the three, on 883 rows, in 371 s",
-        _transitions(_THREE),
-    ),
-    "cancel": Row(
-        "right before; an offset of 0.6 N and a drift of -0.12 N/s",
-        "0.606 and -0.1207",
+    "three": ("friction, gain of fx, and a lag at once", _transitions(_THREE)),
+    "cancel": (
+        "an offset of 0.6 N and a drift of -0.12 N/s",
         _transitions([SensorBias(fx=0.6), SensorDrift(fx=-0.12)]),
     ),
-    "one_episode": Row(
-        "right before; an offset in one episode of twelve",
-        "episode_0004 (SensorBias)",
-        _one_episode_offset,
-    ),
-    "quantum": Row(
-        "right before; a quantum of 0.5 N",
-        "unexplained",
+    "one_episode": ("an offset in one episode of twelve", _one_episode_offset),
+    "quantum": (
+        "a quantum of 0.5 N",
         _transitions(damage=rounded(0.5, "wrench.f", "ft_sensor.f")),
     ),
 }
@@ -321,9 +256,9 @@ def answer(name: str, folder: Path) -> dict[str, Any]:
     """Returns what the program prints of a row, its status, and its time [s]."""
     if not (folder / "options.json").exists():
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "options.json").write_text(json.dumps(ROWS[name].make(folder)))
+        (folder / "options.json").write_text(json.dumps(ROWS[name][1](folder)))
     options = json.loads((folder / "options.json").read_text())
-    command = [sys.executable, _PROGRAM, *options, "--out", str(folder / "out")]
+    command = [sys.executable, _CLOSE_LOOP, *options, "--out", folder / "out"]
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     done = subprocess.run([*command, "--workers", "1"], capture_output=True, text=True)
     spent = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
@@ -331,35 +266,38 @@ def answer(name: str, folder: Path) -> dict[str, Any]:
     if done.returncode == 0:
         result = json.loads((folder / "out" / "result.json").read_text())
         said.append(f"{result['ending']}: {result['sentence']}")
-    return {"name": name, "rc": done.returncode, "said": said, "cpu": round(spent, 1)}
+    return {"rc": done.returncode, "said": said, "cpu": round(spent, 1)}
 
 
-def table(answers: Sequence[dict[str, Any]]) -> str:
-    """Returns the answers beside those of before, as Markdown."""
-    lines = ["| log | at 796ad0f | now | CPU |", "|---|---|---|---|"]
-    for each in answers:
-        row, said = ROWS[each["name"]], "<br>".join(each["said"])
-        lines.append(f"| {row.what} | {row.then} | {said} | {each['cpu']} s |")
-    return "\n".join(lines)
+def main(arguments: Sequence[str]) -> int:
+    """Asks about the logs and prints the table; returns the exit status."""
+    parser = program.argument_parser(f"python {_PROGRAM}", __doc__, _EXAMPLES)
+    parser.add_argument(
+        "rows", nargs="*", metavar="ROW", help=f"of {', '.join(ROWS)} (default: all)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/verdict_table"), metavar="DIR",
+        help="keeps logs and answers; a run that was stopped goes on from there "
+        "(default: out/verdict_table)",
+    )  # fmt: skip
+    add_results_argument(parser)
+    args = parser.parse_args(arguments)
+    if unknown := [name for name in args.rows if name not in ROWS]:
+        parser.error(f"row '{unknown[0]}' is unknown; take of {', '.join(ROWS)}")
+    rows: list[list[Cell]] = []
+    for name in args.rows or ROWS:
+        ask = partial(_numbered, name, args.out / name)
+        [found] = complete(args.out / f"{name}.jsonl", 1, ask)
+        rows.append([ROWS[name][0], "<br>".join(found["said"]), found["cpu"]])
+    lines = [_COLUMNS, ["---"] * len(_COLUMNS), *rows]
+    print("\n".join(f"| {' | '.join(map(str, line))} |" for line in lines))
+    write_result(args.results, _TITLE, _COLUMNS, rows, _PROGRAM, arguments)
+    return 0
 
 
-def main() -> None:
-    """Runs the program."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("rows", nargs="*", metavar="ROW", help=", ".join(ROWS))
-    parser.add_argument("--out", type=Path, default=Path("out/verdict_table"))
-    args = parser.parse_args()
-    args.out.mkdir(parents=True, exist_ok=True)
-    path = args.out / "answers.jsonl"
-    known = [json.loads(line) for line in path.open()] if path.exists() else []
-    found = {each["name"]: each for each in known}
-    with path.open("a") as stream:
-        for name in args.rows or ROWS:
-            if name not in found:
-                found[name] = answer(name, args.out / name)
-                print(json.dumps(found[name]), file=stream, flush=True)
-    print(table([found[name] for name in args.rows or ROWS]))
+def _numbered(name: str, folder: Path, _: int) -> dict[str, Any]:
+    return answer(name, folder)
 
 
 if __name__ == "__main__":
-    main()
+    program.run(main)

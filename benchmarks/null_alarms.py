@@ -1,20 +1,21 @@
-"""How often closing the loop raises an alarm where nothing is missing.
-
-    python -m tests.sysid.effect_selection.null_alarms static white t3 --logs 200
-    python -m tests.sysid.effect_selection.null_alarms arm ar0.98 sieve --logs 200
+"""How often closing the loop names an effect where none is missing.
 
 The motion or the poses are those of real devices (`../shared/data`); what was measured
-is replaced by the model's own prediction and noise that is drawn. Writes each answer
-to out/null_alarms as it comes, and goes on from there.
+is replaced by the model's own prediction and noise that is drawn. Prints how many logs
+raise a false alarm, for each noise: white; t3 (Student's t, 3 degrees of freedom);
+proportional (to what is predicted); ar0.9 (an autoregression with that correlation from
+row to row); sieve (correlated as the real residual); or the sum of two, ar0.98+white.
 """
 
-import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from answers import Answer, Count, add_arguments, complete, report
+from real_data import write_arm, write_motion, write_static
 
+from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.logs import read_logs
 from sysid.effect_selection.close_loop import close_loop
@@ -26,10 +27,13 @@ from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.measurements import Measurements
 from sysid.validation import null_logs
 from sysid.workers import Workers
-from tests.sysid.effect_selection.answers import Answer, complete, counted
-from tests.sysid.real_data import write_arm, write_motion, write_static
 
 _ARM_ROWS = 600  # of 200 Hz: 3 s
+_PROGRAM = "benchmarks/null_alarms.py"
+_EXAMPLES = """examples:
+  python benchmarks/null_alarms.py static white t3 --logs 200
+  python benchmarks/null_alarms.py arm ar0.98 sieve sieve+white --logs 200
+"""
 
 
 def static(folder: Path) -> LogModel:
@@ -54,7 +58,11 @@ MODELS: dict[str, Callable[[Path], LogModel]] = {"static": static, "arm": arm}
 
 
 def noise_of(name: str, model: LogModel) -> null_logs.Noise:
-    """Returns the noise of a name: white, t3, proportional, ar0.9, sieve; or of two."""
+    """Returns the noise of a name: white, t3, proportional, ar0.9, sieve; or of two.
+
+    Raises:
+        DisasmError: there is no such noise.
+    """
     if "+" in name:
         first, second = (noise_of(part, model) for part in name.split("+", 1))
         return null_logs.both(first, second)
@@ -67,7 +75,16 @@ def noise_of(name: str, model: LogModel) -> null_logs.Noise:
         return plain[name]
     if name == "sieve":
         return null_logs.sieve(close_loop(model).last.linearisation.residual)
-    return null_logs.autoregressive(float(name.removeprefix("ar")))
+    try:
+        rho = float(name.removeprefix("ar"))
+    except ValueError:
+        rho = np.nan
+    if not abs(rho) < 1.0:
+        raise DisasmError(
+            f"noise '{name}': unknown; take one of {', '.join([*plain, 'sieve'])}, "
+            "ar0.9 with a number below 1, or two of them with +"
+        )
+    return null_logs.autoregressive(rho)
 
 
 def fitted(model: LogModel) -> np.ndarray:
@@ -108,26 +125,25 @@ def _model(logs: list[Path]) -> LogModel:
     return with_estimated_noise(found, Workers(), found.default_huber_delta)
 
 
-def main() -> None:
-    """Runs the program."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("model", choices=MODELS)
-    parser.add_argument(
-        "noise", nargs="+", help="white, t3, proportional, ar0.9, sieve, ar0.98+white"
-    )
-    parser.add_argument("--logs", type=int, default=200)
-    parser.add_argument("--out", type=Path, default=Path("out/null_alarms"))
-    args = parser.parse_args()
-    args.out.mkdir(parents=True, exist_ok=True)
+def main(arguments: Sequence[str]) -> int:
+    """Judges null logs and prints the table; returns the exit status."""
+    parser = program.argument_parser(f"python {_PROGRAM}", __doc__, _EXAMPLES)
+    parser.add_argument("model", choices=MODELS, help="whose poses or motion")
+    parser.add_argument("noise", nargs="+", metavar="NOISE", help="see above")
+    add_arguments(parser, 200, "null_alarms")
+    args = parser.parse_args(arguments)
     model = MODELS[args.model](args.out / "data")
-    for name in args.noise:
+    noises = {name: noise_of(name, model) for name in args.noise}
+    counts = []
+    for name, noise in noises.items():
         path = args.out / f"{args.model}_{name}.jsonl"
-        answer_to = partial(answer, model, noise_of(name, model))
-        found = complete(path, args.logs, answer_to)
+        found = complete(path, args.logs, partial(answer, model, noise))
         named = sum(bool(each["names"]) for each in found)
-        text = counted(f"{args.model}, {name}", "name an effect", named, found)
-        print(text, flush=True)
+        what = "name an effect (false alarm)"
+        counts.append(Count(f"{args.model}, {name}", what, named, found))
+    report(counts, "Logs with nothing missing", _PROGRAM, arguments, args.results)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    program.run(main)

@@ -1,25 +1,24 @@
-"""What closing the loop says of a real arm's motion with one effect that it hides.
-
-    python -m tests.sysid.effect_selection.arm_verdicts white --logs 100
-    python -m tests.sysid.effect_selection.arm_verdicts ar0.9 --level 1 --friction
+"""What closing the loop says of a real arm's motion in which one effect is hidden.
 
 The motion is that of a real arm (`../shared/data/kuka_lwr4`, 12 s); the torque is what
 its fitted rigid bodies and the effect predict, and noise that is drawn. Each kind of
 effect has its turn, at a joint, in a shape and with signs that are drawn, as large as
 the rigid bodies can't take up `--level` times the noise in its worst channel. With
-`--friction` every joint has dry and viscous friction besides, as real arms have. Writes
-each answer to out/arm_verdicts as it comes, and goes on from there.
+`--friction` every joint has undeclared dry and viscous friction, too, as real arms
+have.
 """
 
-import argparse
 import dataclasses
 import itertools
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from answers import Answer, Count, add_arguments, complete, report
+from null_alarms import arm_log, drawn, fitted, noise_of
 
-from drake_disasm.common import options
+from drake_disasm.common import options, program
 from drake_disasm.common.arrays import Array
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
@@ -38,13 +37,6 @@ from sysid.models.from_logs import ModelChoice, model_of
 from sysid.parameters import Parameter
 from sysid.validation import null_logs
 from sysid.workers import Workers
-from tests.sysid.effect_selection.answers import Answer, complete, counted
-from tests.sysid.effect_selection.null_alarms import (
-    arm_log,
-    drawn,
-    fitted,
-    noise_of,
-)
 
 _ROWS = 2400  # of 200 Hz: 12 s
 _SEED = 11_000
@@ -53,6 +45,11 @@ _CLOSE = 0.05  # of it
 _MOST_OF_RANGE = 0.9  # of an amplitude's
 _MOST_FIELDS = 2
 _NOISE = 0.3  # of what rigid bodies leave of the real torque: without its friction
+_PROGRAM = "benchmarks/arm_verdicts.py"
+_EXAMPLES = """examples:
+  python benchmarks/arm_verdicts.py white --logs 100
+  python benchmarks/arm_verdicts.py ar0.9 --level 1 --friction --logs 48
+"""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -230,8 +227,8 @@ def said(found: Answer) -> set[str]:
     return {name for text in texts for name in text.split(" and ")}
 
 
-def _summary(name: str, answers: list[Answer]) -> str:
-    """Returns how often the effects were named, with Wilson's intervals."""
+def _counts(name: str, answers: list[Answer]) -> list[Count]:
+    """Returns how often the effects were named."""
     shown = [a for a in answers if a["kinds"]]
     own = [a["kinds"][0] in said(a) for a in shown]
     named = [set(a["kinds"]) <= said(a) for a in shown]
@@ -242,30 +239,38 @@ def _summary(name: str, answers: list[Answer]) -> str:
         ("name all that is there, or have it in ties", named),
         ("the same, and name nothing else", alone),
     )
-    return "\n".join(counted(name, what, sum(right), shown) for what, right in rows)
+    return [Count(name, what, sum(right), shown) for what, right in rows]
 
 
-def main() -> None:
-    """Runs the program."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("noise", nargs="+", help="white, t3, ar0.9, sieve")
-    parser.add_argument("--logs", type=int, default=100)
-    parser.add_argument("--level", type=options.above_zero, default=2.0)
+def main(arguments: Sequence[str]) -> int:
+    """Judges the logs and prints the table; returns the exit status."""
+    parser = program.argument_parser(f"python {_PROGRAM}", __doc__, _EXAMPLES)
     parser.add_argument(
-        "--friction", action="store_true", help="joints rub besides, undeclared, too"
+        "noise", nargs="+", metavar="NOISE",
+        help="white, t3, ar0.9, sieve or a sum, as in null_alarms.py",
+    )  # fmt: skip
+    parser.add_argument(
+        "--level", type=options.above_zero, default=2.0, metavar="X",
+        help="size of the effect, times the noise (default: 2)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--friction", action="store_true", help="joints have undeclared friction, too"
     )
-    parser.add_argument("--out", type=Path, default=Path("out/arm_verdicts"))
-    args = parser.parse_args()
-    args.out.mkdir(parents=True, exist_ok=True)
+    add_arguments(parser, 100, "arm_verdicts")
+    args = parser.parse_args(arguments)
     model = arm(args.out / "data")
     real = model, fitted(model)
     real = with_friction(*real) if args.friction else real
-    besides = "_friction" * args.friction
-    for name in args.noise:
-        path = args.out / f"{name}_{args.level:g}{besides}.jsonl"
-        to = partial(answer, model, real, noise_of(name, model), args.level)
-        print(_summary(f"arm, {name}", complete(path, args.logs, to)), flush=True)
+    noises = {name: noise_of(name, model) for name in args.noise}
+    counts = []
+    for name, noise in noises.items():
+        path = args.out / f"{name}_{args.level:g}{'_friction' * args.friction}.jsonl"
+        to = partial(answer, model, real, noise, args.level)
+        counts += _counts(f"arm, {name}", complete(path, args.logs, to))
+    title = "Verdicts on a real arm's motion"
+    report(counts, title, _PROGRAM, arguments, args.results)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    program.run(main)
