@@ -27,17 +27,9 @@ from drake_disasm.scenario import load_scenario
 from drake_disasm.task.recording import EpisodeRecorder
 from tests.drake_disasm.conftest import without_imprecision
 
-SCENARIO = without_imprecision(
-    load_scenario(
-        "removal_randomised",
-        [
-            "contact.model=impact",
-            "ft_sensor.noise=[0, 0, 0, 0, 0, 0]",
-            "task.steps=4",
-            "task.max_translation=0.002",
-        ],
-    )
-)
+_OVERRIDES = ["contact.model=impact", "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"]
+_OVERRIDES += ["task.steps=4", "task.max_translation=0.002"]
+SCENARIO = without_imprecision(load_scenario("removal_randomised", _OVERRIDES))
 
 
 def _training(envs: int, **changes: Any) -> Training:
@@ -59,11 +51,11 @@ def test_a_round_is_the_diagrams_episodes_one_after_the_other():
         assert one.max_force == pytest.approx(other.max_force, abs=0.02)
     for one, other in zip(recorded, expected, strict=True):
         _assert_same_rows(one.columns(), other)
-    found, there = together.replay.contents()[0], apart.replay.contents()[0]
-    order = np.argsort(there[:, 12])  # in lockstep they come in another order
-    np.testing.assert_allclose(
-        found[np.argsort(found[:, 12])][:, :18], there[order][:, :18], atol=0.01
+    found, there = (  # in lockstep they come in another order
+        rows[np.argsort(rows[:, 12]), :18]
+        for rows in (together.replay.contents()[0], apart.replay.contents()[0])
     )
+    np.testing.assert_allclose(found, there, atol=0.01)
 
 
 def _assert_same_rows(found: dict[str, np.ndarray], recorder: EpisodeRecorder) -> None:
@@ -79,14 +71,12 @@ def _assert_same_rows(found: dict[str, np.ndarray], recorder: EpisodeRecorder) -
 
 @pytest.mark.parametrize("schedule", ["delayed", "every_step"])
 def test_a_restored_training_goes_on_bit_for_bit(schedule: str, tmp_path: Path) -> None:
-    whole = _training(2, schedule=schedule)
+    whole, first, second = (_training(2, schedule=schedule) for _ in range(3))
     for _ in range(3):
         whole.run_episodes()
     assert [s.steps for s in whole.summaries] == [4] * 5  # the last round has one
-    first = _training(2, schedule=schedule)
     first.run_episodes()
     first.save(tmp_path / "c.npz")
-    second = _training(2, schedule=schedule)
     second.restore(tmp_path / "c.npz")
     for _ in range(2):
         second.run_episodes()

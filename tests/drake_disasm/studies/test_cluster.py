@@ -30,8 +30,9 @@ def _run_and_kill(study: Study, folder: Path, workers: int, victims: int) -> Non
     One after the other, once episodes are written.
     """
     killed: list[int] = []
+    options = {"processes": victims > 0, "threads_per_worker": 1}  # or this process
     with distributed.LocalCluster(
-        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0"
+        n_workers=workers, dashboard_address=":0", **options
     ) as cluster:
 
         def kill() -> None:

@@ -192,7 +192,7 @@ def test_classical_control_stands_beside_every_agent(tmp_path: Path) -> None:
 def test_factors_are_analysed_as_the_thesis_s(tmp_path: Path) -> None:
     levels = {"batch": ["100"], "critic_rate": ["0.005"]}
     levels |= {"tau": ["0.1", "0.9"], "actor_rate": ["0.005", "0.5"]}
-    study = _study("hyperparameters", levels=levels)
+    study = _study("hyperparameters", levels=levels, validation=1)
     open_study(study, tmp_path / "out", resume=False)
     run_study(study, tmp_path / "out")
     averages, variance, best, spent = study.tables(tmp_path / "out")
