@@ -33,12 +33,12 @@ def with_episode(log: Log, other: Log, place: int) -> Log:
 def scaled(factor: float, *names: str) -> Damage:
     """Returns what scales columns; a name ends where that of a column begins."""
 
-    def damage(columns: Columns) -> None:
+    def _damage(columns: Columns) -> None:
         for name in columns:
             if name.startswith(names):
                 columns[name] = factor * columns[name]
 
-    return damage
+    return _damage
 
 
 def changed(
@@ -46,50 +46,50 @@ def changed(
 ) -> Damage:
     """Returns what changes some rows of a column."""
 
-    def damage(columns: Columns) -> None:
+    def _damage(columns: Columns) -> None:
         columns[name][rows] = change(columns[name][rows])
 
-    return damage
+    return _damage
 
 
 def rounded(step: float, *names: str) -> Damage:
     """Returns what rounds columns to whole steps."""
 
-    def damage(columns: Columns) -> None:
+    def _damage(columns: Columns) -> None:
         for name, values in columns.items():
             if name.startswith(names):
                 columns[name] = step * np.round(values / step)
 
-    return damage
+    return _damage
 
 
 def swapped(first: str, second: str, sign: float = 1.0) -> Damage:
     """Returns what exchanges two columns, and maybe turns the sign of both."""
 
-    def damage(columns: Columns) -> None:
+    def _damage(columns: Columns) -> None:
         columns[first], columns[second] = sign * columns[second], sign * columns[first]
 
-    return damage
+    return _damage
 
 
 def late(rows: int, *names: str) -> Damage:
     """Returns what makes columns late by some rows."""
 
-    def damage(columns: Columns) -> None:
+    def _damage(columns: Columns) -> None:
         for name, values in columns.items():
             if name.startswith(names):
                 late = np.roll(values, rows)
                 late[:rows] = values[0]
                 columns[name] = late
 
-    return damage
+    return _damage
 
 
 def both(*damages: Damage) -> Damage:
     """Returns what does one damage after the other."""
 
-    def damage(columns: Columns) -> None:
+    def _damage(columns: Columns) -> None:
         for each in damages:
             each(columns)
 
-    return damage
+    return _damage

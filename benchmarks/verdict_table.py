@@ -85,13 +85,13 @@ class Hum(SensorEffect):
 def _transitions(effects: Sequence[Effect] = (), damage: Damage | None = None) -> Make:
     """Returns what writes a log of the twin, maybe with columns that are damaged."""
 
-    def make(folder: Path) -> list[str]:
+    def _make(folder: Path) -> list[str]:
         transitions_log(folder / "log", nominal(), effects, _SEED)
         if damage:
             _rewritten(folder / "log", damaged(read_log(folder / "log"), damage))
         return ["--log", str(folder / "log"), *_stated(folder)]
 
-    return make
+    return _make
 
 
 def _rewritten(folder: Path, log: Log) -> None:
@@ -135,7 +135,7 @@ def _moving(folder: Path) -> list[str]:
 def _arm(rows: int | None) -> Make:
     """Returns what writes the begin of a real arm's recording 1, or both recordings."""
 
-    def make(folder: Path) -> list[str]:
+    def _make(folder: Path) -> list[str]:
         urdf = write_arm(folder / "arm.urdf")
         logs = [write_motion(n, folder / f"run_{n}", urdf) for n in (1, 2)]
         if rows is None:
@@ -143,7 +143,7 @@ def _arm(rows: int | None) -> Make:
         _cut(logs[0], slice(0, rows))
         return ["--log", str(logs[0])]
 
-    return make
+    return _make
 
 
 def _cut(folder: Path, rows: slice) -> None:
@@ -186,13 +186,13 @@ def _static(folder: Path) -> list[str]:
 def _cell(*effects: Effect) -> Make:
     """Returns what records the cell, with effects that its log does not state."""
 
-    def make(folder: Path) -> list[str]:
+    def _make(folder: Path) -> list[str]:
         scenario = load_scenario("removal")
         scenario.effects = list(effects)
         record(folder / "log", scenario, _SEED)
         return ["--log", str(folder / "log"), "--scenario", "removal"]
 
-    return make
+    return _make
 
 
 def _wrong_name(folder: Path) -> list[str]:

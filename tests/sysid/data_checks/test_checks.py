@@ -8,6 +8,15 @@ import itertools
 
 import numpy as np
 import pytest
+from damaged_logs import (
+    both,
+    changed,
+    damaged,
+    late,
+    rounded,
+    scaled,
+    swapped,
+)
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import GroovePose
@@ -19,15 +28,6 @@ from sysid.models.base import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
-from damaged_logs import (
-    both,
-    changed,
-    damaged,
-    late,
-    rounded,
-    scaled,
-    swapped,
-)
 from tests.sysid.real_data import write_arm, write_motion, write_static
 
 SENSOR = ("wrench", "ft_sensor")

@@ -72,12 +72,7 @@ def test_a_sine_is_found_with_its_frequency():
     text = _found(residual)
     assert "fy: periodic at 1.3 Hz" in text  # of frequencies 0.17 Hz apart
     assert "fy: 2.3 times its noise" in text and "fx" not in text
-
-
-def test_a_sine_is_found_where_the_noise_is_not_known():
-    residual = _white()
-    residual[:, 0] += 2.0 * np.sin(2 * np.pi * 2.5 * _time())
-    assert _found(residual, noise_is_stated=False).startswith("fx: periodic at 2.5 Hz")
+    assert _found(residual, noise_is_stated=False).startswith("fy: periodic at 1.3 Hz")
 
 
 def test_a_model_that_states_its_own_error_may_be_off_by_as_much_in_a_pattern():
@@ -95,14 +90,14 @@ def test_outlying_rows_are_counted_and_placed():
 
 
 @pytest.mark.parametrize(
-    "noise", [null_logs.white, null_logs.heavy_tailed, null_logs.autoregressive(0.9)]
+    "noise", [null_logs.heavy_tailed, null_logs.autoregressive(0.9)]
 )
 def test_noise_alone_shows_nothing(noise):
-    """In 50 logs: no line where it is slow, no outlier in tails."""
+    """No line where it is slow, no outlier in tails."""
     shape = np.ones((_EPISODES * _ROWS, 2))
-    drawn = [noise(np.random.default_rng(seed), shape) for seed in range(50)]
+    drawn = [noise(np.random.default_rng(seed), shape) for seed in range(30)]
     texts = [_found(residual) for residual in drawn]
-    assert sum(bool(text) for text in texts) <= 2, texts
+    assert sum(bool(text) for text in texts) <= 1, texts
 
 
 def test_more_than_the_stated_noise_is_said_only_of_its_channel():

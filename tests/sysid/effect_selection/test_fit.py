@@ -157,32 +157,22 @@ def test_an_added_effect_ends_where_the_models_own_derivatives_lead(tmp_path):
     assert fit.values["GroovePose.ry"] == pytest.approx(_TURN, rel=0.03)
 
 
-@pytest.mark.parametrize(("off", "harmed"), [(60.0, []), (3.0, ["fy"])])
-def test_a_channel_within_its_noise_may_pay_a_thousandth_of_the_gain(gain, off, harmed):
-    """Two joints' friction moves the wrist by less than its encoder's step."""
+@pytest.mark.parametrize(
+    ("off", "fy", "harmed"),
+    [
+        (60.0, (0.1, 0.95), []),  # within its noise, for a thousandth of the gain
+        (3.0, (0.1, 0.95), ["fy"]),
+        (60.0, (4.0, 5.3), []),  # beyond its noise, by little
+        (30.0, (4.0, 5.3), ["fy"]),
+        (60.0, (4.0, 6.0), ["fy"]),  # its double
+    ],
+)
+def test_a_channel_may_pay_little_of_what_another_gains(gain, off, fy, harmed):
     fitter, effect = gain
     fit = fitter.fit((effect,))
     names = [c.name for c in fit.model.measurements.channels]
     before, after = (fit.linearisation.residual.copy() for _ in range(2))
     before[:, names.index("fz")] = off
-    before[:, names.index("fy")], after[:, names.index("fy")] = 0.1, 0.95
+    before[:, names.index("fy")], after[:, names.index("fy")] = fy
     first, last = (_with(fit, residual=r, huber_delta=np.inf) for r in (before, after))
-    assert last.harmed_channels(first) == harmed
-
-
-@pytest.mark.parametrize(
-    ("off", "after", "harmed"),
-    [(60.0, 5.3, []), (30.0, 5.3, ["fy"]), (60.0, 6.0, ["fy"])],
-)
-def test_a_channel_beyond_its_noise_may_pay_little_and_not_its_double(
-    gain, off, after, harmed
-):
-    """Rotors of six joints against a wrist that they move, too."""
-    fitter, effect = gain
-    fit = fitter.fit((effect,))
-    names = [c.name for c in fit.model.measurements.channels]
-    first, last = (fit.linearisation.residual.copy() for _ in range(2))
-    first[:, names.index("fz")] = off
-    first[:, names.index("fy")], last[:, names.index("fy")] = 4.0, after
-    first, last = (_with(fit, residual=r, huber_delta=np.inf) for r in (first, last))
     assert last.harmed_channels(first) == harmed

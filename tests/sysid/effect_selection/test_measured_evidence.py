@@ -82,9 +82,9 @@ def test_what_shows_three_times_is_found_where_the_noise_is_known():
 
 
 def test_chance_is_taken_for_an_effect_as_often_as_it_says():
-    p = [exceeds_noise_p(*_fits(0.0, seed=seed), 1) for seed in range(200)]
+    p = [exceeds_noise_p(*_fits(0.0, seed=seed), 1) for seed in range(100)]
     # Friction is of one sign: chance makes some in half of the logs.
-    assert 1 <= np.sum(np.array(p) < 0.05) <= 14  # of 200, at 0.025
+    assert 1 <= np.sum(np.array(p) < 0.1) <= 12  # of 100, at 0.05
 
 
 def test_an_effect_has_to_exceed_what_the_model_itself_is_off_by():

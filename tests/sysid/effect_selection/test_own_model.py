@@ -120,11 +120,3 @@ def test_trials_side_by_side_are_those_one_by_one(pendulum):
     assert found[0] == found[1]
     assert "missing: JointCoulombFriction.pivot" in found[0][0]
     assert any("rejected" in message for message in found[0][1])
-
-
-def test_progress_may_stop_it(pendulum):
-    def stop(update):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        close_loop(pendulum, progress=stop)

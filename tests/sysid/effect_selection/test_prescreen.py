@@ -45,25 +45,6 @@ def test_a_groove_turned_by_three_degrees_is_named_and_measured(tmp_path):
     assert closed.errors.in_noise(closed.errors.after) < 1.1
 
 
-@pytest.mark.slow
-def test_many_rows_far_from_the_data_are_searched_by_few_first(tmp_path):
-    """What those name is fitted to all; nothing that it replaces is tried again."""
-    hidden = [GroovePose(ry=-0.0524)]
-    transitions_log(tmp_path / "log", nominal(), hidden, 0, episodes=6, steps=20)
-    model, lines = TwinModel([read_log(tmp_path / "log")], nominal(), ()), []
-    closed = close_loop(
-        model,
-        test=[5],
-        library=[GroovePose, SensorGain],
-        settings=dataclasses.replace(DEFAULT_SETTINGS, search_rows=40),
-        progress=lambda update: lines.append(update.message),
-    )
-    assert closed.verdict.names == ("GroovePose",), closed.text
-    assert len(closed.last.linearisation.residual) == 100
-    after = lines[lines.index("fitting all rows") + 1 :]
-    assert len(after) == 1 and after[0].startswith("with what fewer rows have named")
-
-
 @dataclasses.dataclass
 class ClosedEndMagnet(EnvironmentEffect):
     """A magnet at A, whose pull there the end of the groove takes up.

@@ -1,7 +1,7 @@
 """What real measurements lack, from the models that their authors used."""
 
-import dataclasses
-
+import arm_verdicts
+import null_alarms
 import numpy as np
 import pytest
 from scipy.stats import binom
@@ -9,11 +9,9 @@ from scipy.stats import binom
 from drake_disasm.logs import read_logs
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.models.from_logs import ModelChoice, model_of
-from sysid.validation.null_logs import autoregressive
-import arm_verdicts
-import null_alarms
-from sysid.validation.null_logs import autoregressive, sieve
+from sysid.validation.null_logs import autoregressive, null_log, sieve
 from tests.sysid.real_data import (
+    real_folder,
     write_arm,
     write_emps,
     write_motion,
@@ -21,9 +19,17 @@ from tests.sysid.real_data import (
     write_static,
 )
 
+pytestmark = pytest.mark.usefixtures("real_arm")
+
 _NULLS = 40
 #: More alarms than that come in less than 1 % of such series from a test at 5 %.
 _MOST_ALARMS = int(binom.isf(0.01, _NULLS, 0.05))
+
+
+@pytest.fixture(scope="module")
+def real_arm() -> None:
+    """Skips the tests where the recordings are not there."""
+    real_folder("kuka_lwr4")
 
 
 def _closed(folders, train, test) -> ClosedLoop:
@@ -45,7 +51,6 @@ def test_a_real_force_sensor_drifts_and_stops(tmp_path):
 
 @pytest.mark.slow
 def test_a_real_arm_has_friction_and_offsets(tmp_path):
-    """2.15 %, and 2.10 % without the rows of a filter's ends (--drop-flagged-rows)."""
     arm = write_arm(tmp_path / "arm.urdf")
     folders = [write_motion(n, tmp_path / f"run_{n}", arm) for n in (1, 2)]
     found = _closed(folders, [0], [1])
@@ -81,37 +86,23 @@ def test_friction_shows_in_three_seconds_of_a_real_arms_motion(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("residual_of", ["first", "last"])
-def test_noise_as_correlated_as_a_real_arms_residual_raises_no_alarm(
-    residual_of, tmp_path
-):
-    """Of the model without effects, and of the one with all that were found."""
+def test_noise_as_correlated_as_a_real_arms_residual_raises_no_alarm(tmp_path):
     arm = write_arm(tmp_path / "arm.urdf")
     log = read_logs([write_motion(1, tmp_path / "run", arm)])
     model = model_of(log, ModelChoice())
     model = model.of_rows(np.arange(model.measurements.rows) % 5 == 0)
     found = close_loop(model)
-    fit = getattr(found, residual_of)
-    residual = fit.linearisation.residual * fit.model.measurements.noise
-    clean = found.first.model.predictions(found.first.theta)
-    alarms = []
-    for seed in range(_NULLS):
-        random = np.random.default_rng(seed)
-        noise = np.column_stack([sieve(r, 30, random) for r in residual.T])
-        null = dataclasses.replace(model.measurements, values=clean + noise)
-        alarms.append(
-            close_loop(model.with_measurements(null)).verdict.ending != "none"
-        )
+    noise = sieve(found.last.linearisation.residual)
+    nulls = [
+        null_log(found.first.model, noise, s, found.first.theta) for s in range(_NULLS)
+    ]
+    alarms = [close_loop(null).verdict.ending != "none" for null in nulls]
     assert sum(alarms) <= _MOST_ALARMS
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", ["sieve", "ar0.98+white"])
 def test_three_seconds_of_slow_noise_name_no_effect(noise, tmp_path):
-    """An arm's 43 base parameters took up so much of it that it passed for fast.
-
-    So did what of it the sensor's white noise hides.
-    """
     model = null_alarms.arm(tmp_path)
     noise = null_alarms.noise_of(noise, model)
     answers = [null_alarms.answer(model, noise, seed) for seed in range(_NULLS)]
@@ -119,12 +110,8 @@ def test_three_seconds_of_slow_noise_name_no_effect(noise, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [12, 29])
-def test_what_a_real_arms_motion_hides_beside_friction_is_named_or_in_a_tie(
-    number, tmp_path
-):
-    """A rotor, and a gain that was named a gear while friction was missing."""
+def test_what_a_real_arms_motion_hides_beside_friction_is_named_or_in_a_tie(tmp_path):
     model = arm_verdicts.arm(tmp_path)
     real = arm_verdicts.with_friction(model, null_alarms.fitted(model))
-    found = arm_verdicts.answer(model, real, autoregressive(0.9), 1.0, number)
+    found = arm_verdicts.answer(model, real, autoregressive(0.9), 1.0, 12)
     assert found["kinds"][0] in arm_verdicts.said(found)

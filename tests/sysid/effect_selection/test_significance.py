@@ -36,11 +36,11 @@ def _scores(values):
     return [Scores(v.sum(axis=0, keepdims=True), v[:, None]) for v in unit.T]
 
 
-@pytest.mark.parametrize("alpha", [0.02, 0.05, 0.2])
-def test_alarms_are_as_many_as_alpha_says(alpha, null_p):
+def test_alarms_are_as_many_as_alpha_says(null_p):
     """Where nothing is to be found, in 99 of 100 such tests."""
-    low, high = binom.interval(0.99, _FAMILIES, alpha)
-    assert low <= np.sum(null_p < alpha) <= high
+    for alpha in (0.02, 0.05, 0.2):
+        low, high = binom.interval(0.99, _FAMILIES, alpha)
+        assert low <= np.sum(null_p < alpha) <= high, alpha
 
 
 def test_a_candidate_that_all_blocks_gain_by_is_significant():
@@ -49,11 +49,6 @@ def test_a_candidate_that_all_blocks_gain_by_is_significant():
     gains[:, 7] += 2.0
     p = family_p(_scores(gains), SelectionSettings())
     assert p[7] < 0.01 and np.delete(p, 7).min() > 0.05
-
-
-def test_one_dominant_block_decides_nothing():
-    gains = np.where(np.arange(20) == 0, 1e3, -0.1)[:, None]
-    assert family_p(_scores(gains), SelectionSettings())[0] > 0.5
 
 
 def test_ten_blocks_can_reject_among_many_candidates():
@@ -110,11 +105,6 @@ def test_candidates_of_no_use_do_not_hide_what_all_blocks_gain_by():
     p = ranks_p(gains, 0.01 * len(gains), _FEW)
     assert p[0] < 0.01
     assert ranks_p(gains, 0.0, _FEW)[0] > 0.05  # as they would otherwise
-
-
-def test_losses_of_all_blocks_speak_for_nothing():
-    gains = -_family(np.random.default_rng(1))
-    assert ranks_p(gains, 0.1, _FEW)[0] > 0.2
 
 
 def test_signed_ranks_of_noise_reject_as_often_as_they_say():

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from drake_disasm.logs import Log, LogHeader, LogWriter, flat_columns, read_log
+
 JOINTS = ("shoulder", "elbow")
 
 LINK = """<link name="{0}"><inertial><origin xyz="{1}"/><mass value="{2}"/>
@@ -31,3 +33,13 @@ def smooth_motion(time: np.ndarray) -> tuple[np.ndarray, ...]:
     phase = time[:, None, None] * w
     q, v = np.sin(phase), w * np.cos(phase)
     return tuple(a.sum(axis=1) for a in (q, v, -(w**2) * q))
+
+
+def write_motion_log(
+    folder: Path, urdf: Path, columns: dict[str, np.ndarray], joints=JOINTS
+) -> Log:
+    """Writes a log of one episode of an arm's motion, and reads it."""
+    header = LogHeader("joint_motion", "excite", {}, joints=joints, urdf=str(urdf))
+    with LogWriter(folder, header) as writer:
+        writer.write_episode(flat_columns("joint_motion", columns))
+    return read_log(folder)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from drake_disasm.effects import FlangePayload, JointCoulombFriction
-from drake_disasm.logs import Log, LogHeader, LogWriter, flat_columns, read_log
+from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.candidates import candidates, extended
 from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.scenario_parameters import Request
-from tests.sysid.models.arm import JOINT, JOINTS, LINK
+from tests.sysid.models.arm import JOINT, LINK, write_motion_log
 from tests.sysid.models.test_joint_motion import drakes_torques, states
 
 MASS, COM = 1.5, np.array([0.05, -0.03, 0.12])
@@ -44,24 +44,18 @@ def log(tmp_path: Path) -> Log:
     tau = drakes_torques(loaded, q, v, vd)
     tau += NOISE * np.random.default_rng(1).normal(size=tau.shape)
     columns = {"time": 0.01 * np.arange(400), "q": q, "v": v, "vd": vd, "tau": tau}
-    header = LogHeader("joint_motion", "excite", {}, joints=JOINTS, urdf=str(known))
-    with LogWriter(tmp_path / "log", header) as writer:
-        writer.write_episode(flat_columns("joint_motion", columns))
-    return read_log(tmp_path / "log")
+    return write_motion_log(tmp_path / "log", known, columns)
 
 
-def test_a_payload_is_drakes_point_mass(log: Log) -> None:
+def test_a_payload_is_drakes_point_mass_and_a_candidate_of_the_arm(log: Log) -> None:
+    library = [FlangePayload, JointCoulombFriction]
+    found = candidates(JointMotionModel([log]), library)
+    assert [c.name for c in found].count("FlangePayload") == 1
+    assert len(found) == 1 + 2 * 3  # friction of each joint, in three shapes
     scenario = Scenario(effects=[FlangePayload(MASS, *(MASS * COM))])
     model = JointMotionModel([log], scenario=scenario).only([])
     residual = model.predictions(np.zeros(0)) - model.measurements.values
     assert np.std(residual) == pytest.approx(NOISE, rel=0.1)
-
-
-def test_it_is_a_candidate_of_the_arm_and_not_of_a_joint(log: Log) -> None:
-    library = [FlangePayload, JointCoulombFriction]
-    found = candidates(JointMotionModel([log]), library)
-    assert [c.name for c in found].count("FlangePayload") == 1
-    assert len(found) == 1 + 2 * 3
 
 
 def test_it_is_inseparable_from_the_last_link(log: Log) -> None:

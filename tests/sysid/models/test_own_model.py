@@ -6,7 +6,6 @@ import pickle
 import numpy as np
 import pytest
 
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     Effect,
     Imprecision,
@@ -23,6 +22,7 @@ from sysid.models.effects import effect_parameter
 from sysid.objective import Objective
 from sysid.parameters import Parameter
 from sysid.workers import Workers
+from tests.refusals import refused
 
 INERTIA, WEIGHT = 0.05, 1.2
 HIDDEN = JointCoulombFriction("pivot", 0.15)
@@ -85,7 +85,7 @@ def test_an_effect_acts_through_its_parameters(model):
     assert rubbing.parameters[2].unit == "N m" and not rubbing.parameters[2].is_shape
 
 
-@pytest.mark.parametrize("frozen", ["J", "w", "effects.0.size", "effects.0.creep"])
+@pytest.mark.parametrize("frozen", ["J", "effects.0.creep"])
 def test_a_frozen_parameter_keeps_its_place(frozen, model):
     whole = with_friction(model, "size", "creep")
     values = dict(
@@ -154,7 +154,7 @@ def test_identifies_the_effect_with_defaults_alone(model):
 
 def test_it_has_no_commands_to_displace(model):
     assert not model.has_commands
-    with pytest.raises(DisasmError, match="has no commands"):
+    with refused("has no commands"):
         model.displaced(np.zeros((400, 3)), np.zeros((400, 3)))
 
 
@@ -164,18 +164,15 @@ def test_predictions_of_another_shape_are_refused(model):
             return np.zeros((rows.stop - rows.start, 2))
 
     model.__class__ = Wide
-    with pytest.raises(DisasmError, match=r"Wide\.predict: returns .*400, 2"):
+    with refused("Wide.predict", "(400, 2)"):
         Objective(model, Workers())(np.array([[INERTIA, WEIGHT]]))
 
 
-def test_two_parameters_of_one_name_are_refused(model):
+def test_parameters_and_measurements_that_do_not_fit_are_refused(model):
     twice = model.replace(parameters=(*model.parameters, model.parameters[0]))
-    with pytest.raises(DisasmError, match="two parameters are named 'J'"):
+    with refused("two parameters", "'J'"):
         Objective(twice)
-
-
-def test_measurements_of_another_shape_are_refused():
-    with pytest.raises(DisasmError, match=r"give \(rows, 2\)"):
+    with refused("(rows, 2)"):
         Measurements.of_array(np.zeros(3), [Channel("a", "N"), Channel("b", "N")])
-    with pytest.raises(DisasmError, match="one number for each of the 3 rows"):
+    with refused("3 rows"):
         Measurements(np.zeros((3, 1)), (Channel("a", "N"),), np.zeros(2, int), ("x",))

@@ -3,7 +3,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from drake_disasm.cell.tool import Tool
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.logs import read_log, write_static_wrench
 from drake_disasm.scenario import Scenario, load_scenario
 from sysid.identification import SearchSettings, Settings, identify
@@ -12,6 +11,7 @@ from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.static_wrench import DEFAULT_PARAMETERS, StaticWrenchModel
 from sysid.scenario_parameters import Request, scenario_parameters
 from sysid.workers import Workers
+from tests.refusals import refused
 from tests.sysid.real_data import write_static
 
 TRUTH = np.array([1.1, 0.01, -0.02, 0.06, 1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
@@ -79,11 +79,11 @@ def test_unknown_noise_is_one_for_forces_and_one_for_torques(tmp_path):
 
 def test_only_sensor_effects_reach_a_reading_at_rest(tmp_path):
     log = synthetic(tmp_path / "log")
-    with pytest.raises(DisasmError, match=r"contact\.friction: static readings"):
+    with refused("contact.friction", "static readings"):
         make(log, ["contact.friction"])
-    with pytest.raises(DisasmError, match="--objective rollout"):
+    with refused("`objective` rollout"):
         model_of([log], ModelChoice(objective="rollout"))
-    with pytest.raises(DisasmError, match="--noise fq: no such channel"):
+    with refused("`noise` fq", "no such channel"):
         model_of([log], ModelChoice(noise=(("fq", 1.0),)))
     stated = model_of([log], ModelChoice(noise=(("fx", 0.5),)))
     assert stated.measurements.channels[0].noise == 0.5

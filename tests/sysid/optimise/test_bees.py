@@ -2,11 +2,11 @@ import json
 
 import numpy as np
 import pytest
+from tests.sysid.optimise.functions import STANDARD, rosenbrock, sphere
 
 from drake_disasm.common.errors import DisasmError
 from sysid.optimise import BeesAlgorithm, BeesSettings, Box, Whitened
 from sysid.optimise.bees import Stop
-from tests.sysid.optimise.functions import STANDARD, rosenbrock, sphere
 
 BOX = Box.of([-2.0] * 3, [3.0] * 3)
 

@@ -1,10 +1,10 @@
 import cma
 import numpy as np
 import pytest
+from tests.sysid.optimise.functions import rosenbrock, sphere
 
 from sysid.optimise import BeesAlgorithm, Box, nlopt_search
 from sysid.optimise.bees import Stop
-from tests.sysid.optimise.functions import rosenbrock, sphere
 
 BOX = Box.of([-2.0] * 3, [3.0] * 3)
 

@@ -12,7 +12,6 @@ from drake_disasm.effects import (
     JointViscousFriction,
     RotorInertia,
 )
-from drake_disasm.effects.registry import find_effect
 from sysid.models.response.drive import Drive, Inputs
 from sysid.models.response.gears import Gears
 from sysid.models.response.near_motion import Bodies
@@ -137,16 +136,6 @@ def test_at_rest_a_motor_holds_what_hangs_on_the_yielding_link(arm):
     assert np.abs(torque - arm.bodies.arm.holding(q[None])[0]).max() > 0.02
 
 
-def test_a_hard_gear_is_no_gear(arm):
-    hard = parameters(*motors((1e-8, 1e-8), inertia=(0.0, 0.0)))
-    rigid = parameters(*motors(inertia=(0.0, 0.0)))
-    goals = [segment(arm, swing(TIMES))]
-    motion = simulate(arm, [hard, rigid], goals, 400, 0.005)
-    alone = simulate(arm, [rigid], goals, 400, 0.005)
-    np.testing.assert_allclose(motion.q[:, 1], alone.q[:, 0], atol=1e-9)
-    np.testing.assert_allclose(motion.q[:, 0], alone.q[:, 0], atol=1e-5)
-
-
 def test_a_little_play_changes_the_motion_by_a_little(arm):
     """In proportion, so that a search can begin at none."""
     sets = [parameters(*motors(b=(b, 0.0))) for b in (0.0, 1e-5, 2e-5)]
@@ -190,8 +179,3 @@ def test_a_segment_in_the_middle_of_a_motion_goes_on_with_it(arm):
     nowhere = dataclasses.replace(later, vd=vd + 3.0)  # rad/s^2: a noisy one
     noisy = simulate(arm, [own], [nowhere], 200, 0.005)
     assert np.abs(noisy.q[:, 0, 0] - whole.q[2000::10, 0, 0]).max() < 2e-3
-
-
-def test_the_library_has_both():
-    assert find_effect("JointBacklash") is JointBacklash
-    assert "JointElasticity" in JointBacklash.experiments_against

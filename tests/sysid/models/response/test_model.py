@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     JointBacklash,
     JointCoulombFriction,
@@ -32,6 +31,7 @@ from sysid.models.response.model import JointResponseModel, _assumption
 from sysid.models.response.segments import measured_noise
 from sysid.objective import Objective
 from sysid.workers import Workers
+from tests.refusals import refused
 from tests.sysid.models.response.servo import (
     DAMPING,
     DELAY,
@@ -66,13 +66,11 @@ def test_a_fit_finds_the_drive(log):
     np.testing.assert_allclose(theta, true_parameters(), rtol=0.05)
 
 
-def test_fits_are_least_squares(log):
-    """Of a servo that lacks its friction every row is far off, and none an outlier."""
-    assert JointResponseModel([log]).default_huber_delta == math.inf
-
-
 def test_a_fit_begins_near_the_drive_and_its_delay(log):
-    nominal = {p.name: p.nominal for p in JointResponseModel([log]).parameters}
+    model = JointResponseModel([log])
+    assert model.default_huber_delta == math.inf  # far off in every row: no outliers
+    assert not model.assumptions
+    nominal = {p.name: p.nominal for p in model.parameters}
     assert nominal["delay"] == pytest.approx(DELAY, abs=0.0026)
     assert nominal["servo.stiffness"] == pytest.approx(STIFFNESS, rel=0.2)
 
@@ -110,13 +108,6 @@ def test_covariates_are_the_joints_own_motion(log):
     assert np.corrcoef(found["velocity"], speed)[0, 1] > 0.99
     goal = log.episodes[1]["q_commanded"][:, 0]
     np.testing.assert_allclose(found["distance to the goal"] + position, goal)
-
-
-def test_thinning_keeps_whole_segments(log):
-    model = JointResponseModel([log], segment=0.05)
-    assert model.thin(2).measurements.rows == pytest.approx(
-        model.measurements.rows / 2, rel=0.3
-    )
 
 
 def test_a_few_dozen_segments_are_not_thinned(log):
@@ -174,35 +165,30 @@ def test_degrees_and_a_wrong_sign_are_found(log, tmp_path):
     findings = check_data([degrees], JointResponseModel([degrees]))
     assert any("57" in f.what or "degrees" in f.what for f in findings)
     mirrored = rewritten(log, tmp_path / "mirrored", q=-q)
-    with pytest.raises(DisasmError, match="does not follow"):
+    with refused("does not follow"):
         JointResponseModel([mirrored])
 
 
 @pytest.mark.parametrize(
     ("drive", "why"),
     [
-        ({"limits": 1.0}, r"unknown key 'drive.limits'"),
-        ({"limit": -1.0}, "give a number above zero"),
-        ({"limit": True}, "give a number above zero"),
-        ({"gravity_compensation": "yes"}, "give true or false"),
-        ({"velocity_feedforward": 1}, "give true or false"),
+        ({"limits": 1.0}, "'drive.limits'"),
+        ({"limit": True}, "number above zero"),
+        ({"gravity_compensation": "yes"}, "true or false"),
     ],
 )
 def test_a_drive_that_can_not_be_is_refused(log, tmp_path, drive, why):
     header = dataclasses.replace(log.header, drive=drive)
     other = rewritten(log, tmp_path / "other", header)
-    with pytest.raises(DisasmError, match=why):
+    with refused(why):
         JointResponseModel([other])
 
 
 def test_an_arm_whose_urdf_is_gone_is_one_line_with_the_remedy(log, tmp_path):
     header = dataclasses.replace(log.header, urdf=str(tmp_path / "gone.urdf"))
     other = rewritten(log, tmp_path / "other", header)
-    with pytest.raises(
-        DisasmError, match=r"gone\.urdf.*--urdf FILE.*log\.yaml"
-    ) as caught:
+    with refused("gone.urdf", "`urdf`", "log.yaml"):
         JointResponseModel([other])
-    assert "\n" not in str(caught.value)
     model = JointResponseModel([other], urdf=log.header.urdf)
     assert model.joints == log.header.joints
 
@@ -221,7 +207,6 @@ def test_no_candidate_fails_where_its_derivative_is_taken(log):
 @pytest.mark.parametrize(
     "hidden",
     [
-        JointCoulombFriction("servo", 0.08, 0.005),
         JointLoadFriction("servo", 0.4, 0.02),
         JointElasticity("servo", 0.05),
         JointBacklash("servo", 0.02, 0.02),
@@ -256,8 +241,7 @@ def test_friction_per_squared_load_is_at_most_what_locks_the_gear(log):
     assert 0.3 / heaviest < high < 3.0 / heaviest
 
 
-@pytest.mark.parametrize("rate", [50.0, 100.0, 500.0])
-@pytest.mark.parametrize("noise", [3e-5, 1e-3])
+@pytest.mark.parametrize(("rate", "noise"), [(50.0, 1e-3), (500.0, 3e-5)])
 def test_the_noise_is_told_from_the_motion_at_any_rate(rate, noise):
     """Of rows that are not evenly spaced, of a joint that reverses twice a second."""
     random = np.random.default_rng(0)
@@ -266,11 +250,6 @@ def test_the_noise_is_told_from_the_motion_at_any_rate(rate, noise):
     q = 0.3 * np.sin(np.pi * time) + 0.05 * np.sin(4.0 * np.pi * time)
     q = q[:, None] + random.normal(0.0, noise, (len(time), 1))
     assert measured_noise([{"time": time, "q": q}]) == pytest.approx(noise, rel=0.2)
-
-
-def test_a_scrap_of_a_recording_has_the_least_noise():
-    scrap = {"time": np.arange(4.0), "q": np.ones((4, 2))}
-    assert measured_noise([scrap]).tolist() == [1e-6, 1e-6]
 
 
 def test_an_arm_without_encoder_noise_has_what_steps_of_time_leave():
@@ -292,12 +271,7 @@ def test_a_controller_that_holds_the_arm_is_known_by_the_motion(held):
     error = model.predictions(true_parameters()) - model.measurements.values
     assert np.sqrt(np.mean(error**2)) < 3e-4
     (found,) = [f for f in check_data([held], model) if f.kind == "assumed"]
-    assert "doesn't say whether the controller adds what gravity takes" in found.what
     assert "gravity_compensation: true" in found.remedy
-
-
-def test_nothing_is_assumed_where_the_arm_hangs_on_its_drives(log):
-    assert not JointResponseModel([log]).assumptions
 
 
 def _stating(log, compensates):
@@ -309,15 +283,11 @@ def _stating(log, compensates):
 
 def test_what_is_stated_counts_and_is_doubted(held):
     (assumed,) = JointResponseModel([_stating(held, False)]).assumptions
-    assert "says otherwise: the controller adds what gravity takes" in assumed.what
-
-
-def test_the_shares_that_drives_miss_are_told_apart():
+    assert "otherwise" in assumed.what
     said = _assumption(True, False, (0.01, 0.8)).what
-    assert "says otherwise: the controller does not add what gravity takes" in said
-    assert "drives miss 80 % of the torques if it does, else 1 %" in said
+    assert "otherwise" in said and "80 %" in said and "1 %" in said
 
 
 def test_where_what_is_stated_can_not_be_the_refusal_says_so(log):
-    with pytest.raises(DisasmError, match="gravity_compensation: false"):
+    with refused("gravity_compensation: false"):
         JointResponseModel([_stating(log, True)])

@@ -1,10 +1,10 @@
 """Effects are found by where an arm is, without torques."""
 
 import pytest
+from seven_joints import HIDDEN, write_log
 
 from sysid.effect_selection.close_loop import close_loop
 from sysid.models.response.model import JointResponseModel
-from seven_joints import HIDDEN, write_log
 
 
 def verdict(folder, name):

