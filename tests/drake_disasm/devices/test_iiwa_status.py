@@ -51,11 +51,8 @@ def test_other_arms_and_nan_are_refused() -> None:
         decode_status(b"")
 
 
-@pytest.mark.parametrize(
-    "count", [10_000, pytest.param(100_000, marks=pytest.mark.slow)]
-)
-def test_random_and_mutated_messages_raise_nothing_else(count: int) -> None:
-    random = np.random.default_rng(0)
+def test_random_and_mutated_messages_raise_nothing_else() -> None:
+    random, count = np.random.default_rng(0), 5_000
     good = np.frombuffer(status().encode(), dtype=np.uint8)
     refused = 0
     for number in range(count):
@@ -78,15 +75,9 @@ def test_what_is_lost_late_or_broken_is_counted_and_only_good_ones_get_on() -> N
     checked.Subscribe("S", passed.append)
     time = 0.0
     monitor = IiwaStatusMonitor(lcm, checked, "S", 0.005, lambda: time)
+    times = (5_000, 20_000, 15_000, 20_000)  # the second has lost two
     broken = status(40_000, first=np.nan).encode()
-    for data in (
-        status(5_000).encode(),
-        status(20_000).encode(),  # two are lost
-        status(15_000).encode(),
-        status(20_000).encode(),
-        broken,
-        broken[:50],
-    ):
+    for data in (*(status(t).encode() for t in times), broken, broken[:50]):
         lcm.Publish("S", data)
         lcm.HandleSubscriptions(0)
         checked.HandleSubscriptions(0)
@@ -126,7 +117,7 @@ def test_a_status_that_queued_up_is_as_old_as_it_is() -> None:
     assert (counters.queued, counters.lost) == (1, 18)
 
 
-@pytest.mark.parametrize("stamp", [0.0, 0.3, 80.0])
+@pytest.mark.parametrize("stamp", [0.0, 80.0])
 def test_a_driver_that_was_started_anew_is_believed_its_time(stamp: float) -> None:
     driver = _Driver()
     for k in range(100):
