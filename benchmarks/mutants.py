@@ -3,7 +3,8 @@
 A mutant is one change of one expression in one function: a comparison that is another,
 a constant that is half as large again, a condition that is negated, a call that is left
 out. A sample of them is drawn; each is put into a copy of the tree and meets the tests
-that reach its line, the quickest first, until one fails or a minute of tests is over.
+that reach its line, the quickest first, until one fails or twelve seconds' worth of
+them are over.
 
   sample   draws mutants and writes them to a file
   reach    runs the tests once under coverage, which tells who reaches which line
@@ -18,6 +19,7 @@ skipped, and `compare` counts those that were tried in both.
 import argparse
 import ast
 import compileall
+import contextlib
 import copy
 import hashlib
 import json
@@ -42,8 +44,8 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_json
 
 _PACKAGES = ("drake_disasm", "sysid")
-_PER_MUTANT = 60.0  # s of tests, as they took without a mutant
-_PATIENCE = 4.0  # a mutant's tests may take so many times longer, and
+_PER_MUTANT = 12.0  # s of tests, of the processor's time without a mutant
+_PATIENCE = 10.0  # a mutant's tests may take so many times longer, and
 _START = 60.0  # s more
 _EXAMPLES = """examples:
   python benchmarks/mutants.py sample --out build/mutants.json
@@ -209,14 +211,16 @@ class _Reach:
         )
         self._seconds: Counter[str] = Counter()
         self._coverage.start()
+        self._began = time.process_time()
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
         """Gives what is run from now on to a test."""
         self._coverage.switch_context(_function_of(nodeid))
+        self._began = time.process_time()
 
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Adds the time of a test's phase."""
-        self._seconds[_function_of(report.nodeid)] += report.duration
+    def pytest_runtest_logfinish(self, nodeid: str) -> None:
+        """Adds the processor's time that a test took."""
+        self._seconds[_function_of(nodeid)] += time.process_time() - self._began
 
     def pytest_sessionfinish(self) -> None:
         """Writes both."""
@@ -272,7 +276,7 @@ class _Known:
         self._root = Path(*parts[:top])
 
     def tests(self, file: str, line: int) -> list[str]:
-        """Returns the tests that reach a line, the quickest first, a minute of them."""
+        """Returns the tests that reach a line, the quickest first, twelve seconds."""
         reached: set[str] = set()
         for data in self._data:
             lines = data.contexts_by_lineno(str(self._root / file))
@@ -344,10 +348,8 @@ def _run_tests(tree: Path, tests: Sequence[str]) -> int | None:
 
 
 def _end_group(child: int) -> None:
-    try:
+    with contextlib.suppress(ProcessLookupError):
         os.killpg(child, signal.SIGKILL)
-    except ProcessLookupError:
-        pass
 
 
 def _preload() -> None:

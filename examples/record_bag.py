@@ -1,7 +1,7 @@
 """A ROS 2 bag such as a lab's: an iiwa in motion, with a load on a wrist sensor.
 
 python examples/record_bag.py out/bag
-python examples/record_bag.py out/bag out/motion/motion.csv     what excite.py designed
+python examples/record_bag.py out/bag out/motion/motion.csv     of excite
 
 Simulated: two of its joints have dry friction that no model knows of. Times jitter, 2 %
 of the messages are lost, and the sensor's clock is 12 ms late.

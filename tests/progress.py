@@ -5,6 +5,7 @@ would never end is ended by pytest-timeout, after half an hour (`pyproject.toml`
 """
 
 import contextlib
+import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -31,6 +32,12 @@ def wait_until(
         time.sleep(_PAUSE)
 
 
+def default_signals() -> None:
+    """Lets a new process be interrupted, even if whoever runs the tests can't be."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
 @contextlib.contextmanager
 def running(command: Sequence[str], **options: Any) -> Iterator[subprocess.Popen[str]]:
     """Yields a process with text streams; kills it if it is still there at the end.
@@ -39,6 +46,7 @@ def running(command: Sequence[str], **options: Any) -> Iterator[subprocess.Popen
         command: that is run.
         options: of `subprocess.Popen`.
     """
+    options = {"preexec_fn": default_signals} | options
     with subprocess.Popen(command, text=True, **options) as process:
         try:
             yield process

@@ -37,7 +37,7 @@ class ArchiveKind:
     Attributes:
         name: for messages, such as "policy".
         origin: remedy for a file that is something else, such as "give one that
-            tools/train.py wrote".
+            drake-disasm train wrote".
         remedy: what to do about a damaged one.
         most_bytes: of the file, and of all its members unpacked.
         most_members: arrays, at most.

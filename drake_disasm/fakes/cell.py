@@ -1,7 +1,7 @@
 """A simulated cell behind the devices' own protocols, in place of a real one.
 
 It runs in step with whoever calls `advance`, in virtual time, so that a test has the
-same trajectory each time; `tools/fake_cell.py` advances it in real time.
+same trajectory each time; `drake-disasm fake-cell` advances it in real time.
 """
 
 import dataclasses

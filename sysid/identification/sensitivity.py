@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 #: does not determine a combination even for a perfect model.
 LOOSE = 0.5
 
+_MEANINGLESS = 100.0  # ranges: an interval so wide is no figure
 _PROBES = (0.05, 0.5, 0.95)  # of the range, where a parameter without slope is tried
 _NAMED = 0.3  # least share of a parameter in a combination that is named
 _WEAK = 0.02  # rms change over a step, in units of the noise, to look at a wider one
@@ -89,9 +90,7 @@ class Sensitivity:
         ]
         names = self.names
         return lines + [
-            f"{c.text(names)}: this log determines the combination only to "
-            f"+-{100 * c.interval:.0f} % of its range"
-            for c in self.loose
+            f"{c.text(names)}: this log {_how_well(c.interval)}" for c in self.loose
         ]
 
     def to_freeze(self) -> list[str]:
@@ -102,6 +101,13 @@ class Sensitivity:
             free = [self.names[i] for i in order if self.names[i] not in chosen]
             chosen += free[:1]
         return chosen
+
+
+def _how_well(interval: float) -> str:
+    """Returns how well a combination is determined, from its interval in ranges."""
+    if interval > _MEANINGLESS:
+        return "does not determine the combination near its present value"
+    return f"determines the combination only to +-{100 * interval:.0f} % of its range"
 
 
 def sensitivity(objective: Objective, u: Array) -> Sensitivity:

@@ -48,7 +48,7 @@ class SearchSettings:
 
 @dataclass(frozen=True)
 class Settings:
-    """What a user may choose; the defaults are those of tools/identify.py.
+    """What a user may choose; the defaults are those of `drake-disasm identify`.
 
     Attributes:
         methods: "bees", "nlopt", or both, which then check each other.

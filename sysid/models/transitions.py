@@ -321,7 +321,7 @@ def _refuse_other_logs(log: Log, scenario: Scenario) -> None:
         raise refusal(
             where,
             f"a log of kind '{log.header.kind}', the twin predicts 'transitions'",
-            "name a log that tools/simulate.py --record or the cell wrote",
+            "name a log that drake-disasm simulate --record or the cell wrote",
         )
     period = log.header.period
     if period is None or abs(period - scenario.task.period) > 1e-9:

@@ -70,6 +70,17 @@ def start_program(
     )
 
 
+def assert_one_line(
+    done: subprocess.CompletedProcess[str], words: Sequence[str]
+) -> None:
+    """Checks that a program refused its input in one line that has these words."""
+    assert done.returncode == 2, done.stderr
+    lines = done.stderr.splitlines()
+    errors = [line for line in lines if line.startswith("error: ")]
+    assert len(errors) == 1 and "Traceback" not in done.stderr, done.stderr
+    assert all(word in errors[0] for word in words), errors[0]
+
+
 def interrupt(is_time: Callable[[], bool], name: str, *arguments: object) -> None:
     """Runs a program and presses Ctrl-C; it must say that what it has is kept."""
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}

@@ -1,31 +1,24 @@
-"""What the programs share: an interrupt is not lost, a policy is found by its name."""
+"""What the programs share: subcommands, numbers, policies, hidden effects, signals."""
 
+import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
+from drake_disasm_cli import common, main
 
-from drake_disasm.common.errors import DisasmError
-from drake_disasm.policies import (
-    ActionMap,
-    LearnedPolicy,
-    Network,
-    PolicyDescription,
-    Straight,
-    files,
-    save_policy,
-)
-from drake_disasm.scenario import load_scenario
-from tools import cli
+from drake_disasm.common import drake_warnings
+from drake_disasm.logs import read_log
+from drake_disasm.scenario import load_scenario, scenario_from_mapping
+from tests.progress import default_signals
+from tests.tools.inputs import write_policy
+from tests.tools.programs import ROOT, assert_one_line, run_program
 
-TOOLS = Path(__file__).parents[2] / "tools"
-
-SWALLOWS = """
+_SWALLOWS = """
 import signal
-from drake_disasm.common import program
+from drake_disasm.common import program, stopping
 
 def main(arguments):
     try:
@@ -39,65 +32,180 @@ program.run(main)
 """
 
 
-def test_a_swallowed_interrupt_stops_the_run_all_the_same() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", SWALLOWS], cwd=TOOLS, capture_output=True, text=True
+def _ignore_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@pytest.mark.parametrize(
+    ("prepare", "status"), [(default_signals, 130), (_ignore_interrupts, 0)]
+)
+def test_a_swallowed_interrupt_stops_a_run_that_is_not_in_the_background(
+    prepare, status: int
+) -> None:
+    """A shell starts `simulate &` with SIGINT ignored; so it must stay."""
+    command = [sys.executable, "-c", _SWALLOWS]
+    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=prepare)
+    assert done.returncode == status
+    assert ("interrupted" in done.stderr) == bool(status)
+
+
+def test_every_subcommand_is_listed_and_has_a_thin_program(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main.main(["--help"]) == 0
+    overview = capsys.readouterr().out
+    for name in main.SUBCOMMANDS:
+        assert f"  {name} " in overview
+        assert (ROOT / f"tools/{name.replace('-', '_')}.py").is_file()
+    program = [sys.executable, ROOT / "tools/close_loop.py", "--no-such"]
+    done = subprocess.run(program, capture_output=True, text=True)
+    assert_one_line(done, ["--log"])
+
+
+def test_a_subcommand_that_does_not_exist_is_one_line() -> None:
+    command = [sys.executable, "-m", "drake_disasm_cli", "close-lop"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert_one_line(done, ["close-lop", "close-loop"])
+
+
+def test_a_missing_system_library_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(_: str) -> None:
+        raise ImportError("libSM.so.6: cannot open shared object file: No such file")
+
+    monkeypatch.setattr(main.importlib, "import_module", fails)
+    with pytest.raises(main.DisasmError, match=r"libSM.so.6.*apt-get install"):
+        main.main_of("simulate")
+
+
+#: A program, what it needs, and numbers that it refuses, one of each kind.
+_NUMBERS = [
+    ("simulate", (), "--episodes=0"),
+    ("evaluate", ("--policy", "straight"), "--psi=nan"),
+    ("train", ("--out", "nowhere"), "--seeds=x"),
+    ("identify", ("--log", "nowhere", "--out", "nowhere"), "--huber=0"),
+    ("excite", ("--urdf", "x", "--out", "nowhere"), "--margin=2"),
+]
+
+
+@pytest.mark.parametrize(("name", "needed", "option"), _NUMBERS)
+def test_a_number_that_cannot_be_is_one_line(
+    name: str, needed: tuple[str, ...], option: str
+) -> None:
+    done = run_program(name, *needed, option)
+    option, _, value = option.partition("=")
+    assert_one_line(done, [f"argument {option}", f"'{value}' is not a"])
+
+
+def test_a_library_s_argument_is_an_option_in_messages(tmp_path: Path) -> None:
+    done = run_program("simulate", "--set", "lock.clearence=1")
+    assert_one_line(done, ["--set lock.clearence", "'clearance'"])
+    done = run_program("evaluate", "--policy", "straight", "--sweep", "imprecision=7")
+    assert_one_line(done, ["imprecision"])
+
+
+def test_warnings_of_drake_are_counted_and_shown_if_asked_for(tmp_path: Path) -> None:
+    arm = (ROOT / "models/iiwa14/iiwa14.urdf").read_text()
+    odd = "<type>transmission_interface/SimpleTransmission</type>"
+    urdf = tmp_path / "arm.urdf"
+    extra = '<transmission name="odd"><type>Odd</type></transmission></robot>'
+    assert odd in arm
+    urdf.write_text(arm.replace("</robot>", extra))
+    words = ["excite", "--urdf", urdf, "--out", tmp_path / "x", "--joints", "elbow"]
+    command = [sys.executable, "-m", "drake_disasm_cli", *map(str, words)]
+    quiet = subprocess.run(command, capture_output=True, text=True)
+    assert "1 warning about models" in quiet.stderr and "Odd" not in quiet.stderr
+    loud = subprocess.run([*command, "--verbose"], capture_output=True, text=True)
+    assert "transmission" in loud.stderr and "--verbose" not in loud.stderr
+    assert not drake_warnings.are_kept_back()
+
+
+class TestHiddenEffects:
+    """--hidden adds effects to what is simulated, and not to what is stated."""
+
+    RUN = ("simulate", "--station=twin", "--no-meshcat", "--set", "task.steps=3")
+
+    def test_they_act_and_are_not_in_the_log(self, tmp_path: Path) -> None:
+        (tmp_path / "mine.yaml").write_text("effects: [!SensorBias {fx: 9.0}]\n")
+        for name, more in (("plain", ()), ("biased", ("--hidden", "mine.yaml"))):
+            run = (*self.RUN, "--policy=straight", "--record", name, *more)
+            assert run_program(*run, cwd=tmp_path).returncode == 0
+        plain, biased = (read_log(tmp_path / name) for name in ("plain", "biased"))
+        stated = scenario_from_mapping(dict(biased.header.scenario or {}))
+        assert stated == load_scenario("removal", ["task.steps=3"])
+        assert [len(log.episodes[0]["time"]) for log in (plain, biased)] == [4, 4]
+        assert biased.header.provenance["hidden"]
+        assert plain.data_hash != biased.data_hash
+
+    def test_a_scenario_may_repeat_what_is_stated(self) -> None:
+        run = (*self.RUN, "--policy=straight", "--hidden", "removal_turned")
+        assert run_program(*run).returncode == 0
+
+    @pytest.mark.parametrize(
+        ("text", "words"),
+        [
+            ("lock: {clearance: 0.0003}\neffects: [!SensorBias {}]", ["lock", "--set"]),
+            ("name: empty", ["effects"]),
+            ("effects: [!SensorBais {}]", ["SensorBias"]),
+        ],
     )
-    assert done.returncode == 130
-    assert "interrupted" in done.stderr
+    def test_anything_else_is_refused(
+        self, tmp_path: Path, text: str, words: list[str]
+    ) -> None:
+        (tmp_path / "mine.yaml").write_text(text)
+        done = run_program(*self.RUN, "--hidden", "mine.yaml", cwd=tmp_path)
+        assert_one_line(done, ["mine.yaml", *words])
 
 
-def test_a_program_in_the_background_ignores_interrupts_still() -> None:
-    """A shell starts `simulate.py &` with SIGINT ignored; so it must stay."""
-    done = subprocess.run(
-        [sys.executable, "-c", SWALLOWS],
-        cwd=TOOLS,
-        capture_output=True,
+def test_ctrl_d_closes_the_page_as_enter_does(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def ends(_: str) -> str:
+        raise EOFError
+
+    monkeypatch.setattr("builtins.input", ends)
+    common.wait_for_enter("press Enter ")
+    assert capsys.readouterr().out == "\n"
+
+
+_WAITS = """
+import ctypes, sys
+from drake_disasm.common import program, stopping
+stopping._WORKERS_PATIENCE, stopping._PATIENCE = 0.05, 0.1
+
+def main(arguments):
+    print("begun", flush=True)
+    ctypes.CDLL(None).sleep(60)  # a library that knows nothing of Python's handlers
+    return 0
+
+program.run(main)
+"""
+
+
+def test_sigterm_ends_a_program_that_waits_for_a_library() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", _WAITS],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+        preexec_fn=default_signals,
+        env=os.environ,
     )
-    assert done.returncode == 0
+    assert process.stdout and process.stdout.readline() == "begun\n"
+    process.send_signal(signal.SIGTERM)
+    _, errors = process.communicate()
+    assert process.returncode == 143
+    assert errors == "terminated; what was finished is kept\n"
 
 
-def _save(path: Path, period: float = 0.1) -> None:
-    network = Network((np.ones((6, 12), np.float32),), (np.ones(6, np.float32),))
-    description = PolicyDescription(period=period)
-    save_policy(
-        path, LearnedPolicy(network, np.ones(12), ActionMap(np.ones(6)), description)
-    )
+@pytest.mark.parametrize(
+    "policy", ["x:", "a/b:c", "no_such:x", "nowhere.npz", "mine.py:Mine", "strait"]
+)
+def test_a_policy_that_is_none_is_one_line(policy: str) -> None:
+    done = run_program("simulate", "--no-meshcat", "--policy", policy)
+    assert_one_line(done, [policy.partition(":")[0]])
 
 
-def test_policies_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Scripted ones come first, then shipped ones, then what can be imported."""
-    scenario = load_scenario("chapter4")
-    (tmp_path / "policies").mkdir()
-    for name in ("straight", "residual"):
-        _save(tmp_path / f"policies/{name}.npz")
-    monkeypatch.setattr(files, "models_dir", lambda: tmp_path)
-    assert isinstance(cli.named_policy("straight", scenario), Straight)
-    assert isinstance(cli.named_policy("residual", scenario), LearnedPolicy)
-    assert cli.named_policy("numpy:zeros", scenario) is np.zeros
-    with pytest.raises(DisasmError, match=r"'resdual'.*mean 'residual'.*npz file or"):
-        cli.named_policy("resdual", scenario)
-    with pytest.raises(DisasmError, match="known: straight, admittance, residual"):
-        cli.named_policy("xyz", scenario)
-
-
-def test_policies_by_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    scenario = load_scenario("chapter4")
-    (tmp_path / "folder").mkdir()
-    _save(tmp_path / "folder/straight.npz")
-    monkeypatch.chdir(tmp_path)
-    for name in (str(tmp_path / "folder/straight.npz"), "folder/straight.npz"):
-        assert isinstance(cli.named_policy(name, scenario), LearnedPolicy)
-    monkeypatch.chdir("folder")
-    for name in ("straight.npz", "../folder/straight.npz"):
-        assert isinstance(cli.named_policy(name, scenario), LearnedPolicy)
-    with pytest.raises(DisasmError, match=r"folder/straight.npz: can't be read"):
-        cli.named_policy("folder/straight.npz", scenario)
-
-
-def test_policy_that_does_not_fit_is_refused(tmp_path: Path) -> None:
-    _save(tmp_path / "slow.npz", period=0.5)
-    with pytest.raises(DisasmError, match=r"task\.period 0\.5.*'removal' has 0\.1"):
-        cli.named_policy(str(tmp_path / "slow.npz"), load_scenario("removal"))
+def test_a_policy_that_does_not_fit_is_one_line(tmp_path: Path) -> None:
+    write_policy(tmp_path / "slow.npz", period=0.5)
+    run = ("simulate", "--no-meshcat", "--policy", tmp_path / "slow.npz")
+    assert_one_line(run_program(*run), ["task.period", "0.5", "0.1"])

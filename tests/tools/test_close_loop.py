@@ -87,7 +87,7 @@ def test_a_wrong_name_is_refused_before_any_work(tmp_path, monkeypatch):
     def model_of(*_):
         raise AssertionError("the names come first")
 
-    monkeypatch.setattr("close_loop.model_of", model_of)
+    monkeypatch.setattr("drake_disasm_cli.close_loop.model_of", model_of)
     result = run("--log", log, "--out", tmp_path / "out", "--held-out", "nothing")
     assert result.returncode == 2 and "no such episode" in result.stderr
 

@@ -34,10 +34,8 @@ _LCM = f"udpm://239.255.76.67:{_PORT}?ttl=0"
             "nowhere.yaml",
         ),
         (("--station", "hardware", "--episodes", "2"), "--episodes"),
-        (("--station", "hardware", "--dry-run", "--html", "x.html"), "--html"),
         (("--station", "hardware", "--dry-run", "--record", "x"), "--record"),
         (("--station", "simulated"), "--station simulated: does not exist; known: "),
-        (("--model", "twin"), "--model twin: is --station twin now"),
     ],
 )
 def test_refuses_what_hardware_cannot_do(arguments: tuple[str], words: str) -> None:
@@ -53,7 +51,7 @@ def fake(tmp_path: Path) -> Iterator[Path]:
     config = tmp_path / "fake.yaml"
     # In real time on a slow machine, too.
     quick = ("--set", "simulation.cell_time_step=0.005")
-    cell = command("fake_cell", "--config", config, "--lcm-url", _LCM, *quick)
+    cell = command("fake_cell", "--hardware-config", config, "--lcm-url", _LCM, *quick)
     streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL}
     with running(cell, **streams) as process:
         wait_until(config.exists, process)

@@ -2,6 +2,7 @@
 
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -54,8 +55,9 @@ def examples(name: str) -> list[list[str]]:
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with everything that the examples read."""
+    monkeypatch.delitem(sys.modules, "my_policy", raising=False)  # another example's
     for name in ("out/arm_1", "out/arm_2"):
         write_slide_log(tmp_path / name)
     write_readings(tmp_path / "out/readings")

@@ -19,7 +19,7 @@ def test_a_study_writes_its_report_and_resumes(tmp_path: Path) -> None:
     first = run_program("study", *arguments)
     assert first.returncode == 0, first.stderr
     assert "Trainings in which at least one episode succeeds" in first.stdout
-    assert "tools/study.py precision" in (tmp_path / "out/report.md").read_text()
+    assert "drake-disasm study precision" in (tmp_path / "out/report.md").read_text()
     again = run_program("study", *arguments, "--resume")
     assert again.returncode == 0 and again.stdout == first.stdout
 
@@ -71,7 +71,7 @@ def test_the_studies_are_listed() -> None:
         (["precision", "--out", "x", "--compare", "none.csv"], "none.csv: is no file"),
         (
             ["precision", "--out", "x", "--scheduler", "tcp://a:1"],
-            "add --executor dask",
+            "--executor dask",
         ),
     ],
 )

@@ -180,7 +180,7 @@ def test_a_pool_whose_parent_dies_stops_by_itself(tmp_path: Path) -> None:
 def test_learning_from_logs_alone(undisturbed: Path, tmp_path: Path) -> None:
     logs = [str(undisturbed / f"seed_00{i}/log") for i in (0, 1)]
     out = tmp_path / "offline"
-    _finished(out, "--episodes=5", "--updates=50", "--from-logs", *logs)
+    _finished(out, "--episodes=5", "--updates=50", "--log", *logs)
     result = json.loads((out / "seed_000/result.json").read_text())
     assert result["updates"] == 50 and "training" not in result
     assert result["validation"]["episodes"] == 2
@@ -234,7 +234,7 @@ def test_a_start_that_does_not_fit_is_named(undisturbed: Path, tmp_path: Path) -
     [
         (["--psi=0.3"], "imprecision: 0.3 m is out of range"),
         (["--hyper", "gama=1"], "did you mean 'gamma'"),
-        (["--from-logs", "nowhere"], "nowhere"),
+        (["--log", "nowhere"], "nowhere"),
         (["--hyper", "demonstrations=0.5"], "--demonstrations"),
         (["--episodes=0"], "--episodes: '0' is not a whole number from 1"),
     ],
@@ -249,7 +249,7 @@ def test_bad_input_is_one_line(
 
 def test_a_folder_that_is_taken_is_refused(undisturbed: Path) -> None:
     run = _train(undisturbed, "--episodes=6", "--seeds=2")
-    assert run.returncode == 2 and "add --resume" in run.stderr
+    assert run.returncode == 2 and "--resume" in run.stderr
 
 
 def test_resuming_with_something_else_names_the_difference(undisturbed: Path) -> None:
