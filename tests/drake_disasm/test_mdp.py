@@ -98,9 +98,7 @@ OUTCOMES = [
 
 
 @pytest.mark.parametrize(("state", "steps", "expected"), OUTCOMES)
-def test_outcome(
-    state: BoltState, steps: int, expected: Outcome, task: TaskConfig
-) -> None:
+def test_outcome(state, steps, expected, task):
     assert outcome(state, steps, task, GEOMETRY) is expected
 
 

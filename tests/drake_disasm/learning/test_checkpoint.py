@@ -121,9 +121,7 @@ def test_broken_content_is_one_line_and_changes_nothing(name: str, path: Path) -
 
 @pytest.mark.parametrize("load", [load_memory, lambda p: load_agent(p, _agent())])
 @pytest.mark.parametrize("name", ["no memory", "narrow memory"])
-def test_a_start_from_another_training_is_checked_too(
-    name: str, load: Callable[[Path], object], path: Path
-) -> None:
+def test_a_start_from_another_training_is_checked_too(name, load, path):
     arrays, text = unpack(path.read_bytes(), CHECKPOINT)
     BROKEN[name][0](arrays, text)
     path.write_bytes(pack(arrays, text))

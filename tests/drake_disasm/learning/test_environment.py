@@ -69,9 +69,7 @@ def test_stable_baselines3_trains_on_it_as_it_stands() -> None:
     assert env.action_space.contains(action)
 
 
-def test_jams_and_success_terminate_and_a_time_limit_truncates(
-    env: DisassemblyEnv,
-) -> None:
+def test_jams_and_success_terminate_and_a_time_limit_truncates(env):
     env.reset(seed=1, options={"effects": [GroovePose(ry=0.1)]})
     terminated, truncated, info, _ = _push(env)
     assert (terminated, truncated) == (True, False)

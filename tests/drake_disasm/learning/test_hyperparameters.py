@@ -53,26 +53,23 @@ def test_overrides_are_read_as_the_kind_that_they_change() -> None:
     assert override(config, ["base="]).base == ""
 
 
-@pytest.mark.parametrize(
-    ("pair", "message"),
-    [
-        ("gama=0.9", "did you mean 'gamma'"),
-        ("gamma", "key=value"),
-        ("gamma=high", "is no float"),
-        ("gamma=1.5", "gamma: 1.5 is out of range"),
-        ("gamma=.nan", "gamma: nan"),
-        ("batch=2.5", "is no int"),
-        ("layer_norm=1", "is no bool"),
-        ("hidden=[]", "at least one width"),
-        ("hidden=[a]", "is no int"),
-        (f"hidden=[{10**400}]", "from 1 to 10000"),
-        (f"hidden=[{'9, ' * 50}]", "50 widths"),
-        ("gamma=2020-13-45", "'gamma': not YAML"),
-        ("hidden=50", "is no list"),
-        ("residual=[1, 1]", "6 needed"),
-        ("schedule=sometimes", "use one of"),
-    ],
-)
+@pytest.mark.parametrize(("pair", "message"), [
+    ("gama=0.9", "did you mean 'gamma'"),
+    ("gamma", "key=value"),
+    ("gamma=high", "is no float"),
+    ("gamma=1.5", "gamma: 1.5 is out of range"),
+    ("gamma=.nan", "gamma: nan"),
+    ("batch=2.5", "is no int"),
+    ("layer_norm=1", "is no bool"),
+    ("hidden=[]", "at least one width"),
+    ("hidden=[a]", "is no int"),
+    (f"hidden=[{10**400}]", "from 1 to 10000"),
+    (f"hidden=[{'9, ' * 50}]", "50 widths"),
+    ("gamma=2020-13-45", "'gamma': not YAML"),
+    ("hidden=50", "is no list"),
+    ("residual=[1, 1]", "6 needed"),
+    ("schedule=sometimes", "use one of"),
+])  # fmt: skip
 def test_bad_changes_are_named(pair: str, message: str) -> None:
     with refused(message):
         override(preset("chapter3"), [pair])

@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch.utils._pytree import tree_leaves
 
-from drake_disasm.common.errors import DisasmError, DivergedError, UnreachableError
+from drake_disasm.common.errors import DivergedError, UnreachableError
 from drake_disasm.common.progress import ProgressUpdate, ignore_progress
 from drake_disasm.learning import run
 from drake_disasm.learning.dataset import remember
@@ -122,10 +122,8 @@ def test_what_is_remembered_is_the_action_before_imprecision() -> None:
 
 @pytest.mark.parametrize("failure", [UnreachableError, DivergedError])
 def test_a_step_that_the_arm_can_not_do_ends_the_episode_and_not_the_training(
-    failure: type[DisasmError],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    failure, tmp_path, monkeypatch
+):
     """And its log is valid, with the steps that were done."""
     step, steps, bad = TaskSimulation.step, iter(range(100)), [2]
 
@@ -254,9 +252,7 @@ def test_a_damaged_checkpoint_or_anothers_is_refused(tmp_path: Path) -> None:
         _training(demonstrations=0.5)
 
 
-def test_a_start_from_elsewhere_takes_the_agent_and_nothing_else(
-    tmp_path: Path,
-) -> None:
+def test_a_start_from_elsewhere_takes_the_agent_and_nothing_else(tmp_path):
     first = _training("td3")
     for _ in range(2):
         first.run_episode()
@@ -270,9 +266,7 @@ def test_a_start_from_elsewhere_takes_the_agent_and_nothing_else(
     assert second.run_episode()[0] != _training("td3").run_episode()[0]
 
 
-def test_a_folder_is_trained_in_by_one_program_at_a_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_is_trained_in_by_one_program_at_a_time(tmp_path, monkeypatch):
     monkeypatch.setattr(run, "_PATIENCE", 0.05)
     another = refused("another program is training there")
     with run._locked(tmp_path), another, run._locked(tmp_path):

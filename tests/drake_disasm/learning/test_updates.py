@@ -51,18 +51,13 @@ class _Fed:
 
 
 def _reference(algorithm: str, config: Hyperparameters, env: DisassemblyEnv) -> Any:
+    policy: dict[str, Any] = {"net_arch": list(config.hidden)}
+    policy["optimizer_kwargs"] = {"eps": config.adam_epsilon}
     arguments: dict[str, Any] = {
-        "learning_rate": config.actor_rate,
-        "gamma": config.gamma,
-        "tau": config.tau,
-        "batch_size": config.batch,
-        "learning_starts": 0,
-        "device": "cpu",
-        "policy_kwargs": {
-            "net_arch": list(config.hidden),
-            "optimizer_kwargs": {"eps": config.adam_epsilon},
-        },
-    }
+        "learning_rate": config.actor_rate, "gamma": config.gamma, "tau": config.tau,
+        "batch_size": config.batch, "learning_starts": 0, "device": "cpu",
+        "policy_kwargs": policy,
+    }  # fmt: skip
     if algorithm == "sac":
         arguments["ent_coef"] = (
             f"auto_{config.entropy}" if config.adapt_entropy else config.entropy

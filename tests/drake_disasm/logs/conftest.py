@@ -9,33 +9,18 @@ import pytest
 
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns
 
+_EFFECTS = {"effects": [{"name": "friction", "mu": 0.15}], "seed": 3}
+_ORIGIN = {"program": "test", "seed": 3}
+_URDF = "package://arm/arm.urdf"
+_DRIVE = {"limit": 1.0, "gravity_compensation": True}
 SAMPLE_HEADERS = {
-    "transitions": LogHeader(
-        "transitions",
-        "door_chain_lock",
-        {"program": "test", "seed": 3},
-        period=0.1,
-        scenario={"effects": [{"name": "friction", "mu": 0.15}], "seed": 3},
-    ),
-    "static_wrench": LogHeader(
-        "static_wrench", "weigh", {"sensor": "a"}, frames={"wrench": "W"}
-    ),
-    "joint_motion": LogHeader(
-        "joint_motion",
-        "excite",
-        {},
-        period=0.01,
-        joints=("a", "b", "c"),
-        urdf="package://arm/arm.urdf",
-    ),
-    "joint_response": LogHeader(
-        "joint_response",
-        "swing",
-        {},
-        joints=("a", "b"),
-        urdf="package://arm/arm.urdf",
-        drive={"limit": 1.0, "gravity_compensation": True},
-    ),
+    header.kind: header
+    for header in (
+        LogHeader("transitions", "lock", _ORIGIN, period=0.1, scenario=_EFFECTS),
+        LogHeader("static_wrench", "weigh", {"sensor": "a"}, frames={"wrench": "W"}),
+        LogHeader("joint_motion", "excite", {}, {}, 0.01, ("a", "b", "c"), _URDF),
+        LogHeader("joint_response", "swing", {}, {}, None, ("a", "b"), _URDF, _DRIVE),
+    )
 }
 
 # Doubles that a careless text format changes.
@@ -118,11 +103,7 @@ def sample() -> Callable[..., dict[str, np.ndarray]]:
 
 
 @pytest.fixture
-def written(
-    tmp_path: Path,
-    headers: dict[str, LogHeader],
-    sample: Callable[..., dict[str, np.ndarray]],
-) -> Callable[..., Path]:
+def written(tmp_path, headers, sample):
     """`written(kind, file_format, episodes=1)`: the folder of a sample log."""
 
     def write(kind: str, file_format: str = "csv", episodes: int = 1) -> Path:

@@ -46,9 +46,7 @@ def _append(
         episode.append(row, step)
 
 
-def test_it_is_the_episode_that_is_written_at_once(
-    tmp_path: Path, header: LogHeader, columns: dict[str, np.ndarray]
-) -> None:
+def test_it_is_the_episode_that_is_written_at_once(tmp_path, header, columns):
     at_once, as_they_come = (LogWriter(tmp_path / n, header) for n in ("a", "b"))
     for _ in range(2):
         at_once.write_episode(columns)
@@ -82,9 +80,7 @@ def test_an_error_closes_it_and_is_the_reason(tmp_path, header, columns, error, 
         np.testing.assert_array_equal(found[name][:kept], values[:kept])
 
 
-def test_an_episode_that_had_ended_is_not_cut_off(
-    tmp_path: Path, header: LogHeader, columns: dict[str, np.ndarray]
-) -> None:
+def test_an_episode_that_had_ended_is_not_cut_off(tmp_path, header, columns):
     columns["terminated"][-1] = True
     writer = LogWriter(tmp_path, header)
     with pytest.raises(DisasmError), writer.begin_episode() as episode:
@@ -95,9 +91,7 @@ def test_an_episode_that_had_ended_is_not_cut_off(
 
 
 @pytest.mark.parametrize("rows", [0, 1])
-def test_without_a_step_there_is_no_episode(
-    tmp_path: Path, header: LogHeader, columns: dict[str, np.ndarray], rows: int
-) -> None:
+def test_without_a_step_there_is_no_episode(tmp_path, header, columns, rows):
     writer = LogWriter(tmp_path, header)
     with pytest.raises(DisasmError), writer.begin_episode() as episode:
         _append(episode, columns, range(rows)) if rows else None
@@ -107,9 +101,7 @@ def test_without_a_step_there_is_no_episode(
     assert [path.name for path in tmp_path.iterdir()] == ["log.yaml"]
 
 
-def test_rows_after_one_that_was_not_measured_are_left_out(
-    tmp_path: Path, header: LogHeader, columns: dict[str, np.ndarray]
-) -> None:
+def test_rows_after_one_that_was_not_measured_are_left_out(tmp_path, header, columns):
     columns["wrench.fz"][7] = np.nan
     writer = LogWriter(tmp_path, header)
     with pytest.raises(DisasmError), writer.begin_episode() as episode:
@@ -157,9 +149,7 @@ def killed(tmp_path: Path, header: LogHeader, columns: dict[str, np.ndarray]) ->
     return folder
 
 
-def test_the_next_start_closes_what_a_kill_cut_off(
-    killed: Path, header: LogHeader, columns: dict[str, np.ndarray]
-) -> None:
+def test_the_next_start_closes_what_a_kill_cut_off(killed, header, columns):
     with refused("cut off by a kill", "resume"):
         read_log(killed)
     resumed = LogWriter(killed, header, resume=True)
@@ -174,9 +164,7 @@ def test_the_next_start_closes_what_a_kill_cut_off(
     assert not list(killed.glob(".*"))
 
 
-def test_half_a_line_is_left_out_and_a_damaged_one_is_named(
-    killed: Path, header: LogHeader
-) -> None:
+def test_half_a_line_is_left_out_and_a_damaged_one_is_named(killed, header):
     data = (killed / LEFT).read_bytes()
     (killed / LEFT).write_bytes(data.replace(b"0.1,", b"none,", 1))
     with refused("unfinished.csv: column 'time'"):
@@ -186,9 +174,7 @@ def test_half_a_line_is_left_out_and_a_damaged_one_is_named(
     assert read_log(killed).episodes[0].rows == 5
 
 
-def test_a_start_that_is_killed_while_it_closes_is_made_up_for(
-    killed: Path, header: LogHeader
-) -> None:
+def test_a_start_that_is_killed_while_it_closes_is_made_up_for(killed, header):
     """After the note, and after the episode, which are the places to be killed at."""
     rows = (killed / LEFT).read_bytes()
     LogWriter(killed, header, resume=True)
@@ -211,9 +197,7 @@ def test_wrong_columns_are_refused_at_the_first_row(tmp_path, header, columns):
     assert [path.name for path in tmp_path.iterdir()] == ["log.yaml"]
 
 
-def test_notes_belong_to_the_newest_episode(
-    tmp_path: Path, header: LogHeader, columns: dict[str, np.ndarray]
-) -> None:
+def test_notes_belong_to_the_newest_episode(tmp_path, header, columns):
     writer = LogWriter(tmp_path, header)
     writer.write_episode(columns)
     with writer.begin_episode() as episode:

@@ -27,6 +27,7 @@ from drake_disasm.policies import (
 )
 from drake_disasm.policies.files import FORMAT, POLICY
 from drake_disasm.scenario import load_scenario
+from tests.refusals import refusal
 
 MakeNetwork = Callable[..., Network]
 
@@ -39,36 +40,25 @@ def file(policy: LearnedPolicy, tmp_path: Path) -> Path:
 
 
 def _contents(policy: LearnedPolicy) -> list[Any]:
-    arrays = (
-        *policy.network.weights,
-        *policy.network.biases,
-        policy.observation_scale,
-        policy.action_map.action_scale,
-    )
+    arrays = (*policy.network.weights, *policy.network.biases)
+    arrays += (policy.observation_scale, policy.action_map.action_scale)
     bits = [(a.dtype.str, a.shape, a.tobytes()) for a in arrays]
     return [*bits, policy.action_map.base, policy.description]
 
 
 def _refusal(path: Path) -> str:
-    """Returns the one line by which a file is refused."""
-    with pytest.raises(DisasmError) as caught:
-        load_policy(path)
-    message = str(caught.value)
-    assert "\n" not in message
-    assert str(path) in message
-    assert "; " in message, f"no remedy: {message}"
+    """Returns the one line by which a file is refused, with its remedy."""
+    message = refusal(load_policy, path)
+    assert str(path) in message and "; " in message, message
     return message
 
 
 @pytest.mark.parametrize(
     ("widths", "base"), [((12, 6), None), ((12, 128, 128, 128, 6), Straight())]
 )
-def test_round_trip_of_other_shapes(
-    make_network: MakeNetwork, tmp_path: Path, widths: tuple, base: Straight | None
-) -> None:
-    policy = LearnedPolicy(
-        make_network(*widths), np.ones(12), ActionMap(np.ones(6), base)
-    )
+def test_round_trip_of_other_shapes(make_network, tmp_path, widths, base):
+    mapping = ActionMap(np.ones(6), base)
+    policy = LearnedPolicy(make_network(*widths), np.ones(12), mapping)
     save_policy(tmp_path / "policy.npz", policy)
     assert _contents(load_policy(tmp_path / "policy.npz")) == _contents(policy)
 
@@ -89,9 +79,7 @@ def test_same_policy_same_bytes(policy: LearnedPolicy, file: Path) -> None:
     assert load_policy(other).description.period == 1.0
 
 
-def test_it_comes_back_bit_for_bit_and_numpy_can_read_it(
-    policy: LearnedPolicy, file: Path
-) -> None:
+def test_it_comes_back_bit_for_bit_and_numpy_can_read_it(policy, file):
     assert _contents(load_policy(file)) == _contents(policy)
     with np.load(file, allow_pickle=False) as arrays:
         np.testing.assert_array_equal(arrays["weight_0"], policy.network.weights[0])
@@ -203,9 +191,7 @@ BROKEN: list[tuple[Callable[[Arrays, dict[str, Any]], Any], str]] = [
 
 
 @pytest.mark.parametrize(("change", "words"), BROKEN)
-def test_whole_file_with_broken_content_is_refused(
-    file: Path, change: Callable[..., Any], words: str
-) -> None:
+def test_whole_file_with_broken_content_is_refused(file, change, words):
     arrays, text = unpack(file.read_bytes(), POLICY)
     change(arrays, text)
     file.write_bytes(pack(arrays, text))

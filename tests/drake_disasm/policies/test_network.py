@@ -29,9 +29,7 @@ MakeNetwork = Callable[..., Network]
 
 
 @pytest.mark.parametrize("widths", [(12, 128, 128, 6), (12, 6), (3, 1, 2)])
-def test_network_is_what_torch_computes(
-    make_network: MakeNetwork, widths: tuple[int, ...]
-) -> None:
+def test_network_is_what_torch_computes(make_network, widths):
     torch = pytest.importorskip("torch")
     network = make_network(*widths)
     layers = []
@@ -78,9 +76,7 @@ def _pickled(network: Network) -> Network:
 
 
 @pytest.mark.parametrize("base", [None, Admittance()])
-def test_policy_is_its_formula(
-    make_network: MakeNetwork, base: Admittance | None
-) -> None:
+def test_policy_is_its_formula(make_network, base):
     scale, reach = np.linspace(0.01, 5.0, 12), np.linspace(1e-4, 3e-3, 6)
     policy = LearnedPolicy(make_network(12, 8, 6), scale, ActionMap(reach, base))
     for s in np.random.default_rng(2).normal(size=(5, 12)):
@@ -168,17 +164,13 @@ def _described(policy: LearnedPolicy, **changes: object) -> LearnedPolicy:
     ({"state_names": ("x", "y")}, "", ["state", "('x', 'y')", "train anew"]),
     ({"action_names": ("dx",)}, "", ["action", "('dx',)", "train anew"]),
 ])  # fmt: skip
-def test_policy_of_another_task_is_refused(
-    policy: LearnedPolicy, changes: dict, override: str, words: list[str]
-) -> None:
+def test_policy_of_another_task_is_refused(policy, changes, override, words):
     scenario = load_scenario("chapter4", [override] if override else [])
     with refused("chapter4", *words):
         _described(policy, **changes).check_fits(scenario)
 
 
-def test_policy_carries_over_to_other_locks_errors_and_wider_bounds(
-    policy: LearnedPolicy,
-) -> None:
+def test_policy_carries_over_to_other_locks_errors_and_wider_bounds(policy):
     overrides = ["lock.clearance=0.0003", "effects=[!SensorBias {fx: 0.5}]"]
     overrides += ["task.max_translation=0.005", "task.max_rotation=0.05"]
     overrides += ["task.steps=200", "imprecision=0.0003"]

@@ -28,9 +28,7 @@ def _locks(folder: Path, *addresses: str) -> DeviceLocks:
     return DeviceLocks(dict.fromkeys(addresses, "commands this robot"), folder)
 
 
-def test_a_second_program_is_told_who_has_the_robot_until_that_dies(
-    tmp_path: Path,
-) -> None:
+def test_a_second_program_is_told_who_has_the_robot_until_that_dies(tmp_path):
     process = subprocess.Popen(
         [sys.executable, "-c", HOLD, tmp_path],
         stdin=subprocess.PIPE,

@@ -113,9 +113,7 @@ def _loaded(folder: Path, text: str) -> Scenario:
     return load_scenario(str(path))
 
 
-def test_an_older_scenario_keeps_its_grip_and_what_it_says_of_it(
-    tmp_path: Path,
-) -> None:
+def test_an_older_scenario_keeps_its_grip_and_what_it_says_of_it(tmp_path):
     scenario = _loaded(tmp_path, OLD)
     assert scenario.gripper.compliance == "rigid"
     assert scenario.effects[0].ry == 0.01

@@ -8,20 +8,7 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from drake_disasm.effects import (
-    Effect,
-    FlangePayload,
-    JointAsymmetricFriction,
-    JointCoulombFriction,
-    JointEffect,
-    JointLoadFriction,
-    JointSamples,
-    JointStribeckFriction,
-    JointViscousFriction,
-    RotorInertia,
-    TorqueGain,
-    TorqueOffset,
-)
+from drake_disasm import effects as fx
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation
 from tests.drake_disasm.conftest import QUIET
@@ -40,7 +27,7 @@ def station() -> CellStation:
     return CellStation(load_scenario("removal", [QUIET, "gripper.hold=weld", period]))
 
 
-def _lifted(station: CellStation, effects: Sequence[Effect]) -> Simulator:
+def _lifted(station: CellStation, effects: Sequence[fx.Effect]) -> Simulator:
     """Returns the station with the arm raised, so that nothing touches the bolt."""
     simulator = station.at_start(effects)
     context = simulator.get_mutable_context()
@@ -65,7 +52,7 @@ def _drive(station: CellStation, simulator: Simulator, q: np.ndarray) -> np.ndar
     return np.array(torques)
 
 
-def _forth_and_back(station: CellStation, effects: Sequence[Effect]) -> np.ndarray:
+def _forth_and_back(station: CellStation, effects: Sequence[fx.Effect]) -> np.ndarray:
     """Returns a joint's torque after 0.4 s at steady speed, forwards and backwards."""
     t = station.control_period * np.arange(1, 161)
     torques = [
@@ -81,24 +68,22 @@ def without(station: CellStation) -> np.ndarray:
 
 
 @pytest.mark.parametrize("effect", [
-    JointViscousFriction(NAME, 80.0),
-    JointCoulombFriction(NAME, 9.0, creep=1e-4),
-    JointStribeckFriction(NAME, 12.0, speed=0.15),
-    JointAsymmetricFriction(NAME, 4.0, viscous=30.0),
-    JointLoadFriction(NAME, 0.2),
+    fx.JointViscousFriction(NAME, 80.0),
+    fx.JointCoulombFriction(NAME, 9.0, creep=1e-4),
+    fx.JointStribeckFriction(NAME, 12.0, speed=0.15),
+    fx.JointAsymmetricFriction(NAME, 4.0, viscous=30.0),
+    fx.JointLoadFriction(NAME, 0.2),
 ])  # fmt: skip
 def test_a_joint_at_steady_speed_takes_the_effects_torque(effect, station, without):
     v = np.array([SPEED, -SPEED])
-    expected = effect.torque(JointSamples(0 * v, v, 0 * v, without))
+    expected = effect.torque(fx.JointSamples(0 * v, v, 0 * v, without))
     measured = _forth_and_back(station, [effect])
     np.testing.assert_allclose(measured - without, expected, atol=0.03)
 
 
-def test_friction_does_not_chatter_when_the_joint_comes_to_rest(
-    station: CellStation,
-) -> None:
+def test_friction_does_not_chatter_when_the_joint_comes_to_rest(station):
     """However sharp and strong: the torque falls evenly, it does not jump about."""
-    simulator = _lifted(station, [JointCoulombFriction(NAME, 30.0, creep=1e-4)])
+    simulator = _lifted(station, [fx.JointCoulombFriction(NAME, 30.0, creep=1e-4)])
     ramp = SPEED * station.control_period * np.arange(1, 81)
     torques = _drive(station, simulator, np.append(ramp, np.full(200, ramp[-1])))
     assert np.abs(np.diff(torques[-150:], 2)).max() < 0.01
@@ -110,7 +95,7 @@ def test_a_rotor_takes_torque_while_it_speeds_up(station: CellStation) -> None:
     q = 0.25 * t**2
     slow, fast = (
         _drive(station, _lifted(station, effects), q)[-20:].mean()
-        for effects in ([], [RotorInertia(NAME, 2.0)])
+        for effects in ([], [fx.RotorInertia(NAME, 2.0)])
     )
     assert fast - slow == pytest.approx(1.0, abs=0.01)
 
@@ -118,7 +103,7 @@ def test_a_rotor_takes_torque_while_it_speeds_up(station: CellStation) -> None:
 def test_a_payload_bends_the_joints(station: CellStation) -> None:
     """At rest: k (q_commanded - q) = J^T m g, which nothing compensates."""
     mass, p_FoPcm_F = 2.0, np.array([0.02, -0.05, 0.1])
-    simulator = _lifted(station, [FlangePayload(mass, *(mass * p_FoPcm_F))])
+    simulator = _lifted(station, [fx.FlangePayload(mass, *(mass * p_FoPcm_F))])
     simulator.AdvanceTo(0.6)
     plant = station.plant
     context = station.part_context(plant, simulator.get_mutable_context())
@@ -148,19 +133,19 @@ def _parameters(station: CellStation, context: Context) -> np.ndarray:
 
 
 EVERY = (
-    JointViscousFriction(NAME, 80.0),
-    JointCoulombFriction(NAME, 9.0),
-    JointStribeckFriction(NAME, 12.0),
-    JointAsymmetricFriction(NAME, 4.0, viscous=30.0),
-    JointLoadFriction(NAME, 0.2),
-    RotorInertia(NAME, 2.0),
-    TorqueOffset(NAME, -2.0),
-    TorqueGain(NAME, 0.1),
-    FlangePayload(2.0, 0.1),
+    fx.JointViscousFriction(NAME, 80.0),
+    fx.JointCoulombFriction(NAME, 9.0),
+    fx.JointStribeckFriction(NAME, 12.0),
+    fx.JointAsymmetricFriction(NAME, 4.0, viscous=30.0),
+    fx.JointLoadFriction(NAME, 0.2),
+    fx.RotorInertia(NAME, 2.0),
+    fx.TorqueOffset(NAME, -2.0),
+    fx.TorqueGain(NAME, 0.1),
+    fx.FlangePayload(2.0, 0.1),
 )
 NULL = (
-    *(type(e)(NAME) for e in EVERY if isinstance(e, JointEffect)),
-    FlangePayload(),
+    *(type(e)(NAME) for e in EVERY if isinstance(e, fx.JointEffect)),
+    fx.FlangePayload(),
 )
 
 
@@ -189,10 +174,10 @@ def test_each_effect_changes_the_arm_which_the_twin_has_not(station, twin):
 
 
 @pytest.mark.parametrize(("effects", "words"), [
-    ([TorqueOffset("iiwa_join_4", 1.0)], ["did you mean 'iiwa_joint_4'"]),
-    ([RotorInertia("iiwa_join_4", 1.0)], ["did you mean 'iiwa_joint_4'"]),
-    ([JointLoadFriction(NAME, 0.1)] * 2, ["twice on iiwa_joint_4", "merge"]),
-    ([FlangePayload(cx=0.1)], ["no mass", "give it a mass"]),
+    ([fx.TorqueOffset("iiwa_join_4", 1.0)], ["did you mean 'iiwa_joint_4'"]),
+    ([fx.RotorInertia("iiwa_join_4", 1.0)], ["did you mean 'iiwa_joint_4'"]),
+    ([fx.JointLoadFriction(NAME, 0.1)] * 2, ["twice on iiwa_joint_4", "merge"]),
+    ([fx.FlangePayload(cx=0.1)], ["no mass", "give it a mass"]),
 ])  # fmt: skip
 def test_refuses_what_the_cell_cannot_carry(effects, words, station):
     with refused(*words):
@@ -201,7 +186,7 @@ def test_refuses_what_the_cell_cannot_carry(effects, words, station):
 
 def test_a_torque_sensor_reads_what_its_effects_say(station: CellStation) -> None:
     """Only the reading is wrong: the arm holds still as before."""
-    effects = [TorqueOffset(NAME, -2.0), TorqueGain(NAME, 0.1)]
+    effects = [fx.TorqueOffset(NAME, -2.0), fx.TorqueGain(NAME, 0.1)]
     context = _lifted(station, effects).get_mutable_context()
     true, read = (
         station.GetOutputPort(f"iiwa.torque_{end}").Eval(context)

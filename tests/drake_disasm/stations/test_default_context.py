@@ -9,23 +9,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from drake_disasm.effects import (
-    AT_REST,
-    ChainPull,
-    Effect,
-    FlangePayload,
-    GrooveClearance,
-    GrooveFriction,
-    GroovePose,
-    JointCoulombFriction,
-    JointViscousFriction,
-    PayloadError,
-    RotorInertia,
-    SensorBias,
-    SensorLag,
-    TorqueOffset,
-    environment_at,
-)
+from drake_disasm import effects as fx
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import SimulatedStation, TwinStation, make_station
@@ -34,21 +18,21 @@ from tests.drake_disasm.conftest import QUIET
 from tests.refusals import refused
 
 JOINT = "iiwa_joint_4"
-ANYWHERE: list[Effect] = [
-    GroovePose(ry=0.03, z=3e-4),
-    GrooveFriction(0.2),
-    GrooveClearance(1e-4),
-    ChainPull(fx=-2.0),
-    SensorBias(fx=1.0),
-    SensorLag(share=0.8, time_constant=0.2),
-    PayloadError(mass=0.1),
+ANYWHERE: list[fx.Effect] = [
+    fx.GroovePose(ry=0.03, z=3e-4),
+    fx.GrooveFriction(0.2),
+    fx.GrooveClearance(1e-4),
+    fx.ChainPull(fx=-2.0),
+    fx.SensorBias(fx=1.0),
+    fx.SensorLag(share=0.8, time_constant=0.2),
+    fx.PayloadError(mass=0.1),
 ]
-ON_ARM: list[Effect] = [
-    JointViscousFriction(JOINT, 80.0),
-    JointCoulombFriction(JOINT, 9.0),
-    RotorInertia(JOINT, 2.0),
-    TorqueOffset(JOINT, -2.0),
-    FlangePayload(0.3, 0.01, 0.0, 0.02),
+ON_ARM: list[fx.Effect] = [
+    fx.JointViscousFriction(JOINT, 80.0),
+    fx.JointCoulombFriction(JOINT, 9.0),
+    fx.RotorInertia(JOINT, 2.0),
+    fx.TorqueOffset(JOINT, -2.0),
+    fx.FlangePayload(0.3, 0.01, 0.0, 0.02),
 ]
 
 
@@ -65,7 +49,7 @@ def numbers(context: Context) -> np.ndarray:
     return np.concatenate([[context.get_time()], *state, *parameters])
 
 
-def _scenario(effects: list[Effect], *overrides: str) -> Scenario:
+def _scenario(effects: list[fx.Effect], *overrides: str) -> Scenario:
     scenario = load_scenario("removal_turned", [QUIET, *overrides])
     scenario.effects = [*scenario.effects, *effects]
     return scenario
@@ -127,7 +111,9 @@ def test_begin_and_the_scenarios_effects_leave_it_and_come_back_to_it(station):
 
 def test_groove_and_materials_are_the_effects(station: SimulatedStation) -> None:
     context = station.CreateDefaultContext()
-    expected = environment_at(station.lock.nominal, station.scenario.effects, AT_REST)
+    expected = fx.environment_at(
+        station.lock.nominal, station.scenario.effects, fx.AT_REST
+    )
     assert station.true_groove_pose(context).IsExactlyEqualTo(expected.X_GnG)
     inspector = station.GetOutputPort("query_object").Eval(context).inspector()
     for geometry in (*station.lock.groove_ids, *station.lock.bolt_ids.values()):
@@ -137,7 +123,7 @@ def test_groove_and_materials_are_the_effects(station: SimulatedStation) -> None
         assert friction.static_friction() == expected.friction
 
 
-def _slot(station: SimulatedStation, effects: list[Effect] | None) -> float:
+def _slot(station: SimulatedStation, effects: list[fx.Effect] | None) -> float:
     """Returns the width between the lips [m] as the scene graph has it."""
     context = station.CreateDefaultContext()
     if effects is not None:
@@ -154,15 +140,13 @@ def _slot(station: SimulatedStation, effects: list[Effect] | None) -> float:
 def test_the_slot_is_as_wide_as_the_effects_say(twin: TwinStation) -> None:
     """By default, after a change, and after the change is gone."""
     nominal = _slot(twin, None)
-    wider = TwinStation(_scenario([GrooveClearance(1e-4)]))
+    wider = TwinStation(_scenario([fx.GrooveClearance(1e-4)]))
     assert _slot(wider, None) == pytest.approx(nominal + 1e-4)
     assert _slot(wider, []) == pytest.approx(nominal)
-    assert _slot(twin, [GrooveClearance(1e-4)]) == pytest.approx(nominal + 1e-4)
+    assert _slot(twin, [fx.GrooveClearance(1e-4)]) == pytest.approx(nominal + 1e-4)
 
 
-def test_it_stays_at_the_start_in_a_users_diagram(
-    simulator: Simulator, station: SimulatedStation
-) -> None:
+def test_it_stays_at_the_start_in_a_users_diagram(simulator, station):
     """Gripped at A, at rest, zeroed."""
     context = station.GetMyContextFromRoot(simulator.get_context())
     ports = [station.GetOutputPort(name) for name in ("bolt_pose", "ft_sensor.wrench")]

@@ -22,7 +22,6 @@ from drake_disasm.policies import find_policy, load_policy, make_policy
 from drake_disasm.ports import CELL_PORTS, Health, port_differences
 from drake_disasm.safety import Mode
 from drake_disasm.scenario import load_scenario
-from drake_disasm.stations import CellStation
 from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.task.episode import run_episode
@@ -49,9 +48,7 @@ def station() -> HardwareStation:
     return HardwareStation(load_scenario("removal"), config, lcm=DrakeLcm("memq://"))
 
 
-def test_ports_are_those_of_the_simulated_cell_in_both_directions(
-    station: HardwareStation, cell: CellStation
-) -> None:
+def test_ports_are_those_of_the_simulated_cell_in_both_directions(station, cell):
     assert station.table is cell.table is CELL_PORTS
     for either in (station, cell):
         assert port_differences(either, CELL_PORTS) == []
@@ -292,9 +289,7 @@ def test_another_commander_ends_in_a_hold_and_in_a_refusal_to_begin() -> None:
         assert station.supervisor.mode is Mode.ACTIVE, station.supervisor.reason
 
 
-def test_a_sensor_whose_stream_another_program_has_is_left_alone(
-    station: HardwareStation,
-) -> None:
+def test_a_sensor_whose_stream_another_program_has_is_left_alone(station):
     """Even by a dry run: the box streams to its last client."""
     with station:
         station.connect()

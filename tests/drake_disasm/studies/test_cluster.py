@@ -60,9 +60,7 @@ def test_a_cluster_changes_no_bit(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_one_worker_four_and_a_cluster_of_four_give_the_same_bits(
-    tmp_path: Path,
-) -> None:
+def test_one_worker_four_and_a_cluster_of_four_give_the_same_bits(tmp_path):
     study = small_precision(lockstep=False, seeds=(0, 1))
     alone = _run_here(study, tmp_path / "one", 1)
     assert _run_here(study, tmp_path / "four", 4) == alone

@@ -50,9 +50,7 @@ def test_displaced_bolt_is_drawn_back_by_its_stiffness(control, dynamics, cell):
         np.testing.assert_allclose(felt, K * e, rtol=1e-3, atol=2e-3)
 
 
-def test_moving_bolt_is_braked_by_its_damping(
-    control: CartesianImpedance, dynamics: ArmDynamics, cell: CellStation
-) -> None:
+def test_moving_bolt_is_braked_by_its_damping(control, dynamics, cell):
     rest = _at_rest(cell.start)
     np.testing.assert_allclose(_torque(control, rest, rest), 0.0, atol=1e-9)
     v = np.array([0.1, -0.2, 0.1, 0.3, 0.0, -0.1, 0.2])
@@ -65,9 +63,7 @@ def test_moving_bolt_is_braked_by_its_damping(
     np.testing.assert_allclose(felt, -D @ J @ v, rtol=1e-9)
 
 
-def test_elbow_is_drawn_back_without_moving_the_bolt(
-    control: CartesianImpedance, dynamics: ArmDynamics, cell: CellStation
-) -> None:
+def test_elbow_is_drawn_back_without_moving_the_bolt(control, dynamics, cell):
     dynamics.set_positions(cell.start)
     J, M = dynamics.jacobian(), dynamics.mass_matrix()
     elbow = 0.01 * np.linalg.svd(J)[2][-1]  # J elbow = 0

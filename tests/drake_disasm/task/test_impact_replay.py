@@ -126,9 +126,7 @@ class Wear(EnvironmentEffect):
 
 
 @pytest.mark.slow
-def test_an_effect_of_a_users_own_acts_though_its_equation_takes_no_arrays(
-    monkeypatch,
-):
+def test_an_effect_of_a_users_own_acts_though_its_equation_takes_no_arrays(monkeypatch):
     monkeypatch.setattr(registry, "_effects", dict(registry._effects))
     monkeypatch.setattr(registry, "import_in_workers", lambda module: None)
     register_effect(Wear)

@@ -17,9 +17,10 @@ from drake_disasm.task.diagram import LoadAtStartWarning
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.recording import EpisodeRecorder
 from drake_disasm.task.simulation import TaskSimulation
+from tests.drake_disasm.conftest import QUIET
 
 TURNED = [GroovePose(ry=0.03)]
-IMPACT = ["contact.model=impact", "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"]
+IMPACT = ["contact.model=impact", QUIET]
 
 
 @pytest.fixture(scope="module", params=["cell", "twin"])
@@ -56,9 +57,7 @@ def test_actions_from_outside_equal_a_policys(simulation: TaskSimulation) -> Non
 
 def test_every_period_holds_the_same_number_of_plant_steps() -> None:
     """In free motion each step after the first moves the bolt by the same way."""
-    simulation = TaskSimulation(
-        load_scenario("removal", ["ft_sensor.noise=[0,0,0,0,0,0]"]), "twin"
-    )
+    simulation = TaskSimulation(load_scenario("removal", [QUIET]), "twin")
     x = [simulation.reset(0)[0]]
     for _ in range(40):
         x.append(simulation.step(np.array([1e-3, 0, 0, 0, 0, 0])).observation[0])
