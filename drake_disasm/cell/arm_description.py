@@ -81,6 +81,7 @@ def refuse_unfit_arm(plant: MultibodyPlant, arm: ModelInstanceIndex, url: str) -
     _refuse_missing_links(found, url)
     _refuse_broken_chain(found, url)
     _refuse_missing_drives(found, url)
+    _refuse_missing_rotors(found, url)
     _refuse_weightless(found, url)
 
 
@@ -196,7 +197,7 @@ def _chain(arm: _Arm) -> list[Joint]:
 
 
 def _refuse_missing_drives(arm: _Arm, url: str) -> None:
-    """Refuses joints without a drive of their own, and drives that can't turn them."""
+    """Refuses joints without a drive of their own, and drives in another order."""
     driven = [drive.joint().name() for drive in arm.drives]
     joints = [joint for joint in _chain(arm) if joint.num_velocities() > 0]
     for count, fault, remedy in (
@@ -213,6 +214,9 @@ def _refuse_missing_drives(arm: _Arm, url: str) -> None:
             f"{_names(joints)}",
             "bring them into one order",
         )
+
+
+def _refuse_missing_rotors(arm: _Arm, url: str) -> None:
     still = [d.joint() for d in arm.drives if not d.default_reflected_inertia() > 0.0]
     if still:
         _refuse(
