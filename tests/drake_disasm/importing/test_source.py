@@ -9,8 +9,8 @@ import pyarrow.parquet  # type: ignore[import-untyped]
 import pytest
 from scipy.io import savemat
 
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.importing.source import read_source
+from tests.refusals import refusal
 
 _T = np.arange(5) * 0.1
 _Q = np.arange(10.0).reshape(5, 2)
@@ -41,7 +41,7 @@ def test_csv_as_programs_write_it(tmp_path: Path, text: str) -> None:
 def test_a_column_of_csv_may_begin_otherwise_than_it_goes_on(tmp_path: Path) -> None:
     """Whole numbers, then others, megabytes later; and a flag among numbers."""
     path = tmp_path / "run.csv"
-    rows = 200_000
+    rows = 100_000
     path.write_text("a,b,c\n" + "0,1,x\n" * rows + "0.5, true,\n")
     [stream] = read_source(path).streams
     assert stream.channels["a"][-1] == 0.5 and len(stream.channels["a"]) == rows + 1
@@ -54,29 +54,24 @@ def test_csv_without_names_and_with_flags_and_holes(tmp_path: Path) -> None:
     path.write_text("0,1\n1,2\n")
     assert read_source(path).streams[0].names == ["column_0", "column_1"]
     path.write_text("t,on\n0,true\n1,\n")
-    np.testing.assert_array_equal(read_source(path).channel("on"), [1.0, np.nan])
+    source = read_source(path)
+    np.testing.assert_array_equal(source.channel("on"), [1.0, np.nan])
+    assert "no channel 'om'; it has on" in refusal(source.channel, "om")
 
 
-@pytest.mark.parametrize(
-    "times",
-    [
+def test_dates_and_times_are_seconds_since_1970(tmp_path: Path) -> None:
+    path, expected = tmp_path / "run.csv", [1714564800.25, 1714564800.75]
+    for first, second in (
         ("2024-05-01 12:00:00.25", "2024-05-01 12:00:00.75"),
         ("2024-05-01T12:00:00.25Z", "2024-05-01T12:00:00.75Z"),
         ("2024-05-01T14:00:00.25+02:00", "2024-05-01T14:00:00.75+02:00"),
-    ],
-)
-def test_dates_and_times_are_seconds_since_1970(
-    tmp_path: Path, times: tuple[str, str]
-) -> None:
-    path = tmp_path / "run.csv"
-    path.write_text("t,q\n" + "".join(f"{time},1\n" for time in times))
-    expected = [1714564800.25, 1714564800.75]
-    np.testing.assert_allclose(read_source(path).channel("t"), expected, rtol=1e-15)
-    stamps = np.array([time[:19] for time in times], dtype="datetime64[us]")
+    ):
+        path.write_text(f"t,q\n{first},1\n{second},1\n")
+        np.testing.assert_allclose(read_source(path).channel("t"), expected, rtol=1e-15)
+    stamps = np.array(["2024-05-01T12:00:00"] * 2, dtype="datetime64[us]")
     np.savez(tmp_path / "run.npz", t=stamps, dt=stamps - stamps[0], q=[1.0, 2.0])
     source = read_source(tmp_path / "run.npz")
-    hours = 3600.0 * (int(times[0][11:13]) - 12)
-    assert source.channel("t").tolist() == [1714564800.0 + hours] * 2
+    assert source.channel("t").tolist() == [1714564800.0] * 2
     assert source.channel("dt").tolist() == [0.0, 0.0]
 
 
@@ -91,10 +86,8 @@ def test_archives_matlab_and_parquet_agree(tmp_path: Path) -> None:
         np.testing.assert_array_equal(stream.channels["q.1"], _Q[:, 1])
         assert dict(stream.constants) == ({"gain": 2.5} if ending != "parquet" else {})
     np.save(tmp_path / "run.npy", _Q)
-    assert read_source(tmp_path / "run.npy").streams[0].names == [
-        "column.0",
-        "column.1",
-    ]
+    names = read_source(tmp_path / "run.npy").streams[0].names
+    assert names == ["column.0", "column.1"]
 
 
 def test_a_lerobot_dataset_s_episodes_follow_each_other(tmp_path: Path) -> None:
@@ -102,13 +95,8 @@ def test_a_lerobot_dataset_s_episodes_follow_each_other(tmp_path: Path) -> None:
     (tmp_path / "meta/info.json").write_text(json.dumps({"fps": 10}))
     (tmp_path / "data/chunk-000").mkdir(parents=True)
     for episode in (0, 1):
-        table = pyarrow.table(
-            {
-                "timestamp": _T,
-                "observation.state": [list(row) for row in _Q + episode],
-                "episode_index": [episode] * 5,
-            }
-        )
+        state = {"timestamp": _T, "observation.state": [list(r) for r in _Q + episode]}
+        table = pyarrow.table(state | {"episode_index": [episode] * 5})
         file = tmp_path / f"data/chunk-000/episode_{episode:06d}.parquet"
         pyarrow.parquet.write_table(table, file)
     [stream] = read_source(tmp_path).streams
@@ -124,6 +112,7 @@ def test_a_lerobot_dataset_s_episodes_follow_each_other(tmp_path: Path) -> None:
         ("run.xyz", b"1", "is of no known format"),
         ("run.npz", b"not a zip", "can't be read"),
         ("run.mat", b"not MATLAB" * 50, "can't be read"),
+        ("run.mat", b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM", "with -v7"),
         ("run.parquet", b"PAR1", "can't be read"),
         ("run.mcap", b"\x89MCAP0\r\n", "can't be read"),
         ("run.csv", b"", "has no rows"),
@@ -131,14 +120,11 @@ def test_a_lerobot_dataset_s_episodes_follow_each_other(tmp_path: Path) -> None:
         ("run.csv", b"a,b\nx,y\n", "has no columns of numbers"),
     ],
 )
-def test_what_can_t_be_read_is_refused_in_one_line(
-    tmp_path: Path, name: str, content: bytes, said: str
-) -> None:
+def test_what_can_t_be_read_is_refused(tmp_path, name, content, said) -> None:
     path = tmp_path / name
     path.write_bytes(content)
-    with pytest.raises(DisasmError, match=said) as refused:
-        read_source(path)
-    assert "\n" not in str(refused.value) and str(path) in str(refused.value)
+    message = refusal(read_source, path)
+    assert said in message and str(path) in message
 
 
 def test_damage_that_crashes_scipy_is_refused(tmp_path: Path) -> None:
@@ -147,26 +133,9 @@ def test_damage_that_crashes_scipy_is_refused(tmp_path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[177] = 192  # of the length of a variable's name: a fault in SciPy 1.17.1
     path.write_bytes(content)
-    with pytest.raises(DisasmError, match="can't be read: "):
-        read_source(path)
-
-
-def test_matlab_7_3_is_refused_with_the_remedy(tmp_path: Path) -> None:
-    path = tmp_path / "run.mat"
-    path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(512))
-    with pytest.raises(DisasmError, match="MATLAB 7\\.3; save it with -v7"):
-        read_source(path)
-
-
-def test_a_channel_that_is_not_there_names_its_neighbours(tmp_path: Path) -> None:
-    path = tmp_path / "run.csv"
-    path.write_text("time,position\n0,1\n1,2\n")
-    with pytest.raises(DisasmError, match="has no channel 'postion'; it has position"):
-        read_source(path).channel("postion")
+    assert "can't be read: " in refusal(read_source, path)
 
 
 def test_a_folder_that_is_no_recording_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DisasmError, match="neither a ROS 2 bag"):
-        read_source(tmp_path)
-    with pytest.raises(DisasmError, match="does not exist"):
-        read_source(tmp_path / "none.csv")
+    assert "neither a ROS 2 bag" in refusal(read_source, tmp_path)
+    assert "does not exist" in refusal(read_source, tmp_path / "none.csv")

@@ -1,6 +1,11 @@
-"""A bag of our own cell, as ROS drivers would leave it, and a log of the same run."""
+"""A bag of our own cell, as ROS drivers would leave it, and a log of the same run.
 
-from collections.abc import Callable, Mapping
+The cell has dry friction that its URDF does not state. The bag's sensor has a clock of
+its own. Prints the shift that the importer finds, and what `close_loop` says of either.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +14,30 @@ from pydrake.systems.primitives import VectorLogSink
 from scipy.interpolate import make_interp_spline
 
 from drake_disasm.cell.parsing import movable_joints
+from drake_disasm.common import program
 from drake_disasm.common.files import write_text
+from drake_disasm.effects import Effect, JointCoulombFriction
 from drake_disasm.fakes.bag import FakeBag, bag_times
 from drake_disasm.free_motion.cell_urdf import cell_urdf
 from drake_disasm.free_motion.playing import MotionPlayer
 from drake_disasm.free_motion.table import MotionTable
-from drake_disasm.logs import LogHeader, LogWriter, flat_columns
-from drake_disasm.scenario import Scenario
+from drake_disasm.importing import (
+    Processing,
+    guessed_map,
+    import_recordings,
+    read_source,
+    write_log,
+)
+from drake_disasm.importing.shift import Shift
+from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
+from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import Station, make_station
+from sysid.effect_selection import close_loop
+from sysid.effect_selection.verdict import Verdict
+from sysid.models.from_logs import ModelChoice, model_of
+
+LATE = 0.012  # s, by which the sensor's stamps are
+FRICTION = {"iiwa_joint_2": 4.0, "iiwa_joint_4": 2.5}  # N m
 
 #: Ports of the station that the drivers' topics are made of.
 _PORTS = {
@@ -72,7 +93,7 @@ def _write_bag(
     folder: Path,
     player: MotionPlayer,
     lines: Mapping[str, Callable[[float], np.ndarray]],
-    names: list[str],
+    names: Sequence[str],
     late: float,
 ) -> None:
     random, bag, begin = np.random.default_rng(3), FakeBag(), player.begin
@@ -86,16 +107,69 @@ def _write_bag(
     bag.write(folder / "bag")
 
 
-def _write_log(folder: Path, player: MotionPlayer, names: list[str]) -> None:
+def _write_log(folder: Path, player: MotionPlayer, names: Sequence[str]) -> None:
     header = LogHeader(
         kind="joint_motion",
         task="free motion",
         provenance={"program": "cell_bag"},
         period=player.period,
-        joints=names,
+        joints=tuple(names),
         urdf=str(folder / "arm.urdf"),
     )
     found = player.columns()
     with LogWriter(folder / "log", header) as writer:
         columns = {name: found[name] for name in ("time", *_COLUMNS)}
         writer.write_episode(flat_columns("joint_motion", columns))
+
+
+def motion() -> MotionTable:
+    """Returns 12 s of all joints, each at a rate of its own, from rest to rest."""
+    time = np.arange(0.0, 12.0, 0.005)
+    phase = 2.0 * np.pi * np.outer(time / 12.0, np.arange(3, 10))
+    middle = np.array([0.0, 0.2, 0.0, -1.4, 0.0, 1.2, 0.0])
+    return MotionTable(time, middle - 0.1 * (1.0 - np.cos(phase)))
+
+
+def verdicts(folder: Path) -> tuple[Verdict, Verdict, float]:
+    """Returns the verdicts on the bag and on the log, and the bag's shift [s].
+
+    Args:
+        folder: for recordings and logs.
+    """
+    stated = load_scenario("removal")
+    effects: list[Effect] = [
+        JointCoulombFriction(joint=j, size=s) for j, s in FRICTION.items()
+    ]
+    hidden = dataclasses.replace(stated, effects=effects)
+    record_cell(folder, stated, hidden, motion(), LATE)
+    urdf = folder / "arm.urdf"
+    bag, shifts = _imported(folder / "bag", urdf, folder / "a")
+    own, _ = _imported(folder / "log/episode_0000.parquet", urdf, folder / "b")
+    return bag, own, shifts["/ft"].seconds
+
+
+def _imported(
+    source: Path, urdf: Path, folder: Path
+) -> tuple[Verdict, dict[str, Shift]]:
+    """Returns the verdict on a recording, and its shifts."""
+    read = read_source(source)
+    fields = guessed_map(read, "joint_motion", movable_joints(str(urdf)), str(urdf))
+    imported = import_recordings([read], fields, Processing())
+    write_log(imported, [read], fields, folder, {"program": "cell_bag"})
+    closed = close_loop(model_of([read_log(folder)], ModelChoice()))
+    return closed.verdict, imported.recordings[0].shifts
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Records, imports and prints the verdicts; returns the exit status."""
+    parser = program.argument_parser("python benchmarks/cell_bag.py", __doc__, "")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR")
+    bag, own, shift = verdicts(parser.parse_args(arguments).out)
+    print(f"shift of the sensor's clock: {1e3 * shift:.1f} ms")
+    for name, verdict in (("bag", bag), ("log", own)):
+        print(f"{name}: {verdict.ending}: {', '.join(verdict.names)}")
+    return 0
+
+
+if __name__ == "__main__":
+    program.run(main)
