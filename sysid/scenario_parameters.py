@@ -64,7 +64,7 @@ def read_requests(words: Sequence[str]) -> list[Request]:
             raise DisasmError(f"parameter {name}: is given twice; keep one")
     if not requests:
         raise DisasmError(
-            "no parameter is named; give --parameters, for example "
+            "no parameter is named; give `parameters`, for example "
             "contact.friction GroovePose.ry"
         )
     return requests

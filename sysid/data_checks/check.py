@@ -103,6 +103,6 @@ def without_flagged_rows(
     kept = kept_rows(subject, flagged, whole_episodes)
     if not kept.any():
         raise DisasmError(
-            "--drop-flagged-rows: leaves no row of these logs; record them anew"
+            "`drop_flagged_rows`: leaves no row of these logs; record them anew"
         )
     return model.of_rows(kept)

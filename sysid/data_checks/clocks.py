@@ -80,7 +80,7 @@ def _moving(subject: Subject) -> list[DataFinding]:
         f"{subject.settings.rest_window:g} s before and after"
     )
     return [
-        DataFinding("moving", what, "leave them out: --drop-flagged-rows", rows=rows)
+        DataFinding("moving", what, "leave them out: `drop_flagged_rows`", rows=rows)
     ]
 
 

@@ -125,7 +125,7 @@ def stuck_findings(subject: Subject) -> list[DataFinding]:
         at_end = np.isin(held, (values.min(), values.max())).all()
         what = f"{name} repeats {'its end value' if at_end else 'a value'}: "
         what += "is it saturated?" if at_end else "did the sensor stop?"
-        remedy = "record it anew, or leave the rows out: --drop-flagged-rows"
+        remedy = "record it anew, or leave the rows out: `drop_flagged_rows`"
         found.append(DataFinding("stuck", what, remedy, rows=rows_of(masks)))
     return found
 

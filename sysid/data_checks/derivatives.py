@@ -13,7 +13,7 @@ _PAIRS = (
     ("v", "vd", "accelerations", "velocities"),
 )
 _REMEDY = (
-    "leave them out: --drop-flagged-rows; look at the clock there, and at the ends of "
+    "leave them out: `drop_flagged_rows`; look at the clock there, and at the ends of "
     "a filter"
 )
 

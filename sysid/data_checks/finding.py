@@ -115,5 +115,5 @@ def refuse(findings: Iterable[DataFinding], accepted: Sequence[str] = ()) -> Non
         kinds = " ".join(dict.fromkeys(finding.kind for finding in bad))
         raise DisasmError(
             f"{' | '.join(finding.text for finding in bad)}, or fit them nevertheless "
-            f"by --accept-findings {kinds}"
+            f"by `accept_findings` {kinds}"
         )

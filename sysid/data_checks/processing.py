@@ -43,7 +43,7 @@ def processing_findings(subject: Subject) -> list[DataFinding]:
     what += f" rows{_reason(subject)}"
     remedy = (
         "process the raw reading as docs/reference/log-format.md says, or leave the "
-        "rows out: --drop-flagged-rows"
+        "rows out: `drop_flagged_rows`"
     )
     severity = Severity.REFUSE if _RAW in what else Severity.WARN
     return [DataFinding("processing", what, remedy, severity, rows_of(masks))]

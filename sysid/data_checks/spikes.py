@@ -13,7 +13,7 @@ from sysid.data_checks.tails import tail_limit
 from sysid.models.base import Array
 from sysid.models.measurements import Measurements
 
-_REMEDY = "look at them, or leave them out: --drop-flagged-rows"
+_REMEDY = "look at them, or leave them out: `drop_flagged_rows`"
 
 
 def spike_findings(subject: Subject, expected: Expectation) -> list[DataFinding]:

@@ -86,7 +86,7 @@ def _text_of_stuck(names: tuple[str, str], values: tuple[float, float]) -> str:
     return (
         f"{worse} is stuck: it ended at {max(values):.4f}, {better} at "
         f"{min(values):.4f}, which is more than noise explains. Take {better}'s "
-        "values; a larger --budget or narrower bounds help the other."
+        "values; a larger `budget` or narrower bounds help the other."
     )
 
 

@@ -109,7 +109,7 @@ def _refuse_small_logs(model: LogModel) -> None:
         what = "numbers" if model.affine else "transitions"
         raise DisasmError(
             f"the log has {known} {what} to fit and there are {size} parameters; "
-            "record more, or name fewer --parameters"
+            "record more, or name fewer `parameters`"
         )
 
 
@@ -118,7 +118,7 @@ def _refuse_unknown_profiles(model: LogModel, names: Sequence[str]) -> None:
     for name in names:
         if name not in known:
             raise DisasmError(
-                f"--profile {name}: is not fitted; {closest(name, known)}"
+                f"`profile` {name}: is not fitted; {closest(name, known)}"
             )
 
 
@@ -136,7 +136,7 @@ def _to_freeze(
         raise DisasmError(
             "; ".join(before.complaints)
             + "; leave such a parameter out, record motions that excite it, or freeze "
-            "it by --unidentifiable freeze"
+            "it by `unidentifiable` freeze"
         )
     names = before.to_freeze()
     frozen = {p.name: p.nominal for p in model.parameters if p.name in names}

@@ -73,7 +73,7 @@ class Settings:
                 f"methods {self.methods}: give 'bees', 'nlopt', or both of them"
             )
         if self.huber_delta is not None and not self.huber_delta > 0.0:
-            raise DisasmError("--huber: give a number above zero, or inf")
+            raise DisasmError("`huber_delta`: give a number above zero, or inf")
         if self.unidentifiable not in ("stop", "freeze"):
             raise DisasmError(
                 f"unidentifiable '{self.unidentifiable}': give 'stop' or 'freeze'"

@@ -57,7 +57,7 @@ def split_episodes(
         test = {i for word in held_out for i in _matching(names, word)}
     train = [i for i in range(len(names)) if i not in test]
     if not train:
-        raise DisasmError("--held-out: no episode is left to fit; hold out fewer")
+        raise DisasmError("`held_out`: no episode is left to fit; hold out fewer")
     return train, sorted(test)
 
 
@@ -66,6 +66,6 @@ def _matching(names: Sequence[str], word: str) -> list[int]:
     if not found:
         logs = sorted({name.split("/")[0] for name in names})
         raise DisasmError(
-            f"--held-out {word}: no such episode; {closest(word, [*logs, *names])}"
+            f"`held_out` {word}: no such episode; {closest(word, [*logs, *names])}"
         )
     return found

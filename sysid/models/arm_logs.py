@@ -16,7 +16,7 @@ def arm_urdf(logs: Sequence[Log], urdf: str | None) -> str:
     Raises:
         DisasmError: there is none.
     """
-    where, remedy = logs[0].folder / "log.yaml", "give the arm's URDF by --urdf FILE"
+    where, remedy = logs[0].folder / "log.yaml", "give the arm's URDF by `urdf`"
     if not urdf and logs[0].header.urdf is None:
         raise refusal(where, "no 'urdf'", remedy)
     urdf = str(urdf or logs[0].header.urdf)

@@ -59,7 +59,7 @@ def model_of(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
     objective = choice.objective or OBJECTIVES[kind][0]
     if objective not in OBJECTIVES[kind]:
         raise DisasmError(
-            f"--objective {objective}: {logs[0].folder} is a log of kind '{kind}'; "
+            f"`objective` {objective}: {logs[0].folder} is a log of kind '{kind}'; "
             f"for that use {' or '.join(OBJECTIVES[kind])}"
         )
     make = {
@@ -82,11 +82,11 @@ def _twin(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
     if scenario is None:
         raise DisasmError(
             f"{logs[0].folder}: states no scenario; name the twin's nominal one by "
-            "--scenario"
+            "`scenario`"
         )
     if not (choice.requests or choice.fixed):
         raise DisasmError(
-            "no parameters to identify; name them by --parameters, for example "
+            "no parameters to identify; name them by `parameters`, for example "
             "contact.friction lock.clearance GroovePose.ry"
         )
     scenario, parameters = scenario_parameters(scenario, choice.requests)
@@ -119,11 +119,11 @@ def _with_noise(model: LogModel, noise: dict[str, float]) -> LogModel:
     for name, value in noise.items():
         if name not in known:
             raise DisasmError(
-                f"--noise {name}: no such channel, the model does not predict it; "
+                f"`noise` {name}: no such channel, the model does not predict it; "
                 f"{closest(name, known)}"
             )
         if not 0.0 < value < math.inf:
-            raise DisasmError(f"--noise {name}={value:g}: give a number above zero")
+            raise DisasmError(f"`noise` {name}={value:g}: give a number above zero")
     channels = tuple(
         dataclasses.replace(channel, noise=noise[channel.name], origin="as given")
         if channel.name in noise

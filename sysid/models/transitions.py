@@ -321,14 +321,14 @@ def _refuse_other_logs(log: Log, scenario: Scenario) -> None:
         raise refusal(
             where,
             f"a log of kind '{log.header.kind}', the twin predicts 'transitions'",
-            "name a log that drake-disasm simulate --record or the cell wrote",
+            "name a log that `drake-disasm simulate` or the cell wrote",
         )
     period = log.header.period
     if period is None or abs(period - scenario.task.period) > 1e-9:
         raise refusal(
             where,
             f"period {period} s, the scenario has task.period {scenario.task.period} s",
-            "give the scenario that was recorded, or --set task.period",
+            "give the scenario that was recorded, or change its task.period",
         )
 
 
