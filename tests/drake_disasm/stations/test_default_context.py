@@ -4,16 +4,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from pydrake.multibody.plant import CoulombFriction
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_disasm import effects as fx
-from drake_disasm.policies import make_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import SimulatedStation, TwinStation, make_station
-from drake_disasm.task.simulation import TaskSimulation
 from tests.drake_disasm.conftest import QUIET
 from tests.refusals import refused
 
@@ -111,15 +108,13 @@ def test_begin_and_the_scenarios_effects_leave_it_and_come_back_to_it(station):
 
 def test_groove_and_materials_are_the_effects(station: SimulatedStation) -> None:
     context = station.CreateDefaultContext()
-    expected = fx.environment_at(
-        station.lock.nominal, station.scenario.effects, fx.AT_REST
-    )
+    effects = station.scenario.effects
+    expected = fx.environment_at(station.lock.nominal, effects, fx.AT_REST)
     assert station.true_groove_pose(context).IsExactlyEqualTo(expected.X_GnG)
     inspector = station.GetOutputPort("query_object").Eval(context).inspector()
     for geometry in (*station.lock.groove_ids, *station.lock.bolt_ids.values()):
-        friction: CoulombFriction = inspector.GetProximityProperties(
-            geometry
-        ).GetProperty("material", "coulomb_friction")
+        properties = inspector.GetProximityProperties(geometry)
+        friction = properties.GetProperty("material", "coulomb_friction")
         assert friction.static_friction() == expected.friction
 
 
@@ -171,20 +166,6 @@ def test_the_first_reading_is_of_the_load_at_rest(station: SimulatedStation) -> 
     expected = station.initial_state.reading + bias
     quantum = np.array(station.scenario.ft_sensor.quantum)
     assert np.all(np.abs(reading - expected) <= quantum / 2 + quantum / 4)
-
-
-@pytest.mark.parametrize("name", ["twin", "cell"])
-def test_an_episode_begins_with_the_default_context(name: str) -> None:
-    """TaskSimulation starts from it, to the bit: its first step is a plain one."""
-    simulation = TaskSimulation(
-        load_scenario("removal_turned", [QUIET]), name, make_policy("admittance")
-    )
-    plain = Simulator(simulation.diagram)
-    default = numbers(simulation.diagram.CreateDefaultContext())
-    np.testing.assert_array_equal(numbers(plain.get_context()), default)
-    begun = simulation.diagram.CreateDefaultContext()
-    simulation.systems.begin(begun)
-    np.testing.assert_array_equal(numbers(begun), default)
 
 
 def test_an_unconnected_velocity_is_at_rest(twin: TwinStation) -> None:
