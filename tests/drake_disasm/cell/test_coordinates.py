@@ -8,6 +8,7 @@ from drake_disasm.cell.coordinates import ArmCoordinates
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation, SimulatedStation, TwinStation
+from tests.refusals import refusal
 
 
 def _error(X: RigidTransform, Y: RigidTransform) -> tuple[float, float]:
@@ -18,20 +19,12 @@ def _error(X: RigidTransform, Y: RigidTransform) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("name", ["cell", "twin"])
-def test_start_is_the_identity(name: str, request: pytest.FixtureRequest) -> None:
-    station: SimulatedStation = request.getfixturevalue(name)
-    X_GB = station.coordinates.pose(station.start)
-    assert X_GB.IsNearlyEqualTo(RigidTransform(), 1e-7)
-
-
-@pytest.mark.parametrize("name", ["cell", "twin"])
-@pytest.mark.parametrize("seed", range(4))
-def test_solve_inverts_pose(
-    name: str, seed: int, request: pytest.FixtureRequest
-) -> None:
+@pytest.mark.parametrize("seed", range(2))
+def test_solve_inverts_pose_from_the_start_on(name: str, seed: int, request) -> None:
     """Over the greatest step, 3 mm and 1 degree on each axis, along a path."""
     station: SimulatedStation = request.getfixturevalue(name)
     generator, q, X_GB = np.random.default_rng(seed), station.start, RigidTransform()
+    assert station.coordinates.pose(q).IsNearlyEqualTo(X_GB, 1e-7)
     for _ in range(5):
         p = X_GB.translation() + generator.uniform(-0.003, 0.003, 3)
         rpy = generator.uniform(-0.0175, 0.0175, 3)
@@ -51,19 +44,15 @@ def test_twin_coordinates_are_xyz_yaw_pitch_roll(twin: TwinStation) -> None:
     np.testing.assert_allclose(X_GB @ p_BoTo_B, np.add(p_BoTo_B, [1, 2, 3]), rtol=1e-14)
 
 
-def test_out_of_reach_is_one_line() -> None:
+def test_what_is_out_of_reach_is_refused(cell: CellStation) -> None:
     scenario = load_scenario("removal", ["placement.p_WG=[1.4, 0, 0.2]"])
-    with pytest.raises(DisasmError, match=r"can't reach.*placement\.p_WG"):
-        CellStation(scenario)
+    assert "placement.p_WG" in refusal(CellStation, scenario)
+    far = RigidTransform([0.9, 0.5, 0.0])
+    message = refusal(cell.coordinates.solve, far, cell.start)
+    assert "can't follow" in message and "placement.p_WG" in message
 
 
-def test_a_motion_beyond_the_limits_is_one_line(cell: CellStation) -> None:
-    assert isinstance(cell.coordinates, ArmCoordinates)
-    with pytest.raises(DisasmError, match=r"can't follow.*placement\.p_WG"):
-        cell.coordinates.solve(RigidTransform([0.9, 0.5, 0.0]), cell.start)
-
-
-def test_a_turn_beyond_the_joints_limits_is_one_line(cell: CellStation) -> None:
+def test_a_turn_beyond_the_joints_limits_is_refused(cell: CellStation) -> None:
     """The bolt's place alone could be kept: the orientation must not be lost."""
     X_GB = RigidTransform([0.0, 0.05, 0.0])
     assert isinstance(cell.coordinates, ArmCoordinates)
