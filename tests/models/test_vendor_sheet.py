@@ -50,11 +50,6 @@ def gripper() -> MultibodyPlant:
     return parse("gripper_2f140/gripper_2f140")
 
 
-@pytest.fixture(scope="module")
-def hex_e() -> MultibodyPlant:
-    return parse("hex_e/hex_e")
-
-
 def origin(plant: MultibodyPlant, frame: Frame, q: np.ndarray) -> np.ndarray:
     """The origin of `frame` in the world at positions `q`, (3,), m."""
     context = plant.CreateDefaultContext()
@@ -73,65 +68,49 @@ def joint_origins(iiwa: MultibodyPlant, q: np.ndarray) -> dict[int, np.ndarray]:
     return {i: origin(iiwa, frame, q) for i, frame in enumerate(frames)}
 
 
-@pytest.mark.parametrize("i", JOINTS)
-def test_iiwa_joint_limits(iiwa: MultibodyPlant, i: int) -> None:
-    joint = iiwa.GetJointByName(f"iiwa_joint_{i + 1}")
-    position, velocity = np.deg2rad(POSITION_DEG[i]), np.deg2rad(VELOCITY_DEG[i])
-    np.testing.assert_allclose(joint.position_upper_limits(), position, rtol=1e-10)
-    np.testing.assert_allclose(joint.position_lower_limits(), -position, rtol=1e-10)
-    np.testing.assert_allclose(joint.velocity_upper_limits(), velocity, rtol=1e-10)
-    assert joint.acceleration_upper_limits() == pytest.approx(ACCELERATION[i])
-    assert joint.default_damping() == 0.5
+def test_iiwa_joint_limits(iiwa: MultibodyPlant) -> None:
+    position, velocity = np.deg2rad(POSITION_DEG), np.deg2rad(VELOCITY_DEG)
+    np.testing.assert_allclose(iiwa.GetPositionUpperLimits(), position, rtol=1e-10)
+    np.testing.assert_allclose(iiwa.GetPositionLowerLimits(), -position, rtol=1e-10)
+    np.testing.assert_allclose(iiwa.GetVelocityUpperLimits(), velocity, rtol=1e-10)
+    np.testing.assert_allclose(iiwa.GetAccelerationUpperLimits(), ACCELERATION)
+    for i in JOINTS:
+        assert iiwa.GetJointByName(f"iiwa_joint_{i + 1}").default_damping() == 0.5
 
 
-@pytest.mark.parametrize("i", JOINTS)
-def test_iiwa_actuators(iiwa: MultibodyPlant, i: int) -> None:
-    actuator = iiwa.GetJointActuatorByName(f"iiwa_joint_{i + 1}")
-    assert actuator.joint().name() == f"iiwa_joint_{i + 1}"
-    assert actuator.effort_limit() == EFFORT[i]
-    reflected = ROTOR_INERTIA[i] * GEAR_RATIO[i] ** 2
-    assert actuator.default_reflected_inertia() == pytest.approx(reflected)
-
-
-def test_iiwa_actuators_are_in_the_order_of_the_joints(iiwa: MultibodyPlant) -> None:
+def test_iiwa_actuators_in_the_order_of_the_joints(iiwa: MultibodyPlant) -> None:
     np.testing.assert_array_equal(iiwa.MakeActuationMatrix(), np.eye(7))
+    for i in JOINTS:
+        actuator = iiwa.GetJointActuatorByName(f"iiwa_joint_{i + 1}")
+        assert actuator.effort_limit() == EFFORT[i]
+        reflected = ROTOR_INERTIA[i] * GEAR_RATIO[i] ** 2
+        assert actuator.default_reflected_inertia() == pytest.approx(reflected)
 
 
-def test_iiwa_link_lengths(iiwa: MultibodyPlant) -> None:
+def test_iiwa_mass_and_link_lengths(iiwa: MultibodyPlant) -> None:
+    assert total_mass(iiwa) == pytest.approx(29.9, abs=1e-9)
     q = np.zeros(7)
     at = joint_origins(iiwa, q)
     flange = origin(iiwa, iiwa.GetFrameByName("iiwa_link_ee"), q)
     heights = np.diff([0, at[2][2], at[4][2], at[6][2], flange[2]])
     np.testing.assert_allclose(heights, [0.360, 0.420, 0.400, 0.126], atol=1e-12)
     np.testing.assert_allclose(flange[:2], 0, atol=1e-12)
-
-
-def test_iiwa_link_lengths_hold_at_any_pose(iiwa: MultibodyPlant) -> None:
-    q = np.array([0.3, -0.7, 1.1, 1.3, -0.4, 0.9, 2.0])
-    at = joint_origins(iiwa, q)
+    at = joint_origins(iiwa, np.array([0.3, -0.7, 1.1, 1.3, -0.4, 0.9, 2.0]))
     assert np.linalg.norm(at[4] - at[2]) == pytest.approx(0.420)
     assert np.linalg.norm(at[6] - at[4]) == pytest.approx(0.400)
 
 
-@pytest.mark.parametrize(
-    ("joint", "expected"),
-    [(2, [0.946, 0, 0.360]), (4, [-0.526, 0, 0.780]), (6, [0.126, 0, 1.180])],
-)
-def test_iiwa_elbows_turn_the_right_way(
-    iiwa: MultibodyPlant, joint: int, expected: list[float]
-) -> None:
+def test_iiwa_elbows_turn_the_right_way(iiwa: MultibodyPlant) -> None:
     """Joints 2 and 6 lean the arm to +x at +90 degrees, joint 4 to -x."""
-    q = np.zeros(7)
-    q[joint - 1] = np.pi / 2
-    flange = origin(iiwa, iiwa.GetFrameByName("iiwa_link_ee"), q)
-    np.testing.assert_allclose(flange, expected, atol=1e-12)
+    leaning = {2: [0.946, 0, 0.360], 4: [-0.526, 0, 0.780], 6: [0.126, 0, 1.180]}
+    for joint, expected in leaning.items():
+        q = np.pi / 2 * np.eye(7)[joint - 1]
+        flange = origin(iiwa, iiwa.GetFrameByName("iiwa_link_ee"), q)
+        np.testing.assert_allclose(flange, expected, atol=1e-12)
 
 
-def test_iiwa_mass(iiwa: MultibodyPlant) -> None:
-    assert total_mass(iiwa) == pytest.approx(29.9, abs=1e-9)
-
-
-def test_hex_mass_and_height(hex_e: MultibodyPlant) -> None:
+def test_hex_mass_and_height() -> None:
+    hex_e = parse("hex_e/hex_e")
     assert total_mass(hex_e) == pytest.approx(0.347)
     tool = origin(hex_e, hex_e.GetFrameByName("tool_side"), np.zeros(0))
     np.testing.assert_allclose(tool, [0, 0, 0.050], atol=1e-12)
@@ -140,8 +119,7 @@ def test_hex_mass_and_height(hex_e: MultibodyPlant) -> None:
 
 def test_gripper_mass_and_centre_of_mass(gripper: MultibodyPlant) -> None:
     assert total_mass(gripper) == pytest.approx(1.025)
-    context = gripper.CreateDefaultContext()
-    p_WGcm = gripper.CalcCenterOfMassPositionInWorld(context)
+    p_WGcm = gripper.CalcCenterOfMassPositionInWorld(gripper.CreateDefaultContext())
     np.testing.assert_allclose(p_WGcm, [0, 0, 0.07], atol=5e-4)
 
 
@@ -194,9 +172,8 @@ def test_uris_resolve(name: str) -> None:
 
 
 def test_meshes_are_what_the_script_makes(tmp_path: Path) -> None:
-    script = (MODELS / "make_meshes.py").read_text()
     copy = tmp_path / "make_meshes.py"
-    copy.write_text(script)
+    copy.write_text((MODELS / "make_meshes.py").read_text())
     subprocess.run([sys.executable, str(copy)], check=True)
     for made in (tmp_path / "iiwa14" / "meshes").iterdir():
         kept = MODELS / "iiwa14" / "meshes" / made.name

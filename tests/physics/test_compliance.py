@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from compliance import Push, stated, stiffness
 
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import make_station
 from tests.drake_disasm.conftest import QUIET
+from tests.refusals import refusal
 
 ORIGIN = np.zeros(3)
 
@@ -38,5 +38,5 @@ def test_a_bolt_slips_that_is_pulled_harder_than_it_is_held() -> None:
 def test_a_step_that_is_too_long_for_a_stiff_grip_is_refused() -> None:
     overrides = ["gripper.compliance=rigid", "arm.control=cartesian_impedance"]
     step = "simulation.twin_time_step=0.02"
-    with pytest.raises(DisasmError, match="twin_time_step"):
-        make_station("twin", load_scenario("removal", [*overrides, step]))
+    scenario = load_scenario("removal", [*overrides, step])
+    assert "twin_time_step" in refusal(make_station, "twin", scenario)

@@ -1,5 +1,7 @@
 """Sliding, in the cell and in a turned groove, against Coulomb and the contact."""
 
+import itertools
+
 import numpy as np
 import pytest
 from physics import QUIET, STIFF
@@ -8,6 +10,7 @@ from drake_disasm.common.spatial import rotation_from_vector
 from drake_disasm.effects import GroovePose
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
+from tests.physics.contacts import surfaces
 
 
 def _press(model: str, offset: np.ndarray, ry: float) -> TaskSimulation:
@@ -25,38 +28,29 @@ def _groove_on_bolt(simulation: TaskSimulation) -> np.ndarray:
     station = simulation.station
     contacts = simulation.evaluate(station, "contact_results")
     groove, force = set(station.lock.groove_ids), np.zeros(3)
-    for i in range(contacts.num_hydroelastic_contacts()):
-        info = contacts.hydroelastic_contact_info(i)
-        surface = info.contact_surface()
+    for i, surface in enumerate(surfaces(contacts)):
         if {surface.id_M(), surface.id_N()} & groove:  # the force is on M's body
+            info = contacts.hydroelastic_contact_info(i)
             sign = -1.0 if surface.id_M() in groove else 1.0
             force += sign * info.F_Ac_W().translational()
     return station.X_WG.rotation().matrix().T @ force
 
 
-ANGLES_DEG = [0.0, 2.0, -4.0]
-OFFSETS = [[0, 0, 6e-4], [0, 6e-4, 0], [0, -6e-4, 0]]
-IN_TWIN = [("twin", angle, offset) for angle in ANGLES_DEG for offset in OFFSETS]
-IN_CELL = [("cell", *case) for _, *case in IN_TWIN]
+#: Neck on a lip, head under the lips, head on the floor; groove turned or not.
+WALLS = {"lip": [0, 0, 6e-4], "lips": [0, 6e-4, 0], "floor": [0, -6e-4, 0]}
+QUICK = [("twin", 0.0, "lip"), ("twin", -4.0, "lips"), ("twin", 2.0, "floor")]
+QUICK += [("cell", 2.0, "lips")]
+ALL = itertools.product(("cell", "twin"), (0.0, 2.0, -4.0), WALLS)
+SLOW = [case for case in ALL if case not in QUICK]
 
 
 @pytest.mark.parametrize(
-    ("model", "ry_deg", "offset"),
-    [
-        *IN_TWIN,
-        IN_CELL[4],
-        *(
-            pytest.param(*case, marks=pytest.mark.slow)
-            for case in IN_CELL[:4] + IN_CELL[5:]
-        ),
-    ],
+    ("model", "ry_deg", "wall"),
+    [*QUICK, *(pytest.param(*case, marks=pytest.mark.slow) for case in SLOW)],
 )
-def test_sliding_force_is_mu_n_anywhere(
-    model: str, ry_deg: float, offset: list[float]
-) -> None:
-    """Neck on a lip, head under the lips, head on the floor; groove turned or not."""
+def test_sliding_force_is_mu_n_anywhere(model: str, ry_deg: float, wall: str) -> None:
     ry = np.deg2rad(ry_deg)
-    simulation = _press(model, np.array(offset), ry)
+    simulation = _press(model, np.array(WALLS[wall]), ry)
     R_GnG = rotation_from_vector(np.array([0.0, ry, 0.0]))
     force = R_GnG.inverse() @ simulation.observation()[6:9]
     assert np.hypot(force[1], force[2]) > 3.0
