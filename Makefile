@@ -55,11 +55,10 @@ benchmark: check-libraries $(VENV)/.dev  ## Measure speed (ARGS="--only cell_res
 check-install: check-libraries $(VENV)/.dev  ## Install into an empty environment, import elsewhere
 	rm -rf build/empty && $(PYTHON) -m venv build/empty
 	build/empty/bin/python -m pip install --quiet --constraint constraints.txt .
-	cd / && $(CURDIR)/build/empty/bin/python -c "import drake_disasm, drake_disasm.logs; \
-	from drake_disasm.scenario import load_scenario; \
+	cd / && $(CURDIR)/build/empty/bin/python -c "import gymnasium, sysid; \
 	from drake_disasm.stations import make_station; \
-	from drake_disasm.common.resources import models_dir; \
-	make_station('cell', load_scenario('removal')); print('installed:', models_dir())"
+	make_station('cell', 'removal'); gymnasium.make('drake_disasm/Removal-v0')"
+	cd / && $(CURDIR)/build/empty/bin/drake-disasm simulate --station twin --no-meshcat
 
 clean:  ## Remove what was built
 	rm -rf $(VENV) build dist docs/reference/api *.egg-info .mypy_cache .ruff_cache .pytest_cache

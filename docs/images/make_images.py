@@ -26,11 +26,12 @@ _FLAGS = (
 
 
 def main() -> None:
-    """Writes cell.png, lock.png and both in overview.png, beside this file."""
-    files = [Path(__file__).with_name(f"{name}.png") for name in ("cell", "lock")]
-    for file, close_up in zip(files, (False, True), strict=True):
-        _take(file, close_up)
-    _side_by_side(files, Path(__file__).with_name("overview.png"))
+    """Writes overview.png beside this file: the cell, and a close-up of the lock."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = [Path(folder) / f"{name}.png" for name in ("cell", "lock")]
+        for file, close_up in zip(files, (False, True), strict=True):
+            _take(file, close_up)
+        _side_by_side(files, Path(__file__).with_name("overview.png"))
 
 
 def _side_by_side(files: Sequence[Path], to: Path) -> None:
