@@ -123,6 +123,8 @@ def test_neither_can_it_be_set_later(name, request):
     for change in (station.set_effects, station.begin):
         with refused("ContactExponent"):
             change(station.CreateDefaultContext(), [ContactExponent(0.5)])
+    with refused("contact.model", "'impact'", "twin"):
+        CellStation(_scenario(model="impact"))
 
 
 def test_the_same_effect_is_carried_where_it_belongs() -> None:
@@ -131,8 +133,3 @@ def test_the_same_effect_is_carried_where_it_belongs() -> None:
     conditions = station.impact_conditions(station.CreateDefaultContext())
     nominal = station.scenario.contact.impact.exponent
     assert conditions.law.exponent == pytest.approx(nominal + 0.5)
-
-
-def test_the_cell_names_the_station_that_has_the_contact() -> None:
-    with refused("contact.model", "'impact'", "twin"):
-        CellStation(_scenario(model="impact"))
