@@ -31,9 +31,10 @@ class Exploring:
         deviation: float,
         seed: int,
     ) -> None:
-        if isinstance(policy, System):
+        kind = policy if isinstance(policy, type) else type(policy)
+        if issubclass(kind, System):
             raise DisasmError(
-                f"policy {type(policy).__name__}: is a System, to whose actions no "
+                f"policy {kind.__name__}: is a System, to whose actions no "
                 "noise is added; leave `explore` out, or give a callable"
             )
         self._policy, self._seed = policy, seed

@@ -25,8 +25,12 @@ def resolve_policy(name: str, scenario: Scenario) -> Policy | System:
         name: of a scripted policy (`SCRIPTED`) or a shipped one (`shipped_policies`);
             a path to an .npz; or `module:name` or `FILE.py:name` of a callable from
             observation (12,) to action (6,), of a System with such ports, or of a class
-            of either, which is made without arguments.
+            of either, which can be made without arguments.
         scenario: that it is to act on.
+
+    Returns:
+        A callable, a System, or a class of Systems, of which each diagram makes its
+        own (see `add_task`).
 
     Raises:
         DisasmError: there is none of that name, it is no policy, or it does not fit
@@ -64,9 +68,10 @@ def _own_policy(source: str, attribute: str, where: str) -> Policy | System:
             f"{closest(attribute, _defined_in(module))}"
         )
     policy = getattr(module, attribute)
-    if isinstance(policy, type):
-        policy = _made(policy, where)
-    return _checked(policy, where)
+    if not isinstance(policy, type):
+        return _checked(policy, where)
+    made = _checked(_made(policy, where), where)
+    return policy if isinstance(made, System) else made
 
 
 def _defined_in(module: ModuleType) -> list[str]:

@@ -156,7 +156,8 @@ def add_task(
         station: "cell", "twin" or "hardware", from `make_station`.
         policy: a callable from observation (12,) to action (6,); or a System with the
             input port `observation` (12) and the output port `action` (6), which is
-            added here, sampled at the MDP's period and held; or None: the value of
+            added here, sampled at the MDP's period and held; or a class of such
+            Systems, of which the diagram gets its own; or None: the value of
             `action_source` is the action, zero until it is set.
 
     Returns:
@@ -321,6 +322,8 @@ def _add_policy(
         )
         return None, source, source.get_output_port()
     observation = processor.GetOutputPort("observation")
+    if isinstance(policy, type) and issubclass(policy, System):
+        policy = policy()
     if isinstance(policy, System):
         hold = _add_policy_system(builder, policy, observation, task)
         station.register_part("policy", hold.stopwatch)

@@ -94,8 +94,8 @@ class TaskSimulation:
     Args:
         scenario: what is simulated: an object, a shipped name, or a file.
         station: "cell" or "twin", or what makes a station of a scenario (hardware).
-        policy: observation (12,) to action (6,), or a System (see `add_task`), or
-            None.
+        policy: observation (12,) to action (6,), or a System or a class of such (see
+            `add_task`), or None.
         observers: each one's `connect` is called before the diagram is built.
     """
 
@@ -123,7 +123,7 @@ class TaskSimulation:
         if isinstance(self._policy, System) and hasattr(self, "diagram"):
             raise DisasmError(
                 f"policy {type(self._policy).__name__}: a System can't move to another "
-                "diagram; randomise effects alone, or give a callable"
+                "diagram; randomise effects alone, or give its class or a callable"
             )
         self._built = scenario
         self.bounds = action_bounds(scenario.task)

@@ -99,7 +99,7 @@ def test_options_hold_for_all_environments() -> None:
     envs.reset()
     assert envs.envs.twin.scenarios[0].effects == [GroovePose(ry=0.1)]
     envs.set_options([{"effects": []}, {}])
-    with pytest.raises(DisasmError, match="set_options.*one dictionary for all"):
+    with pytest.raises(DisasmError, match=r"set_options.*one dictionary for all"):
         envs.reset()
 
 

@@ -92,12 +92,24 @@ def test_a_leaf_system_acts_as_its_callable_does(
     ends = []
     for name in ("Ports", "push"):
         policy = resolve_policy(f"{file}:{name}", scenario)
-        assert isinstance(policy, LeafSystem) == (name == "Ports")
         simulation = TaskSimulation(scenario, "twin", policy)
         for seed in (0, 1):  # the diagram's Context is reset between them
             run_episode(simulation, seed)
         ends.append(simulation.observation())
     np.testing.assert_array_equal(*ends)
+
+
+def test_a_system_class_acts_in_every_diagram(file: Path) -> None:
+    """A clearance that is drawn anew needs a diagram anew."""
+    scenario = load_scenario("removal_randomised", ["task.steps=2"])
+    policy = resolve_policy(f"{file}:Ports", scenario)
+    assert issubclass(policy, LeafSystem)
+    simulation = TaskSimulation(scenario, "twin", policy)
+    first = simulation.diagram
+    for seed in (0, 1):
+        run_episode(simulation, seed)
+    assert simulation.diagram is not first
+    assert simulation.observation()[0] == pytest.approx(1e-3, abs=5e-4)
 
 
 def test_objects_functions_and_modules_may_be_named(
