@@ -13,11 +13,18 @@ looks at. `DataSettings` has the thresholds.
 """
 
 from sysid.data_checks.check import check_data, without_flagged_rows
-from sysid.data_checks.finding import KINDS, DataFinding, Severity, refuse
+from sysid.data_checks.finding import (
+    ACCEPTABLE,
+    KINDS,
+    DataFinding,
+    Severity,
+    refuse,
+)
 from sysid.data_checks.settings import DEFAULT_DATA_SETTINGS, DataSettings
 
 __all__ = [
     "DEFAULT_DATA_SETTINGS",
+    "ACCEPTABLE",
     "KINDS",
     "DataFinding",
     "DataSettings",

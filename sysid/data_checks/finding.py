@@ -25,6 +25,8 @@ KINDS: Mapping[str, str] = {
     "time": "time jumps, stands, or is not in step with the period",
     "units": "a quantity that is not SI",
 }
+#: Kinds with which data may be fitted all the same: nothing is fitted to a dead channel.
+ACCEPTABLE = tuple(kind for kind in KINDS if kind != "constant")
 _SHOWN = 3  # rows, and episodes, that a text lists
 
 
@@ -112,8 +114,9 @@ def refuse(findings: Iterable[DataFinding], accepted: Sequence[str] = ()) -> Non
         if finding.severity is Severity.REFUSE and finding.kind not in accepted
     ]
     if bad:
-        kinds = " ".join(dict.fromkeys(finding.kind for finding in bad))
-        raise DisasmError(
-            f"{' | '.join(finding.text for finding in bad)}, or fit them nevertheless "
-            f"by `accept_findings` {kinds}"
-        )
+        text = " | ".join(finding.text for finding in bad)
+        kinds = dict.fromkeys(finding.kind for finding in bad)
+        if set(kinds) <= set(ACCEPTABLE):
+            accept = " ".join(kinds)
+            text += f", or fit them nevertheless by `accept_findings` {accept}"
+        raise DisasmError(text)

@@ -35,6 +35,18 @@ _SMALL = {
 #: Examples that need a cluster or devices; fake-cell runs until it is stopped.
 _ELSEWHERE = re.compile(r"--executor dask|--station hardware|^drake-disasm fake-cell")
 _QUICK = ("simulate", "evaluate", "import-log", "check-log", "plot-training")
+#: A study's own factors, at one level each.
+_LEVELS = {
+    "precision": ("--levels", "agent=ddpg", "psi=0"),
+    "hyperparameters": (
+        *("--levels", "batch=100", "tau=0.1"),
+        *("actor_rate=0.005", "critic_rate=0.005"),
+    ),
+}
+_TABLE_A1 = """experiment,batch_size,tau,actor_learning_rate,critic_learning_rate,\
+performance_1,performance_2,performance_3
+1,100,0.1,0.005,0.005,9.17626,16.93363,24.48816
+"""
 _BOUNDS = "contact.friction: {low: 0.0, high: 0.6}\n"
 _POLICY = """
 import numpy as np
@@ -57,6 +69,7 @@ def examples(name: str) -> list[list[str]]:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with everything that the examples read."""
+    monkeypatch.setattr(sys, "path", list(sys.path))  # where a policy's file is
     monkeypatch.delitem(sys.modules, "my_policy", raising=False)  # another example's
     for name in ("out/arm_1", "out/arm_2"):
         write_slide_log(tmp_path / name)
@@ -77,6 +90,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "arm.yaml": _HIDDEN,
         "bounds.yaml": _BOUNDS,
         "my_policy.py": _POLICY,
+        "table_a1.csv": _TABLE_A1,
     }
     for name, text in texts.items():
         (tmp_path / name).write_text(text)
@@ -113,7 +127,9 @@ def test_examples_run(name: str, folder: Path) -> None:
         _, program, *words = command
         if program == "simulate" and "out/log" in words and name == "identify":
             continue  # the log is there, and small
-        small = _SMALL.get(program, ())
+        small = [*_SMALL.get(program, ()), *_LEVELS.get(words[0] if words else "", ())]
+        if name == "identify" and program == "simulate":
+            small += ["--station=twin"]  # for IMPACT contact, as in the log
         done = run_program(program, *words, *small, cwd=folder)
         assert done.returncode == 0, (command, done.stderr)
         ran += 1

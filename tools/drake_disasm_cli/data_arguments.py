@@ -7,7 +7,7 @@ from typing import Any
 
 from drake_disasm.logs import Log
 from sysid.data_checks import (
-    KINDS,
+    ACCEPTABLE,
     DataFinding,
     check_data,
     refuse,
@@ -33,7 +33,7 @@ def add_data_arguments(add: Callable[..., Any]) -> None:
         "--accept-findings",
         nargs="+",
         default=[],
-        choices=[kind for kind in KINDS if kind != "constant"],
+        choices=ACCEPTABLE,
         metavar="KIND",
         help="go on with data that the check refuses for findings of these kinds: "
         "axes, processing, units",

@@ -132,7 +132,7 @@ def main(arguments: Sequence[str]) -> int:
         return _on_hardware(args, arguments, scenario)
     real = common.real_scenario(args, scenario)
     policy = common.named_policy(args.policy, scenario)
-    writer = _open_log(args, arguments, scenario) if args.record else None
+    writer = _open_log(args, arguments, scenario) if args.resume else None
     done = writer.next_number if writer else 0
     if args.explore:
         policy = Exploring(policy, args.explore * _MM, args.seed + done)
@@ -141,6 +141,8 @@ def main(arguments: Sequence[str]) -> int:
     view = _open_view(args)
     simulation = TaskSimulation(real, args.station, policy, [view] if view else [])
     simulation.set_target_realtime_rate(common.realtime_rate(args))
+    if args.record and not writer:  # a station that is refused leaves no folder
+        writer = _open_log(args, arguments, scenario)
     summaries: list[EpisodeSummary] = []
     try:
         for seed in range(args.seed + done, args.seed + args.episodes):
