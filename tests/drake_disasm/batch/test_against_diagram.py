@@ -6,14 +6,9 @@ import numpy as np
 import pytest
 import torch
 
+from drake_disasm import effects as ef
 from drake_disasm.batch.twin import BatchedTwin
 from drake_disasm.common.arrays import to_numpy
-from drake_disasm.effects import (
-    Effect,
-    Imprecision,
-    SensorResidualModel,
-    registered_effects,
-)
 from drake_disasm.effects.base import ArmEffect, PoseEffect
 from drake_disasm.scenario import Scenario, load_scenario, with_values
 from drake_disasm.task.simulation import TaskSimulation
@@ -28,20 +23,20 @@ SETTINGS = [
     "task.max_rotation=0.01",
 ]
 TURNED = load_scenario("removal_turned", SETTINGS)
-CASES: list[list[Effect]] = [[], *([effect] for effect in EFFECTS)]
+CASES: list[list[ef.Effect]] = [[], *([effect] for effect in EFFECTS)]
 CASES.append([EFFECTS[0], EFFECTS[3], EFFECTS[10], EFFECTS[15], EFFECTS[19]])
 NAMES = ["+".join(type(e).__name__ for e in case) or "none" for case in CASES]
 WHOLE = 27  # steps: to the end of the groove
 BEGIN = 5  # of them in contact: from the third
 
 
-def _scenario(effects: list[Effect]) -> Scenario:
+def _scenario(effects: list[ef.Effect]) -> Scenario:
     return dataclasses.replace(TURNED, effects=[*TURNED.effects, *effects])
 
 
-def _actions(effects: list[Effect]) -> np.ndarray:
+def _actions(effects: list[ef.Effect]) -> np.ndarray:
     """Returns an episode's actions; what scatters by bits gets no rotation."""
-    return actions(WHOLE, turn=0.0 if Imprecision in map(type, effects) else 4e-3)
+    return actions(WHOLE, turn=0.0 if ef.Imprecision in map(type, effects) else 4e-3)
 
 
 @pytest.fixture(scope="module")
@@ -99,20 +94,20 @@ def test_a_whole_episode_is_the_diagrams(batch, case):
     expected = _diagram(_scenario(CASES[case]), moves)
     assert np.abs(expected[:, 6:9]).max() > 1.0
     _assert_same(batch[:, case], expected)
-    if CASES[case] and not isinstance(CASES[case][0], Imprecision):
+    if CASES[case] and not isinstance(CASES[case][0], ef.Imprecision):
         away = np.abs(batch[:, case] - batch[:, 0])
         assert max(away[:, :3].max() / 1e-5, away[:, 6:9].max() / 0.01) > 1.0
 
 
 def test_all_effects_on_the_twin_are_here():
-    known = {type(effect) for effect in EFFECTS} | {SensorResidualModel}
-    shipped = {e for e in registered_effects() if e.__module__.startswith("drake_")}
+    known = {type(effect) for effect in EFFECTS} | {ef.SensorResidualModel}
+    shipped = {e for e in ef.registered_effects() if e.__module__.startswith("drake_")}
     on_twin = {e for e in shipped if not issubclass(e, ArmEffect | PoseEffect)}
     assert known == on_twin, "give the new effect a size in sizes.py"
 
 
 def test_a_learned_effect_is_the_diagrams(tmp_path):
-    learned = SensorResidualModel(file=str(step_in_fy(tmp_path)), share=0.3)
+    learned = ef.SensorResidualModel(file=str(step_in_fy(tmp_path)), share=0.3)
     scenario, moves = _scenario([learned]), actions(3)
     found = _batch([scenario, TURNED], moves)
     _assert_same(found[:, 0], _diagram(scenario, moves))
@@ -164,7 +159,7 @@ def test_reward_place_and_end_are_the_diagrams():
 def test_torch_computes_what_numpy_does():
     moves, scenarios = actions(5), [_scenario(e) for e in CASES]
     expected, found = (_batch(scenarios, moves, on) for on in ("numpy", "cpu"))
-    which = [i for i, case in enumerate(CASES) if Imprecision not in map(type, case)]
+    which = [i for i, case in enumerate(CASES) if ef.Imprecision not in map(type, case)]
     np.testing.assert_allclose(found[:, which], expected[:, which], atol=1e-8)
 
 

@@ -5,22 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from drake_disasm import effects as ef
 from drake_disasm.batch.history import BatchHistory
 from drake_disasm.batch.refusals import refuse_without_compiler
 from drake_disasm.batch.starts import NextEpisodes
 from drake_disasm.batch.twin import BatchedTwin
-from drake_disasm.effects import (
-    Environment,
-    EnvironmentEffect,
-    GrooveFriction,
-    GroovePose,
-    JointCoulombFriction,
-    PoseDelay,
-    SensorLag,
-    amplitude,
-    register_effect,
-    registry,
-)
 from drake_disasm.scenario import Range, Scenario, draw, load_scenario
 from tests.drake_disasm.batch.sizes import actions
 from tests.refusals import refusal
@@ -120,7 +109,7 @@ def test_next_episodes_are_those_of_the_environments_generators():
 
 
 def test_effects_in_other_orders_share_a_batch():
-    one, two = GroovePose(ry=0.02), GrooveFriction(coefficient=0.1)
+    one, two = ef.GroovePose(ry=0.02), ef.GrooveFriction(coefficient=0.1)
     base = load_scenario("removal", QUIET)
     orders = [[one, two], [two, one], [one], []]
     scenarios = [dataclasses.replace(base, effects=effects) for effects in orders]
@@ -183,39 +172,39 @@ def test_an_episode_whose_start_has_failed_is_recorded_in_numbers():
 
 
 @dataclasses.dataclass
-class OneAtATime(EnvironmentEffect):
+class OneAtATime(ef.EnvironmentEffect):
     """Friction by a table, which takes no arrays."""
 
-    a: float = amplitude("1", -1.0, 1.0, "what decides")
+    a: float = ef.amplitude("1", -1.0, 1.0, "what decides")
 
-    def apply(self, environment: Environment, bolt: object) -> Environment:
+    def apply(self, environment: ef.Environment, bolt: object) -> ef.Environment:
         return dataclasses.replace(environment, friction=0.1 if self.a > 0 else 0.3)
 
 
 @dataclasses.dataclass
-class Rubs(EnvironmentEffect):
+class Rubs(ef.EnvironmentEffect):
     """Friction, by arithmetic alone."""
 
-    a: float = amplitude("1", -1.0, 1.0, "added")
+    a: float = ef.amplitude("1", -1.0, 1.0, "added")
 
-    def apply(self, environment: Environment, bolt: object) -> Environment:
+    def apply(self, environment: ef.Environment, bolt: object) -> ef.Environment:
         return dataclasses.replace(environment, friction=environment.friction + self.a)
 
 
 @pytest.fixture
 def own_effects(monkeypatch):
     """Effects of a user, for one test."""
-    monkeypatch.setattr(registry, "_effects", dict(registry._effects))
-    monkeypatch.setattr(registry, "import_in_workers", lambda module: None)
-    register_effect(OneAtATime)
-    register_effect(Rubs)
+    monkeypatch.setattr(ef.registry, "_effects", dict(ef.registry._effects))
+    monkeypatch.setattr(ef.registry, "import_in_workers", lambda module: None)
+    ef.register_effect(OneAtATime)
+    ef.register_effect(Rubs)
 
 
 def test_effects_of_users_take_part_if_their_equations_take_arrays(own_effects):
     base = load_scenario("removal_turned", QUIET)
     scenarios = [
         dataclasses.replace(base, effects=[*base.effects, effect])
-        for effect in (Rubs(a=0.1), GrooveFriction(coefficient=0.1))
+        for effect in (Rubs(a=0.1), ef.GrooveFriction(coefficient=0.1))
     ]
     states = _run(BatchedTwin(scenarios, device="numpy"), [0, 0])
     np.testing.assert_allclose(states[:, 0], states[:, 1], atol=1e-9)
@@ -229,7 +218,7 @@ def _with(*settings: str, **changes: object) -> Scenario:
     return dataclasses.replace(scenario, **changes)
 
 
-FRICTION = JointCoulombFriction(joint="iiwa_joint_1", size=1.0)
+FRICTION = ef.JointCoulombFriction(joint="iiwa_joint_1", size=1.0)
 SLOW = ["ft_sensor.period=0.008"]
 
 
@@ -241,9 +230,13 @@ SLOW = ["ft_sensor.period=0.008"]
         (_with(), {"device": "tpu9"}, "device: 'tpu9' is not there"),
         (_with("contact.model=hydroelastic"), {}, "contact.model: 'hydroelastic'"),
         (_with(effects=[FRICTION]), {}, "JointCoulombFriction"),
-        (_with(effects=[PoseDelay(0.1)]), {}, "PoseDelay: a batch reports poses"),
+        (_with(effects=[ef.PoseDelay(0.1)]), {}, "PoseDelay: a batch reports poses"),
         ([_with(), _with("task.period=0.2")], {}, "task.period: 0.2 and 0.1"),
-        (_with(*SLOW, effects=[SensorLag(share=1.0)]), {}, "ft_sensor.period: 0.008"),
+        (
+            _with(*SLOW, effects=[ef.SensorLag(share=1.0)]),
+            {},
+            "ft_sensor.period: 0.008",
+        ),
         (_with(randomisation=[Range("task.period", 0.1, 0.2)]), {}, "task.period"),
     ],
 )

@@ -6,15 +6,8 @@ import itertools
 import numpy as np
 import pytest
 
+from drake_disasm.cell import lock_dimensions as dimensions
 from drake_disasm.cell.lock import set_environment
-from drake_disasm.cell.lock_dimensions import (
-    bolt_inertia,
-    facet_length,
-    groove_boxes,
-    head_top,
-    lip_height,
-    plate_bottom,
-)
 from drake_disasm.scenario import LockConfig
 from drake_disasm.stations import SimulatedStation
 
@@ -27,7 +20,7 @@ LOCKS = [
 
 @pytest.mark.parametrize("lock", LOCKS)
 def test_gaps_are_the_clearances(lock: LockConfig) -> None:
-    boxes = groove_boxes(lock)
+    boxes = dimensions.groove_boxes(lock)
     low = {name: box[0] for name, box in boxes.items()}
     high = {name: box[1] for name, box in boxes.items()}
     slot = low["lip_left"][2] - high["lip_right"][2]
@@ -43,14 +36,16 @@ def test_gaps_are_the_clearances(lock: LockConfig) -> None:
 
 @pytest.mark.parametrize("lock", LOCKS)
 def test_solid_parts_do_not_overlap(lock: LockConfig) -> None:
-    for first, second in itertools.combinations(groove_boxes(lock).values(), 2):
+    for first, second in itertools.combinations(
+        dimensions.groove_boxes(lock).values(), 2
+    ):
         low, high = np.maximum(first[0], second[0]), np.minimum(first[1], second[1])
         assert np.any(high - low < 1e-12), (first, second)
 
 
 @pytest.mark.parametrize("lock", LOCKS)
 def test_groove_is_its_own_mirror_image(lock: LockConfig) -> None:
-    boxes = groove_boxes(lock)
+    boxes = dimensions.groove_boxes(lock)
     mirror = np.array([1.0, 1.0, -1.0])
     for name in ("lip", "wall", "keyhole"):
         corners = [boxes[f"{name}_right"][i] * mirror for i in (0, 1)]
@@ -63,18 +58,20 @@ def test_groove_is_its_own_mirror_image(lock: LockConfig) -> None:
 def test_heights_add_up(lock: LockConfig) -> None:
     """The head hangs midway in the channel; to be out it rises past lip and itself."""
     play = lock.axial_clearance / 2
-    assert -lip_height(lock) - head_top(lock) == pytest.approx(play)
-    underside = head_top(lock) - lock.head_thickness
-    channel_floor = groove_boxes(lock)["floor"][1][1]
+    assert -dimensions.lip_height(lock) - dimensions.head_top(lock) == pytest.approx(
+        play
+    )
+    underside = dimensions.head_top(lock) - lock.head_thickness
+    channel_floor = dimensions.groove_boxes(lock)["floor"][1][1]
     assert underside - channel_floor == pytest.approx(play)
-    assert plate_bottom(lock) < channel_floor
+    assert dimensions.plate_bottom(lock) < channel_floor
     lifted = underside + lock.lift_needed(0.002)
-    assert lifted == pytest.approx(lip_height(lock) + 0.002)
+    assert lifted == pytest.approx(dimensions.lip_height(lock) + 0.002)
 
 
 def test_bolt_weighs_what_the_scenario_says() -> None:
     lock = LockConfig(bolt_mass=0.3)
-    M_B = bolt_inertia(lock)
+    M_B = dimensions.bolt_inertia(lock)
     assert M_B.get_mass() == 0.3
     middle = lock.lip_thickness / 2 + lock.grip_standoff + lock.grip_size[1] / 2
     np.testing.assert_allclose(M_B.get_com(), [0, middle, 0])
@@ -85,7 +82,7 @@ def test_facets_are_a_multiple_of_four() -> None:
     """By Drake's count: the circumference over the hint, rounded up."""
     for diameter in (0.002, 0.005, 0.0073, 0.02):
         for resolution in (1e-4, 0.8e-3, 1.6e-3, 5e-3):
-            edge = facet_length(diameter, resolution)
+            edge = dimensions.facet_length(diameter, resolution)
             facets = np.ceil(np.pi * diameter / edge)
             assert facets % 4 == 0
             assert edge <= resolution * (1 + 1e-5)

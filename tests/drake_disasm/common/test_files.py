@@ -9,15 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from drake_disasm.common.files import (
-    read_bytes,
-    read_json,
-    read_text,
-    write_atomically,
-    write_figure,
-    write_json,
-    write_text,
-)
+from drake_disasm.common import files
 from tests.refusals import refusal
 
 
@@ -29,7 +21,7 @@ def test_ctrl_c_waits_for_a_file_that_is_being_written(tmp_path):
         np.savez(stream, values=np.arange(3))
 
     with pytest.raises(KeyboardInterrupt):
-        write_atomically(path, write)
+        files.write_atomically(path, write)
     with np.load(path) as data:
         assert data["values"].tolist() == [0, 1, 2]
     with pytest.raises(KeyboardInterrupt):
@@ -42,14 +34,14 @@ def test_nothing_is_left_of_what_failed(tmp_path):
         raise ValueError
 
     with pytest.raises(ValueError):
-        write_atomically(tmp_path / "data.npz", fail)
+        files.write_atomically(tmp_path / "data.npz", fail)
     assert not list(tmp_path.iterdir())
 
 
 def test_text_json_and_figures_come_back(tmp_path):
-    write_text(tmp_path / "text", "20 µm\n")
-    write_json(tmp_path / "json", {"a": [1, 0.1]})
-    write_figure(tmp_path / "png", Figure(figsize=(1, 1)))
+    files.write_text(tmp_path / "text", "20 µm\n")
+    files.write_json(tmp_path / "json", {"a": [1, 0.1]})
+    files.write_figure(tmp_path / "png", Figure(figsize=(1, 1)))
     assert (tmp_path / "text").read_text("utf-8") == "20 µm\n"
     assert json.loads((tmp_path / "json").read_text()) == {"a": [1, 0.1]}
     assert (tmp_path / "png").read_bytes().startswith(b"\x89PNG")
@@ -57,23 +49,23 @@ def test_text_json_and_figures_come_back(tmp_path):
 
 
 def test_a_folder_that_does_not_exist_is_named_with_a_remedy(tmp_path):
-    assert "; check" in refusal(write_text, tmp_path / "no" / "text", "")
+    assert "; check" in refusal(files.write_text, tmp_path / "no" / "text", "")
 
 
 def test_pipes_devices_folders_and_large_files_are_refused(tmp_path):
     """Opened as a file is, a pipe waits for a writer and /dev/zero never ends."""
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path / "pipe", Path("/dev/zero"), Path("/dev/null")):
-        assert "is no regular file" in refusal(read_bytes, path, "copy it", 100)
-    assert "Is a directory" in refusal(read_bytes, tmp_path, "copy it", 9)
-    assert "No such" in refusal(read_bytes, tmp_path / "no", "copy it", 9)
-    assert "null" in refusal(read_bytes, tmp_path / "a\0", "copy it", 9)
+        assert "is no regular file" in refusal(files.read_bytes, path, "copy it", 100)
+    assert "Is a directory" in refusal(files.read_bytes, tmp_path, "copy it", 9)
+    assert "No such" in refusal(files.read_bytes, tmp_path / "no", "copy it", 9)
+    assert "null" in refusal(files.read_bytes, tmp_path / "a\0", "copy it", 9)
     large = tmp_path / "a"
     large.write_bytes(bytes(100))
-    assert len(read_bytes(large, "copy it", 100)) == 100
-    assert "more than" in refusal(read_bytes, large, "copy it", 99)
+    assert len(files.read_bytes(large, "copy it", 100)) == 100
+    assert "more than" in refusal(files.read_bytes, large, "copy it", 99)
     large.write_bytes(b"\xff\xfe")
-    assert "UTF-8" in refusal(read_text, large, "copy it", 99)
+    assert "UTF-8" in refusal(files.read_text, large, "copy it", 99)
 
 
 @pytest.mark.parametrize(
@@ -83,7 +75,7 @@ def test_pipes_devices_folders_and_large_files_are_refused(tmp_path):
 def test_damaged_json_is_refused(tmp_path, text):
     (tmp_path / "a").write_text(text)
     example = {"a": 0, "b": {"c": 0.0}}
-    message = refusal(read_json, tmp_path / "a", "copy it", example)
+    message = refusal(files.read_json, tmp_path / "a", "copy it", example)
     assert "is damaged" in message and message.endswith("; copy it")
     (tmp_path / "a").write_text('{"a": 1, "b": {"c": 2}, "more": 3}')
-    assert read_json(tmp_path / "a", "", example)["more"] == 3
+    assert files.read_json(tmp_path / "a", "", example)["more"] == 3

@@ -5,15 +5,8 @@ import pytest
 import torch
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from drake_disasm.common import rotations
 from drake_disasm.common.arrays import array_like, to_numpy
-from drake_disasm.common.rotations import (
-    Pose,
-    matrices_of_rpy,
-    pose_from_vectors,
-    rotation_matrices,
-    rotation_vectors,
-    rpy_of_matrices,
-)
 from drake_disasm.common.spatial import rotation_from_vector, rotation_vector
 
 RANDOM = np.random.default_rng(1)
@@ -32,8 +25,8 @@ both = pytest.mark.parametrize("like", KINDS, ids=["numpy", "torch"])
 
 @both
 def test_exponential_and_logarithm_are_drakes(like):
-    R = rotation_matrices(array_like(VECTORS, like))
-    found, back = to_numpy(R), to_numpy(rotation_vectors(R))
+    R = rotations.rotation_matrices(array_like(VECTORS, like))
+    found, back = to_numpy(R), to_numpy(rotations.rotation_vectors(R))
     for vector, matrix, again in zip(VECTORS, found, back, strict=True):
         expected = rotation_from_vector(vector)
         np.testing.assert_allclose(matrix, expected.matrix(), atol=1e-14)
@@ -41,16 +34,18 @@ def test_exponential_and_logarithm_are_drakes(like):
 
 
 def test_no_rotation_is_the_identity_bit_for_bit():
-    assert np.array_equal(rotation_matrices(np.zeros((2, 3))), [np.eye(3)] * 2)
+    assert np.array_equal(
+        rotations.rotation_matrices(np.zeros((2, 3))), [np.eye(3)] * 2
+    )
 
 
 @both
 def test_roll_pitch_and_yaw_are_drakes(like):
     rpy = RANDOM.uniform(-1.5, 1.5, (10, 3))
-    R = matrices_of_rpy(array_like(rpy, like))
+    R = rotations.matrices_of_rpy(array_like(rpy, like))
     expected = [RollPitchYaw(one).ToRotationMatrix().matrix() for one in rpy]
     np.testing.assert_allclose(to_numpy(R), expected, atol=1e-14)
-    np.testing.assert_allclose(to_numpy(rpy_of_matrices(R)), rpy, atol=1e-12)
+    np.testing.assert_allclose(to_numpy(rotations.rpy_of_matrices(R)), rpy, atol=1e-12)
 
 
 @both
@@ -59,8 +54,8 @@ def test_poses_compose_as_drakes(like):
     one, other = (
         RigidTransform(rotation_from_vector(turns[i]), p[i]) for i in range(2)
     )
-    poses = pose_from_vectors(array_like(turns, like), array_like(p, like))
-    first, second = (Pose(poses.R[i], poses.p[i]) for i in range(2))
+    poses = rotations.pose_from_vectors(array_like(turns, like), array_like(p, like))
+    first, second = (rotations.Pose(poses.R[i], poses.p[i]) for i in range(2))
     both_ = (one @ other.inverse()).GetAsMatrix34()
     found = first @ second.inverse()
     np.testing.assert_allclose(to_numpy(found.R), both_[:, :3], atol=1e-12)
@@ -69,6 +64,8 @@ def test_poses_compose_as_drakes(like):
 
 
 def test_one_pose_of_numpy_is_drakes_own():
-    X = pose_from_vectors(np.array([0.1, 0.2, 0.3]), np.array([1.0, 2.0, 3.0]))
+    X = rotations.pose_from_vectors(
+        np.array([0.1, 0.2, 0.3]), np.array([1.0, 2.0, 3.0])
+    )
     assert isinstance(X, RigidTransform)
-    assert Pose.of(X).to_drake().IsNearlyEqualTo(X, 1e-15)
+    assert rotations.Pose.of(X).to_drake().IsNearlyEqualTo(X, 1e-15)

@@ -6,28 +6,16 @@ import numpy as np
 import pytest
 
 from drake_disasm.devices.codec_error import CodecError
-from drake_disasm.devices.onrobot_hex.codec import (
-    FILTERS,
-    Command,
-    Request,
-    Sample,
-    decode_request,
-    decode_sample,
-    encode_request,
-    encode_sample,
-    filter_request,
-    period_request,
-    sequence_step,
-)
+from drake_disasm.devices.onrobot_hex import codec
 from tests.refusals import refusal
 
 REQUESTS = [
-    ("1234 0000 00000000", Request(Command.STOP)),
-    ("1234 0002 00000000", Request(Command.START)),
-    ("1234 0002 0000000a", Request(Command.START, 10)),
-    ("1234 0042 000000ff", Request(Command.BIAS, 0xFF)),
-    ("1234 0081 00000004", Request(Command.FILTER, 4)),
-    ("1234 0082 00000002", Request(Command.PERIOD, 2)),
+    ("1234 0000 00000000", codec.Request(codec.Command.STOP)),
+    ("1234 0002 00000000", codec.Request(codec.Command.START)),
+    ("1234 0002 0000000a", codec.Request(codec.Command.START, 10)),
+    ("1234 0042 000000ff", codec.Request(codec.Command.BIAS, 0xFF)),
+    ("1234 0081 00000004", codec.Request(codec.Command.FILTER, 4)),
+    ("1234 0082 00000002", codec.Request(codec.Command.PERIOD, 2)),
 ]
 ZEROS = "00000000" * 4
 SAMPLES = [
@@ -35,31 +23,31 @@ SAMPLES = [
         "00000001 00000002 00000000"
         "00002710 ffffd8f0 00000001"  # 10000, -10000, 1
         "000186a0 fffe7960 ffffffff",  # 100000, -100000, -1
-        Sample(1, 2, 0, (1.0, -1.0, 0.0001, 1.0, -1.0, -0.00001)),
+        codec.Sample(1, 2, 0, (1.0, -1.0, 0.0001, 1.0, -1.0, -0.00001)),
     ),
     (
         "ffffffff 00000000 00000003 7fffffff 80000000" + ZEROS,
-        Sample(2**32 - 1, 0, 3, (214748.3647, -214748.3648, 0.0, 0.0, 0.0, 0.0)),
+        codec.Sample(2**32 - 1, 0, 3, (214748.3647, -214748.3648, 0.0, 0.0, 0.0, 0.0)),
     ),
 ]
 STILL = (0.0,) * 6
 
 
 @pytest.mark.parametrize(("text", "request_"), REQUESTS)
-def test_requests_both_ways(text: str, request_: Request) -> None:
-    assert encode_request(request_) == bytes.fromhex(text)
-    assert decode_request(bytes.fromhex(text)) == request_
+def test_requests_both_ways(text: str, request_: codec.Request) -> None:
+    assert codec.encode_request(request_) == bytes.fromhex(text)
+    assert codec.decode_request(bytes.fromhex(text)) == request_
 
 
 def test_samples_both_ways() -> None:
     for text, sample in SAMPLES:
-        assert encode_sample(sample) == bytes.fromhex(text)
-        assert decode_sample(bytes.fromhex(text)) == sample
+        assert codec.encode_sample(sample) == bytes.fromhex(text)
+        assert codec.decode_sample(bytes.fromhex(text)) == sample
 
 
 def test_forces_are_rounded_to_the_nearest_count() -> None:
-    datagram = encode_sample(Sample(0, 0, 0, (0.00019, *STILL[1:])))
-    assert decode_sample(datagram).wrench[0] == 0.0002
+    datagram = codec.encode_sample(codec.Sample(0, 0, 0, (0.00019, *STILL[1:])))
+    assert codec.decode_sample(datagram).wrench[0] == 0.0002
 
 
 def test_what_is_no_request_or_sample_is_refused() -> None:
@@ -70,49 +58,57 @@ def test_what_is_no_request_or_sample_is_refused() -> None:
         ("1234 0001 00000000", "command 0x0001 is unknown"),
     ):
         with pytest.raises(CodecError, match=words):
-            decode_request(bytes.fromhex(text))
+            codec.decode_request(bytes.fromhex(text))
     for length in (0, 35, 37):
         with pytest.raises(CodecError, match=f"{length} bytes, not 36"):
-            decode_sample(bytes(length))
+            codec.decode_sample(bytes(length))
 
 
 @pytest.mark.parametrize(
     "sample",
     [
-        Sample(0, 0, 0, (np.nan, *STILL[1:])),
-        Sample(0, 0, 0, (214748.3648, *STILL[1:])),
-        Sample(0, 0, 0, (*STILL[1:], -21474.83649)),
-        Sample(0, 0, 0, STILL[1:]),
-        Sample(2**32, 0, 0, STILL),
-        Sample(0, -1, 0, STILL),
-        Request(Command.START, -1),
-        Request(Command.START, 2**32),
+        codec.Sample(0, 0, 0, (np.nan, *STILL[1:])),
+        codec.Sample(0, 0, 0, (214748.3648, *STILL[1:])),
+        codec.Sample(0, 0, 0, (*STILL[1:], -21474.83649)),
+        codec.Sample(0, 0, 0, STILL[1:]),
+        codec.Sample(2**32, 0, 0, STILL),
+        codec.Sample(0, -1, 0, STILL),
+        codec.Request(codec.Command.START, -1),
+        codec.Request(codec.Command.START, 2**32),
     ],
 )
-def test_what_does_not_fit_is_refused(sample: Sample | Request) -> None:
-    encode = encode_sample if isinstance(sample, Sample) else encode_request
+def test_what_does_not_fit_is_refused(sample: codec.Sample | codec.Request) -> None:
+    encode = (
+        codec.encode_sample
+        if isinstance(sample, codec.Sample)
+        else codec.encode_request
+    )
     with pytest.raises(CodecError, match="no encoding"):
         encode(sample)
 
 
 def test_settings() -> None:
-    assert [filter_request(hz).data for hz in FILTERS] == list(range(7))
-    assert filter_request(15) == Request(Command.FILTER, 4)
-    assert period_request(0.002) == Request(Command.PERIOD, 2)
-    assert period_request(0.2) == Request(Command.PERIOD, 200)
+    assert [codec.filter_request(hz).data for hz in codec.FILTERS] == list(range(7))
+    assert codec.filter_request(15) == codec.Request(codec.Command.FILTER, 4)
+    assert codec.period_request(0.002) == codec.Request(codec.Command.PERIOD, 2)
+    assert codec.period_request(0.2) == codec.Request(codec.Command.PERIOD, 200)
 
 
 def test_settings_that_the_box_lacks_are_refused() -> None:
-    assert "choose one of 0, 500, 150, 50, 15, 5, 1.5" in refusal(filter_request, 30)
+    assert "choose one of 0, 500, 150, 50, 15, 5, 1.5" in refusal(
+        codec.filter_request, 30
+    )
     for period in (0.001, 0.0025, 0.201, np.nan):
-        assert "whole milliseconds from 2 to 200" in refusal(period_request, period)
+        assert "whole milliseconds from 2 to 200" in refusal(
+            codec.period_request, period
+        )
 
 
 def test_sequence_numbers_wrap() -> None:
-    assert sequence_step(7, 7) == 0
-    assert sequence_step(2**32 - 1, 0) == 1
-    assert sequence_step(2**32 - 2, 1) == 3
-    assert sequence_step(0, 2**32 - 1) == -1
+    assert codec.sequence_step(7, 7) == 0
+    assert codec.sequence_step(2**32 - 1, 0) == 1
+    assert codec.sequence_step(2**32 - 2, 1) == 3
+    assert codec.sequence_step(0, 2**32 - 1) == -1
 
 
 def _mutated(rng: np.random.Generator, datagram: bytes) -> bytes:
@@ -130,9 +126,9 @@ def test_no_datagram_raises_anything_else() -> None:
         mutated = _mutated(rng, valid[number % len(valid)])
         for datagram in (rng.bytes(number % 45), mutated):
             with contextlib.suppress(CodecError):
-                assert encode_sample(decode_sample(datagram)) == datagram
+                assert codec.encode_sample(codec.decode_sample(datagram)) == datagram
                 decoded += 1
             with contextlib.suppress(CodecError):
-                assert encode_request(decode_request(datagram)) == datagram
+                assert codec.encode_request(codec.decode_request(datagram)) == datagram
                 decoded += 1
     assert decoded > 0.02 * count

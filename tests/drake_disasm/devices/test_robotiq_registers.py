@@ -14,22 +14,9 @@ from pymodbus.pdu.register_message import (
 )
 
 from drake_disasm.devices.codec_error import CodecError
-from drake_disasm.devices.robotiq.registers import (
-    COMMAND_ADDRESS,
-    FAULTS,
-    Activation,
-    Command,
-    Motion,
-    Status,
-    Stroke,
-    decode_command,
-    decode_status,
-    encode_command,
-    encode_status,
-    fault_words,
-)
+from drake_disasm.devices.robotiq import registers as reg
 
-OPEN = Command(activate=True, go=True, speed=255, force=255)
+OPEN = reg.Command(activate=True, go=True, speed=255, force=255)
 
 #: Writes, of the manual's examples.
 GOLDEN_COMMANDS = {
@@ -37,15 +24,15 @@ GOLDEN_COMMANDS = {
     "09 10 03 E8 00 03 06 09 00 00 FF FF FF 42 29": dataclasses.replace(
         OPEN, position=255
     ),
-    "09 10 03 E8 00 03 06 00 00 00 00 00 00 73 30": Command(),
-    "09 10 03 E8 00 03 06 01 00 00 00 00 00 72 E1": Command(activate=True),
+    "09 10 03 E8 00 03 06 00 00 00 00 00 00 73 30": reg.Command(),
+    "09 10 03 E8 00 03 06 01 00 00 00 00 00 72 E1": reg.Command(activate=True),
 }
 
-CLOSING = Status(
+CLOSING = reg.Status(
     activated=True,
     going=True,
-    state=Activation.DONE,
-    object_detected=Motion.MOVING,
+    state=reg.Activation.DONE,
+    object_detected=reg.Motion.MOVING,
     position_request=0xFF,
     position=0x0E,
     current=0x0A,
@@ -55,20 +42,25 @@ CLOSING = Status(
 GOLDEN_STATUSES = {
     "09 03 06 39 00 00 FF 0E 0A F7 8B": CLOSING,
     "09 03 06 B9 00 00 FF BD 00 1D 7C": dataclasses.replace(
-        CLOSING, object_detected=Motion.STOPPED_CLOSING, position=0xBD, current=0
+        CLOSING, object_detected=reg.Motion.STOPPED_CLOSING, position=0xBD, current=0
     ),
 }
 
 #: By register: the bits that mean something.
 BITS = ((0x3900, 0x00FF, 0xFFFF), (0xF900, 0xFFFF, 0xFFFF))
-CODECS = ((encode_command, decode_command), (encode_status, decode_status))
+CODECS = (
+    (reg.encode_command, reg.decode_command),
+    (reg.encode_status, reg.decode_status),
+)
 
 
 def test_golden_commands() -> None:
     framer = FramerRTU(DecodePDU(False))
     for golden, command in GOLDEN_COMMANDS.items():
         request = WriteMultipleRegistersRequest(
-            address=COMMAND_ADDRESS, registers=list(encode_command(command)), dev_id=9
+            address=reg.COMMAND_ADDRESS,
+            registers=list(reg.encode_command(command)),
+            dev_id=9,
         )
         assert framer.buildFrame(request) == bytes.fromhex(golden)
 
@@ -77,48 +69,50 @@ def test_golden_statuses() -> None:
     for golden, status in GOLDEN_STATUSES.items():
         _, reply = FramerRTU(DecodePDU(False)).handleFrame(bytes.fromhex(golden), 9, 0)
         assert isinstance(reply, ReadHoldingRegistersResponse)
-        assert decode_status(reply.registers) == status
-        assert encode_status(status) == tuple(reply.registers)
+        assert reg.decode_status(reply.registers) == status
+        assert reg.encode_status(status) == tuple(reply.registers)
 
 
 @pytest.mark.parametrize(
     ("value", "registers"),
     [
-        (Command(activate=True), (0x0100, 0, 0)),
-        (Command(go=True), (0x0800, 0, 0)),
-        (Command(automatic_release=True), (0x1000, 0, 0)),
-        (Command(release_opens=True), (0x2000, 0, 0)),
-        (Command(position=0x81), (0, 0x0081, 0)),
-        (Command(speed=0x81), (0, 0, 0x8100)),
-        (Command(force=0x81), (0, 0, 0x0081)),
-        (Status(activated=True), (0x0100, 0, 0)),
-        (Status(going=True), (0x0800, 0, 0)),
-        (Status(state=Activation.ACTIVATING), (0x1000, 0, 0)),
-        (Status(state=Activation.DONE), (0x3000, 0, 0)),
-        (Status(object_detected=Motion.STOPPED_OPENING), (0x4000, 0, 0)),
-        (Status(object_detected=Motion.STOPPED_CLOSING), (0x8000, 0, 0)),
-        (Status(object_detected=Motion.AT_REQUEST), (0xC000, 0, 0)),
-        (Status(fault=0x8E), (0, 0x8E00, 0)),
-        (Status(position_request=0x81), (0, 0x0081, 0)),
-        (Status(position=0x81), (0, 0, 0x8100)),
-        (Status(current=0x81), (0, 0, 0x0081)),
+        (reg.Command(activate=True), (0x0100, 0, 0)),
+        (reg.Command(go=True), (0x0800, 0, 0)),
+        (reg.Command(automatic_release=True), (0x1000, 0, 0)),
+        (reg.Command(release_opens=True), (0x2000, 0, 0)),
+        (reg.Command(position=0x81), (0, 0x0081, 0)),
+        (reg.Command(speed=0x81), (0, 0, 0x8100)),
+        (reg.Command(force=0x81), (0, 0, 0x0081)),
+        (reg.Status(activated=True), (0x0100, 0, 0)),
+        (reg.Status(going=True), (0x0800, 0, 0)),
+        (reg.Status(state=reg.Activation.ACTIVATING), (0x1000, 0, 0)),
+        (reg.Status(state=reg.Activation.DONE), (0x3000, 0, 0)),
+        (reg.Status(object_detected=reg.Motion.STOPPED_OPENING), (0x4000, 0, 0)),
+        (reg.Status(object_detected=reg.Motion.STOPPED_CLOSING), (0x8000, 0, 0)),
+        (reg.Status(object_detected=reg.Motion.AT_REQUEST), (0xC000, 0, 0)),
+        (reg.Status(fault=0x8E), (0, 0x8E00, 0)),
+        (reg.Status(position_request=0x81), (0, 0x0081, 0)),
+        (reg.Status(position=0x81), (0, 0, 0x8100)),
+        (reg.Status(current=0x81), (0, 0, 0x0081)),
     ],
 )
-def test_bit_by_bit(value: Command | Status, registers: tuple[int, ...]) -> None:
-    is_command = isinstance(value, Command)
+def test_bit_by_bit(
+    value: reg.Command | reg.Status, registers: tuple[int, ...]
+) -> None:
+    is_command = isinstance(value, reg.Command)
     encode, decode = CODECS[0] if is_command else CODECS[1]
     assert encode(value) == registers
     assert decode(registers) == value
 
 
 def test_reserved_bits_are_ignored() -> None:
-    assert decode_command((0xC6FF, 0xFF00, 0)) == Command()
-    assert decode_status((0x06FF, 0, 0)) == Status()
+    assert reg.decode_command((0xC6FF, 0xFF00, 0)) == reg.Command()
+    assert reg.decode_status((0x06FF, 0, 0)) == reg.Status()
 
 
 def test_undefined_state_is_refused() -> None:
     with pytest.raises(CodecError, match="gSTA is 2"):
-        decode_status((0x2000, 0, 0))
+        reg.decode_status((0x2000, 0, 0))
 
 
 @pytest.mark.parametrize(
@@ -136,8 +130,11 @@ def test_encoding_refuses(value: int) -> None:
         ("position", "speed", "force"),
         ("fault", "position", "current"),
     )
-    for kind, names in ((Command, commands), (Status, (*statuses, "position_request"))):
-        encode, _ = CODECS[kind is Status]
+    for kind, names in (
+        (reg.Command, commands),
+        (reg.Status, (*statuses, "position_request")),
+    ):
+        encode, _ = CODECS[kind is reg.Status]
         for name in names:
             with pytest.raises(CodecError, match="no whole number"):
                 encode(kind(**{name: value}))
@@ -147,7 +144,7 @@ def _random_registers() -> Iterator[tuple[int, ...]]:
     """Whole-range triples, and valid ones with one value or the length mutated."""
     rng = np.random.default_rng(0)
     yield from map(tuple, rng.integers(0, 65536, (6_000, 3)).tolist())
-    valid = [encode_status(CLOSING), encode_command(OPEN)]
+    valid = [reg.encode_status(CLOSING), reg.encode_command(OPEN)]
     mutations = rng.integers([0, -70_000], [4, 70_000], (4_000, 2)).tolist()
     for i, (place, value) in enumerate(mutations):
         registers = list(valid[i % 2])
@@ -171,7 +168,7 @@ def test_garbage(codec: tuple[Callable, Callable], bits: tuple[int, ...]) -> Non
 
 
 def test_openings_and_requests() -> None:
-    stroke = Stroke()
+    stroke = reg.Stroke()
     assert stroke.opening(3) == pytest.approx(0.140)
     assert stroke.opening(230) == pytest.approx(0.0)
     assert stroke.opening(0) > 0.140  # wrong echoes show
@@ -184,7 +181,7 @@ def test_openings_and_requests() -> None:
 
 
 def test_faults_have_words_and_a_remedy() -> None:
-    assert fault_words(0) == ""
-    assert "overcurrent" in fault_words(0x0E)
-    assert "0x21: not in the manual" in fault_words(0x21)
-    assert all(": " in words for words in FAULTS.values())
+    assert reg.fault_words(0) == ""
+    assert "overcurrent" in reg.fault_words(0x0E)
+    assert "0x21: not in the manual" in reg.fault_words(0x21)
+    assert all(": " in words for words in reg.FAULTS.values())

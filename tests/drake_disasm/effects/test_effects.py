@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from drake_disasm import effects as fx
+from drake_disasm import effects as ef
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation, TwinStation
@@ -17,16 +17,16 @@ from tests.drake_disasm.effects.learned_files import step_in_fy
 from tests.refusals import refusal
 
 G_W = np.array([0.0, 0.0, -9.81])
-ENVIRONMENT = fx.Environment(
+ENVIRONMENT = ef.Environment(
     RigidTransform([0.001, 0, 0]), 0.2, 1e9, 1e8, 20.0, 4e-4, 1e3, 1.0
 )
 STEPS = 10  # in contact from the third
-MOVING = fx.BoltMotion(np.array([0.03, 0.001, -0.001]), np.array([0.02, 0.0, 0.005]))
+MOVING = ef.BoltMotion(np.array([0.03, 0.001, -0.001]), np.array([0.02, 0.0, 0.005]))
 
 
-SHIPPED = [e for e in fx.registered_effects() if e.__module__.startswith("drake_")]
-IN_CELL = [e for e in SHIPPED if not issubclass(e, fx.ArmEffect)]
-SAMPLES = fx.JointSamples(
+SHIPPED = [e for e in ef.registered_effects() if e.__module__.startswith("drake_")]
+IN_CELL = [e for e in SHIPPED if not issubclass(e, ef.ArmEffect)]
+SAMPLES = ef.JointSamples(
     q=np.zeros(3),
     v=np.array([-0.5, 0.0, 2.0]),
     vd=np.array([1.0, -1.0, 3.0]),
@@ -34,9 +34,9 @@ SAMPLES = fx.JointSamples(
 )
 
 
-def _sensing(rpy: tuple[float, float, float], time: float = 1.0) -> fx.Sensing:
+def _sensing(rpy: tuple[float, float, float], time: float = 1.0) -> ef.Sensing:
     R_WS = RollPitchYaw(np.array(rpy)).ToRotationMatrix().matrix()
-    return fx.Sensing(np.array(time), R_WS, G_W)
+    return ef.Sensing(np.array(time), R_WS, G_W)
 
 
 def test_every_effect_is_declared_in_full() -> None:
@@ -47,7 +47,7 @@ def test_every_effect_is_declared_in_full() -> None:
         for field in dataclasses.fields(effect):
             data = field.metadata
             assert data["doc"]
-            if field.name in fx.amplitudes(effect):
+            if field.name in ef.amplitudes(effect):
                 assert data["unit"] and field.default == 0.0
                 assert data["low"] <= 0.0 < data["high"]
             for value in (field.default, *data["grid"]) if data["grid"] else ():
@@ -57,22 +57,22 @@ def test_every_effect_is_declared_in_full() -> None:
 def test_every_effect_vanishes_at_null_as_a_function() -> None:
     wrench = np.array([1.1, -2.2, 3.3, 0.1, -0.2, 0.3])
     for null in (effect() for effect in SHIPPED):
-        if isinstance(null, fx.EnvironmentEffect):
+        if isinstance(null, ef.EnvironmentEffect):
             changed = null.apply(ENVIRONMENT, MOVING)
             assert changed.X_GnG.IsExactlyEqualTo(ENVIRONMENT.X_GnG), null
             same = dataclasses.replace(changed, X_GnG=ENVIRONMENT.X_GnG)
             assert same == ENVIRONMENT, null
-        if isinstance(null, fx.SensorEffect):
+        if isinstance(null, ef.SensorEffect):
             read = null.apply(wrench, _sensing((0.3, -0.8, 2.0)))
             assert np.array_equal(read, wrench), null
-        if isinstance(null, fx.JointEffect):
+        if isinstance(null, ef.JointEffect):
             assert not null.torque(SAMPLES).any(), null
-        if isinstance(null, fx.FlangePayload):
+        if isinstance(null, ef.FlangePayload):
             assert not null.inertial.any()
 
 
 def _trajectory(
-    effects: list[fx.Effect], steps: int, model: str = "hydroelastic"
+    effects: list[ef.Effect], steps: int, model: str = "hydroelastic"
 ) -> np.ndarray:
     """An episode in contact, with some turning: the groove is turned and rubs."""
     steps_of_3_mm = "task.max_translation=0.003"  # or exploration's would be clipped
@@ -101,15 +101,15 @@ def test_all_effects_at_null_change_no_bit(without: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("effect", IN_CELL)
-def test_shows_away_from_null(effect: type[fx.Effect], without, tmp_path: Path) -> None:
+def test_shows_away_from_null(effect: type[ef.Effect], without, tmp_path: Path) -> None:
     fields = {f.name: f for f in dataclasses.fields(effect)}
     sized = {
-        name: 0.05 * fields[name].metadata["high"] for name in fx.amplitudes(effect)
+        name: 0.05 * fields[name].metadata["high"] for name in ef.amplitudes(effect)
     }
-    if effect is fx.SensorResidualModel:
+    if effect is ef.SensorResidualModel:
         sized["file"] = str(step_in_fy(tmp_path))
     model = "hydroelastic"
-    if effect is fx.ContactExponent:
+    if effect is ef.ContactExponent:
         model, refused = "impact", effect(**sized)
         assert "ContactExponent" in refusal(_trajectory, [refused], 1)
         without = _trajectory([], STEPS, model)
@@ -121,7 +121,7 @@ def test_shows_away_from_null(effect: type[fx.Effect], without, tmp_path: Path) 
 @pytest.mark.parametrize("rpy", [(np.pi, 0, 0), (0.3, -0.8, 2.0)])
 def test_payload_error_is_a_hanging_mass(rpy: tuple[float, float, float]) -> None:
     sensing, p_SoScm_S = _sensing(rpy), np.array([0.01, -0.02, 0.1])
-    read = fx.PayloadError(0.3, *(0.3 * p_SoScm_S)).apply(np.zeros(6), sensing)
+    read = ef.PayloadError(0.3, *(0.3 * p_SoScm_S)).apply(np.zeros(6), sensing)
     f_W = sensing.R_WS @ read[:3]
     np.testing.assert_allclose(f_W, [0, 0, -0.3 * 9.81], atol=1e-12)
     np.testing.assert_allclose(read[3:], np.cross(p_SoScm_S, read[:3]), atol=1e-12)
@@ -129,77 +129,77 @@ def test_payload_error_is_a_hanging_mass(rpy: tuple[float, float, float]) -> Non
 
 def test_sensor_bias_adds_and_zeroing_does_not_see_it() -> None:
     bias = np.array([0.5, -1, 2, 0.1, 0.2, -0.3])
-    read = fx.SensorBias(*bias).apply(np.ones(6), _sensing((1, 2, 3)))
+    read = ef.SensorBias(*bias).apply(np.ones(6), _sensing((1, 2, 3)))
     np.testing.assert_array_equal(read, 1 + bias)
-    assert not fx.SensorBias.present_at_zeroing
-    assert fx.PayloadError.present_at_zeroing
+    assert not ef.SensorBias.present_at_zeroing
+    assert ef.PayloadError.present_at_zeroing
 
 
 def test_drift_grows_and_warm_up_settles() -> None:
     for time in (0.0, 2.0, 1e4):
         sensing = _sensing((0, 0, 0), time)
-        drift = fx.SensorDrift(fz=0.1, tx=-0.01).apply(np.zeros(6), sensing)
+        drift = ef.SensorDrift(fz=0.1, tx=-0.01).apply(np.zeros(6), sensing)
         np.testing.assert_allclose(drift[2:4], [0.1 * time, -0.01 * time])
-        warm = fx.SensorWarmUp(fz=2.0, time_constant=2.0).apply(np.zeros(6), sensing)
+        warm = ef.SensorWarmUp(fz=2.0, time_constant=2.0).apply(np.zeros(6), sensing)
         assert warm[2] == pytest.approx(2.0 * (1 - np.exp(-time / 2.0)))
     assert (
-        not fx.SensorDrift.present_at_zeroing and not fx.SensorWarmUp.present_at_zeroing
+        not ef.SensorDrift.present_at_zeroing and not ef.SensorWarmUp.present_at_zeroing
     )
 
 
 def test_gain_and_cross_talk_are_the_two_parts_of_a_matrix() -> None:
     wrench, still = np.arange(1.0, 7.0), _sensing((0, 0, 0))
     np.testing.assert_allclose(
-        fx.SensorGain(fy=0.1, tz=-0.5).apply(wrench, still), [1, 2.2, 3, 4, 5, 3]
+        ef.SensorGain(fy=0.1, tz=-0.5).apply(wrench, still), [1, 2.2, 3, 4, 5, 3]
     )
-    mixed = fx.SensorCrossTalk(fx_ty=0.2, tz_fy=-0.05).apply(wrench, still)
+    mixed = ef.SensorCrossTalk(fx_ty=0.2, tz_fy=-0.05).apply(wrench, still)
     np.testing.assert_allclose(mixed, [1 + 0.2 * 5, 2, 3, 4, 5, 6 - 0.05 * 2])
 
 
 def test_a_turned_sensor_reads_in_its_own_axes() -> None:
     """Turned a quarter about z, its x axis is where y_S was."""
     wrench = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
-    read = fx.SensorMounting(rz=np.pi / 2).apply(wrench, _sensing((0, 0, 0)))
+    read = ef.SensorMounting(rz=np.pi / 2).apply(wrench, _sensing((0, 0, 0)))
     np.testing.assert_allclose(read, [2, -1, 3, 5, -4, 6], atol=1e-12)
 
 
 def test_the_chain_goes_from_the_load_to_the_electronics() -> None:
     """A bias that is listed first still acts behind the gain."""
-    listed = [fx.SensorBias(fz=1.0), fx.SensorGain(fz=1.0), fx.PayloadError(mass=-1.0)]
-    kinds = [type(effect) for effect in fx.sensor_chain(listed)]
-    assert kinds == [fx.PayloadError, fx.SensorGain, fx.SensorBias]
+    listed = [ef.SensorBias(fz=1.0), ef.SensorGain(fz=1.0), ef.PayloadError(mass=-1.0)]
+    kinds = [type(effect) for effect in ef.sensor_chain(listed)]
+    assert kinds == [ef.PayloadError, ef.SensorGain, ef.SensorBias]
 
 
 @pytest.mark.parametrize(
     ("effect", "expected"),
     [
-        (fx.JointViscousFriction(coefficient=2.0), [-1.0, 0.0, 4.0]),
-        (fx.JointCoulombFriction(size=3.0, creep=0.001), [-3.0, 0.0, 3.0]),
-        (fx.JointStribeckFriction(size=3.0, speed=2.0, creep=0.001),
+        (ef.JointViscousFriction(coefficient=2.0), [-1.0, 0.0, 4.0]),
+        (ef.JointCoulombFriction(size=3.0, creep=0.001), [-3.0, 0.0, 3.0]),
+        (ef.JointStribeckFriction(size=3.0, speed=2.0, creep=0.001),
          [-3 * np.exp(-1 / 16), 0.0, 3 * np.exp(-1)]),
-        (fx.JointAsymmetricFriction(coulomb=1.0, viscous=2.0, creep=0.001),
+        (ef.JointAsymmetricFriction(coulomb=1.0, viscous=2.0, creep=0.001),
          [2.0, 0.0, 5.0]),
-        (fx.JointLoadFriction(coefficient=0.1, creep=0.001), [-1.0, 0.0, 3.0]),
-        (fx.JointQuadraticFriction(coefficient=0.1, creep=0.001), [-10.0, 0.0, 90.0]),
-        (fx.TorqueOffset(size=-0.7), [-0.7, -0.7, -0.7]),
-        (fx.TorqueGain(share=0.1), [1.0, -2.0, 3.0]),
-        (fx.RotorInertia(inertia=2.0), [2.0, -2.0, 6.0]),
+        (ef.JointLoadFriction(coefficient=0.1, creep=0.001), [-1.0, 0.0, 3.0]),
+        (ef.JointQuadraticFriction(coefficient=0.1, creep=0.001), [-10.0, 0.0, 90.0]),
+        (ef.TorqueOffset(size=-0.7), [-0.7, -0.7, -0.7]),
+        (ef.TorqueGain(share=0.1), [1.0, -2.0, 3.0]),
+        (ef.RotorInertia(inertia=2.0), [2.0, -2.0, 6.0]),
     ],
 )  # fmt: skip
 def test_arm_effects_are_their_equations(
-    effect: fx.JointEffect, expected: list
+    effect: ef.JointEffect, expected: list
 ) -> None:
     np.testing.assert_allclose(effect.torque(SAMPLES), expected, atol=1e-12)
 
 
 def test_groove_friction_adds_and_stops_at_zero() -> None:
-    assert fx.GrooveFriction(0.15).apply(ENVIRONMENT, fx.AT_REST).friction == 0.2 + 0.15
-    assert fx.GrooveFriction(-0.5).apply(ENVIRONMENT, fx.AT_REST).friction == 0.0
+    assert ef.GrooveFriction(0.15).apply(ENVIRONMENT, ef.AT_REST).friction == 0.2 + 0.15
+    assert ef.GrooveFriction(-0.5).apply(ENVIRONMENT, ef.AT_REST).friction == 0.0
 
 
 def test_groove_pose_turns_about_a_and_shifts() -> None:
     nominal = dataclasses.replace(ENVIRONMENT, X_GnG=RigidTransform())
-    X_GnG = fx.GroovePose(ry=0.1, x=0.001, z=0.002).apply(nominal, fx.AT_REST).X_GnG
+    X_GnG = ef.GroovePose(ry=0.1, x=0.001, z=0.002).apply(nominal, ef.AT_REST).X_GnG
     np.testing.assert_allclose(X_GnG.translation(), [0.001, 0, 0.002])
     end = X_GnG.rotation() @ np.array([0.06, 0, 0])
     expected = 0.06 * np.array([np.cos(0.1), 0, -np.sin(0.1)])
@@ -213,9 +213,9 @@ def test_groove_pose_moves_body_and_geometry(station_type) -> None:
     query = station.GetOutputPort("query_object")
     geometry = station.lock.groove_ids[0]
     before = RigidTransform(query.Eval(context).GetPoseInWorld(geometry))
-    effect = fx.GroovePose(ry=0.05, y=0.003)
+    effect = ef.GroovePose(ry=0.05, y=0.003)
     station.set_effects(context, [effect])
-    X_GnG = effect.apply(station.lock.nominal, fx.AT_REST).X_GnG
+    X_GnG = effect.apply(station.lock.nominal, ef.AT_REST).X_GnG
     assert station.true_groove_pose(context).IsExactlyEqualTo(X_GnG)
     after = query.Eval(context).GetPoseInWorld(geometry)
     X_WG = station.X_WG
@@ -224,7 +224,7 @@ def test_groove_pose_moves_body_and_geometry(station_type) -> None:
 
 
 def test_imprecision_scatters_about_the_command_and_repeats_itself():
-    effect = fx.Imprecision(x=1e-3, z=5e-4)
+    effect = ef.Imprecision(x=1e-3, z=5e-4)
     command, memory, away = np.zeros(6), np.zeros(6), []
     for _ in range(2000):
         executed, memory = effect.execute(command, np.zeros(6), memory, 0.1)

@@ -4,23 +4,17 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from drake_disasm import effects as ef
 from drake_disasm.common.spatial import (
     pose_from_vector,
     rotation_vector,
     shift_and_express,
     weight_wrench,
 )
-from drake_disasm.effects import (
-    Effect,
-    GrooveFriction,
-    GroovePose,
-    PayloadError,
-    SensorBias,
-)
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
-from tests.drake_disasm.conftest import QUIET, STIFF
+from tests.drake_disasm.conftest import QUIET
 
 COUNTLESS = "ft_sensor.quantum=[0, 0, 0, 0, 0, 0]"
 TURN = np.array([0, 0, 0, 0.010, -0.012, 0.015])
@@ -35,7 +29,7 @@ def simulation(request: pytest.FixtureRequest) -> TaskSimulation:
 
 
 def _turned(
-    simulation: TaskSimulation, effects: list[Effect]
+    simulation: TaskSimulation, effects: list[ef.Effect]
 ) -> tuple[np.ndarray, RigidTransform]:
     """Returns wrench and measured pose at rest, turned by TURN in free air."""
     simulation.reset(0, effects)
@@ -53,7 +47,7 @@ def _sensor_in_g(simulation: TaskSimulation, X_GB: RigidTransform) -> RigidTrans
 
 def test_bias_is_seen_from_the_bolt(simulation: TaskSimulation) -> None:
     without, nominal = _turned(simulation, [])
-    biased, X_GB = _turned(simulation, [SensorBias(*BIAS)])
+    biased, X_GB = _turned(simulation, [ef.SensorBias(*BIAS)])
     assert X_GB.IsExactlyEqualTo(nominal)  # the motion is untouched
     expected = shift_and_express(BIAS, _sensor_in_g(simulation, X_GB))
     np.testing.assert_allclose(biased - without, expected, atol=1e-9)
@@ -62,7 +56,7 @@ def test_bias_is_seen_from_the_bolt(simulation: TaskSimulation) -> None:
 def test_payload_error_shows_once_the_sensor_turns(simulation: TaskSimulation) -> None:
     """Zeroing hides it upright; turned, the weight's change is what is seen."""
     mass, first_moment = 0.4, np.array([0.004, -0.008, 0.05])
-    effect = PayloadError(mass, *first_moment)
+    effect = ef.PayloadError(mass, *first_moment)
     without, _ = _turned(simulation, [])
     wrong, X_GB = _turned(simulation, [effect])
     X_GS = _sensor_in_g(simulation, X_GB)
@@ -77,24 +71,10 @@ def test_payload_error_shows_once_the_sensor_turns(simulation: TaskSimulation) -
     np.testing.assert_allclose(wrong - without, expected, atol=1e-8)
 
 
-@pytest.mark.parametrize("coefficient", [-0.2, 0.15])
-def test_friction_shows_in_the_twins_sliding_force(coefficient: float) -> None:
-    """Pressed against a lip and slid: Fx = -(mu + coefficient) |Fz|, to 2 %."""
-    scenario = load_scenario("removal", [QUIET, COUNTLESS, STIFF])
-    simulation = TaskSimulation(scenario, "twin")
-    simulation.reset(0, [GrooveFriction(coefficient)])
-    simulation.step(np.array([0, 0, 8e-4, 0, 0, 0]))
-    for _ in range(15):
-        result = simulation.step(np.array([1e-3, 0, 0, 0, 0, 0]))
-    fx, _, fz = result.observation[6:9]
-    assert abs(fz) > 3.0
-    assert -fx / abs(fz) == pytest.approx(0.2 + coefficient, rel=0.02, abs=0.002)
-
-
 def test_environment_effects_act_in_their_order() -> None:
     station = TaskSimulation(load_scenario("removal"), "twin").station
     context = station.CreateDefaultContext()
-    station.set_effects(context, [GroovePose(ry=0.1), GroovePose(x=0.001)])
+    station.set_effects(context, [ef.GroovePose(ry=0.1), ef.GroovePose(x=0.001)])
     expected = [0.001 * np.cos(0.1), 0, -0.001 * np.sin(0.1)]
     X_GnG = station.true_groove_pose(context)
     np.testing.assert_allclose(X_GnG.translation(), expected, atol=1e-15)
@@ -112,7 +92,7 @@ def test_effects_changed_in_place_are_seen_by_the_next_reset() -> None:
     simulation.scenario.effects[0].ry = -0.03
     simulation.reset(0)
     assert _true_ry(simulation) == pytest.approx(-0.03)
-    effect = GroovePose(ry=0.01)
+    effect = ef.GroovePose(ry=0.01)
     simulation.reset(0, [effect])
     effect.ry = 0.02
     simulation.reset(0, [effect])
@@ -124,7 +104,7 @@ def test_effects_of_one_episode_do_not_stay() -> None:
         load_scenario("removal"), "twin", make_policy("straight")
     )
     first = simulation.reset(1)
-    simulation.reset(1, [GroovePose(ry=0.05), SensorBias(fx=1.0)])
+    simulation.reset(1, [ef.GroovePose(ry=0.05), ef.SensorBias(fx=1.0)])
     assert _true_ry(simulation) == pytest.approx(0.05)
     np.testing.assert_array_equal(simulation.reset(1), first)
     assert _true_ry(simulation) == 0.0

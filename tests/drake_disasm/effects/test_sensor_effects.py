@@ -3,35 +3,28 @@
 import numpy as np
 import pytest
 
+from drake_disasm import effects as ef
 from drake_disasm.devices.sensor_chain import sensed_along, sensed_sample
-from drake_disasm.effects import (
-    Sensing,
-    SensorDeadBand,
-    SensorDelay,
-    SensorEffect,
-    SensorGainDrift,
-    SensorStep,
-)
 
 G_W = np.array([0.0, 0.0, -9.81])
 WRENCH = np.array([1.0, -0.2, 3.0, 0.04, -0.005, 0.1])
 _PERIOD = 0.1  # s
 
 
-def _at(*times: float, mass: float = 0.0) -> Sensing:
+def _at(*times: float, mass: float = 0.0) -> ef.Sensing:
     R_WS = np.broadcast_to(np.eye(3), (len(times), 3, 3))
-    return Sensing(np.array(times), R_WS, G_W, mass)
+    return ef.Sensing(np.array(times), R_WS, G_W, mass)
 
 
 def test_a_gain_drifts_from_zero_on() -> None:
-    effect = SensorGainDrift(fx=0.01, tz=-0.02)
+    effect = ef.SensorGainDrift(fx=0.01, tz=-0.02)
     read = effect.apply(np.tile(WRENCH, (2, 1)), _at(0.0, 5.0))
     np.testing.assert_array_equal(read[0], WRENCH)
     np.testing.assert_allclose(read[1], WRENCH * [1.05, 1, 1, 1, 1, 0.9])
 
 
 def test_a_step_sets_in_and_stays() -> None:
-    effect = SensorStep(fy=-2.0, tx=0.1, onset=9.5, rise=1.0)
+    effect = ef.SensorStep(fy=-2.0, tx=0.1, onset=9.5, rise=1.0)
     read = effect.apply(np.zeros((5, 6)), _at(0.0, 9.4, 10.0, 10.6, 1e4))
     np.testing.assert_allclose(read[:, 1], [0, 0, -1, -2, -2])
     np.testing.assert_allclose(read[:, 3], [0, 0, 0.05, 0.1, 0.1])
@@ -46,13 +39,13 @@ def test_a_band_reads_zero_and_beyond_it_all_or_less(
     beyond: float, expected: list[float]
 ) -> None:
     """Half width 0.5 N, and 0.025 N m."""
-    effect = SensorDeadBand(force=1.0, torque=1.0, width=0.5, beyond=beyond)
+    effect = ef.SensorDeadBand(force=1.0, torque=1.0, width=0.5, beyond=beyond)
     read = effect.apply(WRENCH, _at(0.0))
     np.testing.assert_allclose(read[0], expected, atol=2e-4)
 
 
 def test_a_band_is_about_the_weight_of_the_payload() -> None:
-    effect = SensorDeadBand(force=1.0, torque=1.0, width=0.5)
+    effect = ef.SensorDeadBand(force=1.0, torque=1.0, width=0.5)
     weight = np.array([0.0, 0.0, -9.81, 0.0, 0.0, 0.0])
     small = np.array([0.3, -0.3, 0.3, 0.0, 0.0, 0.0])
     read = effect.apply(weight + small, _at(0.0, mass=1.0))
@@ -63,7 +56,7 @@ def _loads(steps: int) -> np.ndarray:
     return np.random.default_rng(0).standard_normal((steps, 6))
 
 
-def _along(effect: SensorEffect, loads: np.ndarray) -> np.ndarray:
+def _along(effect: ef.SensorEffect, loads: np.ndarray) -> np.ndarray:
     times = _PERIOD * np.arange(1.0, len(loads) + 1.0)
     return sensed_along(loads, [effect], _at(*times), np.zeros(6), _at(0.0))
 
@@ -71,7 +64,7 @@ def _along(effect: SensorEffect, loads: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("steps", [1, 3])
 def test_a_delay_by_whole_samples_shifts_rows(steps: int) -> None:
     loads = _loads(8)
-    read = _along(SensorDelay(steps * _PERIOD), loads)
+    read = _along(ef.SensorDelay(steps * _PERIOD), loads)
     np.testing.assert_allclose(read[steps:], loads[:-steps], atol=1e-9)
     np.testing.assert_allclose(read[: steps - 1], 0.0, atol=1e-9)
 
@@ -80,14 +73,14 @@ def test_a_delay_by_whole_samples_shifts_rows(steps: int) -> None:
 def test_a_delay_of_less_is_on_the_line_between_two_samples(delay: float) -> None:
     """No first-order lag: what was before the sample before does not show."""
     loads, share = _loads(8), delay / _PERIOD
-    read = _along(SensorDelay(delay), loads)
+    read = _along(ef.SensorDelay(delay), loads)
     expected = (1.0 - share) * loads[1:] + share * loads[:-1]
     np.testing.assert_allclose(read[1:], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("interval", [0.002, 0.025])
 def test_a_sensor_of_any_rate_delays_a_ramp_exactly(interval: float) -> None:
-    effect, memory = SensorDelay(0.25), np.full(512, np.nan)
+    effect, memory = ef.SensorDelay(0.25), np.full(512, np.nan)
     for k in range(round(1.0 / interval) + 1):
         load = np.full(6, k * interval)
         gap = interval if k else 0.0

@@ -6,29 +6,16 @@ import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw
 
-from drake_disasm.impact import (
-    ImpactConditions,
-    ImpactLaw,
-    ImpactStep,
-    LockShape,
-    Surroundings,
-    turning,
-)
-from drake_disasm.impact.equations import (
-    NORMALS,
-    Known,
-    balance,
-    solve_in_place,
-    workspace,
-)
+from drake_disasm import impact
+from drake_disasm.impact import equations
 from drake_disasm.scenario import LockConfig
 
 M = np.diag([3.0, 3.0, 3.0, 0.02, 0.02, 0.02])
 K, D = np.array([15e3] * 3 + [150.0] * 3), np.array([400.0] * 3 + [3.0] * 3)
-TURNED = ImpactConditions(
-    law=ImpactLaw(300.0, 1.4, 2.0, 0.1),
-    shape=LockShape.of(LockConfig()),
-    around=Surroundings(
+TURNED = impact.ImpactConditions(
+    law=impact.ImpactLaw(300.0, 1.4, 2.0, 0.1),
+    shape=impact.LockShape.of(LockConfig()),
+    around=impact.Surroundings(
         np.array([0.2]),
         RollPitchYaw(0.0, 0.03, 0.0).ToRotationMatrix().matrix()[None],
         np.array([[0.0, 0.0, 1e-4]]),
@@ -55,10 +42,10 @@ def states():
 
 def test_springs_inertia_and_contact_balance_after_the_step():
     q, v, qd, vd = states()
-    step = ImpactStep.of(TURNED, H, q, v, qd, vd)
+    step = impact.ImpactStep.of(TURNED, H, q, v, qd, vd)
     after, wrench = step.v, step.wrench
     assert step.is_solved.all()
-    E, R = turning(q[:, 3:])
+    E, R = impact.turning(q[:, 3:])
     t_To = wrench[:, 3:] - np.cross(R @ TURNED.p_BoTo_B, wrench[:, :3])
     pushed = np.hstack([wrench[:, :3], np.einsum("nji,nj->ni", E, t_To)])
     rest = (after - v) @ M - H * (K * (qd - q - H * after) + D * (vd - after) + pushed)
@@ -67,9 +54,9 @@ def test_springs_inertia_and_contact_balance_after_the_step():
 
 
 def test_without_contact_it_is_the_linear_step():
-    free = dataclasses.replace(TURNED, law=ImpactLaw(0.0, 1.0, 0.0, 0.1))
+    free = dataclasses.replace(TURNED, law=impact.ImpactLaw(0.0, 1.0, 0.0, 0.1))
     q, v, qd, vd = states()
-    step = ImpactStep.of(free, H, q, v, qd, vd)
+    step = impact.ImpactStep.of(free, H, q, v, qd, vd)
     A = M + np.diag(H * D + H**2 * K)
     expected = np.linalg.solve(A, (v @ M + H * (K * (qd - q) + D * vd)).T).T
     np.testing.assert_allclose(step.v, expected, rtol=1e-9)
@@ -77,9 +64,9 @@ def test_without_contact_it_is_the_linear_step():
 
 
 def test_states_do_not_see_each_other():
-    whole = ImpactStep.of(TURNED, H, *states())
+    whole = impact.ImpactStep.of(TURNED, H, *states())
     for i in (0, 7, COUNT - 1):
-        one = ImpactStep.of(TURNED, H, *(part[i : i + 1] for part in states()))
+        one = impact.ImpactStep.of(TURNED, H, *(part[i : i + 1] for part in states()))
         assert one.v[0].tobytes() == whole.v[i].tobytes()
         assert one.wrench[0].tobytes() == whole.wrench[i].tobytes()
 
@@ -95,24 +82,26 @@ def test_each_state_has_its_own_conditions():
     clearance = np.linspace(2e-4, 6e-4, COUNT)
 
     def conditions(rows, clearance):
-        own = Surroundings(*(each[rows] for each in around))
+        own = impact.Surroundings(*(each[rows] for each in around))
         shape = TURNED.shape.with_clearance(clearance)
         return dataclasses.replace(TURNED, around=own, shape=shape)
 
-    whole = ImpactStep.of(conditions(slice(None), clearance), H, *states())
+    whole = impact.ImpactStep.of(conditions(slice(None), clearance), H, *states())
     for i in (0, 13, COUNT - 1):
         own = conditions(slice(i, i + 1), float(clearance[i]))
-        one = ImpactStep.of(own, H, *(part[i : i + 1] for part in states()))
+        one = impact.ImpactStep.of(own, H, *(part[i : i + 1] for part in states()))
         np.testing.assert_allclose(one.v[0], whole.v[i], atol=1e-9)
 
 
 def known(random):
     """Returns what a step of a bolt depends on that touches a few places."""
-    space = workspace()
-    space.depth[:] = np.where(random.uniform(size=len(NORMALS)) < 0.2, 2e-5, -1.0)
-    space.arm[:] = random.uniform(-0.01, 0.01, NORMALS.shape)
+    space = equations.workspace()
+    space.depth[:] = np.where(
+        random.uniform(size=len(equations.NORMALS)) < 0.2, 2e-5, -1.0
+    )
+    space.arm[:] = random.uniform(-0.01, 0.01, equations.NORMALS.shape)
     law = np.array(TURNED.law.row)
-    return Known(M + H * np.diag(D), np.zeros(6), H, 0.2, law, space)
+    return equations.Known(M + H * np.diag(D), np.zeros(6), H, 0.2, law, space)
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -122,10 +111,10 @@ def test_newtons_slope_is_the_derivative(seed):
     (wrench, r), slope = np.empty((2, 6)), np.empty((6, 6))
 
     def out_of_balance(twist):
-        balance(step, twist, wrench, r, np.empty((6, 6)))
+        equations.balance(step, twist, wrench, r, np.empty((6, 6)))
         return r.copy()
 
-    balance(step, twist, wrench, r, slope)
+    equations.balance(step, twist, wrench, r, slope)
     assert wrench.any()
     for i, side in enumerate(d * np.eye(6)):
         change = out_of_balance(twist + side) - out_of_balance(twist - side)
@@ -137,16 +126,16 @@ def test_the_elimination_solves_what_lapack_does():
     A, b = random.normal(size=(6, 6)), random.normal(size=6)
     A[0, 0] = 0.0  # wants a pivot
     x = b.copy()
-    solve_in_place(A.copy(), x)
+    equations.solve_in_place(A.copy(), x)
     np.testing.assert_allclose(x, np.linalg.solve(A, b), rtol=1e-10)
-    solve_in_place(np.ones((6, 6)), x)
+    equations.solve_in_place(np.ones((6, 6)), x)
     assert not np.isfinite(x).all()
 
 
 def test_turning_maps_rates_of_angles_to_angular_velocity():
     angles, rates, d = np.array([[0.3, -0.2, 0.1]]), np.array([0.5, 0.7, -0.4]), 1e-7
-    E, R = turning(angles)
-    _, later = turning(angles + d * rates)
+    E, R = impact.turning(angles)
+    _, later = impact.turning(angles + d * rates)
     W = (later - R)[0] / d @ R[0].T
     np.testing.assert_allclose(E[0] @ rates, [W[2, 1], W[0, 2], W[1, 0]], rtol=1e-5)
 
@@ -154,5 +143,5 @@ def test_turning_maps_rates_of_angles_to_angular_velocity():
 def test_what_no_force_balances_is_said_of_its_state_alone():
     q, v, qd, vd = states()
     vd[3] = np.nan
-    is_solved = ImpactStep.of(TURNED, H, q, v, qd, vd).is_solved
+    is_solved = impact.ImpactStep.of(TURNED, H, q, v, qd, vd).is_solved
     assert not is_solved[3] and is_solved.sum() == COUNT - 1

@@ -3,19 +3,11 @@
 import numpy as np
 import pytest
 
-from drake_disasm.importing.signals import (
-    LowPass,
-    chosen_cutoff,
-    clock_of,
-    even_times,
-    quantum,
-    resample,
-    stretches,
-)
+from drake_disasm.importing import signals
 
 
 def test_derivatives_of_polynomials() -> None:
-    low = LowPass(cutoff=20.0, period=0.005)
+    low = signals.LowPass(cutoff=20.0, period=0.005)
     t = 0.005 * np.arange(200)
     x, inner = (1.0 + 2.0 * t + 3.0 * t**2)[:, None], t[low.reach : -low.reach]
     exact = (1.0 + 2.0 * inner + 3.0 * inner**2, 2.0 + 6.0 * inner, 6.0 + 0.0 * inner)
@@ -26,7 +18,7 @@ def test_derivatives_of_polynomials() -> None:
 
 @pytest.mark.parametrize("order", [0, 1, 2])
 def test_the_filter_and_its_derivatives_have_the_same_gain(order: int) -> None:
-    low, t = LowPass(cutoff=20.0, period=0.005), 0.005 * np.arange(2000)
+    low, t = signals.LowPass(cutoff=20.0, period=0.005), 0.005 * np.arange(2000)
     inner = t[low.reach : -low.reach]
     for w in 2.0 * np.pi * np.array([2.0, 8.0, 14.0]):
         x, wave = np.sin(w * t)[:, None], np.sin(w * inner)
@@ -36,7 +28,7 @@ def test_the_filter_and_its_derivatives_have_the_same_gain(order: int) -> None:
 
 
 def test_what_is_beyond_the_cutoff_is_gone_and_below_it_there() -> None:
-    low, t = LowPass(cutoff=20.0, period=0.005), 0.005 * np.arange(2000)
+    low, t = signals.LowPass(cutoff=20.0, period=0.005), 0.005 * np.arange(2000)
     slow, fast = (np.sin(2.0 * np.pi * f * t)[:, None] for f in (10.0, 32.0))
     inner = slice(low.reach, -low.reach)
     assert np.abs(low(slow) - slow[inner]).max() < 3e-3
@@ -48,34 +40,36 @@ def test_the_cutoff_is_where_motion_and_noise_meet() -> None:
     motion = sum(np.sin(2.0 * np.pi * f * t) / f**2 for f in (0.3, 1.1, 2.7, 5.2))
     for noise in (1e-6, 1e-4):
         q = motion + noise * random.standard_normal(len(t))
-        assert 5.2 < chosen_cutoff(q[:, None], 0.002) < 30.0
+        assert 5.2 < signals.chosen_cutoff(q[:, None], 0.002) < 30.0
     rounded = np.round(motion / 1e-3) * 1e-3
-    assert 5.2 < chosen_cutoff(rounded[:, None], 0.002) < 30.0
+    assert 5.2 < signals.chosen_cutoff(rounded[:, None], 0.002) < 30.0
 
 
 def test_joints_that_rest_don_t_choose_the_cutoff() -> None:
     t = 0.01 * np.arange(1000)
     random = np.random.default_rng(1)
     q = np.stack([np.sin(t) + 1e-5 * random.standard_normal(1000), np.zeros(1000)], 1)
-    assert chosen_cutoff(q, 0.01) == chosen_cutoff(q[:, :1], 0.01) < 25.0
+    assert (
+        signals.chosen_cutoff(q, 0.01) == signals.chosen_cutoff(q[:, :1], 0.01) < 25.0
+    )
 
 
 def test_a_clock_s_gaps_losses_and_jitter_are_told_apart() -> None:
     steps = np.full(1000, 0.01)
     steps[100], steps[500] = 0.02, 0.5
-    clock = clock_of(np.cumsum(steps))
+    clock = signals.clock_of(np.cumsum(steps))
     assert (clock.lost, clock.gaps, clock.repeated) == (1, (pytest.approx(0.5),), 0)
     assert clock.period == pytest.approx(0.01) and not clock.is_even
-    parts = stretches(np.cumsum(steps))
+    parts = signals.stretches(np.cumsum(steps))
     assert [part.stop - part.start for part in parts] == [500, 500]
-    assert clock_of(0.01 * np.arange(50)).is_even
+    assert signals.clock_of(0.01 * np.arange(50)).is_even
 
 
 def test_uneven_rows_are_brought_to_an_even_time_line() -> None:
     random = np.random.default_rng(2)
     time = 0.01 * (np.arange(500) + 0.1 * random.standard_normal(500))
-    at = even_times(time)
-    x = resample(time, np.sin(3.0 * time)[:, None], at)
+    at = signals.even_times(time)
+    x = signals.resample(time, np.sin(3.0 * time)[:, None], at)
     np.testing.assert_allclose(x[:, 0], np.sin(3.0 * at), atol=1e-5)
     assert np.ptp(np.diff(at)) < 1e-12
 
@@ -83,6 +77,6 @@ def test_uneven_rows_are_brought_to_an_even_time_line() -> None:
 def test_rounding_is_recognised() -> None:
     step = 2.0 * np.pi / 4096
     t = np.linspace(0.0, 10.0, 5000)
-    assert quantum(np.round(np.sin(t) / step) * step) == pytest.approx(step)
-    assert quantum(np.sin(t)) == 0.0
-    assert quantum(np.zeros(10)) == 0.0
+    assert signals.quantum(np.round(np.sin(t) / step) * step) == pytest.approx(step)
+    assert signals.quantum(np.sin(t)) == 0.0
+    assert signals.quantum(np.zeros(10)) == 0.0
