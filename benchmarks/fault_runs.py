@@ -116,6 +116,7 @@ def _commands_of(cell: FakeCell) -> list[tuple[float, np.ndarray]]:
     advance = cell.advance
 
     def noted(heard: Callable[[], bool] = lambda: True) -> None:
+        """Advances the cell, and notes what it was commanded."""
         advance(heard)
         sent.append((cell.time, cell.commanded))
 

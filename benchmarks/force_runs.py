@@ -71,6 +71,7 @@ def run_push(push: str, on_force: str, control: str = "position") -> ForceRun:
         advance = cell.advance
 
         def noted(*heard: object) -> None:
+            """Advances the cell, and notes the force at its sensor."""
             advance(*heard)  # type: ignore[arg-type]
             is_held = np.isfinite(station.supervisor.held_since)
             forces.append((bool(is_held), _force(cell)))
