@@ -387,7 +387,7 @@ class SelectionSettings:
         "beyond five times the noise the linear account is not asked: the bolt is "
         "inside the model's wall, and the derivative is the wall's stiffness",
         "a groove turned by 3 degrees is found only by fits (tests/sysid/"
-        "effect_selection/test_prescreen.py); one by 2 degrees, 7.5 times the noise, "
+        "effect_selection/test_twin_logs.py); one by 2 degrees, 7.5 times the noise, "
         "was named a step of the sensor first",
     )
     search_rows: int = _setting(
@@ -505,7 +505,7 @@ class SelectionSettings:
         "in an iteration, of where a step led that is missed by far: a wall between "
         "hides it from the derivatives",
         "with none, 29 micrometres along x where there are none; with 8, 2 "
-        "(tests/sysid/effect_selection/test_command_scatter.py)",
+        "(tests/sysid/effect_selection/test_twin_logs.py)",
     )
     scatter_missed: float = _setting(
         2.0,

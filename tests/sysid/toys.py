@@ -33,7 +33,6 @@ class Decay(LogModel):
         self.others: dict[str, float] = {"a": 2.0, "b": 1.5, "c": 0.3}
         self.x = np.tile(np.linspace(0.0, 3.0, rows), episodes)
         self.die_once: Path | None = None
-        self.dies = False
         error = noise * np.random.default_rng(seed).normal(size=self.x.size)
         truth = self._curve({"a": 2.0, "b": 1.5, "c": 0.3})
         self.measurements = Measurements(
@@ -49,8 +48,6 @@ class Decay(LogModel):
         return (get["a"] + get["twin_of_a"]) * np.exp(-get["b"] * x) + get["c"]
 
     def predict(self, theta, rows):
-        if self.dies:
-            os._exit(1)
         if self.die_once and not self.die_once.exists():
             self.die_once.touch()
             os._exit(1)

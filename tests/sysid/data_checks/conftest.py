@@ -6,25 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from drake_disasm.logs import (
-    Log,
-    LogHeader,
-    LogWriter,
-    flat_columns,
-    read_log,
-    write_static_wrench,
-)
+from drake_disasm.logs import Log, read_log, write_static_wrench
 from sysid.models.regressor import ArmDynamics
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
+from tests.sysid.models.arm import JOINTS, write_motion_log, write_two_link_arm
 
 _G, _MASS, _CENTRE = 9.81, 1.2, (0.01, -0.02, 0.06)
-_LINK = """<link name="{0}"><inertial><origin xyz="{1}"/><mass value="{2}"/>
-<inertia ixx="0.02" ixy="0.001" ixz="0" iyy="0.03" iyz="0" izz="0.02"/>
-</inertial></link>"""
-_JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>
-<origin xyz="{3}" rpy="{4}"/><axis xyz="0 0 1"/>
-<limit lower="-3" upper="3" velocity="9" effort="99"/></joint>"""
 
 
 @pytest.fixture(scope="session")
@@ -67,13 +55,7 @@ def world_log(tmp_path_factory) -> Log:
 def arm_log(tmp_path_factory) -> Log:
     """Two joints that swing for 8 s, with noise and friction that nobody declared."""
     folder = tmp_path_factory.mktemp("arm")
-    urdf = folder / "two.urdf"
-    text = '<robot name="two"><link name="base"/>'
-    text += _LINK.format("upper", "0.1 0.02 0.1", 2.0)
-    text += _LINK.format("lower", "0.05 0 0.1", 1.0)
-    text += _JOINT.format("shoulder", "base", "upper", "0 0 0.3", "1.2 0 0")
-    text += _JOINT.format("elbow", "upper", "lower", "0 0.4 0", "0 1.3 0.2")
-    urdf.write_text(text + "</robot>")
+    urdf = write_two_link_arm(folder / "two.urdf")
     time = 0.01 * np.arange(800)
     q, v, vd = np.zeros((3, len(time), 2))
     for joint, pairs in enumerate([[(0.8, 3.0), (0.3, 7.1)], [(0.9, 4.3), (0.2, 9.7)]]):
@@ -82,12 +64,8 @@ def arm_log(tmp_path_factory) -> Log:
             q[:, joint] += size * np.sin(phase)
             v[:, joint] += size * omega * np.cos(phase)
             vd[:, joint] -= size * omega**2 * np.sin(phase)
-    names = ("shoulder", "elbow")
-    arm = ArmDynamics(str(urdf), names)
+    arm = ArmDynamics(str(urdf), JOINTS)
     tau = arm.regressor(q, v, vd) @ arm.inertia + 0.3 * np.sign(v) + 0.1 * v
     tau += 0.02 * np.random.default_rng(0).standard_normal(tau.shape)
-    header = LogHeader("joint_motion", "swing", {}, joints=names, urdf=str(urdf))
     columns = {"time": time, "q": q, "v": v, "vd": vd, "tau": tau}
-    with LogWriter(folder / "log", header) as writer:
-        writer.write_episode(flat_columns("joint_motion", columns))
-    return read_log(folder / "log")
+    return write_motion_log(folder / "log", urdf, columns)

@@ -6,7 +6,6 @@ what it did: a verdict has nothing but the log to go by.
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from drake_disasm.effects import Effect, SensorBias, SensorEffect, amplitudes
 from drake_disasm.effects.sensor.payload_error import PayloadError
-from drake_disasm.logs import read_log, write_static_wrench
+from drake_disasm.logs import Log, read_log, write_static_wrench
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
-from sysid.effect_selection.verdict import Verdict
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.static_wrench import StaticWrenchModel
 
@@ -28,19 +26,6 @@ _PAYLOAD = PayloadError(mass=1.2, cx=0.01, cy=-0.02, cz=0.06)
 _BIAS = SensorBias(fx=1.0, fy=-2.0, fz=3.0, tx=0.1, ty=-0.2, tz=0.05)
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """What a generator did; for the comparison afterwards.
-
-    Attributes:
-        kinds: of the effects that it put in.
-        folder: of the log.
-    """
-
-    kinds: tuple[type[Effect], ...]
-    folder: Path
-
-
 def static_log(
     folder: Path,
     kinds: Sequence[type[SensorEffect]],
@@ -48,8 +33,8 @@ def static_log(
     seed: int,
     correlation: float = 0.0,
     shape: Mapping[str, float] | None = None,
-) -> Drawn:
-    """Writes readings at rest with effects of a kind each.
+) -> Log:
+    """Writes readings at rest with effects of a kind each, and reads them.
 
     Args:
         folder: of the log.
@@ -68,7 +53,7 @@ def static_log(
     noise = np.array([FORCE_NOISE] * 3 + [TORQUE_NOISE] * 3)
     reading = reading + noise * _correlated(random, READINGS, correlation)
     write_static_wrench(folder / "log", R_WS, reading, "S", "weigh", {})
-    return Drawn(tuple(kinds), folder / "log")
+    return read_log(folder / "log")
 
 
 def _correlated(random: np.random.Generator, rows: int, rho: float) -> np.ndarray:
@@ -78,16 +63,9 @@ def _correlated(random: np.random.Generator, rows: int, rho: float) -> np.ndarra
     return np.asarray(lfilter([1.0], [1.0, -rho], white, axis=0))
 
 
-def verdict_of(folder: Path, library: Sequence[type[Effect]] | None = None) -> Verdict:
-    """Returns what closing the loop says of a log."""
-    return closed(folder, library).verdict
-
-
-def closed(folder: Path, library: Sequence[type[Effect]] | None = None) -> ClosedLoop:
+def closed(log: Log, library: Sequence[type[Effect]] | None = None) -> ClosedLoop:
     """Returns all that closing the loop finds in a log."""
-    model = model_of([read_log(folder)], ModelChoice())
-    assert isinstance(model, StaticWrenchModel)
-    return close_loop(model, library=library)
+    return close_loop(model_of([log], ModelChoice()), library=library)
 
 
 def _readings(folder: Path, R_WS: np.ndarray, effects: list[Effect]) -> np.ndarray:

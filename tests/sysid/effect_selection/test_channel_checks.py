@@ -76,7 +76,6 @@ def test_a_sine_is_found_with_its_frequency():
 
 
 def test_a_model_that_states_its_own_error_may_be_off_by_as_much_in_a_pattern():
-    """Of 2 N stated, a sine of 2 N is none of the log's; one of 9 N is."""
     residual, sine = 0.1 * _white(), np.sin(2 * np.pi * 1.3 * _time())
     for size, shows in ((2.0, False), (9.0, True)):
         residual[:, 1] += size * sine
@@ -93,7 +92,6 @@ def test_outlying_rows_are_counted_and_placed():
     "noise", [null_logs.heavy_tailed, null_logs.autoregressive(0.9)]
 )
 def test_noise_alone_shows_nothing(noise):
-    """No line where it is slow, no outlier in tails."""
     shape = np.ones((_EPISODES * _ROWS, 2))
     drawn = [noise(np.random.default_rng(seed), shape) for seed in range(30)]
     texts = [_found(residual) for residual in drawn]

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from drake_disasm.effects import registered_effects
-from drake_disasm.logs import read_log
 from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.data_sufficiency import refuse_short_logs
 from sysid.effect_selection.detection import detection_limits
@@ -26,7 +25,7 @@ _LOGS = 20
 def model(tmp_path_factory):
     """A hundred simulated readings of a sensor at rest, with nothing missing."""
     log = blind.static_log(tmp_path_factory.mktemp("null"), [], 0.0, 5)
-    found = model_of([read_log(log.folder)], ModelChoice())
+    found = model_of([log], ModelChoice())
     noise = np.array([blind.FORCE_NOISE] * 3 + [blind.TORQUE_NOISE] * 3)
     return found.with_measurements(found.measurements.with_noise(noise, "stated"))
 

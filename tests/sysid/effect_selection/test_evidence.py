@@ -15,9 +15,9 @@ from drake_disasm.effects import (
 from sysid.effect_selection.block_regression import BlockRegression
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.evidence import Evidence, most_parsimonious
-from sysid.effect_selection.search import LinearSearch, trials
+from sysid.effect_selection.search import trials
 from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
-from sysid.effect_selection.trial_comparison import as_good_as_the_best, ties_by_fit
+from sysid.effect_selection.trial_comparison import ties_by_fit
 
 _SCATTER = np.random.default_rng(0).normal(size=40)
 
@@ -57,7 +57,6 @@ def test_what_explains_clearly_more_is_named():
 
 
 def test_the_rarer_effect_is_no_simpler_than_one_of_all_joints():
-    """A coupling took up what was viscous friction of an arm (kuka_lwr4)."""
     coupling = _evidence(JointCoupling, 0.74, 4)
     each = _evidence(JointViscousFriction, 0.80, 7)
     assert coupling.ties_with(each)
@@ -96,42 +95,6 @@ def test_a_rival_that_was_not_fitted_may_gain_by_a_fit_as_the_best_did(gain, is_
     assert ties == ((rival,) if is_tie else ())
 
 
-def _fit_of_rows(rows: list[float], parameters: int) -> SimpleNamespace:
-    """Returns a fit, as far as it is compared, with some losses of its rows."""
-    return SimpleNamespace(
-        loss=sum(rows),
-        bounded_residual=np.sqrt(np.array(rows))[:, None],
-        theta=np.zeros(parameters),
-        settings=DEFAULT_SETTINGS,
-    )
-
-
-@pytest.mark.parametrize(
-    ("rows", "is_tie"), [([1.0, 1.0, 50.0, 1.0], True), ([9.0, 9.0, 9.0, 9.0], False)]
-)
-def test_one_row_at_which_a_rival_is_worse_is_no_reason_to_leave_it_out(rows, is_tie):
-    """A jam, say, that one effect's model of the grip solves and another's does not."""
-    best, rival = (
-        _evidence(kind, 0.5, 1) for kind in (JointCoulombFriction, JointLoadFriction)
-    )
-    found, other = _fit_of_rows([1.0, 1.0, 1.0, 1.0], 1), _fit_of_rows(rows, 1)
-    pairs = [(best, found), (rival, other)]
-    ties = ties_by_fit(best, [rival], pairs, SimpleNamespace(loss=100.0), found)
-    assert ties == ((rival,) if is_tie else ())
-
-
-def test_of_two_that_differ_at_one_row_the_simpler_is_taken():
-    first, second = (
-        _evidence(kind, 0.5, 1) for kind in (JointCoulombFriction, JointLoadFriction)
-    )
-    before = SimpleNamespace(settings=DEFAULT_SETTINGS, states_model_error=True)
-    fits = _fit_of_rows([1.0] * 4, 2), _fit_of_rows([1.0, 1.0, 50.0, 1.0], 1)
-    trials = list(zip((first, second), fits, strict=True))
-    assert as_good_as_the_best(trials, before)[0] is second
-    before.states_model_error = False
-    assert as_good_as_the_best(trials, before)[0] is first
-
-
 def test_what_the_other_blocks_say_nothing_of_goes_to_null():
     """A column acts in one block, and by rounding in the others."""
     back, rows, size = -2.0, 80, 4
@@ -145,45 +108,3 @@ def test_what_the_other_blocks_say_nothing_of_goes_to_null():
     losses = regression.held_out_losses(np.array([0]), np.array([back]))
     assert losses[0] == pytest.approx(size * (0.5 + 3.0 * back) ** 2, rel=1e-3)
     np.testing.assert_allclose(losses[1:], size * 0.25)
-
-
-class _Fitter:
-    """Knows what fits of some effects leave."""
-
-    settings = DEFAULT_SETTINGS
-
-    def __init__(self, **losses):
-        self.losses = losses
-
-    def fit(self, effects, start=None):
-        names = "".join(e.name for e in effects)
-        return SimpleNamespace(
-            effects=effects,
-            loss=self.losses[names],
-            objective=0.0,
-            effect_gains={e.name: 0.001 for e in effects},
-            at_bound=lambda which: which == ["b"] and len(names) > 1,
-            is_misshapen=lambda which: False,
-        )
-
-
-def _search(fitter):
-    library = [SimpleNamespace(name=name, text=name) for name in "ab"]
-    return LinearSearch(fitter, library), fitter.fit(tuple(library))
-
-
-@pytest.mark.parametrize(("without_b", "left"), [(1.001, "a"), (50.0, "ab")])
-def test_an_effect_is_needless_if_a_fit_without_it_is_as_good(without_b, left):
-    """The linear account says that both are."""
-    losses = {"ab": 1.0, "a": without_b, "b": 50.0, "": 60.0}
-    search, fit = _search(_Fitter(**losses))
-    found = search._without_needless(fit)
-    assert "".join(e.name for e in found.effects) == left
-
-
-def test_what_a_later_effect_drives_to_a_bound_is_no_candidate_any_more():
-    losses = {"ab": 1.0, "a": 2.0}
-    search, fit = _search(_Fitter(**losses))
-    found = search._without_misshapen(fit)
-    assert [e.name for e in found.effects] == ["a"]
-    assert [c.name for c in search.library] == ["a"]

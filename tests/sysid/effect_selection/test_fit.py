@@ -7,23 +7,15 @@ import pytest
 
 from drake_disasm.effects import CommandGain, Compliance, GroovePose
 from drake_disasm.logs import read_log
-from drake_disasm.policies import Exploring, make_policy
-from drake_disasm.scenario import load_scenario
-from drake_disasm.task.recording import record_transitions
-from drake_disasm.task.simulation import TaskSimulation
 from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.settings import SelectionSettings
-from sysid.effect_selection.simplification import at_own_minimum, simplified
+from sysid.effect_selection.simplification import simplified
 from sysid.effect_selection.verdict import parameter_values
 from sysid.models.twin import TwinModel
-from sysid.objective import Objective
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
 from sysid.workers import Workers
-from tests.drake_disasm.conftest import STIFF
-
-_TURN = np.deg2rad(2.0)  # of removal_turned
 
 
 @pytest.fixture(scope="module")
@@ -90,18 +82,6 @@ def _with(fit, **changes):
     return dataclasses.replace(fit, linearisation=linearisation)
 
 
-def test_a_channel_that_pays_for_a_gain_is_named(gain):
-    """Of a fit whose force is missed by 1.5 times the noise, which is 1."""
-    fitter, effect = gain
-    fit = fitter.fit((effect,))
-    residual = fit.linearisation.residual.copy()
-    number = [c.name for c in fit.model.measurements.channels].index("fy")
-    residual[:, number] = 1.5
-    worse = _with(fit, residual=residual)
-    assert worse.harmed_channels(fit) == ["fy"]
-    assert fit.harmed_channels(fit) == [] and fit.harmed_channels(worse) == []
-
-
 def test_an_amplitude_that_its_bound_holds_back_is_noticed(gain):
     """At a bound past which the loss would fall, or at one that is null."""
     fitter, effect = gain
@@ -136,25 +116,6 @@ def test_amplitudes_that_gain_nothing_are_left_out(gain):
     assert simple.theta == pytest.approx([0.03], rel=0.02)
     assert simple.loss < 1.01 * fit.loss
     assert simplified(fitter, simple) is simple
-
-
-@pytest.mark.slow
-def test_an_added_effect_ends_where_the_models_own_derivatives_lead(tmp_path):
-    turned = load_scenario("removal_turned", [STIFF, "task.steps=14"])
-    policy = Exploring(make_policy("admittance"), 1.5e-4, 0)
-    simulation = TaskSimulation(turned, "twin", policy)
-    log = record_transitions(tmp_path / "log", simulation, 8)
-    model = TwinModel([log], load_scenario("removal", [STIFF]), ())
-    fitter, pose = _fitter(model, GroovePose)
-    effect = pose.only(["ry", "x"])
-    assert model.costly
-    near = fitter.fit((effect,), values={"GroovePose.ry": 0.9 * _TURN})
-    fit = at_own_minimum(fitter, near)
-    assert fit.objective <= near.objective
-    true = model.with_effects(turned.effects)
-    at_truth = Objective(true, Workers(), fitter.huber_delta)(np.zeros(0))[0]
-    assert fit.objective < at_truth
-    assert fit.values["GroovePose.ry"] == pytest.approx(_TURN, rel=0.03)
 
 
 @pytest.mark.parametrize(

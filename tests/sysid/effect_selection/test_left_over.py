@@ -81,7 +81,6 @@ def test_a_residual_model_halves_the_error_of_a_run_it_never_saw(found, tmp_path
 
 
 def test_identification_takes_the_scenario_with_it(found, folder, tmp_path):
-    """Its predictions are those that the verdict promised."""
     model = found.verdict.residual_model
     model.functions.save(tmp_path / "model.npz")
     scenario = found.scenario_with_residual_model(str(tmp_path / "model.npz"))

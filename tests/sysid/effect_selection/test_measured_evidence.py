@@ -107,13 +107,3 @@ def test_the_linear_account_says_what_a_fit_would(friction):
     p = linear_p(before, survey.linearised, evidence)
     assert p == pytest.approx(exceeds_noise_p(before, after, 1), rel=1e-2)
     assert (p < 0.5) == (friction > 0.1)
-
-
-def test_what_is_left_in_the_rows_that_change_counts_as_noise():
-    """Friction of either sign, though the bolt goes one way: no effect of friction."""
-    noise = np.zeros(_ROWS)
-    noise[_MOVING] = 0.3, -0.2, 0.25
-    fitter = Fitter(Stuck(noise), Workers(), np.inf, _SETTINGS)
-    (effect,) = candidates(fitter.base, [JointCoulombFriction])[:1]
-    before, after = fitter.fit(()), fitter.fit((effect.only(["size"]),))
-    assert exceeds_noise_p(before, after, 1) > 0.05

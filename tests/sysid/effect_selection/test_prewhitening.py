@@ -25,7 +25,6 @@ def test_finds_the_coefficients_of_a_process():
 
 
 def test_episodes_are_not_joined():
-    """A step from one to the next is no correlation."""
     parts = [np.full(200, 1.0), np.full(200, -1.0)]
     random = np.random.default_rng(0)
     noisy = [p + random.standard_normal(200) for p in parts]
@@ -54,7 +53,6 @@ def test_slow_noise_is_white_after_it():
 
 
 def test_slowness_is_rather_taken_for_too_great():
-    """So that what a slow residual shows by chance is no alarm."""
     slow = _process(0.9)
     careful = ArFilter.of([slow], 1, errors=2.0).predictors[1][1]
     assert careful < ArFilter.of([slow], 1).predictors[1][1] < -0.85
@@ -96,7 +94,6 @@ def test_a_sensors_white_noise_does_not_keep_rows_from_being_averaged(noise):
 
 
 def test_columns_are_filtered_as_residuals_are():
-    """Linear: what explains a residual explains it after the filter."""
     random = np.random.default_rng(3)
     columns = random.standard_normal((2000, 2, 3))
     residual = columns @ np.array([1.0, -2.0, 0.5])

@@ -2,14 +2,12 @@
 
 import arm_verdicts
 import null_alarms
-import numpy as np
 import pytest
-from scipy.stats import binom
 
 from drake_disasm.logs import read_logs
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.models.from_logs import ModelChoice, model_of
-from sysid.validation.null_logs import autoregressive, null_log, sieve
+from sysid.validation.null_logs import autoregressive
 from tests.sysid.real_data import (
     real_folder,
     write_arm,
@@ -22,8 +20,6 @@ from tests.sysid.real_data import (
 pytestmark = pytest.mark.usefixtures("real_arm")
 
 _NULLS = 40
-#: More alarms than that come in less than 1 % of such series from a test at 5 %.
-_MOST_ALARMS = int(binom.isf(0.01, _NULLS, 0.05))
 
 
 @pytest.fixture(scope="module")
@@ -74,37 +70,9 @@ def test_a_real_drives_motion_was_recorded_late(tmp_path):
 
 
 @pytest.mark.slow
-def test_friction_shows_in_three_seconds_of_a_real_arms_motion(tmp_path):
-    arm = write_arm(tmp_path / "arm.urdf")
-    log = write_motion(1, tmp_path / "run", arm)
-    model = model_of(read_logs([log]), ModelChoice())
-    found = close_loop(model.of_rows(np.arange(model.measurements.rows) < 600))
-    kinds = [name.partition(".")[0] for name in found.verdict.names]
-    assert kinds[0].endswith("Friction")
-    errors = found.errors
-    assert errors.relative(errors.after) < 0.7 * errors.relative(errors.before)
-
-
-@pytest.mark.slow
-def test_noise_as_correlated_as_a_real_arms_residual_raises_no_alarm(tmp_path):
-    arm = write_arm(tmp_path / "arm.urdf")
-    log = read_logs([write_motion(1, tmp_path / "run", arm)])
-    model = model_of(log, ModelChoice())
-    model = model.of_rows(np.arange(model.measurements.rows) % 5 == 0)
-    found = close_loop(model)
-    noise = sieve(found.last.linearisation.residual)
-    nulls = [
-        null_log(found.first.model, noise, s, found.first.theta) for s in range(_NULLS)
-    ]
-    alarms = [close_loop(null).verdict.ending != "none" for null in nulls]
-    assert sum(alarms) <= _MOST_ALARMS
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("noise", ["sieve", "ar0.98+white"])
-def test_three_seconds_of_slow_noise_name_no_effect(noise, tmp_path):
+def test_three_seconds_of_slow_noise_name_no_effect(tmp_path):
     model = null_alarms.arm(tmp_path)
-    noise = null_alarms.noise_of(noise, model)
+    noise = null_alarms.noise_of("sieve+white", model)
     answers = [null_alarms.answer(model, noise, seed) for seed in range(_NULLS)]
     assert sum(bool(found["names"]) for found in answers) <= 0.1 * _NULLS
 

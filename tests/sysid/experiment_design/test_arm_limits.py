@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from drake_disasm.common.errors import DisasmError
 from sysid.experiment_design.arm_limits import JointLimits, Workspace
 from sysid.experiment_design.fourier import FourierMotion
+from tests.refusals import refused
 from tests.sysid.models.arm import JOINTS, write_two_link_arm
 
 _IIWA = "package://disasm_models/iiwa14/iiwa14.urdf"
@@ -40,27 +40,19 @@ def folding(tmp_path) -> str:
     return str(path)
 
 
-def _workspace(urdf: str) -> Workspace:
-    limits = JointLimits.of_urdf(urdf, JOINTS, 5.0, 0.0)
-    return Workspace(urdf, JOINTS, limits)
-
-
-def test_limits_are_those_of_the_urdf_less_the_margin():
+def test_limits_are_those_of_the_urdf_less_the_margin(folding):
     limits = JointLimits.of_urdf(_IIWA, _IIWA_JOINTS, 5.0, 0.1)
     assert limits.upper[1] == pytest.approx(2.0944 - 0.1 * 2.0 * 2.0944, abs=1e-3)
     assert limits.lower == pytest.approx(-limits.upper)
     assert limits.effort[0] == pytest.approx(0.9 * 320.0)
     assert limits.acceleration[0] == pytest.approx(0.9 * 8.57)  # it states them
-
-
-def test_an_acceleration_that_is_not_stated_is_the_users(folding):
     limits = JointLimits.of_urdf(folding, JOINTS, 5.0, 0.1)
     assert limits.acceleration == pytest.approx(np.full(2, 4.5))
 
 
 def test_a_limit_that_the_urdf_lacks_is_named(tmp_path):
     arm = write_two_link_arm(tmp_path / "two.urdf")  # it has no transmission
-    with pytest.raises(DisasmError, match=r"effort limit of joint 'shoulder'.*<trans"):
+    with refused("effort limit of joint 'shoulder'", "<trans"):
         JointLimits.of_urdf(str(arm), JOINTS, 5.0, 0.1)
 
 
@@ -82,7 +74,8 @@ def test_a_motion_grows_up_to_its_first_limit_and_not_beyond(folding):
 
 
 def test_clearance_is_the_distance_of_links_that_no_joint_connects(folding):
-    workspace = _workspace(folding)
+    limits = JointLimits.of_urdf(folding, JOINTS, 5.0, 0.0)
+    workspace = Workspace(folding, JOINTS, limits)
     assert workspace.has_geometry
     straight, folded = np.zeros(2), np.array([0.0, 3.0])
     far, near = workspace.clearance(np.stack([straight, folded]))
@@ -91,10 +84,7 @@ def test_clearance_is_the_distance_of_links_that_no_joint_connects(folding):
     x, z = 0.4 + 0.4 * np.cos(3.0), -0.4 * np.sin(3.0)
     assert near == pytest.approx(np.hypot(x, z) - 0.1, abs=1e-3)
     assert near < 0.0
-
-
-def test_height_is_that_of_moving_links_alone(folding):
-    workspace = _workspace(folding)  # its base stands at z = 0
+    # The height is that of moving links alone: its base stands at z = 0.
     assert workspace.height(np.zeros((1, 2)))[0] == pytest.approx(1.0)
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from drake_disasm.common.errors import DisasmError
 from sysid.experiment_design.arm_limits import JointLimits, Workspace
 from sysid.experiment_design.design import DesignSettings, design_motion
 from sysid.experiment_design.information import (
@@ -11,7 +10,8 @@ from sysid.experiment_design.information import (
     condition_of,
     uncertainty_of,
 )
-from tests.sysid.models.arm import JOINT, JOINTS, LINK
+from tests.refusals import refused
+from tests.sysid.models.arm import JOINTS, write_two_link_arm
 
 _KINDS = ("JointCoulombFriction", "JointViscousFriction")
 _NOISE = np.array([0.5, 0.2])  # N m
@@ -24,14 +24,7 @@ _SETTINGS = DesignSettings(duration=8.0, harmonics=4, starts=10, iterations=6)
 @pytest.fixture(scope="module")
 def urdf(tmp_path_factory) -> str:
     path = tmp_path_factory.mktemp("arm") / "two.urdf"
-    text = '<robot name="two"><link name="base"/>'
-    text += LINK.format("upper", "0.1 0.02 0.1", 2.0)
-    text += LINK.format("lower", "0.05 0 0.1", 1.0)
-    text += JOINT.format("shoulder", "base", "upper", "0 0 0.3", "1.2 0 0")
-    text += JOINT.format("elbow", "upper", "lower", "0 0.4 0", "0 1.3 0.2")
-    text += "".join(_DRIVE.format(name) for name in JOINTS)
-    path.write_text(text + "</robot>")
-    return str(path)
+    return str(write_two_link_arm(path, "".join(map(_DRIVE.format, JOINTS))))
 
 
 @pytest.fixture(scope="module")
@@ -110,10 +103,7 @@ def test_the_condition_number_is_the_scaled_regressors():
 
 def test_a_floor_above_the_arm_is_refused(urdf, experiment, limits):
     high = DesignSettings(duration=8.0, harmonics=4, starts=2, iterations=1, floor=5.0)
-    with pytest.raises(DisasmError, match=r"no motion.*`floor`"):
+    with refused("no motion", "`floor`"):
         design_motion(experiment, limits, Workspace(urdf, JOINTS, limits), high)
-
-
-def test_an_effect_that_is_none_of_an_arm_is_refused_with_the_nearest(urdf):
-    with pytest.raises(DisasmError, match="JointCoulombFriction"):
+    with refused("did you mean 'JointCoulombFriction'"):
         ArmExperiment(urdf, JOINTS, ["JointCoulombFrictoin"], _NOISE, 8.0)

@@ -29,9 +29,6 @@ def test_it_begins_and_ends_at_rest_in_the_same_posture(motion):
     assert q[0] == pytest.approx(q[1])
     assert np.abs(v).max() < 1e-12 and np.abs(vd).max() < 1e-12
     assert np.ptp(motion.at_rest().states(np.linspace(0.0, 7.0, 50))[0]) > 0.1
-
-
-def test_a_motion_at_rest_stays_as_it_is(motion):
     once = motion.at_rest()
     assert once.at_rest().a == pytest.approx(once.a)
     assert once.at_rest().b == pytest.approx(once.b)

@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from drake_disasm.common.errors import DisasmError
 from sysid.identification import Journal, SearchSettings, Settings, identify
 from sysid.identification.assessment import noise_floor
 from sysid.identification.output import summary, to_mapping
 from sysid.identification.sensitivity import sensitivity
-from sysid.objective import Objective
+from sysid.objective import Objective, pseudo_residual, rms
+from sysid.optimise import BeesSettings
 from sysid.report import report_page
 from sysid.workers import Workers
+from tests.refusals import refused
 from tests.sysid.report.pages import own_part
 from tests.sysid.toys import Decay
 
@@ -42,7 +43,6 @@ def test_finds_the_truth_and_both_methods_agree(tmp_path):
 
 @pytest.mark.slow
 def test_intervals_cover_the_truth_as_often_as_they_say(tmp_path):
-    """95 % of 3 x 60 intervals, give or take; single method to be quick."""
     settings = Settings(
         ("nlopt",), SearchSettings(evaluations=60, local_evaluations=10)
     )
@@ -58,23 +58,21 @@ def test_intervals_cover_the_truth_as_often_as_they_say(tmp_path):
         assert 0.88 < np.mean(hits) < 0.99, (name, np.mean(hits))
 
 
-def test_a_parameter_without_effect_stops_the_fit_by_name(tmp_path):
-    model = Decay(("a", "idle"))
-    with pytest.raises(DisasmError, match=r"idle: has no effect.*--unidentifiable"):
-        run(model, tmp_path / "fit")
-
-
-def test_or_is_frozen_by_choice(tmp_path):
+def test_a_parameter_without_effect_stops_the_fit_or_is_frozen_by_choice(tmp_path):
+    with refused("idle", "no effect", "`unidentifiable` freeze"):
+        run(Decay(("a", "idle")), tmp_path / "stopped")
     settings = Settings(search=SEARCH, unidentifiable="freeze")
     found = run(Decay(("a", "idle", "c")), tmp_path / "fit", settings)
     assert [p.name for p in found.parameters] == ["a", "c"]
     assert found.frozen == {"idle": 0.5}
     assert any("idle was frozen" in note for note in found.notes)
+    with refused("nothing is left"):
+        run(Decay(("idle",)), tmp_path / "nothing", settings)
 
 
 def test_a_combination_that_the_log_cannot_fix_is_named(tmp_path):
     model = Decay(("a", "twin_of_a", "b"))
-    with pytest.raises(DisasmError, match=r"0\.71 .*0\.71 .*only to"):
+    with refused("0.71 a", "0.71 twin_of_a"):
         run(model, tmp_path / "fit")
     objective = Objective(model, Workers())
     found = sensitivity(objective, np.full(3, 0.3))
@@ -84,14 +82,8 @@ def test_a_combination_that_the_log_cannot_fix_is_named(tmp_path):
     )
 
 
-def test_nothing_left_to_fit_is_said(tmp_path):
-    settings = Settings(search=SEARCH, unidentifiable="freeze")
-    with pytest.raises(DisasmError, match="nothing is left"):
-        run(Decay(("idle",)), tmp_path / "fit", settings)
-
-
 def test_fewer_transitions_than_parameters(tmp_path):
-    with pytest.raises(DisasmError, match=r"2 transitions .* 3 parameters"):
+    with refused("2 transitions", "3 parameters"):
         run(Decay(rows=2), tmp_path / "fit", test=(1, 2, 3))
 
 
@@ -112,7 +104,7 @@ def test_an_interrupted_identification_goes_on_to_the_same_bits(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         run(Decay(), tmp_path / "fit", progress=interrupt)
-    with pytest.raises(DisasmError, match="--resume"):
+    with refused("`resume`"):
         run(Decay(), tmp_path / "fit")
     again = run(Decay(), tmp_path / "fit", resume=True)
     assert again.theta.tobytes() == whole.theta.tobytes()
@@ -123,29 +115,17 @@ def test_an_interrupted_identification_goes_on_to_the_same_bits(tmp_path):
     assert again.evaluations < whole.evaluations
 
 
-def test_half_a_line_in_the_journal_is_dropped(tmp_path):
-    whole = run(Decay(), tmp_path / "fit")
-    path = tmp_path / "fit" / "results.jsonl"
-    text = path.read_text()
-    path.write_text(text[: len(text) // 2])
-    again = run(Decay(), tmp_path / "fit", resume=True)
-    assert again.theta.tobytes() == whole.theta.tobytes()
-    assert path.read_text() == text
-
-
 def test_refuses_to_go_on_with_another_identification(tmp_path):
     run(Decay(), tmp_path / "fit")
-    with pytest.raises(DisasmError, match="another seed"):
+    with refused("another seed"):
         Journal(tmp_path / "fit", {"seed": 1}, resume=True)
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "notes.txt").write_text("mine")
-    with pytest.raises(DisasmError, match="not empty"):
+    with refused("not empty"):
         Journal(tmp_path / "other", {}, resume=False)
 
 
 def test_the_thesis_search_counts_as_the_thesis_does(tmp_path):
-    from sysid.optimise import BeesSettings
-
     colony = BeesSettings.thesis()
     search = SearchSettings(cycles=10, local_evaluations=0, bees=colony)
     settings = Settings(search=search, huber_delta=np.inf)
@@ -163,32 +143,23 @@ def test_a_profile_has_its_minimum_at_the_estimate(tmp_path):
     lowest = int(np.argmin(curve.values))
     assert 0 < lowest < len(curve.values) - 1
     assert curve.values[0] > curve.edge < curve.values[-1]
-    with pytest.raises(DisasmError, match="--profile"):
+    with refused("`profile` z"):
         run(Decay(), tmp_path / "2", Settings(profiles=("z",)))
 
 
 def test_the_floor_is_that_of_gaussian_noise():
     assert noise_floor(np.inf) == pytest.approx(1.0, abs=1e-6)
     z = np.random.default_rng(0).normal(size=200_000)
-    from sysid.objective import pseudo_residual, rms
-
     assert noise_floor(1.0) == pytest.approx(rms(pseudo_residual(z, 1.0)), rel=0.01)
 
 
 def test_the_report_needs_nothing_else_and_says_it_all(tmp_path):
     settings = Settings(search=SEARCH, profiles=("c",))
     found = run(Decay(), tmp_path / "fit", settings)
-    page = report_page(found, {"command": "test", "data": "abc"})
-    page = own_part(page)
+    page = own_part(report_page(found, {"command": "test", "data": "abc"}))
     assert page.count("data:image/png;base64,") == 4
     assert page.count('class="plotly-graph-div"') == 2
-    for word in (
-        "Agreement",
-        "Warnings" if found.notes else "Parameters",
-        "abc",
-        "Fit",
-    ):
-        assert word in page
+    assert "Agreement" in page and "abc" in page
     mapping = to_mapping(found)
     assert set(mapping["parameters"]) == {"a", "b", "c"}
     assert "bees and nlopt agree" in summary(found)

@@ -16,7 +16,7 @@ def coloured(n, rho, seed=0):
     return e
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.2, 0.9])
+@pytest.mark.parametrize("rho", [0.0, 0.9])
 def test_ljung_box_is_statsmodels(rho):
     residual = coloured(300, rho)
     oracle = acorr_ljungbox(residual - residual.mean(), lags=[10])

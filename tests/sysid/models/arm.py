@@ -16,9 +16,9 @@ JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2
 <limit lower="-3" upper="3" velocity="3" effort="99"/></joint>"""
 
 
-def write_two_link_arm(path: Path) -> Path:
-    """Writes the URDF of an arm with two joints."""
-    text = '<robot name="two"><link name="base"/>'
+def write_two_link_arm(path: Path, more: str = "") -> Path:
+    """Writes the URDF of an arm with two joints, and more elements."""
+    text = f'<robot name="two"><link name="base"/>{more}'
     text += LINK.format("upper", "0.1 0.02 0.1", 2.0)
     text += LINK.format("lower", "0.05 0 0.1", 1.0)
     text += JOINT.format("shoulder", "base", "upper", "0 0 0.3", "1.2 0 0")

@@ -48,7 +48,6 @@ def _errors(rates: ArmRates, arm: dict[str, np.ndarray]) -> np.ndarray:
 
 @pytest.mark.parametrize("control", ["cartesian_impedance", "joint_impedance"])
 def test_an_arm_that_lags_is_followed(control):
-    """A few steps later to a twentieth of the mean's error."""
     found, by_mean = _errors(*_moved(control))
     assert np.all(found < 0.05 * by_mean)
 

@@ -1,7 +1,5 @@
 """A gear that yields: motor-side positions, and the torque at the joint."""
 
-import pickle
-
 import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
@@ -10,7 +8,7 @@ from drake_disasm.effects import Effect, JointElasticity
 from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.close_loop import close_loop
-from sysid.models.elastic_torques import ElasticTorques, time_derivatives
+from sysid.models.elastic_torques import time_derivatives
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.regressor import ArmDynamics
 from tests.sysid.models.arm import (
@@ -113,39 +111,6 @@ def test_it_is_affine_in_the_compliance_and_of_any_rows(urdf, tmp_path):
     np.testing.assert_allclose(few.predictions(theta), (rigid + change)[mask])
     fewer = few.of_rows(np.arange(mask.sum()) % 2 == 0)
     np.testing.assert_allclose(fewer.predictions(theta), (rigid + change)[mask][::2])
-
-
-def test_derivatives_are_found_once_and_only_if_asked_for(urdf, tmp_path, monkeypatch):
-    log = _behind_springs(tmp_path / "log", urdf, [0.0, 0.0])
-    asked = []
-    torques = ArmDynamics.torques
-
-    def counted(self, *state):
-        asked.append(state)
-        return torques(self, *state)
-
-    monkeypatch.setattr(ArmDynamics, "torques", counted)
-    model = JointMotionModel([log])
-    theta = np.array([p.nominal for p in model.parameters])
-    model.with_effects([JointElasticity("shoulder")]).predictions(theta)
-    assert not asked
-    for size in (1e-3, 2e-3):
-        model.with_effects([JointElasticity("shoulder", size)]).predictions(theta)
-        again = pickle.loads(pickle.dumps(model))
-        again.with_effects([JointElasticity("shoulder", size)]).predictions(theta)
-    assert len(asked) == 2  # the load, and with one gear that yields
-
-
-def test_an_arm_without_mass_has_nothing_to_yield_to(tmp_path):
-    path = tmp_path / "light.urdf"
-    text = _PENDULUM.format(kind="revolute")
-    begin, end = text.index("<inertial>"), text.index("</inertial>")
-    path.write_text(text[:begin] + text[end + len("</inertial>") :])
-    motion = np.ones((3, 30, 1))
-    found = ElasticTorques(
-        str(path), ("pivot",), np.arange(30.0), np.zeros(30, int), motion
-    )
-    assert not found.by_compliance("pivot").any()
 
 
 def test_time_derivatives_of_noise_stay_small():

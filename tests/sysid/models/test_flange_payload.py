@@ -8,12 +8,12 @@ import pytest
 from drake_disasm.effects import FlangePayload, JointCoulombFriction
 from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario
-from sysid.effect_selection.candidates import candidates, extended
+from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.scenario_parameters import Request
-from tests.sysid.models.arm import JOINT, LINK, write_motion_log
+from tests.sysid.models.arm import write_motion_log, write_two_link_arm
 from tests.sysid.models.test_joint_motion import drakes_torques, states
 
 MASS, COM = 1.5, np.array([0.05, -0.03, 0.12])
@@ -26,20 +26,11 @@ FLANGE = """<link name="flange"/><joint name="ee" type="fixed"><parent link="low
 <child link="flange"/><origin xyz="0 0.02 0.3" rpy="0.3 0 1"/></joint>"""
 
 
-def _arm(path: Path, load: str) -> Path:
-    text = '<robot name="two"><link name="base"/>' + FLANGE + load
-    text += LINK.format("upper", "0.1 0.02 0.1", 2.0)
-    text += LINK.format("lower", "0.05 0 0.1", 1.0)
-    text += JOINT.format("shoulder", "base", "upper", "0 0 0.3", "1.2 0 0")
-    text += JOINT.format("elbow", "upper", "lower", "0 0.4 0", "0 1.3 0.2")
-    path.write_text(text + "</robot>")
-    return path
-
-
 @pytest.fixture
 def log(tmp_path: Path) -> Log:
     """Motion of an arm that carries something; the header knows nothing of it."""
-    known, loaded = _arm(tmp_path / "a.urdf", ""), _arm(tmp_path / "b.urdf", LOAD)
+    known = write_two_link_arm(tmp_path / "a.urdf", FLANGE)
+    loaded = write_two_link_arm(tmp_path / "b.urdf", FLANGE + LOAD)
     q, v, vd = states(400)
     tau = drakes_torques(loaded, q, v, vd)
     tau += NOISE * np.random.default_rng(1).normal(size=tau.shape)
@@ -58,22 +49,7 @@ def test_a_payload_is_drakes_point_mass_and_a_candidate_of_the_arm(log: Log) -> 
     assert np.std(residual) == pytest.approx(NOISE, rel=0.1)
 
 
-def test_it_is_inseparable_from_the_last_link(log: Log) -> None:
-    """All that it does, base parameters do: no new column."""
-    base = JointMotionModel([log])
-    model, (new,) = extended(base, candidates(base, [FlangePayload]))
-    theta = np.array([p.nominal for p in model.parameters])
-    rows, count = slice(0, 400), len(base.parameters)
-    at_null = model.predict(theta, rows)
-    shifts = 0.1 * np.eye(len(theta))
-    A = np.array([model.predict(theta + s, rows) - at_null for s in shifts])
-    A = A.reshape(len(theta), -1).T
-    left = A[:, new] - A[:, :count] @ np.linalg.lstsq(A[:, :count], A[:, new])[0]
-    assert np.linalg.norm(left) < 1e-8 * np.linalg.norm(A[:, new])
-
-
 def test_closing_the_loop_finds_it_beside_the_arm_of_the_urdf(log: Log) -> None:
-    """With the base parameters frozen; among all else that an arm may have."""
     model = model_of([log], ModelChoice(requests=(Request("upper.Izz"),)))
     assert isinstance(model, JointMotionModel)
     found = close_loop(model)

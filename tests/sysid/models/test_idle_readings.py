@@ -31,7 +31,6 @@ def _warmed(size: float) -> np.ndarray:
 
 
 def test_a_torque_that_sets_in_is_the_sensors_until_the_bolt_touches():
-    """From there on it is the last that was seen."""
     readings, real = _readings(_warmed(0.2)), _warmed(0.2)
     offsets = IdleReadings.of(readings, _NOISE, _LEVER).offsets(readings)
     idle = slice(5, _TOUCHES - 2)

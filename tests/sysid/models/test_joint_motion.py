@@ -136,6 +136,7 @@ def test_refuses_an_arm_that_is_not_there_or_another(urdf, tmp_path):
         JointMotionModel([log], str(other))
 
 
+@pytest.mark.slow
 def test_a_real_arm_has_43_base_parameters(tmp_path):
     """43 of 80; a free fit leaves 6.6 % on its own recording, 6.3 % on the other."""
     arm = write_arm(tmp_path / "lwr4.urdf")

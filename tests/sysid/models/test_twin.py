@@ -1,5 +1,4 @@
 import dataclasses
-import pickle
 
 import numpy as np
 import pytest
@@ -8,7 +7,6 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from drake_disasm.common.spatial import rotation_from_vector, shift_and_express
 from drake_disasm.scenario import load_scenario, validate
 from drake_disasm.scenario.schema import ImpactConfig
-from drake_disasm.task.replay import TwinReplay
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models import PredictionError
 from sysid.models.twin import TwinModel, at_sensor
@@ -76,24 +74,6 @@ def test_workers_and_chunks_do_not_change_a_bit(log, turned, monkeypatch):
         assert a.tobytes() == b.tobytes() == c.tobytes()
 
 
-@pytest.mark.slow
-def test_drake_simulates_nothing_twice(log, turned, monkeypatch):
-    """What acts on the readings alone changes no simulation."""
-    simulated = []
-    transitions = TwinReplay.transitions
-
-    def count(self, steps):
-        simulated.append(len(steps))
-        return transitions(self, steps)
-
-    monkeypatch.setattr(TwinReplay, "transitions", count)
-    rows = slice(0, 24)
-    theta = np.array([0.21, 4.1e-4, 0.0351])  # of no other test
-    first = make(log, turned).simulate(theta, rows)
-    again = make(log, turned).simulate(theta, rows)
-    assert simulated == [24] and np.array_equal(first, again)
-
-
 def test_a_thinned_log_keeps_rows_that_follow_each_other(log, turned):
     thin = make(log, turned).thin(2)
     rows = thin._transitions.rows
@@ -110,23 +90,6 @@ def test_recovers_parameters_from_nearby(log, turned):
     begin = objective.scaling.to_unit(np.array([0.25, 0.033]))
     found = objective.scaling.from_unit(gauss_newton(objective, begin, 5).u)
     np.testing.assert_allclose(found, [0.2, 0.0349], rtol=0.03)
-
-
-@pytest.mark.slow
-def test_recovers_the_stiffness_of_impact(impact_log, impact):
-    names = ["contact.impact.stiffness"]
-    objective = Objective(make(impact_log, impact, names, coarse=False), Workers())
-    at_truth = objective(truth(objective.model))[0]
-    assert at_truth == pytest.approx(0.707, abs=0.07)
-    linearisation = gauss_newton(
-        objective, objective.scaling.to_unit(np.array([400.0])), 6
-    )
-    assert objective.value(linearisation.residual) < at_truth + 1e-3
-    # By the objective's curvature a standard deviation is 5 %; where a step begins is
-    # known by the noisy wrench alone, which adds to that.
-    assert objective.scaling.from_unit(linearisation.u)[0] == pytest.approx(
-        1000.0, rel=0.2
-    )
 
 
 def test_with_impact_too_chunks_do_not_change_a_bit(impact_log, impact, monkeypatch):
@@ -160,14 +123,6 @@ def test_a_scenario_that_cannot_be_is_a_failed_prediction(log, turned):
     assert model.predict(np.array([0.005]), slice(0, 2)).shape == (2, 12)
 
 
-def test_goes_through_pickle(log, turned):
-    model = make(log, turned)
-    theta, rows = truth(model), slice(0, 3)
-    before = model.predict(theta, rows)
-    copy = pickle.loads(pickle.dumps(model))
-    assert copy.predict(theta, rows).tobytes() == before.tobytes()
-
-
 def test_episodes_rows_and_frozen_parameters(log, turned):
     model = make(log, turned)
     part = model.of_episodes([0, 2])
@@ -199,8 +154,6 @@ def test_the_wrench_at_the_sensor_is_the_inverse_of_the_shift_to_the_bolt():
 
 
 def test_a_surrogate_is_as_stiff_as_the_head(log, turned):
-    """Between walls that the bolt leans on, with IMPACT of another stiffness it is not
-    where it is with hydroelastic contact."""
     model = make(log, turned)
     theta = np.array([p.nominal for p in model.parameters])
     wanted, stiff = model.predictions(theta), model.surrogate()

@@ -91,8 +91,8 @@ def test_the_model_with_the_effect_explains_the_log_of_a_simulation(effect, tmp_
     assert _error(log, scenario) > 2.0
 
 
+@pytest.mark.slow
 def test_local_effects_hold_with_hydroelastic_contact(tmp_path):
-    """To 1.2 times the noise: the wrench that a step begins with is noisy, too."""
     scenario = _scenario("hydroelastic")
     real, log = _log(tmp_path / "log", scenario, RustyPatch(0.3, position=0.01))
     assert _error(log, real) < 1.3
@@ -143,7 +143,6 @@ def test_a_step_begins_where_the_load_has_the_grip_not_the_reading(tmp_path):
 
 
 def test_an_offset_that_the_first_readings_show_moves_no_bolt(tmp_path):
-    """Steps begin in the same place whether the effect is known or not."""
     scenario = load_scenario("removal", ["contact.model=impact"])
     real, log = _log(tmp_path / "log", scenario, SensorBias(ty=0.1))
     bare, stated = (TwinModel([log], s, ()) for s in (scenario, real))

@@ -51,7 +51,6 @@ def test_what_was_read_is_undone(effect):
 
 
 def test_what_a_dead_band_hides_stays_small():
-    """Outside of the band the wrench is found, within it there are no leaps."""
     wrench, effect = _wrenches(), SensorDeadBand(force=1.0, width=2.0)
     found = undone(lambda w: _read_all(effect, w), _read(effect, wrench))
     wide = np.abs(wrench) > 4.0

@@ -7,7 +7,6 @@ from bees_comparison import ours, theirs
 
 @pytest.mark.parametrize("name", ["rosenbrock", "ackley", "rastrigin"])
 def test_is_as_good_as_the_published_package(name):
-    """Medians of the logarithm over six seeds: no worse by more than a decade."""
     mine, published = (
         np.median(np.log10([best(name, seed) + 1e-12 for seed in range(6)]))
         for best in (ours, theirs)

@@ -1,7 +1,7 @@
 import cma
 import numpy as np
 import pytest
-from tests.sysid.optimise.functions import rosenbrock, sphere
+from bees_comparison import rosenbrock, sphere
 
 from sysid.optimise import BeesAlgorithm, Box, nlopt_search
 from sysid.optimise.bees import Stop
@@ -10,7 +10,6 @@ BOX = Box.of([-2.0] * 3, [3.0] * 3)
 
 
 def test_three_opinions_on_rosenbrock():
-    """Bees, CRS2 and CMA-ES, the first two polished by SBPLX, meet at (1, 1, 1)."""
     bees = BeesAlgorithm(BOX, seed=1).run(rosenbrock, stop=Stop(evaluations=1500))
     crs = nlopt_search(rosenbrock, BOX, "GN_CRS2_LM", 1500, seed=1)
     for trace in (bees, crs):
@@ -21,16 +20,12 @@ def test_three_opinions_on_rosenbrock():
         np.testing.assert_allclose(found, 1.0, atol=0.02)
 
 
-def test_spends_its_budget_and_not_more():
-    trace = nlopt_search(sphere, BOX, "GN_CRS2_LM", 200)
-    assert trace.evaluations == 200 and trace.stopped == "budget"
-
-
-def test_is_the_same_with_the_same_seed():
+def test_spends_its_budget_and_is_the_same_with_the_same_seed():
     first, second, other = (
         nlopt_search(sphere, BOX, "GN_CRS2_LM", 100, seed=seed) for seed in (5, 5, 6)
     )
     assert first.values == second.values != other.values
+    assert first.evaluations == 100 and first.stopped == "budget"
 
 
 def test_goes_on_with_a_trace():
@@ -48,17 +43,16 @@ def test_never_leaves_the_bounds_by_a_rounding_error():
     np.testing.assert_allclose(trace.best, box.high, atol=1e-6)
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
-def test_what_goes_wrong_in_the_function_comes_out(error):
+def test_what_goes_wrong_in_the_function_comes_out():
     calls = []
 
     def function(x):
         calls.append(1)
         if len(calls) == 20:
-            raise error
+            raise KeyboardInterrupt
         return sphere(x)
 
-    with pytest.raises(error):
+    with pytest.raises(KeyboardInterrupt):
         nlopt_search(function, BOX, "GN_CRS2_LM", 100)
     assert len(calls) == 20
 

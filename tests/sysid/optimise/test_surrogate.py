@@ -27,7 +27,6 @@ def test_proposes_near_the_minimum_of_a_bowl():
 
 
 def test_helps_the_bees_at_equal_evaluations():
-    """On a bowl in four dimensions, such as a fit has near its optimum."""
     box, stop = Box.of([-2.0] * 4, [3.0] * 4), Stop(evaluations=70)
 
     def best(seed, surrogate):

@@ -101,12 +101,6 @@ def test_residuals_against_covariates_show_their_mean():
     assert plots.dependence_plot([residual] * 2, [{}, {}], channels) is None
 
 
-def test_errors_are_in_units_of_the_noise():
-    (before, after) = plots.error_plot(_errors(1000)).figure.data
-    assert before.y == pytest.approx(10.0, rel=0.2)
-    assert after.y == pytest.approx(1.0, rel=0.2)
-
-
 def test_what_the_model_states_of_its_own_error_is_part_of_the_unit():
     errors = _errors(1000)
     own = np.zeros_like(errors.measured)

@@ -41,23 +41,15 @@ class _Here(Executor):
         return future
 
 
-@pytest.mark.slow  # tests/sysid/effect_selection and examples/ name effects, too
-@pytest.mark.parametrize("name", ["CommandGain", "GrooveFriction"])
-def test_an_effect_at_twice_the_noise_gets_its_name(name):
-    found = run_case(Case((name,), 2.0, 0))
-    assert found.named_first and found.ending == "explained"
-    assert found.after < found.before
-
-
 @pytest.mark.slow
 def test_nothing_is_found_where_nothing_is():
     assert run_case(Case((), 0.0, 1)).ending == "none"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", single_cases((5.0,), (0,)), ids=lambda c: c.effects[0])
-def test_the_whole_library_at_five_times_the_noise(case):
-    assert run_case(case).in_tie
+def test_the_whole_library_at_five_times_the_noise():
+    cases = single_cases((5.0,), (0,))
+    assert [case.key for case in cases if not run_case(case).in_tie] == []
 
 
 def test_a_log_states_nothing_of_what_was_put_in(tmp_path):
@@ -100,26 +92,17 @@ def test_answers_are_kept_and_not_asked_for_again(tmp_path):
     assert executor.done == 5
 
 
-@pytest.mark.parametrize("count", [2, 3])
-def test_several_effects_differ_and_can_show(count):
+def test_several_effects_differ_and_can_show():
     names = {effect.__name__ for effect in observable_effects()}
-    for case in several_cases(count, 3.0, range(20)):
-        assert len(set(case.effects)) == count and set(case.effects) <= names
+    for case in several_cases(3, 3.0, range(20)):
+        assert len(set(case.effects)) == 3 and set(case.effects) <= names
 
 
 def test_tables_and_figure_count_what_was_said():
-    right = Answer(
-        Case(("SensorBias",), 2.0, 0), (), "explained", ("SensorBias",), ((),), 2.0, 1.0
-    )
-    tied = Answer(
-        Case(("SensorBias",), 2.0, 1),
-        (),
-        "explained",
-        ("SensorGain",),
-        (("SensorBias",),),
-        2.0,
-        1.1,
-    )
+    bias, gain, cases = ("SensorBias",), ("SensorGain",), range(2)
+    first, second = (Case(bias, 2.0, seed) for seed in cases)
+    right = Answer(first, (), "explained", bias, ((),), 2.0, 1.0)
+    tied = Answer(second, (), "explained", gain, (bias,), 2.0, 1.1)
     assert "| SensorBias | 1/2 | 2/2 |" in table([right, tied])
     assert "2.00 → 1.05" in errors_table([right, tied])
     labels = confusion_figure([right, tied]).axes[0].get_xticklabels()

@@ -102,7 +102,7 @@ def errors_of(arm, c, b, h):
     """How far simulations in steps h, in halves, and without play are off at most."""
     reference = in_closed_form(arm, c, b)
     errors = []
-    for step, play in ((h, b), (h / 2, b), (h, 0.0 * b)):
+    for step, play in ((h, b), (h / 2, b), (h, 0.0 * b))[: 2 + b.any()]:
         own, every = parameters(*motors(c, play)), round(0.02 / step)
         motion = simulate(arm, [own], [segment(arm, swing(TIMES))], 100 * every, step)
         errors.append(np.abs(motion.q[::every, 0, 0] - reference).max())
@@ -110,7 +110,7 @@ def errors_of(arm, c, b, h):
 
 
 def test_two_masses_on_a_spring_move_as_in_the_textbook(arm):
-    coarse, fine, _ = errors_of(arm, np.array([2e-3, 4e-3]), np.zeros(2), 0.005)
+    coarse, fine = errors_of(arm, np.array([2e-3, 4e-3]), np.zeros(2), 0.005)
     assert coarse < 1e-3
     assert 3.0 < coarse / fine < 5.0
 
@@ -136,15 +136,6 @@ def test_at_rest_a_motor_holds_what_hangs_on_the_yielding_link(arm):
     assert np.abs(torque - arm.bodies.arm.holding(q[None])[0]).max() > 0.02
 
 
-def test_a_little_play_changes_the_motion_by_a_little(arm):
-    """In proportion, so that a search can begin at none."""
-    sets = [parameters(*motors(b=(b, 0.0))) for b in (0.0, 1e-5, 2e-5)]
-    motion = simulate(arm, sets, [segment(arm, swing(TIMES))], 400, 0.005)
-    once, twice = motion.q[:, 1] - motion.q[:, 0], motion.q[:, 2] - motion.q[:, 0]
-    assert np.abs(once).max() > 1e-6
-    assert np.linalg.norm(twice - 2.0 * once) < 0.05 * np.linalg.norm(twice)
-
-
 def test_links_have_coordinates_only_where_some_lane_needs_them():
     sets = [(JointElasticity("b", 1e-3),), (JointBacklash("b", 0.01),), ()]
     gears = Gears.of(("a", "b", "c"), sets)
@@ -166,16 +157,15 @@ def test_a_segment_begins_with_the_link_where_its_load_has_it():
 
 
 def test_a_segment_in_the_middle_of_a_motion_goes_on_with_it(arm):
-    """Its links are where what the drives give has them, by the measured motors."""
     own = parameters(*motors((2e-3, 4e-3), inertia=(0.0, 0.0)))
     begin = segment(arm, swing(TIMES))
-    whole = simulate(arm, [own], [begin], 4000, 0.0005)
-    q, v = (x[2000, 0, 0] for x in (whole.q, whole.v))
-    vd = (whole.v[2001, 0, 0] - whole.v[1999, 0, 0]) / 0.001
+    whole = simulate(arm, [own], [begin], 2000, 0.001)
+    q, v = (x[1000, 0, 0] for x in (whole.q, whole.v))
+    vd = (whole.v[1001, 0, 0] - whole.v[999, 0, 0]) / 0.002
     later = dataclasses.replace(begin, start=1.0, q=q, v=v, vd=vd)
     rest = simulate(arm, [own], [later], 200, 0.005)
-    off = np.abs(rest.q[:, 0, 0] - whole.q[2000::10, 0, 0]).max()
+    off = np.abs(rest.q[:, 0, 0] - whole.q[1000::5, 0, 0]).max()
     assert off < 1e-3
     nowhere = dataclasses.replace(later, vd=vd + 3.0)  # rad/s^2: a noisy one
     noisy = simulate(arm, [own], [nowhere], 200, 0.005)
-    assert np.abs(noisy.q[:, 0, 0] - whole.q[2000::10, 0, 0]).max() < 2e-3
+    assert np.abs(noisy.q[:, 0, 0] - whole.q[1000::5, 0, 0]).max() < 2e-3

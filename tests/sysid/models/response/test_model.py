@@ -1,7 +1,5 @@
 import dataclasses
-import itertools
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,11 +13,8 @@ from drake_disasm.effects import (
     TorqueGain,
     registered_effects,
 )
-from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
+from drake_disasm.logs import LogWriter, flat_columns, read_log
 from sysid.data_checks.check import check_data
-from sysid.data_checks.settings import DataSettings
-from sysid.data_checks.spikes import spike_findings
-from sysid.data_checks.subject import Subject
 from sysid.effect_selection.candidates import candidates, extended
 from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.fitter import Fitter
@@ -38,7 +33,6 @@ from tests.sysid.models.response.servo import (
     QUANTUM,
     STIFFNESS,
     goals,
-    write_pendulum,
     write_response,
 )
 
@@ -81,15 +75,6 @@ def test_a_whole_episode_is_one_segment_if_asked(log):
     assert np.abs(error).max() < 0.01
 
 
-def test_no_bit_depends_on_what_is_simulated_beside(log):
-    model = JointResponseModel([log])
-    thetas = true_parameters() * np.array([[1.0], [0.9], [1.2]])
-    for rows in model.chunks():
-        beside = model.simulate_all(thetas, rows)
-        for theta, own in zip(thetas, beside, strict=True):
-            np.testing.assert_allclose(own, model.simulate(theta, rows), atol=1e-9)
-
-
 def test_selected_rows_are_predicted_as_among_all(log):
     model = JointResponseModel([log])
     mask = np.random.default_rng(0).random(model.measurements.rows) < 0.3
@@ -110,44 +95,11 @@ def test_covariates_are_the_joints_own_motion(log):
     np.testing.assert_allclose(found["distance to the goal"] + position, goal)
 
 
-def test_a_few_dozen_segments_are_not_thinned(log):
-    model = JointResponseModel([log], segment=0.5)
-    assert model.thin(1000).measurements.rows == model.measurements.rows
-    fitter = Fitter.of(model, Workers(), np.inf, DEFAULT_SETTINGS)
-    assert fitter.affordable is fitter
-
-
 def test_what_is_in_a_torque_sensor_alone_is_no_candidate(log):
     model = JointResponseModel([log])
     kinds = {type(e) for e in model.applicable_effects(registered_effects())}
     assert JointCoulombFriction in kinds
     assert TorqueGain not in kinds
-
-
-def test_uneven_times_are_no_finding_but_gaps_are(tmp_path):
-    write_pendulum(tmp_path / "pendulum.urdf")
-    header = LogHeader(
-        "joint_response",
-        "swing",
-        {},
-        joints=("servo",),
-        urdf=str(tmp_path / "pendulum.urdf"),
-    )
-    rng = np.random.default_rng(0)
-    time = np.cumsum(rng.choice([0.0035, 0.0055], 800))
-    gap = time + np.where(np.arange(800) > 400, 0.3, 0.0)
-    found = []
-    for name, t in (("even", time), ("gap", gap)):
-        goal = goals(t, 0)
-        q = 0.8 * goals(t - 0.03, 0)
-        with LogWriter(tmp_path / name, header) as writer:
-            table = {"time": t, "q_commanded": goal, "q": q}
-            writer.write_episode(flat_columns("joint_response", table))
-        log = read_log(tmp_path / name)
-        findings = check_data([log], JointResponseModel([log]))
-        found.append([f for f in findings if f.kind == "time"])
-    assert not found[0]
-    assert found[1]
 
 
 def rewritten(log, folder, header=None, **columns):
@@ -157,6 +109,16 @@ def rewritten(log, folder, header=None, **columns):
     with LogWriter(folder, header or log.header) as writer:
         writer.write_episode(flat_columns("joint_response", table))
     return read_log(folder)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.3])
+def test_uneven_times_are_no_finding_but_gaps_are(log, tmp_path, gap):
+    steps = np.random.default_rng(0).choice([0.0035, 0.0055], 800)
+    time = np.cumsum(steps) + np.where(np.arange(800) > 400, gap, 0.0)
+    table = {"q_commanded": goals(time, 0), "q": 0.8 * goals(time - 0.03, 0)}
+    uneven = rewritten(log, tmp_path / "uneven", time=time, **table)
+    kinds = [f.kind for f in check_data([uneven], JointResponseModel([uneven]))]
+    assert ("time" in kinds) == (gap > 0.0)
 
 
 def test_degrees_and_a_wrong_sign_are_found(log, tmp_path):
@@ -217,19 +179,6 @@ def test_the_loop_names_what_is_hidden_in_a_servo(tmp_path, hidden):
     log = write_response(tmp_path / "log", hidden)
     closed = close_loop(JointResponseModel([log]))
     assert closed.verdict.names[0].startswith(type(hidden).__name__)
-
-
-def test_where_a_segment_begins_anew_is_no_spike(log):
-    """The arm of another mass drifts away over a segment, and back at its end."""
-    model = JointResponseModel([log])
-    drift = np.zeros_like(model.measurements.values)
-    begins = np.flatnonzero(np.diff(model.piece, prepend=-1))
-    for begin, end in itertools.pairwise([*begins, len(drift)]):
-        drift[begin:end, 0] = 0.05 * np.linspace(0.0, 1.0, end - begin) ** 2
-    noise = model.measurements.noise
-    subject = Subject([log], model, DataSettings())
-    expected = SimpleNamespace(scale=noise, all_residuals=lambda: drift / noise)
-    assert not spike_findings(subject, expected)
 
 
 def test_friction_per_squared_load_is_at_most_what_locks_the_gear(log):

@@ -153,19 +153,6 @@ def test_damping_acts_on_the_error_of_the_velocity_if_the_drive_allows_for_it():
     assert late.rate[0, 0] == pytest.approx(1.5 * np.cos(2.7), abs=1e-3)
 
 
-def test_lanes_do_not_see_each_other(arm):
-    sets = [
-        parameters(JointLoadFriction(JOINTS[0], c, 0.02), RotorInertia(JOINTS[1], c))
-        for c in (0.0, 0.1, 0.4)
-    ]
-    segments = [segment(), segment(at=(0.6, -0.4))]
-    together = run(arm, sets, segments, 60)
-    for i, own in enumerate(sets):
-        for j, each in enumerate(segments):
-            alone = run(arm, [own], [each], 60)
-            np.testing.assert_allclose(together.q[:, i, j], alone.q[:, 0, 0], atol=1e-9)
-
-
 def test_a_lane_that_fails_is_nan_and_the_others_go_on(arm):
     sets = [parameters(), parameters(k=np.array([np.inf, 1.0]))]
     with np.errstate(invalid="ignore"):
@@ -215,13 +202,19 @@ def test_near_the_measured_motion_simulations_are_as_by_drake(arm):
     np.testing.assert_allclose(found.q[:, 1:3], wanted.q[:, 1:3], atol=1e-9)
 
 
-def test_lanes_that_take_many_iterations_are_as_alone(arm):
-    """Others are done long before; they go on without them."""
-    dry = [JointCoulombFriction(j, 50.0, 1e-4) for j in JOINTS]
-    none = [JointCoulombFriction(j, 0.0, 1e-4) for j in JOINTS]
-    sets = [parameters(*none), parameters(*dry), parameters(*none)]
+def test_lanes_do_not_see_each_other(arm):
+    """Dry friction takes many iterations; others are done long before."""
+    sets = [
+        parameters(
+            JointCoulombFriction(JOINTS[0], dry, 1e-4),
+            JointLoadFriction(JOINTS[0], c, 0.02),
+            RotorInertia(JOINTS[1], c),
+        )
+        for dry, c in ((0.0, 0.0), (50.0, 0.1), (0.0, 0.4))
+    ]
     segments = [segment(at=(0.1, 0.3)), segment(at=(-0.4, 0.2))]
-    beside = run(arm, sets, segments, 100)
-    for number, own in enumerate(sets):
-        alone = run(arm, [own], segments, 100)
-        np.testing.assert_allclose(beside.q[:, number], alone.q[:, 0], atol=1e-9)
+    together = run(arm, sets, segments, 60)
+    for i, own in enumerate(sets):
+        for j, each in enumerate(segments):
+            alone = run(arm, [own], [each], 60)
+            np.testing.assert_allclose(together.q[:, i, j], alone.q[:, 0, 0], atol=1e-9)
