@@ -100,6 +100,8 @@ def analysis_of_variance(runs: Runs) -> list[Source]:
             "pip install 'drake_disasm[studies]'"
         ) from None
     names = [name for name, own in runs.levels.items() if len(np.unique(own)) > 1]
+    if not names:
+        return []
     frame = pandas.DataFrame({n: runs.levels[n] for n in names} | {"y": runs.response})
     fitted = ols("y ~ (" + " + ".join(f"C({n})" for n in names) + ") ** 2", frame).fit()
     if fitted.df_resid < 1:

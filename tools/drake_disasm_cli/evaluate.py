@@ -64,7 +64,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         nargs="+",
         required=True,
         metavar="NAME",
-        help="scripted or shipped names, .npz files, or module:callable",
+        help="scripted or shipped names, .npz files, FILE.py:Class or module:name",
     )
     common.add_station_argument(add, "cell", "what the policies act on")
     add(

@@ -58,9 +58,9 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
         "--policy",
         default="removal_randomised",
         metavar="NAME",
-        help="a scripted one (straight, admittance), a trained one (a name in "
-        "models/policies, or an .npz file), or module:callable from (12,) to (6,) "
-        "(default: removal_randomised, the shipped one)",
+        help="a scripted one (straight, admittance), a trained one (a shipped name, or "
+        "an .npz file), or one of your own: FILE.py:Class or module:name, a callable "
+        "from (12,) to (6,) or a LeafSystem (default: removal_randomised, shipped)",
     )
     common.add_station_argument(
         add,
