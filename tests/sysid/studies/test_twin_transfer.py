@@ -12,6 +12,7 @@ import pytest
 from drake_disasm.common.files import write_text
 from drake_disasm.common.progress import ignore_progress
 from drake_disasm.effects import GroovePose, SensorBias
+from drake_disasm.learning import learning_curve
 from drake_disasm.learning.evaluation import Evaluation
 from drake_disasm.learning.experiment import seed_folder
 from drake_disasm.logs import read_log
@@ -150,6 +151,7 @@ def test_agents_arrive_and_learn_and_the_report_says_so(
 ) -> None:
     """All of it, on a twin in the robot's place."""
     monkeypatch.setattr(twin_transfer, "_STATION", "twin")
+    monkeypatch.setattr(learning_curve, "plot_learning_curves", lambda *_: None)
     make_robot(tmp_path, "tilted")
     small = StudyOptions(
         seeds=(0, 1),
