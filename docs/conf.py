@@ -38,6 +38,8 @@ nb_merge_streams = True
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 
+smartquotes = False  # --log stays what is typed
+
 lexers["csv"] = TextLexer()
 
 # API reference, from docstrings in Google's style. `name` in a docstring links to

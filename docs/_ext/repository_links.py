@@ -74,9 +74,11 @@ def _source_read(app: "Sphinx", page: str, source: list[str]) -> None:
         source[0] = rewrite(source[0], folder, page)
 
 
-def _include_read(app: "Sphinx", path: Path, parent: str, source: list[str]) -> None:
-    folder = (Path(app.srcdir) / path).resolve().parent.relative_to(ROOT).as_posix()
-    source[0] = rewrite(source[0], folder, parent)
+def _include_read(app: "Sphinx", path: Path, _: str, source: list[str]) -> None:
+    file = (Path(app.srcdir) / path).resolve().relative_to(ROOT).as_posix()
+    # The page that MyST names lacks its folder.
+    page = INCLUDED.get(file, "index.md")
+    source[0] = rewrite(source[0], posixpath.dirname(file), page)
 
 
 def setup(app: "Sphinx") -> dict[str, bool]:
