@@ -39,8 +39,14 @@ def test_damage_is_refused_or_harmless(name: str) -> None:
         assert any(fuzz.verdict(subject, subject.make(r)) == "accepted" for r in more)
 
 
-def test_all_subjects_are_in_the_table() -> None:
+def test_the_program_and_its_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert {*fuzz.READERS, *fuzz.CODECS} == set(SUBJECTS)
+    assert fuzz.main(["--only", "hex_sample", "--datagrams", "50"]) == 0
+    shown = capsys.readouterr().out
+    assert re.search(r"\| hex_sample \| 50 \| \d+ \| \d+ \| 0 \|", shown)
+    assert fuzz.main(["--only", "hex_sample", "--case", "3"]) == 0
+    assert "hex_sample: " in capsys.readouterr().out
+    assert "--only hex: no such reader" in refusal(fuzz.main, ["--only", "hex"])
 
 
 def _raise(error: BaseException) -> Callable[[object], object]:
@@ -81,12 +87,3 @@ def test_a_case_that_hangs_or_dies_is_named_and_the_rest_is_read(worker, why) ->
     row = fuzz.fuzz("x", 0, 4, worker=worker, patience=0.2)
     assert row.failures == [(1, why)]
     assert (row.tried, row.refused + row.accepted) == (4, 3)
-
-
-def test_the_program(capsys: pytest.CaptureFixture[str]) -> None:
-    assert fuzz.main(["--only", "hex_sample", "--datagrams", "50"]) == 0
-    shown = capsys.readouterr().out
-    assert re.search(r"\| hex_sample \| 50 \| \d+ \| \d+ \| 0 \|", shown)
-    assert fuzz.main(["--only", "hex_sample", "--case", "3"]) == 0
-    assert "hex_sample: " in capsys.readouterr().out
-    assert "--only hex: no such reader" in refusal(fuzz.main, ["--only", "hex"])

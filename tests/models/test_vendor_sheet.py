@@ -68,7 +68,7 @@ def joint_origins(iiwa: MultibodyPlant, q: np.ndarray) -> dict[int, np.ndarray]:
     return {i: origin(iiwa, frame, q) for i, frame in enumerate(frames)}
 
 
-def test_iiwa_joint_limits(iiwa: MultibodyPlant) -> None:
+def test_iiwa_joints_and_actuators(iiwa: MultibodyPlant) -> None:
     position, velocity = np.deg2rad(POSITION_DEG), np.deg2rad(VELOCITY_DEG)
     np.testing.assert_allclose(iiwa.GetPositionUpperLimits(), position, rtol=1e-10)
     np.testing.assert_allclose(iiwa.GetPositionLowerLimits(), -position, rtol=1e-10)
@@ -76,9 +76,6 @@ def test_iiwa_joint_limits(iiwa: MultibodyPlant) -> None:
     np.testing.assert_allclose(iiwa.GetAccelerationUpperLimits(), ACCELERATION)
     for i in JOINTS:
         assert iiwa.GetJointByName(f"iiwa_joint_{i + 1}").default_damping() == 0.5
-
-
-def test_iiwa_actuators_in_the_order_of_the_joints(iiwa: MultibodyPlant) -> None:
     np.testing.assert_array_equal(iiwa.MakeActuationMatrix(), np.eye(7))
     for i in JOINTS:
         actuator = iiwa.GetJointActuatorByName(f"iiwa_joint_{i + 1}")
@@ -117,13 +114,10 @@ def test_hex_mass_and_height() -> None:
     assert hex_e.HasFrameNamed("sensor")
 
 
-def test_gripper_mass_and_centre_of_mass(gripper: MultibodyPlant) -> None:
+def test_gripper_mass_stroke_and_pads(gripper: MultibodyPlant) -> None:
     assert total_mass(gripper) == pytest.approx(1.025)
     p_WGcm = gripper.CalcCenterOfMassPositionInWorld(gripper.CreateDefaultContext())
     np.testing.assert_allclose(p_WGcm, [0, 0, 0.07], atol=5e-4)
-
-
-def test_gripper_stroke_and_limits(gripper: MultibodyPlant) -> None:
     left = gripper.GetFrameByName("left_finger")
     right = gripper.GetFrameByName("right_finger")
     upper = gripper.GetPositionUpperLimits()
@@ -134,9 +128,6 @@ def test_gripper_stroke_and_limits(gripper: MultibodyPlant) -> None:
     for side in ("left", "right"):
         actuator = gripper.GetJointActuatorByName(f"{side}_finger_actuator")
         assert actuator.effort_limit() == 125
-
-
-def test_gripper_pads_meet_at_the_tcp(gripper: MultibodyPlant) -> None:
     tcp = origin(gripper, gripper.GetFrameByName("tcp"), np.zeros(2))
     for side in ("left", "right"):
         frame = gripper.GetFrameByName(f"{side}_finger")

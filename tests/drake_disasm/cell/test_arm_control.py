@@ -21,10 +21,12 @@ def _coupled_inertia() -> np.ndarray:
     return np.asarray(A @ A.T + np.diag([5.0, 5.0, 5.0, 0.5, 0.5, 0.5]))
 
 
-def test_position_control_damps_about_one_inertia() -> None:
+def test_joint_gains_of_position_and_cartesian_control() -> None:
     k, d = joint_gains(ArmConfig(stiffness=[8e3] * 7, damping_ratio=0.5), INERTIA)
     np.testing.assert_allclose(k, 8e3)
     np.testing.assert_allclose(d, np.sqrt(8e3 * 4.0))
+    for gain in joint_gains(ArmConfig(control="cartesian_impedance"), INERTIA):
+        np.testing.assert_array_equal(gain, np.zeros(7))
 
 
 def test_joint_impedance_damps_each_joint_about_its_own_inertia() -> None:
@@ -35,11 +37,6 @@ def test_joint_impedance_damps_each_joint_about_its_own_inertia() -> None:
     np.testing.assert_allclose(k, arm.joint_impedance.stiffness)
     poles = (-d + np.emath.sqrt(d**2 - 4.0 * INERTIA * k)) / (2.0 * INERTIA)
     np.testing.assert_allclose(-poles.real / np.abs(poles), 0.3)
-
-
-def test_cartesian_impedance_leaves_the_joints_without_springs() -> None:
-    for gain in joint_gains(ArmConfig(control="cartesian_impedance"), INERTIA):
-        np.testing.assert_array_equal(gain, np.zeros(7))
 
 
 def test_cartesian_damping_of_a_diagonal_inertia_is_that_of_each_axis() -> None:

@@ -69,17 +69,14 @@ def test_heights_add_up(lock: LockConfig) -> None:
     assert lifted == pytest.approx(dimensions.lip_height(lock) + 0.002)
 
 
-def test_bolt_weighs_what_the_scenario_says() -> None:
+def test_bolt_weight_and_facets() -> None:
+    """Facets by Drake's count: the circumference over the hint, rounded up."""
     lock = LockConfig(bolt_mass=0.3)
     M_B = dimensions.bolt_inertia(lock)
     assert M_B.get_mass() == 0.3
     middle = lock.lip_thickness / 2 + lock.grip_standoff + lock.grip_size[1] / 2
     np.testing.assert_allclose(M_B.get_com(), [0, middle, 0])
     assert M_B.IsPhysicallyValid()
-
-
-def test_facets_are_a_multiple_of_four() -> None:
-    """By Drake's count: the circumference over the hint, rounded up."""
     for diameter in (0.002, 0.005, 0.0073, 0.02):
         for resolution in (1e-4, 0.8e-3, 1.6e-3, 5e-3):
             edge = dimensions.facet_length(diameter, resolution)

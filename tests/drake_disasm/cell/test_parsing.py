@@ -15,10 +15,15 @@ HEX_E = "package://disasm_models/hex_e/hex_e.urdf"
 GRIPPER = "package://disasm_models/gripper_2f140/gripper_2f140.urdf"
 
 
-def test_url_and_plain_path_name_the_same_file() -> None:
+def test_shipped_models_are_found_and_read() -> None:
     path = models_dir() / "hex_e" / "hex_e.urdf"
     assert model_path(HEX_E) == model_path(str(path)) == path
     assert package_map().GetPackageNames() == ["disasm_models"]
+    plant = MultibodyPlant(0.0)
+    instance, flange = add_arm(plant, "package://disasm_models/iiwa14/iiwa14.urdf")
+    plant.Finalize()
+    assert plant.num_positions(instance) == 7
+    assert flange.name() == "iiwa_link_ee"
 
 
 @pytest.mark.parametrize(
@@ -27,14 +32,6 @@ def test_url_and_plain_path_name_the_same_file() -> None:
 def test_missing_file_is_named(url: str) -> None:
     message = refusal(model_path, url)
     assert url in message and "is missing" in message and "`model` key" in message
-
-
-def test_arm_has_seven_joints_and_a_flange() -> None:
-    plant = MultibodyPlant(0.0)
-    instance, flange = add_arm(plant, "package://disasm_models/iiwa14/iiwa14.urdf")
-    plant.Finalize()
-    assert plant.num_positions(instance) == 7
-    assert flange.name() == "iiwa_link_ee"
 
 
 @pytest.mark.parametrize(

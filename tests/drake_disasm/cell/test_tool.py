@@ -19,15 +19,11 @@ def tool(quiet_scenario: Scenario) -> Tool:
     return Tool.from_models(quiet_scenario)
 
 
-def test_mass_is_that_of_the_parts(tool: Tool) -> None:
-    """Sensor and gripper by their sheets, bolt by the scenario."""
+def test_mass_and_first_moment_are_those_of_the_parts(tool: Tool) -> None:
+    """Sensor at 25 mm, gripper at 50 + 70 mm, by their sheets; bolt by the scenario."""
     assert tool.mass == pytest.approx(0.347 + 1.025 + 0.2)
     assert tool.M_F.get_mass() == tool.mass
     assert tool.M_F.IsPhysicallyValid()
-
-
-def test_first_moment_is_the_sum_of_the_parts(tool: Tool) -> None:
-    """About So: sensor at 25 mm, gripper at 50 + 70 mm, bolt in the pads."""
     grip = tool.X_SB @ np.array([0, 0.00125 + 0.003 + 0.015, 0])
     moment = 0.347 * 0.025 + 1.025 * (0.050 + 0.070) + 0.2 * grip[2]
     np.testing.assert_allclose(

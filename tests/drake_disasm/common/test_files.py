@@ -28,7 +28,7 @@ def test_ctrl_c_waits_for_a_file_that_is_being_written(tmp_path):
         os.kill(os.getpid(), signal.SIGINT)
 
 
-def test_nothing_is_left_of_what_failed(tmp_path):
+def test_what_can_t_be_written_leaves_nothing(tmp_path) -> None:
     def fail(stream):
         stream.write(b"half")
         raise ValueError
@@ -36,6 +36,7 @@ def test_nothing_is_left_of_what_failed(tmp_path):
     with pytest.raises(ValueError):
         files.write_atomically(tmp_path / "data.npz", fail)
     assert not list(tmp_path.iterdir())
+    assert "; check" in refusal(files.write_text, tmp_path / "no" / "text", "")
 
 
 def test_text_json_and_figures_come_back(tmp_path):
@@ -46,10 +47,6 @@ def test_text_json_and_figures_come_back(tmp_path):
     assert json.loads((tmp_path / "json").read_text()) == {"a": [1, 0.1]}
     assert (tmp_path / "png").read_bytes().startswith(b"\x89PNG")
     assert len(list(tmp_path.iterdir())) == 3
-
-
-def test_a_folder_that_does_not_exist_is_named_with_a_remedy(tmp_path):
-    assert "; check" in refusal(files.write_text, tmp_path / "no" / "text", "")
 
 
 def test_pipes_devices_folders_and_large_files_are_refused(tmp_path):

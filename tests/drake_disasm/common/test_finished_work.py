@@ -17,6 +17,9 @@ def test_results_come_back_bit_for_bit(tmp_path: Path) -> None:
     again = FinishedWork(tmp_path, IDENTITY)
     assert again.get(["stage", [value, -0.0]]) == {"f": value / 3}
     assert again.get(["stage", [value, 0.0]]) is None
+    work = FinishedWork()
+    work.keep("a", 1)
+    assert work.get("a") == 1 and work.get("b") is None
 
 
 def test_arrays_are_found_once(tmp_path: Path) -> None:
@@ -27,12 +30,6 @@ def test_arrays_are_found_once(tmp_path: Path) -> None:
     assert float(again["huber"]) == 3.0
     other = {"u": np.zeros(1)}
     assert FinishedWork(tmp_path).arrays("another", lambda: other) is other
-
-
-def test_without_a_folder_results_are_kept_in_memory() -> None:
-    work = FinishedWork()
-    work.keep("a", 1)
-    assert work.get("a") == 1 and work.get("b") is None
 
 
 def test_half_a_line_of_a_killed_run_is_dropped(tmp_path: Path) -> None:
@@ -51,11 +48,9 @@ def test_other_work_is_not_taken_up(tmp_path: Path) -> None:
     other = {"seed": 0, "config": {"rate": 0.2, "layers": (2, 3)}}
     message = refusal(FinishedWork, tmp_path, other)
     assert "another config.rate (0.1, not 0.2)" in message
-
-
-def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text("mine")
-    message = refusal(FinishedWork, tmp_path, IDENTITY, what="a study")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other/notes.txt").write_text("mine")
+    message = refusal(FinishedWork, tmp_path / "other", IDENTITY, what="a study")
     assert "not empty and does not hold a study" in message
 
 

@@ -23,12 +23,9 @@ class _Outer:
     many: list[_Inner] = dataclasses.field(default_factory=list)
 
 
-def test_defaults_pass_and_bounds_are_inclusive() -> None:
+def test_defaults_pass_and_are_not_shared() -> None:
     check(_Outer())
     check(_Outer(values=[-3.0, 3.0], inner=_Inner(0.5), many=[_Inner(2.0)]))
-
-
-def test_list_defaults_are_not_shared() -> None:
     first, second = _Outer(), _Outer()
     first.values.append(9.0)
     assert second.values == [1.0, 2.0]

@@ -33,10 +33,15 @@ def test_exponential_and_logarithm_are_drakes(like):
         np.testing.assert_allclose(again, rotation_vector(expected), atol=1e-9)
 
 
-def test_no_rotation_is_the_identity_bit_for_bit():
+def test_one_pose_of_numpy_is_drakes_own() -> None:
     assert np.array_equal(
         rotations.rotation_matrices(np.zeros((2, 3))), [np.eye(3)] * 2
     )
+    X = rotations.pose_from_vectors(
+        np.array([0.1, 0.2, 0.3]), np.array([1.0, 2.0, 3.0])
+    )
+    assert isinstance(X, RigidTransform)
+    assert rotations.Pose.of(X).to_drake().IsNearlyEqualTo(X, 1e-15)
 
 
 @both
@@ -61,11 +66,3 @@ def test_poses_compose_as_drakes(like):
     np.testing.assert_allclose(to_numpy(found.R), both_[:, :3], atol=1e-12)
     np.testing.assert_allclose(to_numpy(found.p), both_[:, 3], atol=1e-12)
     np.testing.assert_allclose(to_numpy(first @ second.p), one @ p[1], atol=1e-12)
-
-
-def test_one_pose_of_numpy_is_drakes_own():
-    X = rotations.pose_from_vectors(
-        np.array([0.1, 0.2, 0.3]), np.array([1.0, 2.0, 3.0])
-    )
-    assert isinstance(X, RigidTransform)
-    assert rotations.Pose.of(X).to_drake().IsNearlyEqualTo(X, 1e-15)

@@ -38,13 +38,10 @@ def test_zero_is_the_identity_exactly() -> None:
     np.testing.assert_array_equal(rotation_vector(RotationMatrix()), np.zeros(3))
 
 
-def test_drakes_order_is_turned_round() -> None:
+def test_wrench_order_and_shift_by_a_lever() -> None:
+    """10 N up at the end of a lever of 0.2 m along x, seen from its foot."""
     F = SpatialForce(tau=[1, 2, 3], f=[4, 5, 6])
     np.testing.assert_array_equal(wrench_from_spatial_force(F), [4, 5, 6, 1, 2, 3])
-
-
-def test_shift_by_a_lever() -> None:
-    """10 N up at the end of a lever of 0.2 m along x, seen from its foot."""
     R_AS = RotationMatrix.MakeXRotation(np.pi / 2)  # y_S is z_A
     wrench = shift_and_express(
         np.array([0, 10.0, 0, 0, 0.5, 0]), RigidTransform(R_AS, [0.2, 0, 0])

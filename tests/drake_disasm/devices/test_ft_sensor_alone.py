@@ -47,24 +47,15 @@ def _reading(sensor: ForceTorqueSensor, context: Context) -> np.ndarray:
     return sensor.GetOutputPort("wrench").Eval(context)
 
 
-def test_reads_minus_the_reaction_forces_first_and_noise() -> None:
+def test_reading_is_minus_the_reaction_with_noise_in_whole_counts() -> None:
     np.testing.assert_array_equal(_reading(*_sensor()), LOAD)
     expected = LOAD + 0.1 * np.array([1, 2, 3, -1, -2, -3])
     np.testing.assert_allclose(_reading(*_sensor(noise=0.1)), expected)
-
-
-def test_zeroing_averages_noise_and_counts_away() -> None:
     sensor, context = _sensor(noise=0.1, quantum=0.5)
     np.testing.assert_array_equal(sensor.reading_at_zeroing(context), LOAD)
-
-
-def test_reading_is_the_nearest_whole_count() -> None:
     reading = _reading(*_sensor(quantum=0.07))
     assert np.abs(reading - LOAD).max() <= 0.07 / 2 + 1e-12
     np.testing.assert_allclose(reading / 0.07, np.round(reading / 0.07), atol=1e-12)
-
-
-def test_quantise_leaves_channels_without_a_quantum() -> None:
     values = np.array([0.123, 0.123, -0.5])
     quantum = np.array([0.0, 0.1, 0.2])
     np.testing.assert_allclose(quantise(values, quantum), [0.123, 0.1, -0.4])
@@ -77,29 +68,12 @@ def test_health() -> None:
         assert sensor.GetOutputPort("health").Eval(context)[0] == health
 
 
-def test_effects_see_the_sensors_own_orientation() -> None:
+def test_effects_see_the_orientation_and_zeroing_the_payload() -> None:
     sensor, context = _sensor()
     sensor.set_effects(context, [PayloadError(mass=0.5, cz=0.05)])
     g_S = (R_W_BODY @ R_BODY_S).matrix().T @ G_W
     expected = LOAD + np.concatenate([0.5 * g_S, np.cross([0, 0, 0.05], g_S)])
     np.testing.assert_allclose(_reading(sensor, context), expected, atol=1e-14)
-
-
-class _Doubling(SensorEffect):
-    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
-        return 2.0 * wrench_S
-
-
-def test_effects_act_in_their_order() -> None:
-    sensor, context = _sensor()
-    bias = SensorBias(fx=1.0)
-    sensor.set_effects(context, [bias, _Doubling()])
-    assert _reading(sensor, context)[0] == 2.0 * (LOAD[0] + 1.0)
-    sensor.set_effects(context, [_Doubling(), bias])
-    assert _reading(sensor, context)[0] == 2.0 * LOAD[0] + 1.0
-
-
-def test_zeroing_sees_only_what_is_present_then() -> None:
     sensor, context = _sensor()
     sensor.set_effects(context, [SensorBias(fx=1.0), PayloadError(mass=0.5)])
     g_S = (R_W_BODY @ R_BODY_S).matrix().T @ G_W
@@ -107,8 +81,19 @@ def test_zeroing_sees_only_what_is_present_then() -> None:
     np.testing.assert_allclose(sensor.reading_at_zeroing(context), expected, atol=1e-14)
 
 
-def test_effects_belong_to_the_context() -> None:
+class _Doubling(SensorEffect):
+    def apply(self, wrench_S: np.ndarray, sensing: Sensing) -> np.ndarray:
+        return 2.0 * wrench_S
+
+
+def test_effects_act_in_their_order_and_belong_to_the_context() -> None:
     """Two Contexts of one sensor, as two episodes side by side have."""
+    sensor, context = _sensor()
+    bias = SensorBias(fx=1.0)
+    sensor.set_effects(context, [bias, _Doubling()])
+    assert _reading(sensor, context)[0] == 2.0 * (LOAD[0] + 1.0)
+    sensor.set_effects(context, [_Doubling(), bias])
+    assert _reading(sensor, context)[0] == 2.0 * LOAD[0] + 1.0
     sensor, biased = _sensor()
     clean = biased.Clone()
     sensor.set_effects(biased, [SensorBias(fx=1.0)])

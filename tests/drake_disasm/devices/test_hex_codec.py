@@ -43,9 +43,6 @@ def test_samples_both_ways() -> None:
     for text, sample in SAMPLES:
         assert codec.encode_sample(sample) == bytes.fromhex(text)
         assert codec.decode_sample(bytes.fromhex(text)) == sample
-
-
-def test_forces_are_rounded_to_the_nearest_count() -> None:
     datagram = codec.encode_sample(codec.Sample(0, 0, 0, (0.00019, *STILL[1:])))
     assert codec.decode_sample(datagram).wrench[0] == 0.0002
 
@@ -87,14 +84,11 @@ def test_what_does_not_fit_is_refused(sample: codec.Sample | codec.Request) -> N
         encode(sample)
 
 
-def test_settings() -> None:
+def test_settings_and_those_that_the_box_lacks() -> None:
     assert [codec.filter_request(hz).data for hz in codec.FILTERS] == list(range(7))
     assert codec.filter_request(15) == codec.Request(codec.Command.FILTER, 4)
     assert codec.period_request(0.002) == codec.Request(codec.Command.PERIOD, 2)
     assert codec.period_request(0.2) == codec.Request(codec.Command.PERIOD, 200)
-
-
-def test_settings_that_the_box_lacks_are_refused() -> None:
     assert "choose one of 0, 500, 150, 50, 15, 5, 1.5" in refusal(
         codec.filter_request, 30
     )

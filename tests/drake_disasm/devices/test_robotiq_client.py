@@ -6,7 +6,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import psutil
@@ -16,7 +15,6 @@ from drake_disasm.devices.codec_error import CodecError
 from drake_disasm.devices.robotiq import Activation, RobotiqClient, RobotiqSettings
 from drake_disasm.fakes.robotiq_gripper import FakeRobotiqGripper
 from drake_disasm.ports import Health
-from tests.fakes.serial_line import serial_line
 from tests.progress import wait_until
 from tests.refusals import refusal
 
@@ -70,14 +68,23 @@ def _wait_for_attempts(
     wait_until(lambda: len(attempts) > number)
 
 
-def test_reads_without_writing(fake: FakeRobotiqGripper) -> None:
-    with _client(fake) as client:
+def test_writes_nothing_until_commanded_and_then_once(fake: FakeRobotiqGripper) -> None:
+    client = _client(fake)
+    client.command(0.0)
+    client.command(None)
+    with client:
         _wait_for_polls(fake)
         reading = client.read()
-    np.testing.assert_allclose(reading.values, [0.140, 0.0])
-    assert reading.error == ""
-    assert reading.health(reading.time, 0.1) is Health.READY
-    assert fake.writes == []
+        np.testing.assert_allclose(reading.values, [0.140, 0.0])
+        assert reading.error == ""
+        assert reading.health(reading.time, 0.1) is Health.READY
+        assert fake.writes == []
+        client.command(1.0)
+        wait_until(lambda: fake.writes)
+        _wait_for_polls(fake)
+    assert fake.writes == [OPEN]
+    with pytest.raises(CodecError, match="NaN"):
+        client.command(np.nan)
 
 
 def test_dry_run_leaves_the_inactive_alone() -> None:
@@ -87,25 +94,6 @@ def test_dry_run_leaves_the_inactive_alone() -> None:
         assert "not activated" in client.read().error
     assert inactive.writes == []
     assert client.read().health(0.0, 0.1) is Health.ERROR
-
-
-def test_command_arrives_once_as_the_golden_frame(fake: FakeRobotiqGripper) -> None:
-    with _client(fake) as client:
-        client.command(1.0)
-        wait_until(lambda: fake.writes)
-        _wait_for_polls(fake)
-    assert fake.writes == [OPEN]
-
-
-def test_none_commands_nothing_and_nan_is_refused(fake: FakeRobotiqGripper) -> None:
-    client = _client(fake)
-    client.command(0.0)
-    client.command(None)
-    with client:
-        _wait_for_polls(fake)
-    assert fake.writes == []
-    with pytest.raises(CodecError, match="NaN"):
-        client.command(np.nan)
 
 
 def test_follows_to_the_opening_with_a_rate(
@@ -249,8 +237,11 @@ def test_wrong_settings_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         assert words in refusal(RobotiqClient, dataclasses.replace(SETTINGS, **change))
 
 
-def test_a_serial_line_carries_the_same_frames(fake: FakeRobotiqGripper) -> None:
-    with serial_line(fake.port) as (path, unplug), RobotiqClient(_at(path)) as client:
+def test_a_serial_line_carries_the_same_frames_until_it_is_unplugged() -> None:
+    with FakeRobotiqGripper() as fake:
+        line = {"transport": "serial", "address": f"socket://127.0.0.1:{fake.port}"}
+        client = RobotiqClient(dataclasses.replace(SETTINGS, period=0.005, **line))
+        client.start()
         _wait_for_sample(client)
         np.testing.assert_allclose(client.read().values, [0.140, 0.0])
         client.command(1.0)
@@ -258,23 +249,5 @@ def test_a_serial_line_carries_the_same_frames(fake: FakeRobotiqGripper) -> None
         _wait_for_polls(fake)
         assert fake.writes == [OPEN]
         assert client.read().counters.invalid == 0
-        unplug()
-        wait_until(lambda: client.read().counters.invalid)
-
-
-def test_a_serial_device_that_is_not_there_is_waited_for(
-    fake: FakeRobotiqGripper, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    adapter = tmp_path / "adapter"
-    with (
-        serial_line(fake.port) as (path, _),
-        RobotiqClient(_at(str(adapter))) as client,
-    ):
-        _wait_for_attempts(client, monkeypatch)
-        assert client.read().health(0.0, 0.1) is Health.NO_DATA
-        adapter.symlink_to(path)
-        _wait_for_sample(client)
-
-
-def _at(path: str) -> RobotiqSettings:
-    return dataclasses.replace(SETTINGS, transport="serial", address=path, period=0.005)
+    wait_until(lambda: client.read().counters.invalid)
+    client.stop()

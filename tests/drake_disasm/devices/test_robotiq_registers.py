@@ -54,7 +54,7 @@ CODECS = (
 )
 
 
-def test_golden_commands() -> None:
+def test_golden_frames() -> None:
     framer = FramerRTU(DecodePDU(False))
     for golden, command in GOLDEN_COMMANDS.items():
         request = WriteMultipleRegistersRequest(
@@ -63,9 +63,6 @@ def test_golden_commands() -> None:
             dev_id=9,
         )
         assert framer.buildFrame(request) == bytes.fromhex(golden)
-
-
-def test_golden_statuses() -> None:
     for golden, status in GOLDEN_STATUSES.items():
         _, reply = FramerRTU(DecodePDU(False)).handleFrame(bytes.fromhex(golden), 9, 0)
         assert isinstance(reply, ReadHoldingRegistersResponse)
@@ -105,12 +102,9 @@ def test_bit_by_bit(
     assert decode(registers) == value
 
 
-def test_reserved_bits_are_ignored() -> None:
+def test_reserved_bits_are_ignored_and_undefined_states_refused() -> None:
     assert reg.decode_command((0xC6FF, 0xFF00, 0)) == reg.Command()
     assert reg.decode_status((0x06FF, 0, 0)) == reg.Status()
-
-
-def test_undefined_state_is_refused() -> None:
     with pytest.raises(CodecError, match="gSTA is 2"):
         reg.decode_status((0x2000, 0, 0))
 

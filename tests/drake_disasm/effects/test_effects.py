@@ -147,17 +147,14 @@ def test_drift_grows_and_warm_up_settles() -> None:
     )
 
 
-def test_gain_and_cross_talk_are_the_two_parts_of_a_matrix() -> None:
+def test_gain_cross_talk_and_mounting_are_their_matrices() -> None:
+    """A sensor turned a quarter about z: its x axis is where y_S was."""
     wrench, still = np.arange(1.0, 7.0), _sensing((0, 0, 0))
     np.testing.assert_allclose(
         ef.SensorGain(fy=0.1, tz=-0.5).apply(wrench, still), [1, 2.2, 3, 4, 5, 3]
     )
     mixed = ef.SensorCrossTalk(fx_ty=0.2, tz_fy=-0.05).apply(wrench, still)
     np.testing.assert_allclose(mixed, [1 + 0.2 * 5, 2, 3, 4, 5, 6 - 0.05 * 2])
-
-
-def test_a_turned_sensor_reads_in_its_own_axes() -> None:
-    """Turned a quarter about z, its x axis is where y_S was."""
     wrench = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
     read = ef.SensorMounting(rz=np.pi / 2).apply(wrench, _sensing((0, 0, 0)))
     np.testing.assert_allclose(read, [2, -1, 3, 5, -4, 6], atol=1e-12)
@@ -192,12 +189,9 @@ def test_arm_effects_are_their_equations(
     np.testing.assert_allclose(effect.torque(SAMPLES), expected, atol=1e-12)
 
 
-def test_groove_friction_adds_and_stops_at_zero() -> None:
+def test_groove_friction_and_pose() -> None:
     assert ef.GrooveFriction(0.15).apply(ENVIRONMENT, ef.AT_REST).friction == 0.2 + 0.15
     assert ef.GrooveFriction(-0.5).apply(ENVIRONMENT, ef.AT_REST).friction == 0.0
-
-
-def test_groove_pose_turns_about_a_and_shifts() -> None:
     nominal = dataclasses.replace(ENVIRONMENT, X_GnG=RigidTransform())
     X_GnG = ef.GroovePose(ry=0.1, x=0.001, z=0.002).apply(nominal, ef.AT_REST).X_GnG
     np.testing.assert_allclose(X_GnG.translation(), [0.001, 0, 0.002])

@@ -85,7 +85,7 @@ def _true_ry(simulation: TaskSimulation) -> float:
     return rotation_vector(simulation.station.true_groove_pose(context).rotation())[1]
 
 
-def test_effects_changed_in_place_are_seen_by_the_next_reset() -> None:
+def test_effects_are_of_one_episode_as_they_are_at_its_reset() -> None:
     """As an optimiser does that writes its parameters into the same objects."""
     simulation = TaskSimulation(load_scenario("removal_turned"), "twin")
     simulation.reset(0)
@@ -97,9 +97,6 @@ def test_effects_changed_in_place_are_seen_by_the_next_reset() -> None:
     effect.ry = 0.02
     simulation.reset(0, [effect])
     assert _true_ry(simulation) == pytest.approx(0.02)
-
-
-def test_effects_of_one_episode_do_not_stay() -> None:
     simulation = TaskSimulation(
         load_scenario("removal"), "twin", make_policy("straight")
     )

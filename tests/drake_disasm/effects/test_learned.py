@@ -17,13 +17,10 @@ from tests.drake_disasm.effects.learned_files import (
 from tests.refusals import refusal
 
 
-def test_a_tree_is_followed_to_its_leaf_and_zero_outside_the_data() -> None:
+def test_a_tree_is_followed_and_comes_back_from_its_file(tmp_path: Path) -> None:
     inputs = np.array([[-1.0, 0.0], [0.5, 0.0], [0.5, 9.0], [0.0, 0.0]])
     found = step_above_zero(2, 0, -2.0, 2.0)(inputs)
     np.testing.assert_array_equal(found, [0.0, HEIGHT, 0.0, 0.0])
-
-
-def test_a_file_holds_the_same_functions(tmp_path: Path) -> None:
     path = step_in_fy(tmp_path)
     found = LearnedFunctions.load(path)
     assert found.inputs == ef.SensorResidualModel.inputs
@@ -77,16 +74,13 @@ def test_without_share_no_file_is_needed() -> None:
     np.testing.assert_array_equal(null.apply(wrench, at_rest), wrench)
 
 
-def test_refuses_what_is_no_such_file(tmp_path: Path) -> None:
+def test_what_is_no_such_file_or_for_something_else_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "model.npz"
     np.savez(path, inputs=np.array([print], dtype=object))  # pickled, would run code
     for content in (path.read_bytes(), b"no archive"):
         path.write_bytes(content)
         message = refusal(LearnedFunctions.load, path)
         assert "can't be read" in message and "; name the file" in message
-
-
-def test_refuses_functions_of_something_else(tmp_path: Path) -> None:
     effect = ef.ArmResidualModel(str(step_in_fy(tmp_path)), share=1.0)
     zero = np.zeros((1, 1))
     samples = ef.ArmSamples(("a",), zero, zero, zero, zero)

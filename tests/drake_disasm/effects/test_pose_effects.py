@@ -78,9 +78,6 @@ def test_weights_are_of_the_two_poses_around_it() -> None:
     path = np.arange(4.0)[:, None] ** 2
     found = reported_poses(path, np.array([0.0, 0.5, 0.5]))
     np.testing.assert_allclose(found[:, 0], [0.0, 0.0, 0.5, 2.5])
-
-
-def test_delays_that_add_up_to_too_much_are_refused() -> None:
     scenario = load_scenario("removal", [QUIET])
     scenario.effects = [PoseDelay(0.2), PoseDelay(0.2)]
     message = refusal(TaskSimulation, scenario, "twin")

@@ -152,10 +152,17 @@ def test_a_cell_of_a_notebook_may_run_again() -> None:
     assert "registered again since" in refusal(sc.validate, stale)
 
 
-def test_two_effects_of_one_name_are_refused() -> None:
+def test_names_that_clash_and_joints_that_lack_are_refused() -> None:
     message = refusal(ef.register_effect, _own("SensorBias"))
     assert "sensor.bias" in message and "rename" in message
     assert ef.find_effect("SensorBias") is ef.SensorBias
+
+    class _Rubs(ef.JointEffect):
+        def torque(self, samples: ef.JointSamples) -> np.ndarray:
+            return samples.v
+
+    own = dataclasses.make_dataclass("Own", [("c", float, _FX)], bases=(_Rubs,))
+    assert "`joint: str = joint_name()`" in refusal(ef.register_effect, own)
 
 
 _FX = ef.amplitude("N", -1.0, 1.0, "of the force")
@@ -180,15 +187,6 @@ def test_what_is_not_complete_is_refused_in_one_line(fault: str) -> None:
     message = refusal(ef.register_effect, _FAULTY[fault])
     assert message.startswith("effect Own: ") and fault in message, message
     assert ";" in message  # the remedy
-
-
-def test_a_joint_effect_needs_its_joint() -> None:
-    class _Rubs(ef.JointEffect):
-        def torque(self, samples: ef.JointSamples) -> np.ndarray:
-            return samples.v
-
-    own = dataclasses.make_dataclass("Own", [("c", float, _FX)], bases=(_Rubs,))
-    assert "`joint: str = joint_name()`" in refusal(ef.register_effect, own)
 
 
 def test_an_effect_that_is_not_registered_is_named_with_the_remedy() -> None:

@@ -16,14 +16,11 @@ def _at(*times: float, mass: float = 0.0) -> ef.Sensing:
     return ef.Sensing(np.array(times), R_WS, G_W, mass)
 
 
-def test_a_gain_drifts_from_zero_on() -> None:
+def test_a_gain_drifts_from_zero_on_and_a_step_stays() -> None:
     effect = ef.SensorGainDrift(fx=0.01, tz=-0.02)
     read = effect.apply(np.tile(WRENCH, (2, 1)), _at(0.0, 5.0))
     np.testing.assert_array_equal(read[0], WRENCH)
     np.testing.assert_allclose(read[1], WRENCH * [1.05, 1, 1, 1, 1, 0.9])
-
-
-def test_a_step_sets_in_and_stays() -> None:
     effect = ef.SensorStep(fy=-2.0, tx=0.1, onset=9.5, rise=1.0)
     read = effect.apply(np.zeros((5, 6)), _at(0.0, 9.4, 10.0, 10.6, 1e4))
     np.testing.assert_allclose(read[:, 1], [0, 0, -1, -2, -2])

@@ -95,8 +95,5 @@ def test_what_shows_the_cell_joins_the_diagram(hasty: None) -> None:
     station = cell()
     MotionPlayer(station, MOTION, add_view)
     assert shown[0][1] is station
-
-
-def test_the_twin_has_no_arm() -> None:
     twin = TwinStation(load_scenario("removal"))
     assert "no arm" in refusal(MotionPlayer, twin, MOTION)

@@ -15,11 +15,13 @@ def force(law: ImpactLaw, penetration_mm: float, rate_mm_s: float = 0.0) -> floa
     return normal_force(penetration_mm * MM, rate_mm_s * MM, np.array(law.row))[0]
 
 
-def test_without_motion_it_is_a_power_of_the_penetration():
+def test_without_motion_it_is_a_power_of_the_penetration() -> None:
     for p in (0.01, 1.0):
         assert force(LAW, p) == pytest.approx(2000.0 * p**1.5)
     assert force(LAW, 0.0, 5.0) == force(LAW, -0.1, 5.0) == 0.0
     assert force(LAW, 0.1, -1000.0) == 0.0  # it never pulls
+    config = ImpactConfig(stiffness=7.0, exponent=2.0, damping=3.0, depth=0.5)
+    assert ImpactLaw.of(config) == ImpactLaw(7.0, 2.0, 3.0, 0.5)
 
 
 def test_damping_rises_by_adams_cubic_step():
@@ -38,8 +40,3 @@ def test_slopes_are_the_derivatives(p, v):
     assert by_p * MM == pytest.approx(in_mm, rel=1e-5)
     in_mm = (force(LAW, p, v + d) - force(LAW, p, v - d)) / (2 * d)
     assert by_rate * MM == pytest.approx(in_mm, rel=1e-5)
-
-
-def test_takes_the_scenarios_section():
-    config = ImpactConfig(stiffness=7.0, exponent=2.0, damping=3.0, depth=0.5)
-    assert ImpactLaw.of(config) == ImpactLaw(7.0, 2.0, 3.0, 0.5)

@@ -196,12 +196,19 @@ def test_a_log_says_what_was_done(tmp_path: Path) -> None:
     assert log.header.joints == ("a", "b") and log.episodes[0].rows == found.rows
 
 
-def test_a_filter_longer_than_the_record_is_refused(tmp_path: Path) -> None:
+def test_a_filter_or_gaps_that_leave_no_stretch_are_refused(tmp_path: Path) -> None:
     path, fields = _table(tmp_path / "run.npz", rows=200, kt=1.0), parse_map(_FIELDS)
     message = refusal(_imported, path, fields, cutoff=0.5)
     assert "no stretch without gaps is longer" in message
     message = refusal(_imported, path, fields, cutoff=150.0)
     assert "is not below half the sampling rate" in message
+
+    def part(values: dict[str, np.ndarray]) -> None:
+        values["t"] += 1e4 * (np.arange(2000) // 3)
+
+    path = _table(tmp_path / "run.npz", change=part, kt=1.0)
+    message = refusal(_imported, path, parse_map(_FIELDS))
+    assert "no stretch of 4 rows is without gaps" in message
 
 
 def test_readings_at_rest_are_taken_as_they_are(tmp_path: Path) -> None:
@@ -220,7 +227,7 @@ def test_readings_at_rest_are_taken_as_they_are(tmp_path: Path) -> None:
     )
 
 
-def test_names_of_many_kinds_are_guessed(tmp_path: Path) -> None:
+def test_names_and_units_of_many_kinds_are_guessed(tmp_path: Path) -> None:
     time = 0.01 * np.arange(100)
     for names in (
         ("time", "q_0", "q_1"),
@@ -234,6 +241,10 @@ def test_names_of_many_kinds_are_guessed(tmp_path: Path) -> None:
         fields = guessed_map(source, "joint_motion")
         assert fields.time == names[0].lstrip("%")
         assert fields.columns == {"q": Column(names[1:])}
+    for unit, step in (("s", 0.01), ("ms", 10.0), ("us", 1e4), ("ns", 1e7)):
+        path = tmp_path / "run.npz"
+        np.savez(path, t=step * np.arange(50), q=np.arange(50.0))
+        assert guessed_map(read_source(path), "joint_motion").time_unit == unit
 
 
 def test_units_behind_names_are_taken(tmp_path: Path) -> None:
@@ -256,13 +267,6 @@ def test_what_has_no_names_that_are_known_is_not_guessed(tmp_path: Path) -> None
     source = _csv(path, ("t", "q"), time, time)
     message = refusal(guessed_map, source, "joint_response", ["a"], "arm.urdf")
     assert "commanded joint positions" in message
-
-
-def test_a_time_in_milliseconds_is_noticed(tmp_path: Path) -> None:
-    for unit, step in (("s", 0.01), ("ms", 10.0), ("us", 1e4), ("ns", 1e7)):
-        path = tmp_path / "run.npz"
-        np.savez(path, t=step * np.arange(50), q=np.arange(50.0))
-        assert guessed_map(read_source(path), "joint_motion").time_unit == unit
 
 
 def test_commanded_and_measured_positions_become_a_response(tmp_path: Path) -> None:
@@ -294,15 +298,6 @@ def test_rows_that_came_at_once_or_are_absurd_are_dropped(tmp_path: Path) -> Non
     path = _table(tmp_path / "run.npz", change=damage, kt=1.0)
     recording = _imported(path, parse_map(_FIELDS)).recordings[0]
     assert recording.dropped == 2 and np.diff(recording.time).min() > 0.004
-
-
-def test_gaps_everywhere_leave_nothing(tmp_path: Path) -> None:
-    def part(values: dict[str, np.ndarray]) -> None:
-        values["t"] += 1e4 * (np.arange(2000) // 3)
-
-    path = _table(tmp_path / "run.npz", change=part, kt=1.0)
-    message = refusal(_imported, path, parse_map(_FIELDS))
-    assert "no stretch of 4 rows is without gaps" in message
 
 
 def test_a_clock_that_is_set_during_the_record_is_a_gap(tmp_path: Path) -> None:

@@ -127,15 +127,12 @@ def test_what_can_t_be_read_is_refused(tmp_path, name, content, said) -> None:
     assert said in message and str(path) in message
 
 
-def test_damage_that_crashes_scipy_is_refused(tmp_path: Path) -> None:
+def test_what_crashes_scipy_or_is_no_recording_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.mat"
     savemat(path, {"t": np.arange(4.0), "s": {"a": np.arange(3.0)}})
     content = bytearray(path.read_bytes())
     content[177] = 192  # of the length of a variable's name: a fault in SciPy 1.17.1
     path.write_bytes(content)
     assert "can't be read: " in refusal(read_source, path)
-
-
-def test_a_folder_that_is_no_recording_is_refused(tmp_path: Path) -> None:
     assert "neither a ROS 2 bag" in refusal(read_source, tmp_path)
     assert "does not exist" in refusal(read_source, tmp_path / "none.csv")
