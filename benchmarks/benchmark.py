@@ -485,7 +485,9 @@ def main(arguments: Sequence[str]) -> int:
     return 0
 
 
-def as_rows(figures: list[Figure]) -> tuple[str, Sequence[str], list[Sequence[Cell]]]:
+def as_rows(
+    figures: list[Figure],
+) -> tuple[str, Sequence[str], Sequence[Sequence[Cell]]]:
     """Returns the figures as title, columns and rows of a result."""
     columns = ("figure", "value", "unit", "compared with", "ratio")
     rows = [

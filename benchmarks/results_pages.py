@@ -146,8 +146,8 @@ def _parsed(content: Any) -> Page:
     for picture in pictures:
         _check_keys(picture, Figure)
     figures = tuple(Figure(**picture) for picture in pictures)
-    fields = content | {"data": tuple(content["data"]), "figures": figures}
-    return Page(**{k: _one_line(v) if k in texts else v for k, v in fields.items()})
+    fields: dict[str, Any] = {key: _one_line(content[key]) for key in texts}
+    return Page(**fields, data=tuple(content["data"]), figures=figures)
 
 
 def _names(schema: type) -> list[str]:
