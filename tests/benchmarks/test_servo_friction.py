@@ -1,11 +1,10 @@
 """A real servo: its runs as logs, and a friction that shows in them."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
-from servo_friction import parse, written_logs
+from servo_friction import written_logs
 
 from drake_disasm.effects import JointLoadFriction, RotorInertia
 from drake_disasm.scenario import Scenario
@@ -13,11 +12,6 @@ from sysid.models.response.model import JointResponseModel
 from tests.sysid.real_data import DATA as SHARED
 
 DATA = SHARED / "servo_pendulum"
-
-
-def test_the_command_line_asks_for_data_and_a_folder() -> None:
-    args = parse(["data", "--out", "out", "--only", "loop"])
-    assert (args.data, args.out, args.only) == (Path("data"), Path("out"), "loop")
 
 
 @pytest.mark.skipif(not DATA.exists(), reason=f"{DATA} is not here")

@@ -2,15 +2,7 @@
 
 import numpy as np
 import pytest
-from physics import (
-    QUIET,
-    STIFF,
-    action,
-    episode,
-    play,
-    quiet,
-    sliding,
-)
+from physics import QUIET, STIFF, action, episode, play, quiet, sliding
 
 from drake_disasm.effects import GroovePose
 from drake_disasm.policies import make_policy

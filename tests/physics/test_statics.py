@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 from compliance import AWAY
-from physics import (
-    QUIET,
-    STIFF,
-    pushed,
-    stated_stiffness,
-    stiffness,
-)
+from physics import QUIET, STIFF, pushed, stated_stiffness, stiffness
 from pydrake.math import RotationMatrix
 
 from drake_disasm.cell.twin_parameters import bolt_stiffness

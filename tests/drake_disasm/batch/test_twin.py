@@ -38,10 +38,19 @@ def test_no_bit_of_an_environment_depends_on_its_company():
         assert not np.array_equal(whole[:, 0], whole[:, 3])
 
 
-def test_the_same_seed_draws_from_the_ranges_what_the_diagram_draws():
+def test_seeds_draw_what_the_diagram_draws_and_generators_seeds() -> None:
     twin = BatchedTwin(RANDOM, 3, "numpy")
     twin.reset([4, 9, 4])
     assert twin.drawn == [draw(RANDOM, seed) for seed in (4, 9, 4)]
+    twin = BatchedTwin(RANDOM, 3, "numpy")
+    twin.reset([0, 1, 2])
+    following = NextEpisodes(twin, [np.random.default_rng(i) for i in range(3)])
+    mine = [np.random.default_rng(i) for i in range(3)]
+    for rows in ([1], [1, 2], [0, 1, 2]):
+        seeds, episodes = following.take(np.array(rows))
+        assert seeds == [int(mine[row].integers(2**31)) for row in rows]
+        expected = twin.begin(np.array(rows), seeds)
+        np.testing.assert_allclose(episodes.state.q, expected.state.q, atol=1e-9)
 
 
 def test_noise_is_the_scenarios_and_of_the_seed():
@@ -67,7 +76,7 @@ def test_imprecision_is_that_of_algorithm_3_2():
     assert np.isfinite(moved).all()
 
 
-def test_what_is_not_finite_ends_its_own_environment_alone():
+def test_what_is_not_finite_ends_its_own_environment_alone() -> None:
     scenario = load_scenario("removal", QUIET)
     twin, alone = BatchedTwin(scenario, 3, "numpy"), BatchedTwin(scenario, 1, "numpy")
     twin.reset([0, 1, 2])
@@ -85,27 +94,12 @@ def test_what_is_not_finite_ends_its_own_environment_alone():
     np.testing.assert_allclose(
         result.observation[2], expected.observation[0], atol=1e-9
     )
-
-
-def test_a_state_that_is_not_finite_ends_its_own_environment_alone():
     twin = BatchedTwin(load_scenario("removal", QUIET), 2, "numpy")
     twin.reset([0, 1])
     twin.episodes.state.q[0, 3] = np.nan
     result = twin.step(np.repeat(actions(1), 2, axis=0))
     assert "environment 0: no contact force" in result.failure[0]
     assert not result.failure[1] and np.isfinite(result.observation).all()
-
-
-def test_next_episodes_are_those_of_the_environments_generators():
-    twin = BatchedTwin(RANDOM, 3, "numpy")
-    twin.reset([0, 1, 2])
-    following = NextEpisodes(twin, [np.random.default_rng(i) for i in range(3)])
-    mine = [np.random.default_rng(i) for i in range(3)]
-    for rows in ([1], [1, 2], [0, 1, 2]):
-        seeds, episodes = following.take(np.array(rows))
-        assert seeds == [int(mine[row].integers(2**31)) for row in rows]
-        expected = twin.begin(np.array(rows), seeds)
-        np.testing.assert_allclose(episodes.state.q, expected.state.q, atol=1e-9)
 
 
 def test_effects_in_other_orders_share_a_batch():
@@ -181,35 +175,11 @@ class OneAtATime(ef.EnvironmentEffect):
         return dataclasses.replace(environment, friction=0.1 if self.a > 0 else 0.3)
 
 
-@dataclasses.dataclass
-class Rubs(ef.EnvironmentEffect):
-    """Friction, by arithmetic alone."""
-
-    a: float = ef.amplitude("1", -1.0, 1.0, "added")
-
-    def apply(self, environment: ef.Environment, bolt: object) -> ef.Environment:
-        return dataclasses.replace(environment, friction=environment.friction + self.a)
-
-
-@pytest.fixture
-def own_effects(monkeypatch):
-    """Effects of a user, for one test."""
+def test_an_effect_of_a_user_whose_equation_takes_no_arrays_is_refused(monkeypatch):
     monkeypatch.setattr(ef.registry, "_effects", dict(ef.registry._effects))
     monkeypatch.setattr(ef.registry, "import_in_workers", lambda module: None)
     ef.register_effect(OneAtATime)
-    ef.register_effect(Rubs)
-
-
-def test_effects_of_users_take_part_if_their_equations_take_arrays(own_effects):
-    base = load_scenario("removal_turned", QUIET)
-    scenarios = [
-        dataclasses.replace(base, effects=[*base.effects, effect])
-        for effect in (Rubs(a=0.1), ef.GrooveFriction(coefficient=0.1))
-    ]
-    states = _run(BatchedTwin(scenarios, device="numpy"), [0, 0])
-    np.testing.assert_allclose(states[:, 0], states[:, 1], atol=1e-9)
-    refused = dataclasses.replace(base, effects=[OneAtATime(a=0.5)])
-    message = refusal(BatchedTwin, [refused, base])
+    message = refusal(BatchedTwin, [_with(effects=[OneAtATime(a=0.5)]), _with()])
     assert "OneAtATime: its equation takes no arrays" in message
 
 
@@ -219,7 +189,7 @@ def _with(*settings: str, **changes: object) -> Scenario:
 
 
 FRICTION = ef.JointCoulombFriction(joint="iiwa_joint_1", size=1.0)
-SLOW = ["ft_sensor.period=0.008"]
+SLOW, LAG = ["ft_sensor.period=0.008"], ef.SensorLag(share=1.0)
 
 
 @pytest.mark.parametrize(
@@ -232,11 +202,7 @@ SLOW = ["ft_sensor.period=0.008"]
         (_with(effects=[FRICTION]), {}, "JointCoulombFriction"),
         (_with(effects=[ef.PoseDelay(0.1)]), {}, "PoseDelay: a batch reports poses"),
         ([_with(), _with("task.period=0.2")], {}, "task.period: 0.2 and 0.1"),
-        (
-            _with(*SLOW, effects=[ef.SensorLag(share=1.0)]),
-            {},
-            "ft_sensor.period: 0.008",
-        ),
+        (_with(*SLOW, effects=[LAG]), {}, "ft_sensor.period: 0.008"),
         (_with(randomisation=[Range("task.period", 0.1, 0.2)]), {}, "task.period"),
     ],
 )

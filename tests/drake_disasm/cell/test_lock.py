@@ -35,17 +35,11 @@ def test_gaps_are_the_clearances(lock: LockConfig) -> None:
 
 
 @pytest.mark.parametrize("lock", LOCKS)
-def test_solid_parts_do_not_overlap(lock: LockConfig) -> None:
-    for first, second in itertools.combinations(
-        dimensions.groove_boxes(lock).values(), 2
-    ):
+def test_solid_parts_do_not_overlap_and_are_a_mirror_image(lock: LockConfig) -> None:
+    boxes = dimensions.groove_boxes(lock)
+    for first, second in itertools.combinations(boxes.values(), 2):
         low, high = np.maximum(first[0], second[0]), np.minimum(first[1], second[1])
         assert np.any(high - low < 1e-12), (first, second)
-
-
-@pytest.mark.parametrize("lock", LOCKS)
-def test_groove_is_its_own_mirror_image(lock: LockConfig) -> None:
-    boxes = dimensions.groove_boxes(lock)
     mirror = np.array([1.0, 1.0, -1.0])
     for name in ("lip", "wall", "keyhole"):
         corners = [boxes[f"{name}_right"][i] * mirror for i in (0, 1)]

@@ -66,8 +66,7 @@ def test_pipes_devices_folders_and_large_files_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["[1]", "{", '{"a": 1, "b": {}}', "[" * 10**5, '{"a": ' + "9" * 5000 + "}"],
+    "text", ["[1]", "{", '{"a": 1, "b": {}}', "[" * 10**5, '{"a": ' + "9" * 5000 + "}"]
 )
 def test_damaged_json_is_refused(tmp_path, text):
     (tmp_path / "a").write_text(text)

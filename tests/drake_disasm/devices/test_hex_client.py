@@ -63,14 +63,7 @@ def _counted(client: HexClient, **expected: int) -> None:
     wait_until(lambda: client.read().counters == Counters(**expected))
 
 
-def test_settings_come_before_the_start(box: FakeHexBox, client: HexClient) -> None:
-    assert box.requests == STREAM
-    client.stop()
-    wait_until(lambda: not box.started)
-    assert box.requests == [*STREAM, Request(Command.STOP)]
-
-
-def test_a_sample_is_read(box: FakeHexBox, client: HexClient, clock: _Clock) -> None:
+def test_a_sample_is_read_after_the_settings(box, client, clock) -> None:
     assert client.read().health(0.0, stale_after=0.1) == Health.NO_DATA
     clock.now = 2.0
     box.send(WRENCH)
@@ -78,6 +71,10 @@ def test_a_sample_is_read(box: FakeHexBox, client: HexClient, clock: _Clock) -> 
     np.testing.assert_array_equal(client.read().values, WRENCH)
     assert client.read().time == 2.0
     assert client.read().health(2.05, stale_after=0.1) == Health.READY
+    assert box.requests == STREAM
+    client.stop()
+    wait_until(lambda: not box.started)
+    assert box.requests == [*STREAM, Request(Command.STOP)]
 
 
 @pytest.mark.parametrize(
@@ -139,7 +136,11 @@ def test_numbers_wrap_and_begin_anew(box: FakeHexBox, client: HexClient) -> None
     _counted(client, received=5, lost=4999)
 
 
-def test_a_box_that_was_restarted_streams_again() -> None:
+def test_a_silent_or_restarted_box_is_asked_again() -> None:
+    with FakeHexBox() as box, HexClient("127.0.0.1", box.port, silence=0.02) as client:
+        wait_until(lambda: client.read().counters.reconnects >= 2)
+        wait_until(lambda: len(box.requests) >= 6)
+        assert box.requests[:6] == [*STREAM, *STREAM]
     with FakeHexBox() as old, HexClient("127.0.0.1", old.port, silence=0.02) as client:
         wait_until(lambda: old.started)
         old.stop()
@@ -153,13 +154,6 @@ def test_a_box_that_was_restarted_streams_again() -> None:
             wait_until(lambda: box.started)
             wait_until(sends_until_read)
     np.testing.assert_array_equal(client.read().values, WRENCH)
-
-
-def test_a_silent_box_is_asked_again() -> None:
-    with FakeHexBox() as box, HexClient("127.0.0.1", box.port, silence=0.02) as client:
-        wait_until(lambda: client.read().counters.reconnects >= 2)
-        wait_until(lambda: len(box.requests) >= 6)
-        assert box.requests[:6] == [*STREAM, *STREAM]
 
 
 def test_nothing_is_left_behind() -> None:

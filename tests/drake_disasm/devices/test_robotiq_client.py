@@ -160,7 +160,7 @@ def test_commands_again_after_a_reconnect(fake: FakeRobotiqGripper) -> None:
     assert set(fake.writes) == {OPEN}
 
 
-def test_a_fault_is_said_in_words_and_stops_commands(fake: FakeRobotiqGripper) -> None:
+def test_a_fault_stops_commands_and_an_allowed_activation_clears_it(fake) -> None:
     fake.fault = "status"
     with _client(fake) as client:
         client.command(1.0)
@@ -170,9 +170,6 @@ def test_a_fault_is_said_in_words_and_stops_commands(fake: FakeRobotiqGripper) -
         fake.fault = ""
         wait_until(lambda: fake.writes)
         assert client.read().error == ""
-
-
-def test_a_major_fault_is_cleared_by_an_allowed_activation() -> None:
     with FakeRobotiqGripper() as fake:
         fake.fault = "status"
         with _client(fake, activate=True) as client:

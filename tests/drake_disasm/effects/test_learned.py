@@ -9,11 +9,7 @@ from drake_disasm import effects as ef
 from drake_disasm.effects.learned import LearnedFunctions
 from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
 from drake_disasm.scenario.validity import validate
-from tests.drake_disasm.effects.learned_files import (
-    HEIGHT,
-    step_above_zero,
-    step_in_fy,
-)
+from tests.drake_disasm.effects.learned_files import HEIGHT, step_above_zero, step_in_fy
 from tests.refusals import refusal
 
 
