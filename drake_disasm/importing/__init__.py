@@ -9,7 +9,7 @@
 """
 
 from drake_disasm.importing.field_map import FieldMap, read_map
-from drake_disasm.importing.guess import guessed_map
+from drake_disasm.importing.guess import NoGuessError, guessed_map, map_to_fill_in
 from drake_disasm.importing.importer import Imported, import_recordings, write_log
 from drake_disasm.importing.processing import Processing
 from drake_disasm.importing.source import Source, read_source
@@ -17,10 +17,12 @@ from drake_disasm.importing.source import Source, read_source
 __all__ = [
     "FieldMap",
     "Imported",
+    "NoGuessError",
     "Processing",
     "Source",
     "guessed_map",
     "import_recordings",
+    "map_to_fill_in",
     "read_map",
     "read_source",
     "write_log",

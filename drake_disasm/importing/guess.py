@@ -10,6 +10,7 @@ from drake_disasm.importing.field_map import Column, FieldMap
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stream import Stream
 from drake_disasm.importing.units import UNITS
+from drake_disasm.logs.schema import KINDS
 
 #: What channels of a table are called, the more usual names first; a number may follow.
 _NAMES = {
@@ -51,6 +52,51 @@ _OF_JOINTS = {
 _PREFIXES = {"": "", "actual.": "desired.", "feedback.": "reference."}
 
 
+class NoGuessError(DisasmError):
+    """The names of a recording do not tell what is what.
+
+    Attributes:
+        reason: what no name tells.
+    """
+
+    def __init__(self, where: object, reason: str) -> None:
+        """Says so, with what to do.
+
+        Args:
+            where: the recording's path, or the stream's name.
+            reason: what no name tells.
+        """
+        self.reason = reason
+        super().__init__(
+            f"{where}: {reason}; `show` prints the channels, `save_map` writes a map "
+            "to fill in, which is given by `map`"
+        )
+
+
+def map_to_fill_in(kind: str, source: Source) -> str:
+    """Returns a map as YAML that names what a kind of log needs, and no channels.
+
+    Args:
+        kind: of the log.
+        source: the recording, whose channels stand above it as a comment.
+    """
+    names = [name for stream in source.streams for name in stream.names]
+    lines = [
+        "# Write the names of channels into each `from: []`, one for each component;",
+        "# a quantity with # before it is optional. The channels are:",
+        *(f"#   {', '.join(names[i : i + 6])}" for i in range(0, len(names), 6)),
+        f"kind: {kind}",
+        "joints: []  # their names in the URDF, in the order of the channels",
+        "time: {from: TIME, unit: s}",
+        "columns:",
+    ]
+    for quantity in KINDS[kind].quantities:
+        if quantity.name not in ("time", "extra"):
+            mark = "" if quantity.required else "# "
+            lines.append(f"  {mark}{quantity.name}: {{from: []}}  # {quantity.meaning}")
+    return "\n".join(lines) + "\n"
+
+
 def guessed_map(
     source: Source, kind: str, joints: Sequence[str] = (), urdf: str = ""
 ) -> FieldMap:
@@ -66,16 +112,13 @@ def guessed_map(
         urdf: of the arm.
 
     Raises:
-        DisasmError: nothing that the kind needs is known by its name.
+        NoGuessError: nothing that the kind needs is known by its name.
     """
     if kind in ("joint_motion", "joint_response"):
         return _joint_motion(source, joints, urdf, kind)
     if kind == "static_wrench":
         return _static_wrench(source)
-    raise DisasmError(
-        f"a map of kind {kind} is not guessed; write one and give it by `map`, see "
-        "docs/guides/import-log.md"
-    )
+    raise NoGuessError(source.path, f"a map of kind {kind} is not guessed")
 
 
 def _joint_motion(
@@ -89,16 +132,12 @@ def _joint_motion(
         if "q" in found and (stream is None or len(found) > len(columns)):
             stream, columns = each, found
     if stream is None:
-        raise DisasmError(
-            f"{source.path}: no channel is called as joint positions are; write a map "
-            "and give it by `map`; `show` prints the channels"
-        )
+        raise NoGuessError(source.path, "no channel is called as joint positions are")
     count = len(columns["q"].channels)
     columns = {n: c for n, c in columns.items() if len(c.channels) == count}
     if kind == "joint_response" and "q_commanded" not in columns:
-        raise DisasmError(
-            f"{source.path}: no channel is called as commanded joint positions are; "
-            "write a map and give it by `map`; `show` prints the channels"
+        raise NoGuessError(
+            source.path, "no channel is called as commanded joint positions are"
         )
     return FieldMap(
         kind=kind,
@@ -229,10 +268,7 @@ def _time_of(stream: Stream) -> str | None:
     plain = _plain_names(stream)
     found = next((plain[name] for name in _NAMES["time"] if name in plain), None)
     if found is None:
-        raise DisasmError(
-            "no channel is called as time is; write a map with time: {from: NAME, "
-            "unit: s}"
-        )
+        raise NoGuessError(stream.name or "table", "no channel is called as time is")
     return found
 
 
@@ -295,8 +331,7 @@ def _static_wrench(source: Source) -> FieldMap:
             if set(names) <= set(stream.names):
                 columns["R_WS"] = Column(names)
     if len(columns) < 2:
-        raise DisasmError(
-            f"{source.path}: no wrench with an orientation is found by its names; "
-            "write a map and give it by `map`"
+        raise NoGuessError(
+            source.path, "no channels are called as a wrench with an orientation is"
         )
     return FieldMap("static_wrench", columns, time, frames={"wrench": "S"})

@@ -11,7 +11,7 @@ import pytest
 from drake_disasm.cell.parsing import movable_joints
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from tests.sysid.real_data import real_folder, write_arm, write_slide
-from tests.tools.programs import run_program
+from tests.tools.programs import assert_one_line, run_program
 
 
 @pytest.fixture
@@ -33,6 +33,22 @@ def test_a_recording_is_shown_with_the_guess(table: Path, tmp_path: Path) -> Non
     assert "250 Hz" in run.stdout and "tau.0: -2 to 2, in steps of" in run.stdout
     assert "from: [q.0, q.1]" in run.stdout
     assert (tmp_path / "m").read_text().startswith("kind: joint_motion")
+
+
+def test_a_recording_whose_names_tell_nothing_is_shown(tmp_path: Path) -> None:
+    table = tmp_path / "run.csv"
+    np.savetxt(table, np.random.default_rng(0).normal(size=(20, 3)), delimiter=",")
+    look = ("import-log", table, "--show", "--save-map", tmp_path / "map.yaml")
+    run = run_program(*look)
+    assert run.returncode == 0, run.stderr
+    assert "column_2: " in run.stdout and "no map is guessed: " in run.stdout
+    template = (tmp_path / "map.yaml").read_text()
+    filled = template.replace("q: {from: []", "q: {from: [column_1]")
+    filled = filled.replace("TIME", "column_0").replace("joints: []", "joints: [a]")
+    (tmp_path / "map.yaml").write_text(filled)
+    assert run_program(*look[:3], "--map", tmp_path / "map.yaml").returncode == 0
+    refused = run_program("import-log", table, "--out", tmp_path / "log")
+    assert_one_line(refused, ["run.csv", "--show", "--save-map"])
 
 
 def test_a_recording_becomes_a_log(table: Path, tmp_path: Path) -> None:

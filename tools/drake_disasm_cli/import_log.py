@@ -23,10 +23,12 @@ from drake_disasm.common.files import write_text
 from drake_disasm.common.resources import model_path
 from drake_disasm.importing import (
     FieldMap,
+    NoGuessError,
     Processing,
     Source,
     guessed_map,
     import_recordings,
+    map_to_fill_in,
     read_map,
     read_source,
     write_log,
@@ -135,7 +137,13 @@ def main(arguments: Sequence[str]) -> int:
     if not (args.show or args.out or args.save_map):
         raise DisasmError("--out: give a folder for the log, or --show to look first")
     sources = [read_source(path) for path in args.sources]
-    fields = _fields(args, sources)
+    try:
+        fields = _fields(args, sources)
+    except NoGuessError as error:
+        if not (args.show or args.save_map):
+            raise
+        _show_without_map(args, sources, error)
+        return 0
     if args.save_map:
         write_text(args.save_map, fields.to_yaml())
         print(f"map: {args.save_map}")
@@ -163,6 +171,18 @@ def main(arguments: Sequence[str]) -> int:
     print(summary(imported))
     print(f"log: {args.out}")
     return 0
+
+
+def _show_without_map(
+    args: argparse.Namespace, sources: Sequence[Source], error: NoGuessError
+) -> None:
+    """Shows what is in a recording whose map is not guessed; writes one to fill in."""
+    if args.save_map:
+        write_text(args.save_map, map_to_fill_in(args.kind, sources[0]))
+        print(f"map to fill in: {args.save_map}")
+    if args.show:
+        print("\n".join(described(source) for source in sources))
+    print(f"no map is guessed: {error.reason}")
 
 
 def _fields(args: argparse.Namespace, sources: Sequence[Source]) -> FieldMap:
