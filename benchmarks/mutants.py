@@ -3,7 +3,7 @@
 A mutant is one change of one expression in one function: a comparison that is another,
 a constant that is half as large again, a condition that is negated, a call that is left
 out. A sample of them is drawn; each is put into a copy of the tree and meets the tests
-that reach its line, the quickest first, until one fails or twelve seconds' worth of
+that reach its line, the quickest first, until one fails or five seconds' worth of
 them are over.
 
   sample   draws mutants and writes them to a file
@@ -44,9 +44,10 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_json
 
 _PACKAGES = ("drake_disasm", "sysid")
-_PER_MUTANT = 12.0  # s of tests, of the processor's time without a mutant
+_PER_MUTANT = 5.0  # s of tests, of the processor's time without a mutant
 _PATIENCE = 10.0  # a mutant's tests may take so many times longer, and
 _START = 60.0  # s more
+_MOST_TESTS = 40  # of a mutant
 _EXAMPLES = """examples:
   python benchmarks/mutants.py sample --out build/mutants.json
   python benchmarks/mutants.py reach --out build/reach
@@ -276,7 +277,7 @@ class _Known:
         self._root = Path(*parts[:top])
 
     def tests(self, file: str, line: int) -> list[str]:
-        """Returns the tests that reach a line, the quickest first, twelve seconds."""
+        """Returns the tests that reach a line, the quickest first, five seconds."""
         reached: set[str] = set()
         for data in self._data:
             lines = data.contexts_by_lineno(str(self._root / file))
@@ -284,7 +285,7 @@ class _Known:
         chosen, total = [], 0.0
         for name in sorted(reached, key=lambda n: self._seconds[n]):
             total += self._seconds[name]
-            if chosen and total > _PER_MUTANT:
+            if chosen and (total > _PER_MUTANT or len(chosen) == _MOST_TESTS):
                 break
             chosen.append(name)
         return chosen
@@ -325,7 +326,7 @@ def _run_tests(tree: Path, tests: Sequence[str]) -> int | None:
     """
     child = os.fork()
     if child == 0:
-        os.setsid()
+        os.setpgid(0, 0)
         log = os.open(str(tree / "mutant.log"), os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(log, 1)
         os.dup2(log, 2)
