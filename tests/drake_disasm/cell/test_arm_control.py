@@ -29,7 +29,7 @@ def test_joint_gains_of_position_and_cartesian_control() -> None:
         np.testing.assert_array_equal(gain, np.zeros(7))
 
 
-def test_joint_impedance_damps_each_joint_about_its_own_inertia() -> None:
+def test_springs_are_damped_about_each_joints_inertia() -> None:
     arm = ArmConfig(control="joint_impedance")
     arm.joint_impedance.stiffness = list(np.arange(1.0, 8.0) * 100.0)
     arm.joint_impedance.damping_ratio = 0.3
@@ -37,6 +37,12 @@ def test_joint_impedance_damps_each_joint_about_its_own_inertia() -> None:
     np.testing.assert_allclose(k, arm.joint_impedance.stiffness)
     poles = (-d + np.emath.sqrt(d**2 - 4.0 * INERTIA * k)) / (2.0 * INERTIA)
     np.testing.assert_allclose(-poles.real / np.abs(poles), 0.3)
+    arm = ArmConfig()
+    arm.cartesian_impedance.nullspace_stiffness = 50.0
+    arm.cartesian_impedance.nullspace_damping_ratio = 0.5
+    k, d = nullspace_gains(arm, INERTIA)
+    np.testing.assert_allclose(k, 50.0)
+    np.testing.assert_allclose(d, np.sqrt(50.0 * INERTIA))
 
 
 def test_cartesian_damping_of_a_diagonal_inertia_is_that_of_each_axis() -> None:
@@ -77,12 +83,3 @@ def test_joints_yield_to_a_load_as_their_springs_do(control: str) -> None:
     arm.cartesian_impedance.stiffness = K
     J, w = generator.normal(size=(6, 7)), generator.normal(size=6)
     np.testing.assert_allclose(yielding(arm, J) @ w, _joint_angles(arm, J, w))
-
-
-def test_nullspace_spring_is_damped_about_each_joints_inertia() -> None:
-    arm = ArmConfig()
-    arm.cartesian_impedance.nullspace_stiffness = 50.0
-    arm.cartesian_impedance.nullspace_damping_ratio = 0.5
-    k, d = nullspace_gains(arm, INERTIA)
-    np.testing.assert_allclose(k, 50.0)
-    np.testing.assert_allclose(d, np.sqrt(50.0 * INERTIA))

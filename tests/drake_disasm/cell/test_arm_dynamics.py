@@ -20,17 +20,10 @@ def _pose(dynamics: ArmDynamics, q: np.ndarray) -> RigidTransform:
     return dynamics.pose()
 
 
-def test_the_bolt_is_where_the_stations_coordinates_have_it(
-    dynamics: ArmDynamics, cell: CellStation
-) -> None:
+def test_pose_and_jacobian_are_the_stations_coordinates(dynamics, cell) -> None:
     q = cell.start + 0.1
     expected = cell.coordinates.pose(q)
     assert _pose(dynamics, q).IsNearlyEqualTo(expected, 1e-12)
-
-
-def test_jacobian_is_the_derivative_of_the_pose(
-    dynamics: ArmDynamics, cell: CellStation
-) -> None:
     step = 1e-6
     columns = []
     for direction in np.eye(7):
@@ -43,9 +36,7 @@ def test_jacobian_is_the_derivative_of_the_pose(
     np.testing.assert_allclose(dynamics.jacobian(), np.array(columns).T, atol=1e-8)
 
 
-def test_inertia_at_the_bolt_is_what_the_arms_is_felt_as_there(
-    dynamics: ArmDynamics, cell: CellStation
-) -> None:
+def test_inertia_at_the_bolt_is_what_the_arms_is_felt_as_there(dynamics, cell) -> None:
     """A force there accelerates it by Lambda^-1, whatever the null space does."""
     dynamics.set_positions(cell.start)
     J, M = dynamics.jacobian(), dynamics.mass_matrix()

@@ -103,9 +103,14 @@ def test_what_a_dead_worker_left_is_done_again(tmp_path: Path, reports: bool) ->
         assert pool.notes == ["a worker process died; its work was done again"]
 
 
-def test_workers_that_die_again_and_again_are_an_error() -> None:
+def test_workers_that_die_or_cannot_be_reached_are_an_error() -> None:
     with WorkerPool(2) as pool:
         assert "died 3 times over the same work" in refusal(pool.map, _dies, [1])
+    with (
+        ThreadPoolExecutor(1) as threads,
+        WorkerPool(executor=threads, host="192.0.2.1") as pool,
+    ):
+        assert "cannot listen" in refusal(lambda: list(pool.run(_square, [1])))
 
 
 class KilledWorker(Exception):  # noqa: N818
@@ -153,12 +158,10 @@ if __name__ == "__main__":
 def test_workers_end_with_a_killed_parent(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(_KILLED)
-    parent = subprocess.Popen(
-        [sys.executable, script], stdout=subprocess.PIPE, text=True
-    )
+    command = [sys.executable, script]
+    parent = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert parent.stdout
-    workers = {parent.stdout.readline() for _ in range(2)}
-    assert len(workers) == 2
+    assert len({parent.stdout.readline() for _ in range(2)}) == 2  # the workers'
     parent.send_signal(signal.SIGKILL)
     parent.wait()
     assert parent.stdout.read() == ""  # ends once nobody holds it any more
@@ -168,9 +171,7 @@ def _is_imported(module: str) -> bool:
     return module in sys.modules
 
 
-def test_workers_import_what_they_are_told_to(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_workers_import_what_they_are_told_to(tmp_path: Path, monkeypatch) -> None:
     (tmp_path / "registers_something.py").write_text("")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(executors, "_modules", {})
@@ -180,11 +181,3 @@ def test_workers_import_what_they_are_told_to(
         assert pool.map(_is_imported, ["registers_something"]) == [True]
         import_in_workers("is_nowhere")
         assert "PYTHONPATH" in refusal(pool.map, _is_imported, ["is_nowhere"])
-
-
-def test_a_host_that_is_not_here_is_an_error() -> None:
-    with (
-        ThreadPoolExecutor(1) as threads,
-        WorkerPool(executor=threads, host="192.0.2.1") as pool,
-    ):
-        assert "cannot listen" in refusal(lambda: list(pool.run(_square, [1])))

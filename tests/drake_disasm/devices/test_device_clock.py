@@ -10,13 +10,15 @@ from drake_disasm.devices.datagrams import receive, stamp_arrivals
 from drake_disasm.devices.device_clock import DRIFT, DeviceClock
 
 
+def _taken_at(clock: DeviceClock, taken: np.ndarray, at: np.ndarray) -> np.ndarray:
+    return np.array([clock.taken_at(*pair) for pair in zip(taken, at, strict=True)])
+
+
 def test_a_burst_of_queued_samples_keeps_the_times_at_which_they_were_taken() -> None:
     clock, taken = DeviceClock(), np.arange(40) * 0.01
     arrivals = 1000.0 + taken + 0.002
     arrivals[20:32] = arrivals[32]  # a stall of 0.12 s, then all at once
-    found = np.array(
-        [clock.taken_at(*pair) for pair in zip(taken, arrivals, strict=True)]
-    )
+    found = _taken_at(clock, taken, arrivals)
     assert found == pytest.approx(1000.002 + taken, abs=DRIFT * 0.14)
     assert (arrivals - found).max() == pytest.approx(0.12, abs=2e-3)
 
@@ -25,9 +27,7 @@ def test_jitter_never_makes_a_sample_younger_than_its_arrival() -> None:
     rng = np.random.default_rng(0)
     clock, taken = DeviceClock(), np.arange(5000) * 0.005
     arrivals = 7.0 + taken + rng.exponential(0.001, len(taken))
-    found = np.array(
-        [clock.taken_at(*pair) for pair in zip(taken, arrivals, strict=True)]
-    )
+    found = _taken_at(clock, taken, arrivals)
     assert (found <= arrivals + 1e-12).all()
     assert np.abs(found - 7.0 - taken)[50:].max() < 1e-3
 

@@ -1,7 +1,5 @@
 """The HEX's packets, against bytes written by hand from the protocol."""
 
-import contextlib
-
 import numpy as np
 import pytest
 
@@ -43,6 +41,9 @@ def test_samples_both_ways() -> None:
     for text, sample in SAMPLES:
         assert codec.encode_sample(sample) == bytes.fromhex(text)
         assert codec.decode_sample(bytes.fromhex(text)) == sample
+    rng = np.random.default_rng(0)
+    for datagram in (rng.bytes(36) for _ in range(500)):
+        assert codec.encode_sample(codec.decode_sample(datagram)) == datagram
     datagram = codec.encode_sample(codec.Sample(0, 0, 0, (0.00019, *STILL[1:])))
     assert codec.decode_sample(datagram).wrench[0] == 0.0002
 
@@ -103,26 +104,3 @@ def test_sequence_numbers_wrap() -> None:
     assert codec.sequence_step(2**32 - 1, 0) == 1
     assert codec.sequence_step(2**32 - 2, 1) == 3
     assert codec.sequence_step(0, 2**32 - 1) == -1
-
-
-def _mutated(rng: np.random.Generator, datagram: bytes) -> bytes:
-    """Returns it with one byte changed, and about every second time cut."""
-    changed = bytearray(datagram)
-    changed[rng.integers(len(changed))] = rng.integers(256)
-    return bytes(changed)[: rng.integers(2 * len(changed))]
-
-
-def test_no_datagram_raises_anything_else() -> None:
-    rng, count = np.random.default_rng(0), 5_000
-    valid = [bytes.fromhex(text) for text, _ in [*REQUESTS, *SAMPLES]]
-    decoded = 0
-    for number in range(count):
-        mutated = _mutated(rng, valid[number % len(valid)])
-        for datagram in (rng.bytes(number % 45), mutated):
-            with contextlib.suppress(CodecError):
-                assert codec.encode_sample(codec.decode_sample(datagram)) == datagram
-                decoded += 1
-            with contextlib.suppress(CodecError):
-                assert codec.encode_request(codec.decode_request(datagram)) == datagram
-                decoded += 1
-    assert decoded > 0.02 * count

@@ -51,25 +51,6 @@ def test_other_arms_and_nan_are_refused() -> None:
         decode_status(b"")
 
 
-def test_random_and_mutated_messages_raise_nothing_else() -> None:
-    random, count = np.random.default_rng(0), 5_000
-    good = np.frombuffer(status().encode(), dtype=np.uint8)
-    refused = 0
-    for number in range(count):
-        if number % 4:
-            data = good.copy()
-            where = random.integers(len(data), size=3)
-            data[where] = random.integers(256, size=3)
-            data = data[: random.integers(len(data) + 1)] if number % 4 == 1 else data
-        else:
-            data = random.integers(256, size=random.integers(500), dtype=np.uint8)
-        try:
-            decode_status(data.tobytes())
-        except CodecError:
-            refused += 1
-    assert 0.25 * count < refused < count
-
-
 def test_what_is_lost_late_or_broken_is_counted_and_only_good_ones_get_on() -> None:
     lcm, checked, passed = DrakeLcm("memq://"), DrakeLcm("memq://"), []
     checked.Subscribe("S", passed.append)

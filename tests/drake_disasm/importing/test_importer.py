@@ -225,9 +225,8 @@ def test_readings_at_rest_are_taken_as_they_are(tmp_path: Path) -> None:
     fields = guessed_map(source, "static_wrench")
     found = import_recordings([source], fields, Processing())
     write_log(found, [source], fields, tmp_path / "log", {})
-    np.testing.assert_array_equal(
-        read_log(tmp_path / "log").episodes[0]["wrench"], wrench
-    )
+    [episode] = read_log(tmp_path / "log").episodes
+    np.testing.assert_array_equal(episode["wrench"], wrench)
 
 
 def test_names_and_units_of_many_kinds_are_guessed(tmp_path: Path) -> None:
