@@ -108,12 +108,11 @@ def _unexplained(change: np.ndarray, R_WS: np.ndarray) -> float:
     force = np.hstack([g_S.reshape(-1, 1), eye])
     cross = np.cross(np.eye(3)[None], g_S[:, None]).swapaxes(1, 2).reshape(-1, 3)
     torque = np.hstack([cross, eye])
-    parts = []
-    for A, y, noise in (
-        (force, change[:, :3], FORCE_NOISE),
-        (torque, change[:, 3:], TORQUE_NOISE),
-    ):
-        flat = y.reshape(-1)
-        left = flat - A @ np.linalg.lstsq(A, flat, rcond=None)[0]
-        parts.append(left / noise)
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+    left = [
+        (y.ravel() - A @ np.linalg.lstsq(A, y.ravel(), rcond=None)[0]) / noise
+        for A, y, noise in (
+            (force, change[:, :3], FORCE_NOISE),
+            (torque, change[:, 3:], TORQUE_NOISE),
+        )
+    ]
+    return float(np.sqrt(np.mean(np.square(left))))

@@ -18,36 +18,19 @@ from sysid.validation.synthetic_logs import transitions_log
 from sysid.workers import Workers
 
 
+def _fitter(folder, effect, episodes=6):
+    """Returns a fitter of a log that has an effect, and the candidate of its kind."""
+    transitions_log(folder / "log", nominal(), [effect], 0, episodes, steps=12)
+    model = TwinModel([read_log(folder / "log")], nominal(), ())
+    (candidate,) = candidates(model, [type(effect)])
+    delta = model.default_huber_delta
+    return Fitter(model, Workers(), delta, SelectionSettings()), candidate
+
+
 @pytest.fixture(scope="module")
 def gain(tmp_path_factory):
-    """A fitter of a log of an arm that goes 3 % too far along x, and its effect."""
-    folder = tmp_path_factory.mktemp("gain") / "log"
-    transitions_log(folder, nominal(), [CommandGain(x=0.03)], 0, episodes=6, steps=12)
-    return _fitter(TwinModel([read_log(folder)], nominal(), ()), CommandGain)
-
-
-@pytest.fixture(scope="module")
-def turned_impact(tmp_path_factory):
-    """A fitter of a log of a groove that is turned, and its effect."""
-    folder = tmp_path_factory.mktemp("turned") / "log"
-    transitions_log(folder, nominal(), [GroovePose(ry=0.02)], 0, episodes=4, steps=12)
-    return _fitter(TwinModel([read_log(folder)], nominal(), ()), GroovePose)
-
-
-@pytest.fixture(scope="module")
-def yielding(tmp_path_factory):
-    """A fitter of a log of an arm that yields, and its effect."""
-    folder = tmp_path_factory.mktemp("yielding") / "log"
-    effects = [Compliance(y=3.6e-5)]
-    transitions_log(folder, nominal(), effects, 0, episodes=6, steps=12)
-    return _fitter(TwinModel([read_log(folder)], nominal(), ()), Compliance)
-
-
-def _fitter(model, kind):
-    """Returns a fitter, and the candidate of a kind of effect."""
-    (effect,) = candidates(model, [kind])
-    delta = model.default_huber_delta
-    return Fitter(model, Workers(), delta, SelectionSettings()), effect
+    """Of an arm that goes 3 % too far along x."""
+    return _fitter(tmp_path_factory.mktemp("gain"), CommandGain(x=0.03))
 
 
 def test_an_effect_is_worth_what_the_loss_rises_by_without_it(gain):
@@ -62,9 +45,9 @@ def test_an_effect_is_worth_what_the_loss_rises_by_without_it(gain):
     assert fit.significant[x].all()
 
 
-def test_the_error_of_coarse_time_steps_leads_to_the_fit_in_fine_ones(turned_impact):
+def test_the_error_of_coarse_time_steps_leads_to_the_fit_in_fine_ones(tmp_path):
     """Where a fit in fine steps ends, the estimate is off no more."""
-    fitter, effect = turned_impact
+    fitter, effect = _fitter(tmp_path, GroovePose(ry=0.02), episodes=4)
     turn = effect.only(["ry"])
     coarse = fitter.fit((turn,))
     fine = fitter.with_base(fitter.base.refined()).fit((turn,), coarse)
@@ -99,8 +82,8 @@ def test_an_amplitude_that_its_bound_holds_back_is_noticed(gain):
     assert pushed_inwards.within_bounds(fit.effects) == list(fit.effects)
 
 
-def test_an_amplitude_at_a_bound_that_is_null_is_none(yielding):
-    fitter, effect = yielding
+def test_an_amplitude_at_a_bound_that_is_null_is_none(tmp_path):
+    fitter, effect = _fitter(tmp_path, Compliance(y=3.6e-5))
     fit = fitter.fit((effect.only(["y"]),))
     assert fit.within_bounds(fit.effects) == list(fit.effects)
     none = _with(fit, u=fit.null, residual=np.zeros_like(fit.linearisation.residual))

@@ -1,7 +1,6 @@
 """A model that has only what a user has to write: everything else has a default."""
 
 import dataclasses
-import pickle
 
 import numpy as np
 import pytest
@@ -26,7 +25,6 @@ from tests.refusals import refused
 
 INERTIA, WEIGHT = 0.05, 1.2
 HIDDEN = JointCoulombFriction("pivot", 0.15)
-ROWS = slice(0, 400)
 
 
 class Pendulum(LogModel):
@@ -110,13 +108,6 @@ def test_rows_are_selected_with_all_that_the_model_has_become(model):
     assert part.measurements.noise == noise and part.measurements.rows == 100
     assert part.effects == changed.effects and part.parameters == changed.parameters
     assert part.measurements.values[1] == model.measurements.values[4]
-
-
-def test_it_goes_through_pickle(model):
-    theta = np.array([INERTIA, WEIGHT, 0.1])
-    rubbing = with_friction(model, "size")
-    again = pickle.loads(pickle.dumps(rubbing))
-    assert again.predictions(theta).tobytes() == rubbing.predictions(theta).tobytes()
 
 
 class Tension(Effect):

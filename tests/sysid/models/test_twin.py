@@ -47,12 +47,6 @@ def test_a_rollout_reproduces_a_whole_episode(silent_log, turned):
     assert np.quantile(np.abs(residual[:, 6:]), 0.95) < 0.25
 
 
-def test_coarse_steps_cost_little_accuracy(silent_log, turned):
-    model = make(silent_log, turned)
-    residual = Objective(model, Workers()).residuals(truth(model))[0]
-    assert np.quantile(np.abs(residual), 0.9) < 1.0
-
-
 def test_at_the_truth_the_objective_is_the_sensors_noise(log, turned):
     """Wrench channels at 1, pose channels (which a twin's log has exactly) at 0."""
     objective = Objective(make(log, turned, coarse=False), Workers())
