@@ -310,7 +310,7 @@ def _try(tree: Path, mutant: dict[str, Any], known: _Known) -> dict[str, Any]:
         code = _run_tests(tree, tests)
     finally:
         file.write_text(text, "utf-8")
-    fate = {0: "survived", 1: "caught", 2: "caught", None: "caught"}.get(code, "broken")
+    fate = "survived" if code == 0 else "caught"  # or broken at import, or endless
     return mutant | {
         "fate": fate,
         "tests": len(tests),
