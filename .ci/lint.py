@@ -72,6 +72,7 @@ GENERATED = (
     "docs/reference/settings.md",
 )
 _HASH = re.compile(r"\b(?=[0-9a-f]*\d)(?=[0-9a-f]*[a-f])[0-9a-f]{7,12}\b")
+_SYSTEM = re.compile(r"@system\nname: (\w+)\n.*?@endsystem", re.S)
 _DIARY = re.compile(r"\b(used to|no longer|was mended|at this commit)\b")
 
 SOURCES = sorted(f for part in MAY_IMPORT for f in (ROOT / part).rglob("*.py"))
@@ -187,6 +188,20 @@ def docstrings() -> Iterator[str]:
                 yield f"{_path(file)}:{node.lineno}: {node.name} has no docstring"
 
 
+def system_blocks() -> Iterator[str]:
+    """Yields systems whose docstring has no block of ports, as Drake's have."""
+    bases = {"LeafSystem", "Diagram", "Station", "SimulatedStation"}
+    for file in (ROOT / "drake_disasm").rglob("*.py"):
+        for node in ast.walk(_tree(file)):
+            if not isinstance(node, ast.ClassDef) or node.name in bases:
+                continue
+            if not {getattr(base, "id", "") for base in node.bases} & bases:
+                continue
+            found = _SYSTEM.findall(ast.get_docstring(node) or "")
+            if found != [node.name.lstrip("_")]:
+                yield f"{_path(file)}:{node.lineno}: {node.name}: no @system block"
+
+
 def _length(node: ast.FunctionDef) -> int:
     """Returns a function's lines without its docstring."""
     lines = (node.end_lineno or 0) - node.lineno + 1
@@ -262,6 +277,7 @@ RULES = (
     arrows,
     packages,
     docstrings,
+    system_blocks,
     lengths,
     examples,
     words,
