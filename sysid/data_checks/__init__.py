@@ -23,8 +23,8 @@ from sysid.data_checks.finding import (
 from sysid.data_checks.settings import DEFAULT_DATA_SETTINGS, DataSettings
 
 __all__ = [
-    "DEFAULT_DATA_SETTINGS",
     "ACCEPTABLE",
+    "DEFAULT_DATA_SETTINGS",
     "KINDS",
     "DataFinding",
     "DataSettings",

@@ -25,7 +25,7 @@ KINDS: Mapping[str, str] = {
     "time": "time jumps, stands, or is not in step with the period",
     "units": "a quantity that is not SI",
 }
-#: Kinds with which data may be fitted all the same: nothing is fitted to a dead channel.
+#: Kinds with which data may be fitted all the same; nothing fits a dead channel.
 ACCEPTABLE = tuple(kind for kind in KINDS if kind != "constant")
 _SHOWN = 3  # rows, and episodes, that a text lists
 
