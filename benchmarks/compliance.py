@@ -184,7 +184,9 @@ def _table(rows: np.ndarray) -> str:
 
 def main(arguments: Sequence[str]) -> int:
     """Prints the tables; returns the exit status."""
-    program.argument_parser("python benchmarks/compliance.py", __doc__, "").parse_args(arguments)
+    program.argument_parser("python benchmarks/compliance.py", __doc__, "").parse_args(
+        arguments
+    )
     for line in _lines():
         print(line, flush=True)
     return 0

@@ -85,9 +85,10 @@ def run_fault(device: str, fault: str) -> FaultRun:
             simulation.step()
         sent = _commands_of(cell)
         begun = cell.time
-        {"iiwa": cell, "ft_sensor": cell.hex, "gripper": cell.gripper}[
-            device
-        ].fault = fault
+        players: dict[str, Any] = {
+            "iiwa": cell, "ft_sensor": cell.hex, "gripper": cell.gripper
+        }  # fmt: skip
+        players[device].fault = fault
         _run_on(simulation, device)
         supervisor, counters = station.supervisor, station.readings()[device].counters
         return FaultRun(

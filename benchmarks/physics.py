@@ -147,7 +147,7 @@ def replay_errors(
 
 
 def pushed(
-    station: CellStation, wrench_G: Sequence[float], duration: float
+    station: CellStation, wrench_G: Sequence[float] | np.ndarray, duration: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns true and measured displacement (6,) of a bolt pushed in free space.
 

@@ -31,7 +31,9 @@ def responses(simulation: TaskSimulation, axis: int, step: float) -> np.ndarray:
 
 def main(arguments: Sequence[str]) -> int:
     """Prints the table; returns the exit status."""
-    program.argument_parser("python benchmarks/sensor_in_motion.py", __doc__, "").parse_args(arguments)
+    program.argument_parser(
+        "python benchmarks/sensor_in_motion.py", __doc__, ""
+    ).parse_args(arguments)
     scenario = load_scenario("removal", QUIET)
     for station in ("cell", "twin"):
         simulation = TaskSimulation(scenario, station)
