@@ -10,6 +10,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from drake_disasm.batch.twin import BatchedTwin
+from drake_disasm.common import executors
 from drake_disasm.common.arrays import to_numpy
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
@@ -28,7 +29,6 @@ from drake_disasm.scenario import Scenario, load_scenario, scenario_from_mapping
 from drake_disasm.stations import make_station
 from drake_disasm.task.diagram import add_task
 from drake_disasm.task.simulation import TaskSimulation
-from examples.drying_grease import DryingGrease
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.validation.synthetic_logs import transitions_log
@@ -56,6 +56,7 @@ def effects_of_its_own(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """What a test registers is gone after it."""
     registry.registered_effects()
     monkeypatch.setattr(registry, "_effects", dict(registry._effects))
+    monkeypatch.setattr(executors, "_modules", dict(executors._modules))
     register_effect(Clock)
     SEEN.clear()
     yield
@@ -104,6 +105,8 @@ def test_a_batch_gives_each_environment_its_own_time() -> None:
 
 
 def test_a_log_s_model_with_the_effect_leaves_the_noise_alone(tmp_path) -> None:
+    from examples.drying_grease import DryingGrease  # registers it, for this test
+
     register_effect(DryingGrease)
     stated = load_scenario("removal_turned", ["contact.model=impact"])
     grease = DryingGrease(0.4, 0.5)
