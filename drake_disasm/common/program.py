@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn, Self
@@ -65,7 +65,7 @@ def status(main: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> in
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_UNREAD
     except DisasmError as error:
-        print(f"error: {_with_options(str(error))}", file=sys.stderr)
+        print(f"error: {with_options(str(error))}", file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
         return stopping.report()
@@ -75,12 +75,16 @@ def status(main: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> in
         raise
 
 
-def _with_options(message: str) -> str:
+def with_options(message: str, more: Mapping[str, str] | None = None) -> str:
     """Returns a message in which a library's arguments are the program's options.
 
     What a library calls `held_out` is --held-out to whoever typed the command.
+
+    Args:
+        message: of a library.
+        more: options of other programs, by the names of the arguments.
     """
-    names = _Parser.option_names
+    names = {**(more or {}), **_Parser.option_names}
     return _ARGUMENT.sub(lambda found: names.get(found[1], found[0]), message)
 
 

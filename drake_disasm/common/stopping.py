@@ -1,11 +1,13 @@
 """Ctrl-C and SIGTERM: each ends a program in one line, whatever it is doing."""
 
+import contextlib
 import multiprocessing
 import os
 import signal
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from types import FrameType
 
 EXIT_INTERRUPTED = 130
@@ -29,11 +31,13 @@ class _Stop:
 
     error: KeyboardInterrupt | None = None
     is_reported = False
+    is_deferred = False
 
     def __call__(self, number: int, _: FrameType | None) -> None:
         is_ctrl_c = number == signal.SIGINT
         self.error = KeyboardInterrupt() if is_ctrl_c else Terminated("terminated")
-        raise self.error
+        if not self.is_deferred:
+            raise self.error
 
 
 _stop = _Stop()
@@ -55,6 +59,20 @@ def stop_if_interrupted() -> None:
     """Raises Ctrl-C or SIGTERM once more if it came; call it in a loop."""
     if _stop.error:
         raise _stop.error
+
+
+@contextlib.contextmanager
+def deferred() -> Iterator[None]:
+    """Raises Ctrl-C or SIGTERM at the end of a block, and not within.
+
+    For imports: extension modules make all kinds of errors and output of it.
+    """
+    _stop.is_deferred = True
+    try:
+        yield
+    finally:
+        _stop.is_deferred = False
+    stop_if_interrupted()
 
 
 def is_stopping() -> bool:

@@ -63,7 +63,8 @@ def main(arguments: Sequence[str]) -> int:
         Workers(args.workers, progress=progress) as workers,
     ):
         findings = check_data(logs, model, workers=workers)
-        print("\n".join(f"data: {finding.text}" for finding in findings))
+        for finding in findings:
+            print(program.with_options(f"data: {finding.text}", data_arguments.OPTIONS))
         if not findings:
             print("data: nothing is wrong with them")
         refuse(findings)

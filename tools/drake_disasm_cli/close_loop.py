@@ -80,6 +80,7 @@ def _add_model_arguments(add: Callable[..., object]) -> None:
     )
     add(
         "--huber",
+        dest="huber_delta",
         type=options.above_zero_or_inf,
         metavar="K",
         help="residual, in standard deviations, beyond which the loss is linear; inf "
@@ -112,7 +113,7 @@ def main(arguments: Sequence[str]) -> int:
             model,
             train=train,
             test=test,
-            huber_delta=args.huber,
+            huber_delta=args.huber_delta,
             workers=workers,
             progress=progress,
             folder=fits,

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from drake_disasm.common import program
 from drake_disasm.logs import Log
 from sysid.data_checks import (
     ACCEPTABLE,
@@ -15,6 +16,12 @@ from sysid.data_checks import (
 )
 from sysid.models import LogModel
 from sysid.workers import Workers
+
+#: What findings recommend, for programs that do not have it themselves.
+OPTIONS = {
+    "drop_flagged_rows": "--drop-flagged-rows",
+    "accept_findings": "--accept-findings",
+}
 
 
 def add_data_arguments(add: Callable[..., Any]) -> None:
@@ -74,7 +81,7 @@ def checked(
     findings = check_data(logs, model, workers=workers)
     refuse(findings, args.accept_findings)
     for finding in findings:
-        print(f"data: {finding.text}", file=sys.stderr)
+        print(program.with_options(f"data: {finding.text}"), file=sys.stderr)
     if args.drop_flagged_rows:
         rows = model.measurements.rows
         model = without_flagged_rows(logs, model, findings, whole_episodes)

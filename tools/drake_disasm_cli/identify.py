@@ -164,6 +164,7 @@ def _add_judgement_arguments(add: Callable[..., object]) -> None:
     )
     add(
         "--huber",
+        dest="huber_delta",
         type=options.above_zero_or_inf,
         metavar="K",
         help="the loss is linear for residuals beyond K standard deviations; inf for "
@@ -241,7 +242,7 @@ def _settings(args: argparse.Namespace) -> Settings:
         seed=args.seed,
         propose=_surrogate() if args.surrogate else None,
     )
-    huber_delta = np.inf if thesis and args.huber is None else args.huber
+    huber_delta = np.inf if thesis and args.huber_delta is None else args.huber_delta
     methods = METHODS if args.method == "both" else (args.method,)
     return Settings(
         methods, search, huber_delta, args.unidentifiable, tuple(args.profile)

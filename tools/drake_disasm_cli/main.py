@@ -8,7 +8,7 @@ import importlib
 import re
 from collections.abc import Callable, Sequence
 
-from drake_disasm.common import program
+from drake_disasm.common import program, stopping
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 
@@ -79,7 +79,10 @@ def main_of(name: str) -> Callable[[Sequence[str]], int]:
         DisasmError: a library of the system that Drake needs is missing.
     """
     try:
-        module = importlib.import_module(f"drake_disasm_cli.{name.replace('-', '_')}")
+        with stopping.deferred():
+            module = importlib.import_module(
+                f"drake_disasm_cli.{name.replace('-', '_')}"
+            )
     except ImportError as error:
         if library := _SHARED_LIBRARY.match(str(error)):
             raise DisasmError(
