@@ -119,7 +119,6 @@ def test_pages_have_blocks_to_check() -> None:
     [
         ("drake-disasm simulate --no-such-flag", "refused"),
         ("drake-disasm simulat", "no such subcommand"),
-        ("python tools/simulate.py --no-such-flag", "refused"),
         ("python tools/no_such.py", "no_such"),
         ("make no-such-target", "no-such-target"),
         ("no-such-program x", "neither"),

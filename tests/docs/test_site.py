@@ -50,9 +50,6 @@ def test_quantities_become_a_table() -> None:
     assert all(t in text for t in ("``stiffness``", "``2.5``", "N/m", "≥ 0", "coil"))
     assert "``flat``, ``hook``" in text
     assert docstrings.field_table(int) == []
-
-
-def test_settings_become_a_table() -> None:
     text = "\n".join(docstrings.field_table(SelectionSettings))
     names = [field.name for field in dataclasses.fields(SelectionSettings)]
     assert all(f"``{name}``" in text for name in names) and "binomial" in text
@@ -70,39 +67,21 @@ def test_what_is_indented_after_a_colon_is_code() -> None:
     assert text == ["So::", *lines[1:]]
 
 
-@pytest.mark.parametrize(
-    "markdown, folder, page, expected",
-    [
-        (
-            "[`mdp`](../drake_disasm/mdp.py)",
-            "docs",
-            "a.md",
-            "reference/api/drake_disasm.mdp.rst",
-        ),
-        (
-            "[s](../../sysid/models)",
-            "docs/guides",
-            "guides/a.md",
-            "../reference/api/sysid.models.rst",
-        ),
-        (
-            "[p](docs/explanation/physics.md#contact)",
-            ".",
-            "index.md",
-            "explanation/physics.md#contact",
-        ),
-        ("[s](models/SOURCES.md)", ".", "index.md", "reference/models.md"),
-        ("[i](../README.md#the-idea)", "docs", "a.md", "index.md#the-idea"),
-        ("[h](../models/x.yaml)", "docs", "a.md", "../models/x.yaml"),
-        ("[d](https://drake.mit.edu)", "docs", "a.md", "https://drake.mit.edu"),
-    ],
-)
-def test_links_into_the_repository(
-    markdown: str, folder: str, page: str, expected: str
-) -> None:
-    assert f"({expected})" in repository_links.rewrite(markdown, folder, page)
+#: Markdown, the folder that it stands in, its page of the site, the link there.
+_LINKS = """
+[m](../drake_disasm/mdp.py)              docs         a.md         reference/api/drake_disasm.mdp.rst
+[s](../../sysid/models)                  docs/guides  guides/a.md  ../reference/api/sysid.models.rst
+[p](docs/explanation/physics.md#contact) .            index.md     explanation/physics.md#contact
+[s](models/SOURCES.md)                   .            index.md     reference/models.md
+[i](../README.md#the-idea)               docs         a.md         index.md#the-idea
+[h](../models/x.yaml)                    docs         a.md         ../models/x.yaml
+[d](https://drake.mit.edu)               docs         a.md         https://drake.mit.edu
+"""  # noqa: E501
 
 
-def test_a_link_to_a_folder_is_its_name() -> None:
+def test_links_into_the_repository() -> None:
+    for line in _LINKS.strip().splitlines():
+        markdown, folder, page, expected = line.split()
+        assert f"({expected})" in repository_links.rewrite(markdown, folder, page)
     rewritten = repository_links.rewrite("in [`models/`](models) here", ".", "index.md")
     assert rewritten == "in `models/` here"

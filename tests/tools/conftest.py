@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.tools.programs import ROOT, Runner, run_program
+from tests.tools.programs import Runner, run_program
 
 
 @pytest.fixture
@@ -17,23 +17,5 @@ def simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Runner:
 
     def run(*arguments: str) -> subprocess.CompletedProcess[str]:
         return run_program("simulate", "--no-meshcat", *arguments, cwd=tmp_path)
-
-    return run
-
-
-@pytest.fixture
-def simulate_apart(tmp_path: Path) -> Runner:
-    """Runs tools/simulate.py in an interpreter and an environment of its own."""
-
-    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, str(ROOT / "tools/simulate.py"), "--no-meshcat"]
-        return subprocess.run(
-            [*command, *arguments],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            env={"PATH": "/usr/bin:/bin", "PYTHONPATH": str(tmp_path)},
-            check=False,
-        )
 
     return run

@@ -13,6 +13,7 @@ from drake_disasm.common import drake_warnings
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import load_scenario, scenario_from_mapping
 from tests.progress import default_signals
+from tests.refusals import refused
 from tests.tools.inputs import write_policy
 from tests.tools.programs import ROOT, assert_one_line, run_program
 
@@ -57,15 +58,11 @@ def test_every_subcommand_is_listed_and_has_a_thin_program(
     for name in main.SUBCOMMANDS:
         assert f"  {name} " in overview
         assert (ROOT / f"tools/{name.replace('-', '_')}.py").is_file()
+    with refused("close-lop", "close-loop"):
+        main.main(["close-lop"])
     program = [sys.executable, ROOT / "tools/close_loop.py", "--no-such"]
     done = subprocess.run(program, capture_output=True, text=True)
     assert_one_line(done, ["--log"])
-
-
-def test_a_subcommand_that_does_not_exist_is_one_line() -> None:
-    command = [sys.executable, "-m", "drake_disasm_cli", "close-lop"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert_one_line(done, ["close-lop", "close-loop"])
 
 
 def test_a_missing_system_library_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,10 +102,8 @@ def test_a_library_s_argument_is_an_option_in_messages(tmp_path: Path) -> None:
 
 def test_warnings_of_drake_are_counted_and_shown_if_asked_for(tmp_path: Path) -> None:
     arm = (ROOT / "models/iiwa14/iiwa14.urdf").read_text()
-    odd = "<type>transmission_interface/SimpleTransmission</type>"
     urdf = tmp_path / "arm.urdf"
     extra = '<transmission name="odd"><type>Odd</type></transmission></robot>'
-    assert odd in arm
     urdf.write_text(arm.replace("</robot>", extra))
     words = ["excite", "--urdf", urdf, "--out", tmp_path / "x", "--joints", "elbow"]
     command = [sys.executable, "-m", "drake_disasm_cli", *map(str, words)]
@@ -136,15 +131,10 @@ class TestHiddenEffects:
         assert biased.header.provenance["hidden"]
         assert plain.data_hash != biased.data_hash
 
-    def test_a_scenario_may_repeat_what_is_stated(self) -> None:
-        run = (*self.RUN, "--policy=straight", "--hidden", "removal_turned")
-        assert run_program(*run).returncode == 0
-
     @pytest.mark.parametrize(
         ("text", "words"),
         [
             ("lock: {clearance: 0.0003}\neffects: [!SensorBias {}]", ["lock", "--set"]),
-            ("name: empty", ["effects"]),
             ("effects: [!SensorBais {}]", ["SensorBias"]),
         ],
     )
@@ -198,7 +188,7 @@ def test_sigterm_ends_a_program_that_waits_for_a_library() -> None:
 
 
 @pytest.mark.parametrize(
-    "policy", ["x:", "a/b:c", "no_such:x", "nowhere.npz", "mine.py:Mine", "strait"]
+    "policy", ["a/b:c", "no_such:x", "nowhere.npz", "mine.py:Mine", "strait"]
 )
 def test_a_policy_that_is_none_is_one_line(policy: str) -> None:
     done = run_program("simulate", "--no-meshcat", "--policy", policy)

@@ -17,7 +17,7 @@ from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
 from tests.sysid.effect_selection.blind import static_log
 from tests.sysid.report.pages import own_part
-from tests.tools.programs import interrupt, run_program
+from tests.tools.programs import assert_one_line, interrupt, run_program
 
 
 def run(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -72,11 +72,9 @@ def test_data_that_no_fit_makes_sense_of_are_refused_unless_accepted(tmp_path):
     spoilt = _spoilt(log, tmp_path / "turned", fx=turned)
     arguments = ("--log", spoilt, "--workers", "1", "--out", tmp_path / "out")
     refused = run(*arguments)
-    assert refused.returncode == 2 and refused.stderr.count("\n") == 1
-    assert "error: axes: fx = -fx would explain" in refused.stderr
-    assert "--accept-findings axes" in refused.stderr
+    assert_one_line(refused, ["axes: fx = -fx would explain", "--accept-findings axes"])
     assert not (tmp_path / "out").exists()
-    accepted = run(*arguments, "--accept-findings", "axes")
+    accepted = run(*arguments, "--accept-findings", "axes", "--time-budget", 0.01)
     assert accepted.returncode == 0, accepted.stderr
     assert "data: axes: fx = -fx" in accepted.stderr
 
@@ -88,8 +86,12 @@ def test_a_wrong_name_is_refused_before_any_work(tmp_path, monkeypatch):
         raise AssertionError("the names come first")
 
     monkeypatch.setattr("drake_disasm_cli.close_loop.model_of", model_of)
-    result = run("--log", log, "--out", tmp_path / "out", "--held-out", "nothing")
-    assert result.returncode == 2 and "no such episode" in result.stderr
+    arguments = ("--log", log, "--out", tmp_path / "out")
+    assert_one_line(run(*arguments, "--held-out", "nothing"), ["no such episode"])
+    monkeypatch.undo()
+    wrong = run(*arguments, "--parameters", "contact.frictoin")
+    assert_one_line(wrong, ["did you mean 'friction'"])
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow
@@ -105,20 +107,6 @@ def test_transitions_give_a_scenario_that_simulates(tmp_path):
     simulation = TaskSimulation(scenario, "twin", make_policy("straight"))
     simulation.reset(0)
     assert np.isfinite(simulation.step().observation).all()
-
-
-def test_refuses_what_is_not_there(tmp_path):
-    transitions_log(tmp_path / "log", nominal(), [], 0, episodes=2, steps=12)
-    arguments = ("--log", tmp_path / "log", "--out", tmp_path / "out")
-    for more, text in (
-        (("--held-out", "nothing"), "no such episode"),
-        (("--huber", "-1"), "--huber"),
-        (("--parameters", "contact.frictoin"), "did you mean"),
-    ):
-        result = run(*arguments, *more)
-        assert result.returncode == 2 and text in result.stderr
-        assert result.stderr.count("\n") == 1
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow

@@ -77,7 +77,7 @@ def test_live_page_shows_robot_and_lock(live_page: str, tmp_path: Path) -> None:
 
 
 def test_saved_page_plays_offline(simulate: Runner, tmp_path: Path) -> None:
-    done = simulate("--html", "page.html")
+    done = simulate("--html", "page.html", "--set", "task.steps=20")
     assert done.returncode == 0, done.stderr
     url = (tmp_path / "page.html").as_uri()
     # Meshcat's controls list a recording only once it is loaded.

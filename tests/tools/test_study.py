@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.tools.programs import run_program
+from tests.tools.programs import assert_one_line, run_program
 
 _SMALL = [
     "--levels", "agent=ddpg", "psi=0", "--seeds=1", "--episodes=2", "--validation=1",
@@ -20,6 +20,8 @@ def test_a_study_writes_its_report_and_resumes(tmp_path: Path) -> None:
     assert first.returncode == 0, first.stderr
     assert "Trainings in which at least one episode succeeds" in first.stdout
     assert "drake-disasm study precision" in (tmp_path / "out/report.md").read_text()
+    listed = run_program("study", "--list").stdout
+    assert "precision: " in listed and "actor_rate: 0.005, 0.05, 0.5" in listed
     again = run_program("study", *arguments, "--resume")
     assert again.returncode == 0 and again.stdout == first.stdout
 
@@ -54,14 +56,6 @@ def test_a_disk_that_fills_up_loses_nothing(small_disk: Path, tmp_path: Path) ->
     assert (small_disk / "out" / table).read_bytes() == expected
 
 
-def test_the_studies_are_listed() -> None:
-    run = run_program("study", "--list")
-    assert run.returncode == 0
-    for name in ("precision", "precision_transfer", "hyperparameters", "baselines"):
-        assert f"{name}: " in run.stdout
-    assert "actor_rate: 0.005, 0.05, 0.5" in run.stdout
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -69,10 +63,7 @@ def test_the_studies_are_listed() -> None:
         (["precision"], "--out: give a folder"),
         (["precision", "--out", "x", "--levels", "psi"], "write it as FACTOR=A,B"),
         (["precision", "--out", "x", "--compare", "none.csv"], "none.csv: is no file"),
-        (
-            ["precision", "--out", "x", "--scheduler", "tcp://a:1"],
-            "--executor dask",
-        ),
+        (["precision", "--out", "x", "--scheduler", "a:1"], "--executor dask"),
     ],
 )
 def test_bad_input_is_refused_before_work_starts(
@@ -80,5 +71,5 @@ def test_bad_input_is_refused_before_work_starts(
 ) -> None:
     arguments = [str(tmp_path / a) if a == "x" else a for a in arguments]
     run = run_program("study", *arguments)
-    assert run.returncode == 2 and said in run.stderr
+    assert_one_line(run, [said])
     assert not (tmp_path / "x").exists()

@@ -51,20 +51,14 @@ def test_an_error_that_the_model_states_of_itself_has_a_column(found):
     assert f"<th>{own}</th>" in page and page.count("<td>0.123</td>") == 6
 
 
-def test_a_value_at_its_bound_is_marked(found):
+def test_what_is_at_its_bound_and_what_is_not_explained_is_marked(found):
+    page = own_part(closing_page(found, {}))
+    assert "at its bound" not in page and 'class="box warn"' not in page
     verdict = found.verdict
-    assert "at its bound" not in own_part(closing_page(found, {}))
     values = tuple(dataclasses.replace(v, is_at_bound=True) for v in verdict.values)
-    at_bound = dataclasses.replace(verdict, values=values)
-    page = closing_page(dataclasses.replace(found, verdict=at_bound), {})
-    assert "at its bound" in page
-
-
-@pytest.mark.parametrize("ending", ["explained", "partly"])
-def test_the_page_is_yellow_if_something_is_left(found, ending):
-    verdict = dataclasses.replace(found.verdict, ending=ending)
-    page = closing_page(dataclasses.replace(found, verdict=verdict), {})
-    assert ('class="box warn"' in page) == (ending == "partly")
+    other = dataclasses.replace(verdict, values=values, ending="partly")
+    page = closing_page(dataclasses.replace(found, verdict=other), {})
+    assert "at its bound" in page and 'class="box warn"' in page
 
 
 def test_an_interval_has_the_digits_that_tell_its_ends_apart():

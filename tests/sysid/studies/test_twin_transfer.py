@@ -139,9 +139,6 @@ def test_learning_on_the_robot_follows_the_twin_or_nothing(tmp_path: Path) -> No
     for each in (new, closed):
         assert each.station == "cell" and each.config.episodes == 60
         assert each.scenario.effects == list(MISMATCHES["tilted"].effects)
-
-
-def test_there_is_no_robot_in_other_studies() -> None:
     with refused("no robot", "'precision'"):
         PrecisionStudy(StudyOptions((0,), robot_episodes=3))
 

@@ -52,20 +52,15 @@ def test_the_whole_library_at_five_times_the_noise():
     assert [case.key for case in cases if not run_case(case).in_tie] == []
 
 
-def test_a_log_states_nothing_of_what_was_put_in(tmp_path):
-    transitions_log(tmp_path / "log", nominal(), [SensorBias(fx=1.0)], 0, 2, 5)
-    log = read_log(tmp_path / "log")
-    assert log.header.scenario["effects"] == []
-    text = (tmp_path / "log" / "log.yaml").read_text("utf-8")
-    assert "SensorBias" not in text
-
-
 def test_a_model_with_the_effects_explains_a_blind_log(tmp_path):
     scenario = nominal()
     effects = [CommandGain(x=0.02), SensorBias(fy=0.4)]
     transitions_log(tmp_path / "log", scenario, effects, 3, 4, 12)
     scenario.effects = list(effects)
-    model = TwinModel([read_log(tmp_path / "log")], scenario, ())
+    log = read_log(tmp_path / "log")
+    assert log.header.scenario["effects"] == []
+    assert "SensorBias" not in (tmp_path / "log" / "log.yaml").read_text("utf-8")
+    model = TwinModel([log], scenario, ())
     error = model.predictions(np.zeros(0)) - model.measurements.values
     rms = np.sqrt(np.mean((error / model.measurements.noise) ** 2, axis=0))
     assert rms[:6].max() < 2e-3  # what the noise of the first readings is of an offset
@@ -73,11 +68,11 @@ def test_a_model_with_the_effects_explains_a_blind_log(tmp_path):
 
 
 def test_effects_are_drawn_by_the_residual_they_leave(tmp_path):
-    random = np.random.default_rng(0)
-    effect = random_effect(
-        SensorBias, random, 2.0, lambda e: residual(e, str(tmp_path))
-    )
-    assert residual(effect, str(tmp_path)) == pytest.approx(2.0, rel=0.1)
+    def size(effect):
+        return residual(effect, str(tmp_path))
+
+    effect = random_effect(SensorBias, np.random.default_rng(0), 2.0, size)
+    assert size(effect) == pytest.approx(2.0, rel=0.1)
 
 
 def test_answers_are_kept_and_not_asked_for_again(tmp_path):
@@ -85,10 +80,7 @@ def test_answers_are_kept_and_not_asked_for_again(tmp_path):
     executor = _Here()
     with WorkerPool(executor=executor) as pool:
         first = run_cases(cases[:3], pool, FinishedWork(tmp_path))
-        second = run_cases(cases[:5], pool, FinishedWork(tmp_path))
-        assert executor.done == 5
-        assert second[:3] == first
-        assert run_cases(cases[:5], pool, FinishedWork(tmp_path)) == second
+        assert run_cases(cases[:5], pool, FinishedWork(tmp_path))[:3] == first
     assert executor.done == 5
 
 
