@@ -27,7 +27,7 @@ def complaint(packages: Mapping[str, str] = PACKAGES) -> str:
         return ""
     names = " ".join(packages[name] for name in missing)
     return (
-        f"error: Drake needs {', '.join(missing)}, which this system lacks; "
+        f"Drake needs {', '.join(missing)}, which this system lacks; "
         f"on Debian or Ubuntu: sudo apt-get install {names}"
     )
 
@@ -41,4 +41,5 @@ def _loads(name: str) -> bool:
 
 
 if __name__ == "__main__":
-    sys.exit(complaint() or 0)
+    text = complaint()
+    sys.exit(f"error: {text}" if text else 0)

@@ -5,12 +5,12 @@ needs PyTorch does not make the others wait for it.
 """
 
 import importlib
-import re
 from collections.abc import Callable, Sequence
 
 from drake_disasm.common import program, stopping
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
+from drake_disasm.common.system_libraries import complaint
 
 #: Subcommands in the order of the help, by what they are for.
 COMMANDS = {
@@ -39,7 +39,6 @@ SUBCOMMANDS = {
     name: text for group in COMMANDS.values() for name, text in group.items()
 }
 
-_SHARED_LIBRARY = re.compile(r"(lib[\w.+-]+\.so[\w.]*): cannot open shared object")
 _USAGE = """usage: drake-disasm COMMAND [ARGUMENTS]
 
 A toolkit for robotic disassembly on Drake.
@@ -84,11 +83,8 @@ def main_of(name: str) -> Callable[[Sequence[str]], int]:
                 f"drake_disasm_cli.{name.replace('-', '_')}"
             )
     except ImportError as error:
-        if library := _SHARED_LIBRARY.match(str(error)):
-            raise DisasmError(
-                f"{library[1]} is missing, which Drake needs; "
-                "apt-get install libglib2.0-0 libx11-6 libsm6"
-            ) from error
+        if text := complaint():
+            raise DisasmError(text) from error
         raise
     found: Callable[[Sequence[str]], int] = module.main
     return found
