@@ -22,6 +22,7 @@ import compileall
 import contextlib
 import copy
 import hashlib
+import importlib
 import json
 import os
 import py_compile
@@ -31,7 +32,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -48,6 +49,10 @@ _PER_MUTANT = 5.0  # s of tests, of the processor's time without a mutant
 _PATIENCE = 10.0  # a mutant's tests may take so many times longer, and
 _START = 60.0  # s more
 _MOST_TESTS = 40  # of a mutant
+_SLOW_IMPORTS = (
+    *("gymnasium", "matplotlib.pyplot", "plotly", "pyarrow.parquet", "pydrake.all"),
+    *("scipy.optimize", "scipy.stats", "sklearn.linear_model", "torch"),
+)
 _EXAMPLES = """examples:
   python benchmarks/mutants.py sample --out build/mutants.json
   python benchmarks/mutants.py reach --out build/reach
@@ -56,7 +61,7 @@ _EXAMPLES = """examples:
   python benchmarks/mutants.py compare build/before.jsonl build/after.jsonl
 """
 
-_OTHER = {
+_OTHER: dict[type, Any] = {
     ast.Lt: ast.LtE,
     ast.LtE: ast.Lt,
     ast.Gt: ast.GtE,
@@ -210,7 +215,7 @@ class _Reach:
             source=[str(Path.cwd() / name) for name in _PACKAGES],
             config_file=False,
         )
-        self._seconds: Counter[str] = Counter()
+        self._seconds: defaultdict[str, float] = defaultdict(float)
         self._coverage.start()
         self._began = time.process_time()
 
@@ -267,7 +272,7 @@ class _Known:
         self._data = [coverage.CoverageData(str(file)) for file in files]
         for data in self._data:
             data.read()
-        self._seconds: Counter[str] = Counter()
+        self._seconds: defaultdict[str, float] = defaultdict(float)
         for file in folder.glob("seconds.*.json"):
             for name, seconds in json.loads(file.read_text()).items():
                 self._seconds[name] = max(self._seconds[name], seconds)
@@ -282,7 +287,8 @@ class _Known:
         for data in self._data:
             lines = data.contexts_by_lineno(str(self._root / file))
             reached |= set(lines.get(line, ())) - {""}
-        chosen, total = [], 0.0
+        chosen: list[str] = []
+        total = 0.0
         for name in sorted(reached, key=lambda n: self._seconds[n]):
             total += self._seconds[name]
             if chosen and (total > _PER_MUTANT or len(chosen) == _MOST_TESTS):
@@ -355,15 +361,8 @@ def _end_group(child: int) -> None:
 
 def _preload() -> None:
     """Imports what takes long and is not ours, for the forks to share."""
-    import gymnasium  # noqa: F401
-    import matplotlib.pyplot  # noqa: F401
-    import plotly  # noqa: F401
-    import pyarrow.parquet  # noqa: F401
-    import pydrake.all  # noqa: F401
-    import scipy.optimize
-    import scipy.stats  # noqa: F401
-    import sklearn.linear_model  # noqa: F401
-    import torch  # noqa: F401
+    for name in _SLOW_IMPORTS:
+        importlib.import_module(name)
 
 
 def _copy_of(tree: Path, scratch: Path) -> Path:
