@@ -5,11 +5,7 @@ Gymnasium 1.0 and later load no plugins, so `import drake_disasm` registers the 
 name is imported when an environment is made.
 """
 
-import sys
-from collections.abc import Sequence
-from importlib.machinery import ModuleSpec
-from types import ModuleType
-from typing import Any
+from gymnasium.envs.registration import register, registry
 
 #: Registered ids and the scenario of each.
 IDS = {
@@ -29,20 +25,7 @@ IDS = {
 
 
 def register_environments() -> None:
-    """Registers all ids at once, or as soon as gymnasium is imported.
-
-    Gymnasium is not imported here: programs that never make an environment start
-    without it, and set up NumPy's threads before NumPy is loaded.
-    """
-    if "gymnasium" in sys.modules:
-        _register()
-    else:
-        sys.meta_path.insert(0, _GymnasiumFinder())
-
-
-def _register() -> None:
-    from gymnasium.envs.registration import register, registry
-
+    """Registers all ids with Gymnasium; once is enough."""
     for name, scenario in IDS.items():
         if name not in registry:
             register(
@@ -53,36 +36,3 @@ def _register() -> None:
                 ),
                 kwargs={"scenario": scenario},
             )
-
-
-class _GymnasiumFinder:
-    """Finds gymnasium as Python does, and has it register the ids once it has run."""
-
-    def find_spec(
-        self,
-        name: str,
-        path: Sequence[str] | None = None,
-        target: ModuleType | None = None,
-    ) -> ModuleSpec | None:
-        """Returns gymnasium's spec; None for any other module."""
-        if name != "gymnasium":
-            return None
-        others = (finder for finder in sys.meta_path if finder is not self)
-        found = (finder.find_spec(name, path, target) for finder in others)
-        spec = next((spec for spec in found if spec), None)
-        if spec and spec.loader:
-            self._register_after(spec.loader)
-        return spec
-
-    def _register_after(self, loader: Any) -> None:
-        """Has a loader register the ids after it has run its module."""
-        execute = loader.exec_module
-
-        def exec_module(module: ModuleType) -> None:
-            """Runs gymnasium, then registers."""
-            execute(module)
-            if self in sys.meta_path:
-                sys.meta_path.remove(self)
-            _register()
-
-        loader.exec_module = exec_module

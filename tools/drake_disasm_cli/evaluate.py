@@ -7,11 +7,8 @@ The same seeds give the same episodes.
 
 import argparse
 import dataclasses
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-
-os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError

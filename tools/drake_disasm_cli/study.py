@@ -8,11 +8,8 @@ study's report is written anew.
 """
 
 import argparse
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-
-os.environ.setdefault("OMP_NUM_THREADS", "1")  # processes work in parallel, not threads
 
 from drake_disasm.common import options, program
 from drake_disasm.common.cluster import executor_for

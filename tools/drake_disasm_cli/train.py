@@ -7,11 +7,8 @@ interrupted or killed continues with --resume, bit for bit.
 """
 
 import argparse
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-
-os.environ.setdefault("OMP_NUM_THREADS", "1")  # processes work in parallel, not threads
 
 from drake_disasm.common import options, program
 from drake_disasm.common.cluster import executor_for
