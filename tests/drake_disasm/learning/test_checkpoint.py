@@ -32,7 +32,6 @@ def _agent(seed: int = 0) -> Agent:
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A checkpoint of an agent whose memory holds nine transitions."""
     replay = Replay(20)
     for _ in range(9):
         replay.add(np.ones(12), np.zeros(6), 1.0, np.ones(12), False)

@@ -36,20 +36,6 @@ def test_gymnasium_approves(station: str) -> None:
         check_env(DisassemblyEnv("removal", station))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["removal", "removal_turned"])
-def test_random_actions_survive_for_a_hundred_steps(name: str) -> None:
-    """As an agent without experience acts."""
-    env = DisassemblyEnv(name)
-    low, high = env.action_space.low, env.action_space.high
-    for seed in range(2):
-        env.reset(seed=seed)
-        random = np.random.default_rng(seed)
-        for _ in range(100):
-            _, _, terminated, truncated, info = env.step(random.uniform(low, high))
-            assert not (terminated or truncated), info["outcome"]
-
-
 def test_every_id_makes_its_scenario() -> None:
     for name in IDS:
         env = gymnasium.make(name, station="twin")

@@ -25,18 +25,12 @@ def experiment() -> Experiment:
     return Experiment(load_scenario("chapter3"), "twin", "best", preset("best"))
 
 
-def _begin_as_of_old(experiment: Experiment, folder: Path) -> None:
-    """Leaves a folder behind in which the station is called "model"."""
-    open_experiment(experiment, folder, resume=False)
-    path = folder / "training.json"
-    content = json.loads(path.read_text())
-    content["model"] = content.pop("station")
-    content["provenance"] = {"seed": 7}
-    path.write_text(json.dumps(content))
-
-
 def test_an_experiment_that_says_model_is_resumed(experiment, tmp_path):
-    _begin_as_of_old(experiment, tmp_path)
+    open_experiment(experiment, tmp_path, resume=False)
+    path = tmp_path / "training.json"
+    content = json.loads(path.read_text())
+    content["model"] = content.pop("station")  # as older versions call it
+    path.write_text(json.dumps(content | {"provenance": {"seed": 7}}))
     resumed = open_experiment(experiment, tmp_path, resume=True)
     assert resumed.station == "twin" and resumed.provenance == {"seed": 7}
     other = Experiment(experiment.scenario, "cell", "best", experiment.config)

@@ -4,12 +4,7 @@ import itertools
 
 import pytest
 
-from drake_disasm.learning.hyperparameters import (
-    ALGORITHMS,
-    PRESETS,
-    override,
-    preset,
-)
+from drake_disasm.learning.hyperparameters import ALGORITHMS, PRESETS, override, preset
 from tests.refusals import refused
 
 TABLES = {
@@ -34,9 +29,6 @@ def test_every_preset_has_every_algorithm_and_one_of_its_own() -> None:
     for name, algorithm in itertools.product(PRESETS, ALGORITHMS):
         assert preset(name, algorithm).algorithm == algorithm
     assert preset("best").algorithm == "sac" and preset("chapter3").algorithm == "ddpg"
-
-
-def test_td3_and_sac_have_their_own_parameters() -> None:
     td3, sac = preset("chapter3", "td3"), preset("chapter3", "sac")
     assert (td3.policy_delay, td3.target_noise) == (2, 0.01)
     assert td3.target_noise_limit == 0.01

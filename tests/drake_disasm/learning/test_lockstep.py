@@ -10,19 +10,14 @@ from torch.utils._pytree import tree_leaves
 
 from drake_disasm.batch.history import RecordedEpisode
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.progress import ProgressUpdate
-from drake_disasm.learning.experiment import Experiment
 from drake_disasm.learning.hyperparameters import preset
-from drake_disasm.learning.jobs import seed_jobs, train_seeds
 from drake_disasm.learning.lockstep import (
     LockstepTraining,
     LockstepTrainings,
     refuse_envs,
 )
 from drake_disasm.learning.training import Training, TrainingSpec
-from drake_disasm.logs import read_log
 from drake_disasm.mdp import Outcome
-from drake_disasm.policies import load_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.recording import EpisodeRecorder
 from tests.drake_disasm.conftest import without_imprecision
@@ -97,7 +92,6 @@ def test_an_episode_whose_simulation_fails_is_not_learned_from():
     twin, begin = training._twin, training._twin.reset
 
     def broken(seeds: list[int]) -> Any:
-        """Resets, and breaks one environment."""
         observation = begin(seeds)
         twin.episodes.state.q[1, 0] = np.nan
         return observation
@@ -163,35 +157,3 @@ def test_each_of_them_learns_from_its_own_episodes_until_it_has_enough():
     assert ended[:4] == [[0, 1], [2], [0, 1], [0, 1, 2]]  # nobody waits: 4 and 6 steps
     assert [len(t.summaries) for t in together.trainings] == [7, 5, 5]
     assert [t.agent.updates for t in together.trainings] == [28, 20, 30]
-
-
-@pytest.mark.slow
-def test_a_program_that_was_stopped_goes_on_bit_for_bit(tmp_path: Path) -> None:
-    """The rounds before its last checkpoint are not run again."""
-    config = _training(1).spec.config
-    experiment = Experiment(
-        SCENARIO, "twin", "chapter3", config, compiled=False, validation=1,
-        lockstep=True,
-    )  # fmt: skip
-    whole, parts = (
-        seed_jobs(experiment, range(2), tmp_path / name) for name in ("a", "b")
-    )
-    train_seeds(whole)
-
-    def stop(update: ProgressUpdate) -> None:
-        if update.done and update.done >= 4:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        train_seeds(parts, progress=stop)
-    assert not parts[0].is_finished
-    train_seeds(parts)
-    for one, other in zip(whole, parts, strict=True):
-        assert one.is_finished and other.is_finished
-        bits, again = (
-            load_policy(j.folder / "policy.npz").network for j in (one, other)
-        )
-        for a, b in zip(bits.weights, again.weights, strict=True):
-            np.testing.assert_array_equal(a, b)
-        logs = [read_log(job.folder / "log") for job in (one, other)]
-        assert [len(log.episodes) for log in logs] == [config.episodes] * 2

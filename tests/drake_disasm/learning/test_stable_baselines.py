@@ -1,11 +1,8 @@
 """The batch as stable-baselines3 sees it, against the single environment."""
 
-import warnings
-
 import numpy as np
 import pytest
 from stable_baselines3 import SAC
-from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.monitor import Monitor
@@ -25,12 +22,6 @@ def _scenario(steps: int = 3) -> Scenario:
     return load_scenario(
         "removal", [quiet, "contact.model=impact", f"task.steps={steps}"]
     )
-
-
-def test_stable_baselines3_approves_of_the_single_environment() -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # actions in m are no actions in [-1, 1]
-        check_env(DisassemblyEnv(_scenario()))
 
 
 def test_a_batch_runs_the_episodes_of_single_environments() -> None:
@@ -82,15 +73,6 @@ def test_sac_learns_on_it_with_the_usual_wrappers() -> None:
     assert agent.replay_buffer.timeouts[:50].any(axis=1).sum() == 200 // 4 // 3
     mean, _ = evaluate_policy(agent, normalised, n_eval_episodes=4)
     assert np.isfinite(mean)
-
-
-def test_seeds_repeat_and_hold_for_one_reset() -> None:
-    envs = DisassemblyVecEnv(2, "removal_randomised")
-    assert envs.seed(3) == [3, 4]
-    first, second = envs.reset(), envs.reset()
-    envs.seed(3)
-    np.testing.assert_array_equal(envs.reset(), first)
-    assert not np.array_equal(first, second)
 
 
 def test_options_hold_for_all_environments() -> None:

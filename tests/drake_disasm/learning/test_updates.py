@@ -75,55 +75,32 @@ def _linear(layers: Any) -> list[Any]:
     return [m for m in layers if isinstance(m, torch.nn.Linear)]
 
 
-def _copy(modules: list[Any], layers: Any) -> None:
-    for module, layer in zip(modules, layers, strict=True):
-        module.weight.data.copy_(layer["weight"])
-        module.bias.data.copy_(layer["bias"])
-
-
-def _actor_modules(actor: Any, algorithm: str) -> list[Any]:
-    if algorithm != "sac":
+def _actor_modules(actor: Any) -> list[Any]:
+    if isinstance(actor.mu, torch.nn.Sequential):
         return _linear(actor.mu)
     return [*_linear(actor.latent_pi), actor.mu, actor.log_std]
 
 
-def _give(reference: Any, state: AgentState, algorithm: str) -> None:
-    """Copies an agent's parameters into the reference."""
+def _pairs(reference: Any, state: AgentState) -> Iterator[tuple[Any, Any]]:
+    """Yields each tensor of the reference's networks with the agent's."""
     actor = state.actor
-    if algorithm == "sac":
+    if isinstance(reference, SAC):  # the agent has mean and deviation in one layer
         heads = {k: v.chunk(2) for k, v in actor[-1].items()}
-        halves = [{k: v[i] for k, v in heads.items()} for i in (0, 1)]
-        actor = (*actor[:-1], *halves)
-    _copy(_actor_modules(reference.actor, algorithm), actor)
-    if algorithm != "sac":
-        _copy(_actor_modules(reference.actor_target, algorithm), actor)
-    for i, critic in enumerate(state.critics):
-        for net in (reference.critic, reference.critic_target):
-            _copy(_linear(net.q_networks[i]), critic)
-
-
-def _check(reference: Any, state: AgentState, algorithm: str) -> None:
-    def same(modules: list[Any], layers: Any) -> None:
+        actor = (*actor[:-1], *({k: v[i] for k, v in heads.items()} for i in (0, 1)))
+    networks = [(_actor_modules(reference.actor), actor)]
+    if not isinstance(reference, SAC):
+        target = _actor_modules(reference.actor_target)
+        networks.append((target, state.target_actor))
+    for critic, own in (
+        (reference.critic, state.critics),
+        (reference.critic_target, state.target_critics),
+    ):
+        nets = zip(critic.q_networks, own, strict=True)
+        networks += [(_linear(net), layers) for net, layers in nets]
+    for modules, layers in networks:
         for module, layer in zip(modules, layers, strict=True):
             for name in ("weight", "bias"):
-                torch.testing.assert_close(
-                    getattr(module, name).data, layer[name], rtol=1e-4, atol=2e-6
-                )
-
-    modules = _actor_modules(reference.actor, algorithm)
-    if algorithm == "sac":
-        same(modules[:-2], state.actor[:-1])
-        for name in ("weight", "bias"):
-            both = torch.cat([getattr(m, name).data for m in modules[-2:]])
-            torch.testing.assert_close(
-                both, state.actor[-1][name], rtol=1e-4, atol=2e-6
-            )
-    else:
-        same(modules, state.actor)
-        same(_actor_modules(reference.actor_target, algorithm), state.target_actor)
-    for i in range(len(state.critics)):
-        same(_linear(reference.critic.q_networks[i]), state.critics[i])
-        same(_linear(reference.critic_target.q_networks[i]), state.target_critics[i])
+                yield getattr(module, name).data, layer[name]
 
 
 def _share_noise(agent: Agent, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -164,13 +141,15 @@ def test_updates_are_those_of_stable_baselines3(algorithm, changes, env, monkeyp
     )
     agent = Agent(config, seed=1, compiled=False)
     reference = _reference(algorithm, config, env)
-    _give(reference, agent.state, algorithm)
+    for theirs, own in _pairs(reference, agent.state):
+        theirs.copy_(own)
     _share_noise(agent, monkeypatch)
     batches = list(_batches(_UPDATES))
     for rows in batches:
         agent.learn(rows, np.random.default_rng(0))
     _train_reference(reference, batches)
-    _check(reference, agent.state, algorithm)
+    for theirs, own in _pairs(reference, agent.state):
+        torch.testing.assert_close(theirs, own, rtol=1e-4, atol=2e-6)
     if config.adapt_entropy:
         assert float(agent.state.log_entropy) == pytest.approx(
             float(reference.log_ent_coef), abs=1e-6

@@ -134,7 +134,6 @@ def test_effects_may_be_given_at_a_reset():
     action = np.tile([5e-4, 0, 4e-4, 0, 0, 0], (1, 1))
 
     def force(options: dict[str, object] | None) -> float:
-        """Returns the force across the groove after some steps."""
         envs.reset(seed=0, options=options)
         for _ in range(4):
             observation = envs.step(action)[0]

@@ -26,13 +26,11 @@ def random_network(*widths: int, seed: int = 0) -> Network:
 
 @pytest.fixture
 def make_network() -> Callable[..., Network]:
-    """Makes a random network of given widths."""
     return random_network
 
 
 @pytest.fixture
 def policy() -> LearnedPolicy:
-    """A small policy that corrects a scripted one."""
     return LearnedPolicy(
         random_network(12, 7, 5, 6),
         np.repeat([0.01, 0.035, 5.0, 1.0], 3),

@@ -2,7 +2,6 @@
 
 import dataclasses
 import io
-import os
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -34,7 +33,6 @@ MakeNetwork = Callable[..., Network]
 
 @pytest.fixture
 def file(policy: LearnedPolicy, tmp_path: Path) -> Path:
-    """The policy as a file."""
     save_policy(tmp_path / "policy.npz", policy)
     return tmp_path / "policy.npz"
 
@@ -77,29 +75,10 @@ def test_same_policy_same_bytes(policy: LearnedPolicy, file: Path) -> None:
     description = dataclasses.replace(policy.description, period=1)  # an int
     save_policy(other, dataclasses.replace(policy, description=description))
     assert load_policy(other).description.period == 1.0
-
-
-def test_it_comes_back_bit_for_bit_and_numpy_can_read_it(policy, file):
     assert _contents(load_policy(file)) == _contents(policy)
     with np.load(file, allow_pickle=False) as arrays:
         np.testing.assert_array_equal(arrays["weight_0"], policy.network.weights[0])
         assert FORMAT in arrays["text"].tobytes().decode()
-
-
-def test_flipped_bits_never_go_unnoticed(policy: LearnedPolicy, file: Path) -> None:
-    """A flip in what a zip says of itself may be harmless; then nothing changed."""
-    data, generator = file.read_bytes(), np.random.default_rng(0)
-    expected, refused = _contents(policy), 0
-    for place in generator.integers(len(data), size=200):
-        damaged = bytearray(data)
-        damaged[place] ^= int(generator.integers(1, 256))
-        file.write_bytes(damaged)
-        try:
-            assert _contents(load_policy(file)) == expected
-        except DisasmError as error:
-            assert "\n" not in str(error)
-            refused += 1
-    assert refused > 100
 
 
 def test_a_cut_file_and_flips_that_the_zip_would_accept_are_refused(file: Path) -> None:
@@ -127,12 +106,6 @@ def test_other_files_are_refused(file: Path, tmp_path: Path) -> None:
     assert "Object arrays" in _refusal(file)
     assert "No such file" in _refusal(tmp_path / "missing.npz")
     assert "directory" in _refusal(tmp_path)
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-def test_unreadable_file_is_refused(file: Path) -> None:
-    file.chmod(0)
-    assert "Permission denied" in _refusal(file)
 
 
 def _put(**changes: Any) -> Callable[[Arrays, dict[str, Any]], Any]:
@@ -229,12 +202,19 @@ def test_two_arrays_of_one_name_or_no_mapping_are_refused(file: Path) -> None:
     assert "is there twice" in _refusal(file)
 
 
-def test_names_of_policies(tmp_path: Path) -> None:
+def test_names_of_policies_and_shipped_ones_written_as_they_were(
+    tmp_path: Path,
+) -> None:
     assert find_policy("a/b.npz") == Path("a/b.npz")
     assert find_policy("no_such_policy") is None
     assert find_policy("a" * 5000) is None
     for name in shipped_policies():
-        assert find_policy(name) == models_dir() / f"policies/{name}.npz"
+        path = models_dir() / f"policies/{name}.npz"
+        assert find_policy(name) == path
+        shipped = load_policy(path)
+        save_policy(tmp_path / "again.npz", shipped)  # the entries keep their names
+        assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
+        assert shipped.description.station in ("cell", "twin")
 
 
 def test_scenario_hash_is_of_content() -> None:
@@ -243,14 +223,3 @@ def test_scenario_hash_is_of_content() -> None:
     assert len(removal) == 64
     for override in ("lock.clearance=0.0003", "effects=[!SensorBias {fx: 0.5}]"):
         assert removal != scenario_hash(load_scenario("removal", [override]))
-
-
-def test_a_shipped_policy_is_written_as_it_was(tmp_path: Path) -> None:
-    """The format's entries keep their names, whatever the fields are called."""
-    for name in shipped_policies():
-        path = find_policy(name)
-        assert path is not None
-        shipped = load_policy(path)
-        save_policy(tmp_path / "again.npz", shipped)
-        assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
-        assert shipped.description.station in ("cell", "twin")

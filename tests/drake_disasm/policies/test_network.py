@@ -10,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from drake_disasm.mdp import Outcome
 from drake_disasm.policies import (
     ActionMap,
     Admittance,
@@ -20,8 +19,6 @@ from drake_disasm.policies import (
     save_policy,
 )
 from drake_disasm.scenario import load_scenario
-from drake_disasm.task.episode import run_episode
-from drake_disasm.task.simulation import TaskSimulation
 from tests.refusals import refused
 
 MakeNetwork = Callable[..., Network]
@@ -57,17 +54,10 @@ def test_network_remembers_nothing(make_network: MakeNetwork) -> None:
     np.testing.assert_array_equal(first, kept)
     np.testing.assert_array_equal(network(a), kept)
     np.testing.assert_array_equal(a, given)
-
-
-def test_copies_of_a_used_network_work_on_their_own(make_network: MakeNetwork) -> None:
-    network = make_network(12, 9, 6)
-    a, b = np.random.default_rng(0).normal(size=(2, 12)).astype(np.float32)
-    expected = network(a), network(b)
     pickled = pickle.loads(pickle.dumps(network))
     for twin in (copy.deepcopy(network), copy.copy(network), pickled):
-        for x, output in zip((a, b), expected, strict=True):
-            network(np.zeros(12, np.float32))
-            np.testing.assert_array_equal(twin(x), output)
+        network(b)
+        np.testing.assert_array_equal(twin(a), kept)
 
 
 @pytest.mark.parametrize("base", [None, Admittance()])
@@ -97,17 +87,6 @@ def test_choice_comes_back_from_its_action(base: Admittance | None) -> None:
     mapping = ActionMap(np.array([1e-3, 1e-3, 0.0, 0.1, 0.1, 0.1]), Straight(1e-3))
     choice = mapping.from_action(np.zeros(12), np.array([1.0, -1.0, 0.5, 0, 0.05, 0]))
     np.testing.assert_allclose(choice, [1, -1, 0, 0, 0.5, 0])
-
-
-def test_policy_runs_in_the_diagram(policy: LearnedPolicy) -> None:
-    """On the twin: its correction of `straight` is too small to spoil the slide."""
-    scenario = load_scenario("chapter3")
-    policy.check_fits(scenario)
-    summary = run_episode(TaskSimulation(scenario, "twin", policy), seed=1)
-    assert summary.outcome is not Outcome.RUNNING
-    assert summary.travel > 0.005
-    again = run_episode(TaskSimulation(scenario, "twin", policy), seed=1)
-    assert dataclasses.asdict(again) == dataclasses.asdict(summary)
 
 
 TORCHLESS = """

@@ -45,9 +45,7 @@ def test_admittance_slows_down_and_stands_still_at_its_push() -> None:
     assert steps[1] == pytest.approx(policy.push_compliance * (policy.push - 5.0))
     assert steps[2] == pytest.approx(0.0)
     assert steps[3] < 0.0
-
-
-def test_admittance_lifts_only_when_stopped_or_lifted() -> None:
+    # It lifts only when stopped or lifted.
     for fx, y, lifts in ((-5.9, 0, 0), (-6.1, 0, 1), (6.1, 0, 0), (0.0, 0.001, 1)):
         assert (Admittance()(_observation(y, fx=fx))[1] > 0.0) == lifts, (fx, y)
 
@@ -88,9 +86,7 @@ def test_gains_follow_from_the_stiffness(held: str) -> None:
     assert (policy.rotation_compliance * k[3:]).max() == pytest.approx(0.6)
     assert policy.speed * k[0] < policy.push + 1.0
     assert policy.stop < policy.push
-
-
-def test_gains_of_a_stiff_bolt_are_the_ones_that_were_tuned_for_it() -> None:
+    # The stiff one's are those that were tuned for it.
     policy = Admittance.for_stiffness(STIFFNESS["stiff"], 0.0)
     for field in dataclasses.fields(Admittance):
         tuned = getattr(Admittance(), field.name)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
+from pydrake.multibody.tree import JacobianWrtVariable
 
 from drake_disasm.effects import GroovePose
 from drake_disasm.ports import Health
@@ -13,7 +14,6 @@ from tests.drake_disasm.conftest import QUIET
 
 @pytest.fixture(scope="module", params=["friction", "weld"])
 def held(request: pytest.FixtureRequest) -> CellStation:
-    """The cell with its bolt held in either way."""
     return CellStation(
         load_scenario("removal", [QUIET, f"gripper.hold={request.param}"])
     )
@@ -44,26 +44,16 @@ def test_measured_torque_carries_the_weight(held: CellStation) -> None:
     gravity = plant.CalcGravityGeneralizedForces(plant_context)
     expected = -plant.GetVelocitiesFromArray(held.iiwa, gravity)
     if held.scenario.gripper.hold == "friction":  # there the bolt is a body apart
-        p_WB = held.X_WG.translation()
-        expected = expected + _joint_torque(held, p_WB, 0.2 * 9.81)
+        p_WG, world = held.X_WG.translation(), plant.world_frame()
+        flange = plant.GetFrameByName("iiwa_link_ee")
+        p_F = flange.CalcPoseInWorld(plant_context).inverse() @ p_WG
+        J_W = plant.CalcJacobianTranslationalVelocity(
+            plant_context, JacobianWrtVariable.kV, flange, p_F, world, world
+        )
+        weight = J_W.T @ [0.0, 0.0, 0.2 * 9.81]
+        expected = expected + plant.GetVelocitiesFromArray(held.iiwa, weight)
     measured = held.GetOutputPort("iiwa.torque_measured").Eval(context)
     np.testing.assert_allclose(measured, expected, atol=5e-3)
-
-
-def _joint_torque(station: CellStation, p_W: np.ndarray, weight: float) -> np.ndarray:
-    """Torque that carries a weight at p_W (its place along z does not matter)."""
-    plant = station.plant
-    context = station.part_context(plant, station.settled([]))
-    torques = []
-    for index in plant.GetJointIndices(station.iiwa):
-        joint = plant.get_joint(index)
-        if joint.num_velocities() != 1:
-            continue
-        X_WJ = joint.frame_on_child().CalcPoseInWorld(context)
-        axis_W = X_WJ.rotation() @ joint.revolute_axis()
-        lever = p_W - X_WJ.translation()
-        torques.append(axis_W @ np.cross(lever, [0, 0, weight]))
-    return np.array(torques)
 
 
 @pytest.mark.parametrize("force", [30.0, 90.0])

@@ -76,13 +76,11 @@ STATIONS: dict[str, Callable[[], SimulatedStation]] = {
 
 @pytest.fixture(scope="module", params=STATIONS)
 def simulator(request: pytest.FixtureRequest) -> Simulator:
-    """A user's own diagram with every kind of effect, not yet initialised."""
     return _simulated(STATIONS[request.param]())
 
 
 @pytest.fixture
 def station(simulator: Simulator) -> SimulatedStation:
-    """The station in it."""
     systems = simulator.get_system().GetSystems()
     return next(each for each in systems if isinstance(each, SimulatedStation))
 
@@ -154,12 +152,8 @@ def test_it_stays_at_the_start_in_a_users_diagram(simulator, station):
     position = station.GetOutputPort(f"{station.arm}.position_measured").Eval(context)
     np.testing.assert_allclose(position, station.start, atol=2e-3)
 
-
-def test_the_first_reading_is_of_the_load_at_rest(station: SimulatedStation) -> None:
-    """Not of the zeros that a plant's reactions are before its first step.
-
-    To half a count, and to what is left of the motion when the sensor is zeroed.
-    """
+    # The first reading is of the load at rest, not of the zeros that a plant's
+    # reactions are before its first step: to half a count, and to the motion's rest.
     context = station.CreateDefaultContext()
     reading = station.GetOutputPort("ft_sensor.wrench").Eval(context)
     bias = np.array([1.0, 0, 0, 0, 0, 0])  # which comes up after zeroing

@@ -36,9 +36,6 @@ def test_a_mistake_is_one_line(tmp_path: Path, text: str, words: str) -> None:
     path.write_text(text)
     with refused(words):
         load_hardware_config(path)
-
-
-def test_a_missing_file_says_what_to_copy(tmp_path: Path) -> None:
     with refused("copy models/hardware/cell.yaml"):
         load_hardware_config(tmp_path / "none.yaml")
 
@@ -46,9 +43,7 @@ def test_a_missing_file_says_what_to_copy(tmp_path: Path) -> None:
 def test_the_shipped_guard_lets_the_shipped_tasks_decide() -> None:
     for name in shipped_scenarios():
         refuse_narrow_guard(load_scenario(name), SafetyConfig())
-
-
-def test_a_guard_within_the_tasks_workspace_is_refused() -> None:
+    # One within a task's workspace is refused.
     for low, high, words in (
         ([-0.012] * 3, [0.070, 0.03, 0.01], "safety.workspace_high.0: 0.07 m"),
         ([-0.012, -0.009, -0.01], [0.08, 0.03, 0.01], "safety.workspace_low.1: -0.009"),

@@ -17,7 +17,6 @@ from drake_disasm.task.simulation import TaskSimulation
 from tests.drake_disasm.conftest import QUIET
 from tests.refusals import refused
 
-IMPEDANCE = [control for control in CONTROLS if control != "position"]
 _STEPS = 25
 
 
@@ -31,8 +30,8 @@ def _end(simulation: TaskSimulation) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("control", IMPEDANCE)
-def test_an_arm_that_yields_goes_as_in_simulation(control: str) -> None:
+@pytest.mark.parametrize("control", CONTROLS)
+def test_an_arm_goes_as_in_simulation(control: str) -> None:
     scenario = load_scenario("removal", [QUIET, f"arm.control={control}"])
     policy = make_policy("admittance")
     simulated = _end(TaskSimulation(scenario, "cell", policy))

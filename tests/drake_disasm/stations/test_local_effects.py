@@ -28,11 +28,7 @@ EXACT = [QUIET, STIFF, "ft_sensor.quantum=[0,0,0,0,0,0]"]
 
 
 class Pull:
-    """The twin in a diagram of its own, pulled along the groove at constant speed.
-
-    Attributes:
-        station, simulator, context: the station, and its own Context.
-    """
+    """The twin in a diagram of its own, pulled along the groove at constant speed."""
 
     def __init__(
         self,
@@ -45,9 +41,8 @@ class Pull:
         scenario.effects = list(effects)
         builder = DiagramBuilder()
         self.station = builder.AddSystem(TwinStation(scenario))
-        ends = np.array([[0, 0, across, 0, 0, 0]] * 2)
-        ends[1, 0] = SPEED * DURATION
-        path = PiecewisePolynomial.FirstOrderHold([0.0, DURATION], ends.T)
+        ends = [[0, 0, across, 0, 0, 0], [SPEED * DURATION, 0, across, 0, 0, 0]]
+        path = PiecewisePolynomial.FirstOrderHold([0.0, DURATION], np.transpose(ends))
         command = builder.AddSystem(TrajectorySource(path, 1))
         parts = builder.AddSystem(Demultiplexer([6, 6]))
         builder.Connect(command.get_output_port(), parts.get_input_port())
@@ -59,20 +54,17 @@ class Pull:
         self.context = self.station.GetMyMutableContextFromRoot(root)
 
     def to(self, time: float) -> "Pull":
-        """Attaches the station, and advances to a time [s]."""
         self.station.attach(self.simulator)
         self.simulator.AdvanceTo(time)
         return self
 
     @property
     def bolt(self) -> np.ndarray:
-        """Where the bolt is (3,) in Gn [m]."""
         port = self.station.GetOutputPort("bolt_pose")
         return port.Eval(self.context).translation()
 
     @property
     def force(self) -> np.ndarray:
-        """What the groove does to the bolt (3,) in Gn [N], as the sensor measures."""
         wrench = self.station.GetOutputPort("ft_sensor.wrench").Eval(self.context)
         f_S = (wrench - self.station.initial_state.reading)[:3]
         return self.station.X_SB.rotation().inverse() @ f_S
@@ -80,7 +72,6 @@ class Pull:
 
 @pytest.fixture(scope="module")
 def pulled() -> np.ndarray:
-    """x at the last update and at the end of each period, and the force, (n, 5)."""
     pull, rows = Pull([PATCH]), []
     pull.station.attach(pull.simulator)
     known = 2 * pull.station.time_step  # the command has been seen to move

@@ -20,12 +20,7 @@ from drake_disasm.effects import (
 )
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.scenario import Scenario, load_scenario
-from drake_disasm.stations import (
-    STATIONS,
-    CellStation,
-    TwinStation,
-    make_station,
-)
+from drake_disasm.stations import STATIONS, CellStation, TwinStation, make_station
 from drake_disasm.stations.hardware import HardwareStation
 from drake_disasm.stations.hardware_config import HardwareConfig
 from tests.refusals import refused
@@ -33,7 +28,6 @@ from tests.refusals import refused
 
 @pytest.fixture(autouse=True)
 def own_effects(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Registers the effects of this file, for its own tests alone."""
     monkeypatch.setattr(registry, "_effects", dict(registry._effects))
     for effect in (Magnetism, HotGear, SoftHead):
         registry._effects[effect.__name__] = effect
@@ -64,7 +58,6 @@ class SoftHead(EnvironmentEffect):
     share: float = amplitude("1", 0.0, 0.9, "of the head's modulus that is lost")
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
-        """Softens the head."""
         softer = environment.head_modulus * (1.0 - self.share)
         return dataclasses.replace(environment, head_modulus=softer)
 

@@ -12,7 +12,7 @@ from drake_disasm.cell.tool import Tool
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations.measured_cell import MeasuredCell
-from drake_disasm.visualization import MeasuredView, MeshcatView, start_meshcat
+from drake_disasm.visualization import MeshcatView, start_meshcat
 
 _ARM = "/drake/visualizer/iiwa14/iiwa_link_7"
 
@@ -56,17 +56,6 @@ def test_bolt_and_fingers_are_where_the_arm_holds_them(scenario: Scenario) -> No
         a, b = (X.translation() for n, X in at.items() if n.endswith("_finger"))
         apart.append(np.linalg.norm(a - b))
     assert apart[0] - apart[1] == pytest.approx(0.04)
-
-
-def test_a_view_follows_what_is_measured(scenario: Scenario, meshcat: Meshcat) -> None:
-    with in_lockstep(scenario, make_policy("straight")) as (simulation, station, _):
-        simulation.reset(0)
-        view = MeasuredView(meshcat, station)
-        unknown = {"iiwa.position_measured": np.full(7, np.nan)}
-        view.show(station.measured() | unknown)  # can't be drawn, and is left out
-        assert not meshcat._GetPackedTransform(_ARM)
-        view.show(station.measured())
-        assert meshcat._GetPackedTransform(_ARM)
 
 
 def test_a_run_on_hardware_is_seen_and_what_a_view_takes_is_counted(

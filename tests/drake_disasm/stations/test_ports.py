@@ -43,10 +43,7 @@ def test_every_device_has_health_and_time(table: tuple[Port, ...]) -> None:
     assert all(port.unit and port.frame for port in table)
     for device in {name.split(".")[0] for name in names}:
         assert {f"{device}.health", f"{device}.time_measured"} <= names
-
-
-def test_shared_ports_mean_the_same() -> None:
-    """What cell and twin both have is declared alike."""
+    # What cell and twin both have is declared alike.
     cell = {port.name: port for port in CELL_PORTS}
     shared = [port for port in TWIN_PORTS if port.name in cell]
     assert len(shared) == 3

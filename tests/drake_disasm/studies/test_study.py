@@ -53,7 +53,6 @@ def bits(folder: Path) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Returns the folder of a finished study, done in this process."""
     folder = tmp_path_factory.mktemp("study") / "out"
     _run(small_precision(), folder)
     return folder
@@ -85,9 +84,7 @@ def test_the_hyperparameter_study_is_the_thesis_s_of_243_trainings() -> None:
     assert len(stage.treatments) * len(stage.seeds) == 243
     config = stage.treatments[0].experiment.config
     assert (config.episodes, config.schedule) == (100, "every_step")
-
-
-def test_what_is_not_studied_is_refused() -> None:
+    # What is not studied is refused.
     for levels, word in (({"psi": ["0.3"]}, "psi=0.3"), ({"phi": ["0"]}, "phi")):
         with refused(word, "stud"):
             STUDIES["precision"](StudyOptions((0,), levels))
@@ -197,12 +194,3 @@ def test_factors_are_analysed_as_the_thesis_s(tmp_path: Path) -> None:
     for picture in study.pictures(tmp_path / "out"):
         picture.draw(tmp_path / picture.name)
         assert (tmp_path / picture.name).read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("lockstep", [True, False])
-def test_processes_give_the_same_bits(tmp_path: Path, lockstep: bool) -> None:
-    for workers in (1, 4):
-        _run(small_precision(lockstep=lockstep), tmp_path / str(workers), workers)
-    assert bits(tmp_path / "1") == bits(tmp_path / "4")
-    assert len(bits(tmp_path / "1")) == 12

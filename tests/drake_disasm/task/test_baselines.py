@@ -1,5 +1,7 @@
 """What the two scripted policies do on turned grooves, and that no cheat pays more."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,6 @@ from drake_disasm.scenario import load_scenario
 from drake_disasm.task.episode import EpisodeSummary, run_episode
 from drake_disasm.task.simulation import TaskSimulation
 
-ANGLES_DEG = (0.0, 2.0, -2.0, 4.0, -4.0)
 F_MAX = 20.0  # N
 SCENARIO = load_scenario("removal")
 GEOMETRY = TaskGeometry.of(SCENARIO)
@@ -57,45 +58,24 @@ def test_straight_jams_before_the_end(model: str, angle_deg: float) -> None:
     _assert_jammed(episodes, 0.055)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("angle_deg", ANGLES_DEG)
-def test_ten_seeds_in_the_cell(angle_deg: float) -> None:
-    removed = _episodes("cell", "admittance", angle_deg, range(10))
-    assert all(s.outcome is Outcome.SUCCESS and s.max_force < F_MAX for s in removed)
-    # Where the bolt is, is judged to half a millimetre while the arm moves: the head of
-    # some is that much short of the height at which it counts as out.
-    assert sum(s.bolt_is_out for s in removed) > 5
-    straight = _episodes("cell", "straight", angle_deg, range(10), "chapter4_stiff")
-    _assert_jammed(straight, 0.055 if angle_deg else 0.062)
+def _cheat(then: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Removes the bolt up to just below success, then flies on or up and down."""
+    honest, cheats = make_policy("admittance", SCENARIO), []
 
-
-class Cheat:
-    """Removes the bolt honestly up to just below success, then does something else.
-
-    Args:
-        then: gives the action (6,) for a height [m], step by step.
-    """
-
-    def __init__(self, then: str) -> None:
-        self._honest, self._then = make_policy("admittance", SCENARIO), then
-        self._steps = 0
-
-    def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """Returns the action (6,) for an observation (12,)."""
+    def act(observation: np.ndarray) -> np.ndarray:
         y = GEOMETRY.place(BoltState.from_vector(observation))[1]
-        if y < HOVER - 0.0003 and not self._steps:
-            action = self._honest(observation)
-            action[1] = min(action[1], 0.0004)
-            return action
-        self._steps += 1
-        if self._then == "fly on":
+        if y < HOVER - 0.0003 and not cheats:
+            return np.minimum(honest(observation), [1, 0.0004, 1, 1, 1, 1])
+        cheats.append(len(cheats) + 1)
+        if then == "fly on":
             return np.array([0.003, 0.2 * (HOVER - y), 0.0, 0.0, 0.0, 0.0])
-        sign = -1.0 if self._steps % 2 else 1.0
-        return np.array([0.0, sign * 0.003, 0.0, 0.0, 0.0, 0.0])
+        return np.array([0.0, 0.003 * (-1.0) ** cheats[-1], 0.0, 0.0, 0.0, 0.0])
+
+    return act
 
 
-def _episode(policy: object, seed: int = 1) -> EpisodeSummary:
-    return run_episode(TaskSimulation(SCENARIO, "twin", policy), seed)
+def _episode(policy: object) -> EpisodeSummary:
+    return run_episode(TaskSimulation(SCENARIO, "twin", policy), 1)
 
 
 def test_cheating_pays_less_than_removing_the_bolt() -> None:
@@ -103,7 +83,7 @@ def test_cheating_pays_less_than_removing_the_bolt() -> None:
     assert honest.outcome is Outcome.SUCCESS
     ends = {"fly on": Outcome.WORKSPACE, "up and down": Outcome.STEP_LIMIT}
     for then, end in ends.items():
-        cheat = _episode(Cheat(then))
+        cheat = _episode(_cheat(then))
         assert cheat.outcome is end and cheat.reward < honest.reward, then
 
 

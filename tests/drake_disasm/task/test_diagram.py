@@ -74,7 +74,6 @@ def _observations(diagram: Diagram, systems: TaskSystems) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def stepped(scenario: Scenario) -> np.ndarray:
-    """What a TaskSimulation on the twin observes."""
     simulation = TaskSimulation(scenario, "twin", make_policy("admittance"))
     first = simulation.reset(seed=7)
     rest = [simulation.step().observation for _ in range(STEPS - 1)]
@@ -156,29 +155,3 @@ def test_a_system_that_is_no_policy_or_elsewhere_is_refused(scenario):
     wide = load_scenario("removal", [clearance])  # needs a diagram anew
     with refused("can't move to another diagram"):
         TaskSimulation(wide, "twin", AsSystem(make_policy("straight"))).reset(0)
-
-
-def test_an_effect_that_depends_on_the_motion_acts_once_attached() -> None:
-    """Friction is larger in the patch, and the effect is never silently missing."""
-    patch = "!RustyPatch {coefficient: 0.6, position: 0.008, width: 0.002}"
-    scenario = load_scenario(
-        "removal", [QUIET, f"effects=[!GroovePose {{ry: 0.03}}, {patch}]"]
-    )
-    diagram, systems = _own_diagram(scenario, "twin", make_policy("straight"))
-    with refused("RustyPatch: ", "station.attach(simulator)"):
-        Simulator(diagram).Initialize()
-    simulator = Simulator(diagram)
-    systems.station.attach(simulator)
-    context = systems.processor.GetMyContextFromRoot(simulator.get_context())
-    friction = {}
-    for step in range(15):
-        simulator.AdvanceTo(boundary(step, scenario.task.period))
-        seen = systems.processor.GetOutputPort("observation").Eval(context)
-        normal = max(1e-6, np.hypot(seen[7], seen[8]))
-        friction[round(1e3 * seen[0])] = -seen[6] / normal  # by the position in mm
-    assert 0.4 < friction[8] - friction[14] < 0.7
-    simulation = TaskSimulation(scenario, "twin", make_policy("straight"))
-    simulation.reset(0)
-    for _ in range(14):
-        last = simulation.step()
-    np.testing.assert_allclose(seen, last.observation, atol=0.02)

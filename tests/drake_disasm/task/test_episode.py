@@ -5,10 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from drake_disasm.common.errors import (
-    DivergedError,
-    UnreachableError,
-)
+from drake_disasm.common.errors import DivergedError, UnreachableError
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
@@ -28,7 +25,6 @@ def _result(
 
 @pytest.fixture
 def summary() -> EpisodeSummary:
-    """Three steps: forwards, farther and up, back; the last at the force limit."""
     summary = EpisodeSummary(seed=7)
     summary.add(_result([1, 0, 0], [3, 4, 0], 0.1))
     summary.add(_result([5, 2, 0], [0, 0, -1], -0.4))
@@ -36,24 +32,17 @@ def summary() -> EpisodeSummary:
     return summary
 
 
-def test_terms_add_up_by_name(summary: EpisodeSummary) -> None:
+def test_terms_add_up_by_name_and_values_are_greatest_and_mean(
+    summary: EpisodeSummary,
+) -> None:
     expected = {"progress": 8.0, "force": -3.0, "torque": -1.5, "lift": 0.0}
     assert summary.reward_terms == pytest.approx(expected)
     assert summary.reward == pytest.approx(3.5)
-    assert _result([3, 0, 0], [0, 0, 0], 0.0).reward == pytest.approx(1.5)
-
-
-def test_greatest_and_mean_values(summary: EpisodeSummary) -> None:
-    assert summary.steps == 3
-    assert summary.travel == pytest.approx(0.005)
-    assert summary.rise == pytest.approx(0.002)
-    assert summary.max_force == pytest.approx(25.0)
+    assert (summary.steps, summary.outcome) == (3, Outcome.FORCE_LIMIT)
+    assert (summary.travel, summary.rise) == pytest.approx((0.005, 0.002))
+    assert (summary.max_force, summary.max_torque) == pytest.approx((25.0, 0.4))
     assert summary.mean_force == pytest.approx((5 + 1 + 25) / 3)
-    assert summary.max_torque == pytest.approx(0.4)
-    assert summary.outcome is Outcome.FORCE_LIMIT
-
-
-def test_table_says_what_the_summary_does(summary: EpisodeSummary) -> None:
+    assert _result([3, 0, 0], [0, 0, 0], 0.0).reward == pytest.approx(1.5)
     header, units, row, total = summary_table([summary]).splitlines()
     assert "outcome" in header and "mm" in units
     assert row.split()[:4] == ["0", "7", "3", "3.50"]

@@ -24,7 +24,6 @@ def test_what_was_measured_is_kept_with_the_reason_of_the_end(error, reason, tmp
     seen: list[int] = []
 
     def policy(_: np.ndarray) -> np.ndarray:
-        """Moves, and has something happen after some steps."""
         if len(seen) == STEPS and error is KeyboardInterrupt:
             raise error
         cells[0].hex.fault = "jump" if len(seen) == STEPS else ""
