@@ -98,3 +98,12 @@ def test_attributes_are_the_batch() -> None:
     with pytest.raises(DisasmError, match="env_method render"):
         envs.env_method("render")
     envs.close()
+
+
+def test_seeds_repeat_and_hold_for_one_reset() -> None:
+    envs = DisassemblyVecEnv(2, "removal_randomised")
+    assert envs.seed(3) == [3, 4]
+    first, second = envs.reset(), envs.reset()
+    envs.seed(3)
+    np.testing.assert_array_equal(envs.reset(), first)
+    assert not np.array_equal(first, second)

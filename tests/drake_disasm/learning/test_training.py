@@ -13,6 +13,7 @@ from drake_disasm.common.errors import DivergedError, UnreachableError
 from drake_disasm.common.progress import ProgressUpdate, ignore_progress
 from drake_disasm.learning import run
 from drake_disasm.learning.dataset import remember
+from drake_disasm.learning.evaluation import validate_policy
 from drake_disasm.learning.experiment import Experiment
 from drake_disasm.learning.hyperparameters import preset
 from drake_disasm.learning.jobs import seed_jobs, train_seed
@@ -258,3 +259,13 @@ def test_a_folder_is_trained_in_by_one_program_at_a_time(tmp_path, monkeypatch):
         pass
     with run._locked(tmp_path):
         pass
+
+
+def test_validation_does_not_disturb_the_training() -> None:
+    calm, watched = _training(), _training()
+    for _ in range(2):
+        calm.run_episode()
+        watched.run_episode()
+        policy = trained_policy(watched, {})
+        validate_policy(policy, SCENARIO, "twin", [1, 2])
+    _assert_same_bits(calm, watched)

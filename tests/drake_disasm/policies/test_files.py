@@ -223,3 +223,19 @@ def test_scenario_hash_is_of_content() -> None:
     assert len(removal) == 64
     for override in ("lock.clearance=0.0003", "effects=[!SensorBias {fx: 0.5}]"):
         assert removal != scenario_hash(load_scenario("removal", [override]))
+
+
+def test_flipped_bits_never_go_unnoticed(policy: LearnedPolicy, file: Path) -> None:
+    """A flip in what a zip says of itself may be harmless; then nothing changed."""
+    data, generator = file.read_bytes(), np.random.default_rng(0)
+    expected, refused = _contents(policy), 0
+    for place in generator.integers(len(data), size=200):
+        damaged = bytearray(data)
+        damaged[place] ^= int(generator.integers(1, 256))
+        file.write_bytes(damaged)
+        try:
+            assert _contents(load_policy(file)) == expected
+        except DisasmError as error:
+            assert "\n" not in str(error)
+            refused += 1
+    assert refused > 100

@@ -12,7 +12,7 @@ from drake_disasm.cell.tool import Tool
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations.measured_cell import MeasuredCell
-from drake_disasm.visualization import MeshcatView, start_meshcat
+from drake_disasm.visualization import MeasuredView, MeshcatView, start_meshcat
 
 _ARM = "/drake/visualizer/iiwa14/iiwa_link_7"
 
@@ -81,3 +81,14 @@ def test_a_run_on_hardware_is_seen_and_what_a_view_takes_is_counted(
     assert set(took) == {"view", "policy", "inverse kinematics", "sending"}
     assert took["view"] > 0.02  # two arrows of 5 ms, in three frames
     assert took["policy"] == took["inverse kinematics"] == took["sending"] == 0.0
+
+
+def test_a_view_follows_what_is_measured(scenario: Scenario, meshcat: Meshcat) -> None:
+    with in_lockstep(scenario, make_policy("straight")) as (simulation, station, _):
+        simulation.reset(0)
+        view = MeasuredView(meshcat, station)
+        unknown = {"iiwa.position_measured": np.full(7, np.nan)}
+        view.show(station.measured() | unknown)  # can't be drawn, and is left out
+        assert not meshcat._GetPackedTransform(_ARM)
+        view.show(station.measured())
+        assert meshcat._GetPackedTransform(_ARM)

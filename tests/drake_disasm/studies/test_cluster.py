@@ -1,5 +1,9 @@
-"""A study on a Dask cluster: same bits, and what is refused."""
+"""A study on a Dask cluster: same bits, workers that die, and what is refused."""
 
+import os
+import random
+import signal
+import threading
 from pathlib import Path
 
 import pytest
@@ -8,6 +12,7 @@ from drake_disasm.common.cluster import executor_for
 from drake_disasm.studies.runner import open_study, run_study
 from drake_disasm.studies.study import Study
 from tests.drake_disasm.studies.test_study import bits, small_precision
+from tests.progress import wait_until
 from tests.refusals import refused
 
 distributed = pytest.importorskip("distributed")
@@ -19,28 +24,48 @@ def _run_here(study: Study, folder: Path, workers: int) -> dict[str, str]:
     return bits(folder)
 
 
-def _run_on_cluster(study: Study, folder: Path) -> None:
-    options = {"processes": False, "threads_per_worker": 1, "dashboard_address": ":0"}
-    with distributed.LocalCluster(n_workers=1, **options) as cluster:
+def _run_and_kill(study: Study, folder: Path, workers: int, victims: int) -> None:
+    """Runs a study on a cluster, of which some workers at random are killed.
+
+    One after the other, once episodes are written.
+    """
+    killed: list[int] = []
+    options = {"processes": victims > 0, "threads_per_worker": 1}  # or this process
+    with distributed.LocalCluster(
+        n_workers=workers, dashboard_address=":0", **options
+    ) as cluster:
+
+        def kill() -> None:
+            """Kills them."""
+            for worker in random.sample(list(cluster.workers.values()), victims):
+                wait_until(lambda: len(list(folder.rglob("episode_*"))) > len(killed))
+                os.kill(worker.process.pid, signal.SIGKILL)
+                killed.append(worker.process.pid)
+
+        thread = threading.Thread(target=kill)
+        thread.start()
         open_study(study, folder, resume=False)
         address = cluster.scheduler_address
         with executor_for("dask", address) as (executor, host):
-            run_study(study, folder, 1, executor, host)
+            run_study(study, folder, workers, executor, host)
+        thread.join()
+    assert len(killed) == victims
 
 
 def test_a_cluster_changes_no_bit(tmp_path: Path) -> None:
     study = small_precision(lockstep=False, seeds=(0,), levels=("0",))
     alone = _run_here(study, tmp_path / "alone", 1)
-    _run_on_cluster(study, tmp_path / "cluster")
+    _run_and_kill(study, tmp_path / "cluster", 1, 0)
     assert bits(tmp_path / "cluster") == alone
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("lockstep", [True, False])
-def test_processes_give_the_same_bits(tmp_path, lockstep):
-    study = small_precision(lockstep=lockstep)
-    one, four = (_run_here(study, tmp_path / str(n), n) for n in (1, 4))
-    assert one == four and len(one) == 12
+def test_one_worker_four_and_a_cluster_of_four_give_the_same_bits(tmp_path):
+    study = small_precision(lockstep=False, seeds=(0, 1))
+    alone = _run_here(study, tmp_path / "one", 1)
+    assert _run_here(study, tmp_path / "four", 4) == alone
+    _run_and_kill(study, tmp_path / "cluster", 4, 2)
+    assert bits(tmp_path / "cluster") == alone
 
 
 def test_a_cluster_that_cannot_work_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

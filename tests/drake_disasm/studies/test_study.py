@@ -194,3 +194,11 @@ def test_factors_are_analysed_as_the_thesis_s(tmp_path: Path) -> None:
     for picture in study.pictures(tmp_path / "out"):
         picture.draw(tmp_path / picture.name)
         assert (tmp_path / picture.name).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_processes_give_the_same_bits(tmp_path: Path) -> None:
+    for workers in (1, 4):
+        _run(small_precision(lockstep=True), tmp_path / str(workers), workers)
+    assert bits(tmp_path / "1") == bits(tmp_path / "4")
+    assert len(bits(tmp_path / "1")) == 12
