@@ -1,8 +1,14 @@
 """Many steps of the twin with IMPACT at once, against the diagram."""
 
+import dataclasses
+import math
+from typing import ClassVar
+
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
+from drake_disasm.effects import EnvironmentEffect, amplitude, register_effect, registry
 from drake_disasm.scenario import Scenario, load_scenario, with_values
 from drake_disasm.stations import TwinStation
 from drake_disasm.task.impact_replay import ImpactReplay
@@ -19,9 +25,6 @@ SENSING = load_scenario(
         "!PayloadError {mass: 0.2, cx: 0.01}]",
         "observation.variant=small_angle",
     ],
-)
-LOCAL = load_scenario(
-    "removal_turned", [*QUIET, "effects=[!RustyPatch {coefficient: 0.3, width: 0.02}]"]
 )
 COUNT = 24
 
@@ -47,8 +50,8 @@ def steps(scenario: Scenario) -> Steps:
 
 @pytest.mark.parametrize(
     ("scenario", "pushes"),
-    [(TURNED, 0.8), (SENSING, 0.8), (STIFF, 3.0), (LOCAL, 0.5)],
-    ids=["turned", "sensing", "stiff", "local"],
+    [(TURNED, 0.8), (SENSING, 0.8), (STIFF, 3.0)],
+    ids=["turned", "sensing", "stiff"],
 )
 def test_it_says_what_the_diagram_says(scenario, pushes):
     """To some 10 nm, thousandths of a newton and hundredths of a N mm."""
@@ -101,3 +104,32 @@ def test_a_state_without_balance_is_nan_and_the_others_are_found():
     assert np.isnan(found[3]).all()
     others = np.arange(COUNT) != 3
     np.testing.assert_allclose(found[others], expected[others], rtol=1e-9, atol=1e-11)
+
+
+@dataclasses.dataclass
+class Wear(EnvironmentEffect):
+    """Groove: z -= depth exp(-x / 20 mm), mu += 0.1 where more than half is worn."""
+
+    depth: float = amplitude("m", 0.0, 2e-3, "at A")
+    is_local: ClassVar[bool] = True
+    experiment: ClassVar[str] = "any"
+
+    def apply(self, environment, bolt):
+        worn = self.depth * math.exp(-max(bolt.p[0], 0.0) / 0.02)
+        friction = environment.friction + 0.1 * (worn > 0.5 * self.depth)
+        X_GnG = RigidTransform([0.0, 0.0, -worn]) @ environment.X_GnG
+        return dataclasses.replace(environment, X_GnG=X_GnG, friction=friction)
+
+
+@pytest.mark.slow
+def test_an_effect_of_a_users_own_acts_though_its_equation_takes_no_arrays(monkeypatch):
+    monkeypatch.setattr(registry, "_effects", dict(registry._effects))
+    monkeypatch.setattr(registry, "import_in_workers", lambda module: None)
+    register_effect(Wear)
+    scenario = load_scenario("removal_turned", QUIET)
+    scenario.effects.append(Wear(depth=4e-4))
+    expected = TwinReplay(scenario).transitions(steps(scenario))
+    found, plain = ImpactReplay([scenario, TURNED]).transitions([steps(scenario)] * 2)
+    assert np.abs(found - plain)[:, 6:9].max() > 0.05
+    np.testing.assert_allclose(found[:, :3], expected[:, :3], atol=6e-8)
+    np.testing.assert_allclose(found[:, 6:9], expected[:, 6:9], atol=2e-3)
