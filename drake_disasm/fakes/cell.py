@@ -186,6 +186,9 @@ class FakeCell:
         since = self.time - self._first_status
         if not since > _DEAF:  # NaN before the first status
             raise DisasmError("the iiwa driver stops: a command came before it listens")
+        count = len(message.joint_position)
+        if count != len(self.commanded):
+            raise DisasmError(f"the iiwa driver stops: a command is of {count} joints")
         if not np.isfinite(message.joint_position).all():
             raise DisasmError("the iiwa driver stops: a command is not finite")
         self.commands += 1

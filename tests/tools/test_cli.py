@@ -124,7 +124,9 @@ class TestHiddenEffects:
     RUN = ("simulate", "--station=twin", "--no-meshcat", "--set", "task.steps=3")
 
     def test_they_act_and_are_not_in_the_log(self, tmp_path: Path) -> None:
-        (tmp_path / "mine.yaml").write_text("effects: [!SensorBias {fx: 9.0}]\n")
+        (tmp_path / "mine.yaml").write_text(
+            "task: {steps: 150}  # as in removal\neffects: [!SensorBias {fx: 9.0}]\n"
+        )
         for name, more in (("plain", ()), ("biased", ("--hidden", "mine.yaml"))):
             run = (*self.RUN, "--policy=straight", "--record", name, *more)
             assert run_program(*run, cwd=tmp_path).returncode == 0

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from drake import lcmt_iiwa_command
 from pydrake.lcm import DrakeLcm
 
 from drake_disasm.devices.iiwa import IiwaStatusMonitor, encode_command
@@ -11,6 +12,7 @@ from drake_disasm.fakes import real_time
 from drake_disasm.fakes.cell import FakeCell
 from drake_disasm.fakes.real_time import RealTime
 from drake_disasm.scenario import load_scenario
+from tests.refusals import refused
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +42,13 @@ def test_a_jogged_arm_is_back_at_the_start(cell: FakeCell) -> None:
     assert np.linalg.norm(cell.load()) == 0.0
     assert cell.time == time  # the devices' clocks go on
     assert np.array_equal(cell.commanded, cell.station.start)
+
+
+def test_a_command_of_other_joints_stops_the_driver(cell: FakeCell) -> None:
+    cell.jog_to_start()
+    cell._lcm.Publish("IIWA_COMMAND", lcmt_iiwa_command().encode())
+    with refused("driver stops", "0 joints"):
+        cell.advance()
 
 
 def test_a_driver_that_restarts_is_silent_and_counts_anew(cell: FakeCell) -> None:
