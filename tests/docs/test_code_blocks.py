@@ -48,6 +48,7 @@ def _check_imports(block: Block) -> None:
             assert not missing, f"{block}: {node.module} has no {missing}"
 
 
+@pytest.mark.usefixtures("own_effects")
 def test_commands_are_understood(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     found = [block for page in pages() for block in blocks(page, *_SHELL)]

@@ -2,7 +2,6 @@
 
 import abc
 import dataclasses
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from drake_disasm.batch.twin import BatchedTwin
-from drake_disasm.common import executors
 from drake_disasm.common.arrays import to_numpy
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
@@ -52,14 +50,10 @@ class Clock(EnvironmentEffect):
 
 
 @pytest.fixture(autouse=True)
-def effects_of_its_own(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """What a test registers is gone after it."""
-    registry.registered_effects()
-    monkeypatch.setattr(registry, "_effects", dict(registry._effects))
-    monkeypatch.setattr(executors, "_modules", dict(executors._modules))
+def clock(own_effects: None) -> None:
+    """The clock is registered, and has seen nothing."""
     register_effect(Clock)
     SEEN.clear()
-    yield
 
 
 def _scenario() -> Scenario:
