@@ -52,3 +52,10 @@ def test_a_quarter_turn_changes_nothing_for_a_round_bolt():
     np.testing.assert_allclose(np.sort(turned[0]), np.sort(straight[0]), atol=1e-12)
     lengths = (np.sort(np.linalg.norm(each[1], axis=1)) for each in (straight, turned))
     np.testing.assert_allclose(*lengths)
+
+
+def test_another_clearance_is_the_lock_s_with_that_clearance():
+    wide = LockShape.of(LockConfig(clearance=6e-4))
+    narrow = LockShape.of(LockConfig(clearance=2e-4)).with_clearance(6e-4)
+    assert narrow.slot == pytest.approx(wide.slot, abs=1e-12)
+    assert wide.slot - wide.neck == pytest.approx(3e-4, abs=1e-12)
