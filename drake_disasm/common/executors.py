@@ -138,11 +138,16 @@ class WorkerPool:
         for index, result in self._completed(function, jobs, combined):
             yield jobs[index], result
 
-    def close(self) -> None:
-        """Ends its own workers; the next work starts new ones."""
+    def close(self, wait: bool = False) -> None:
+        """Ends its own workers; the next work starts new ones.
+
+        Args:
+            wait: whether to return only when they are gone.
+        """
         if self._own:
             # Not waiting for a pool that replaces its processes fails in its thread.
-            self._own.shutdown(wait=self._process_per_job, cancel_futures=True)
+            wait = wait or self._process_per_job
+            self._own.shutdown(wait=wait, cancel_futures=True)
         self._own = None
 
     def counted(self, result: Result) -> Result:
@@ -229,9 +234,10 @@ class WorkerPool:
         """Returns the pool."""
         return self
 
-    def __exit__(self, *_: object) -> None:
-        """Ends its own workers."""
-        self.close()
+    def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
+        """Ends its own workers; does not wait for them after an error."""
+        # Python's exit writes to a closed pipe if it meets a pool that is ending.
+        self.close(wait=error is None)
 
 
 def _call(

@@ -1,6 +1,7 @@
 """Jobs in this process, in several, in threads, and with workers that die."""
 
 import itertools
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -87,6 +88,7 @@ def test_map_keeps_the_order_and_counts() -> None:
     with WorkerPool(2, progress=seen.append, stage="squaring") as pool:
         assert pool.map(abs, [-1, 2, -3]) == [1, 2, 3]
         assert pool.map(abs, [-4]) == [4]
+    assert not multiprocessing.active_children()
     assert seen == [ProgressUpdate("squaring", done) for done in (1, 2, 3, 4)]
 
 
