@@ -111,6 +111,10 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
                 os.fsync(stream.fileno())
             os.replace(temporary, path)
         _sync_folder(path.parent)
+    except FileNotFoundError:
+        raise DisasmError(
+            f"{path}: cannot be written; make the folder {path.parent} first"
+        ) from None
     except OSError as error:
         raise DisasmError(
             f"{path}: cannot be written ({error.strerror}); check the disk's space "

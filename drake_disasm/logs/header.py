@@ -116,7 +116,10 @@ def parse_header(raw: object, where: str) -> LogHeader:
 def read_header(folder: Path) -> LogHeader:
     """The header of the log in a folder; see `parse_header` for what is refused."""
     path = folder / HEADER_NAME
-    remedy = f"write the log's {HEADER_NAME}, see docs/reference/log-format.md"
+    remedy = (
+        f"name a log's folder, or write its {HEADER_NAME}, see "
+        "docs/reference/log-format.md"
+    )
     text = read_text(path, remedy, _MOST_BYTES)
     return parse_header(_parsed(text, path), str(path))
 

@@ -47,8 +47,8 @@ def resolve_policy(name: str, scenario: Scenario) -> Policy | System:
     if not separator:
         known = [*SCRIPTED, *shipped_policies()]
         raise DisasmError(
-            f"policy '{clipped(name)}' does not exist; {closest(clipped(name), known)} "
-            f"or give {_FORMS}"
+            f"policy '{clipped(name)}' does not exist; {closest(clipped(name), known)}"
+            f", or give {_FORMS}"
         )
     return _own_policy(source, attribute, f"policy {clipped(name)}")
 

@@ -180,6 +180,6 @@ def _refuse_missing(episodes: Sequence[Episode]) -> None:
                 raise refusal(
                     episode.path,
                     f"no columns '{quantity}.*'",
-                    "inverse dynamics needs q, v, vd and tau; differentiate and "
-                    "filter q",
+                    "inverse dynamics needs q, v, vd and tau; map q and tau in "
+                    "import-log, which makes v and vd",
                 )

@@ -36,7 +36,9 @@ def test_what_can_t_be_written_leaves_nothing(tmp_path) -> None:
     with pytest.raises(ValueError):
         files.write_atomically(tmp_path / "data.npz", fail)
     assert not list(tmp_path.iterdir())
-    assert "; check" in refusal(files.write_text, tmp_path / "no" / "text", "")
+    assert "; make the folder" in refusal(files.write_text, tmp_path / "no/text", "")
+    (tmp_path / "file").touch()
+    assert "; check" in refusal(files.write_text, tmp_path / "file/text", "")
 
 
 def test_text_json_and_figures_come_back(tmp_path):
