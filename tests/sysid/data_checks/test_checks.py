@@ -16,9 +16,17 @@ from damaged_logs import (
 
 from drake_disasm.effects import GroovePose
 from drake_disasm.logs import Log, read_log
-from sysid.data_checks import KINDS, Severity, check_data, refuse, without_flagged_rows
+from sysid.data_checks import (
+    DEFAULT_DATA_SETTINGS,
+    KINDS,
+    Severity,
+    check_data,
+    refuse,
+    without_flagged_rows,
+)
 from sysid.data_checks.constancy import dead_channels
 from sysid.data_checks.finding import DataFinding
+from sysid.data_checks.units import sign_findings
 from sysid.models.base import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.validation.blind_tests import nominal
@@ -308,3 +316,11 @@ def test_rows_read_as_ranges():
     found = DataFinding("spikes", "fy", "look", rows={"log/episode_0001": (3, 4, 5, 9)})
     assert found.text == "spikes: fy (log/episode_0001 row 3 to 5, 9); look"
     assert found.to_mapping()["rows"] == {"log/episode_0001": [3, 4, 5, 9]}
+
+
+def test_a_sign_is_wrong_where_a_scale_is_about_minus_one() -> None:
+    assert [f.kind for f in sign_findings("q", -1.05, DEFAULT_DATA_SETTINGS)] == [
+        "axes"
+    ]
+    for scale in (1.0, -57.3, -0.017):
+        assert not sign_findings("q", scale, DEFAULT_DATA_SETTINGS)
