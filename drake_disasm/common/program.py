@@ -35,7 +35,8 @@ def run(main: Callable[[Sequence[str]], int]) -> None:
     warnings.formatwarning = _one_line_for_ours(warnings.formatwarning)
     drake_warnings.keep_back()
     code = status(main, sys.argv[1:])
-    if summary := drake_warnings.summary():
+    summary = drake_warnings.summary()
+    if summary and not stopping.is_stopping():  # which is one line
         print(summary, file=sys.stderr)
     sys.exit(code)
 

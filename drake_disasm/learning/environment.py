@@ -17,7 +17,7 @@ import numpy as np
 from drake_disasm.common.errors import DisasmError, DivergedError, UnreachableError
 from drake_disasm.effects import Effect
 from drake_disasm.mdp import REWARD_TERMS, Outcome
-from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.scenario import Scenario
 from drake_disasm.task.simulation import StepResult, TaskSimulation
 
 
@@ -49,8 +49,6 @@ class DisassemblyEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def __init__(
         self, scenario: Scenario | str | Path = "removal", station: str = "twin"
     ) -> None:
-        if not isinstance(scenario, Scenario):
-            scenario = load_scenario(str(scenario))
         self.simulation = TaskSimulation(scenario, station)
         unlimited = np.full(12, np.inf, dtype=np.float32)
         self.observation_space = gymnasium.spaces.Box(-unlimited, unlimited)

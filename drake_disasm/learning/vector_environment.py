@@ -34,7 +34,8 @@ from drake_disasm.mdp import (
     Outcome,
     action_bounds,
 )
-from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.scenario import Scenario
+from drake_disasm.scenario.given import scenario_of
 
 _MODES = (AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP)
 _WORTH_A_GPU = 1024  # environments: with fewer, starting its kernels takes longer
@@ -329,8 +330,7 @@ def _scenarios_of(given: Scenarios, count: int) -> list[Scenario]:
 
 
 def _loaded(given: Scenario | str | Path) -> Scenario:
-    scenario = given if isinstance(given, Scenario) else load_scenario(str(given))
-    return with_impact(scenario)
+    return with_impact(scenario_of(given))
 
 
 def _observation_space(scenarios: Sequence[Scenario]) -> gymnasium.spaces.Box:

@@ -1,4 +1,4 @@
-"""What the command-line programs share: arguments, and policies by name."""
+"""What the command-line programs share: arguments, and logs by name."""
 
 import argparse
 import os
@@ -7,15 +7,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from pydrake.systems.framework import System
-
-from drake_disasm.common import options
+from drake_disasm.common import options, program
 from drake_disasm.common.cluster import EXECUTORS
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.effects import import_effects
 from drake_disasm.logs import Log, read_logs
-from drake_disasm.policies import resolve_policy
 from drake_disasm.scenario import (
     Scenario,
     load_scenario,
@@ -23,7 +20,6 @@ from drake_disasm.scenario import (
     with_hidden_effects,
 )
 from drake_disasm.stations import SIMULATED_STATIONS, STATIONS
-from drake_disasm.systems.policy import Policy
 
 
 def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
@@ -194,11 +190,6 @@ def add_executor_arguments(parser: argparse.ArgumentParser, more: str = "") -> N
     )
 
 
-def named_policy(name: str, scenario: Scenario) -> Policy | System:
-    """Returns the policy of a name, see `drake_disasm.policies.resolve_policy`."""
-    return resolve_policy(name, scenario)
-
-
 def named_logs(folders: Iterable[str | Path]) -> tuple[Log, ...]:
     """Returns the logs in some folders; says on stderr what of them is left out.
 
@@ -207,5 +198,5 @@ def named_logs(folders: Iterable[str | Path]) -> tuple[Log, ...]:
     """
     logs = read_logs(folders)
     for remark in (remark for log in logs for remark in log.remarks):
-        print(remark, file=sys.stderr)
+        print(program.with_options(remark), file=sys.stderr)
     return logs

@@ -16,6 +16,7 @@ from drake_disasm.common.executors import WorkerPool
 from drake_disasm.common.files import make_folder, write_json
 from drake_disasm.common.progress import Progress
 from drake_disasm.learning.evaluation import Evaluation, evaluate, summed_up
+from drake_disasm.policies import resolve_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
 from drake_disasm_cli import common
@@ -98,7 +99,7 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     rows = list(_rows(args))
     for row in rows:  # errors are reported before anything runs
-        common.named_policy(row.policy, load_scenario(row.scenario, row.overrides))
+        resolve_policy(row.policy, load_scenario(row.scenario, row.overrides))
     found: dict[Row, Evaluation] = {}
     try:
         with (
@@ -147,7 +148,7 @@ def _settings(sweep: str | None) -> list[str]:
 def _run(row: Row, progress: Progress) -> Evaluation:
     """Returns one row's figures; runs in a worker process."""
     scenario = load_scenario(row.scenario, row.overrides)
-    policy = common.named_policy(row.policy, scenario)
+    policy = resolve_policy(row.policy, scenario)
     simulation = TaskSimulation(scenario, row.station, policy)
     return summed_up(evaluate(simulation, row.seeds, progress=progress))
 

@@ -168,7 +168,7 @@ def main(arguments: Sequence[str]) -> int:
     )
     if imported.done:
         plot_import(imported, args.out / "import.png")
-    print(summary(imported))
+    print(program.with_options(summary(imported)))
     print(f"log: {args.out}")
     return 0
 

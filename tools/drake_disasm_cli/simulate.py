@@ -16,7 +16,7 @@ from drake_disasm.common import options, program, stopping
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder
 from drake_disasm.logs import LogWriter, flat_columns
-from drake_disasm.policies import Exploring
+from drake_disasm.policies import Exploring, resolve_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import Station
 from drake_disasm.task.episode import EpisodeSummary, run_episode, summary_table
@@ -131,7 +131,7 @@ def main(arguments: Sequence[str]) -> int:
     if args.station == "hardware":
         return _on_hardware(args, arguments, scenario)
     real = common.real_scenario(args, scenario)
-    policy = common.named_policy(args.policy, scenario)
+    policy = resolve_policy(args.policy, scenario)
     writer = _open_log(args, arguments, scenario) if args.resume else None
     done = writer.next_number if writer else 0
     if args.explore:
@@ -161,7 +161,7 @@ def _on_hardware(
     with hardware.open_station(scenario, args.hardware_config, args.dry_run) as station:
         if args.dry_run:
             hardware.watch(station, _open_measured_view(args, station))
-        policy = common.named_policy(args.policy, scenario)
+        policy = resolve_policy(args.policy, scenario)
         writer = _open_log(args, arguments, scenario) if args.record else None
         seed = args.seed + (writer.next_number if writer else 0)
         if args.explore:
