@@ -175,9 +175,7 @@ class OneAtATime(ef.EnvironmentEffect):
         return dataclasses.replace(environment, friction=0.1 if self.a > 0 else 0.3)
 
 
-def test_an_effect_of_a_user_whose_equation_takes_no_arrays_is_refused(monkeypatch):
-    monkeypatch.setattr(ef.registry, "_effects", dict(ef.registry._effects))
-    monkeypatch.setattr(ef.registry, "import_in_workers", lambda module: None)
+def test_an_effect_of_a_user_whose_equation_takes_no_arrays_is_refused(own_effects):
     ef.register_effect(OneAtATime)
     message = refusal(BatchedTwin, [_with(effects=[OneAtATime(a=0.5)]), _with()])
     assert "OneAtATime: its equation takes no arrays" in message

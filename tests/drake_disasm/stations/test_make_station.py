@@ -27,8 +27,7 @@ from tests.refusals import refused
 
 
 @pytest.fixture(autouse=True)
-def own_effects(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "_effects", dict(registry._effects))
+def _three_of_them(own_effects: None) -> None:
     for effect in (Magnetism, HotGear, SoftHead):
         registry._effects[effect.__name__] = effect
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from drake_disasm.effects import EnvironmentEffect, amplitude, register_effect, registry
+from drake_disasm.effects import EnvironmentEffect, amplitude, register_effect
 from drake_disasm.scenario import Scenario, load_scenario, with_values
 from drake_disasm.stations import TwinStation
 from drake_disasm.task.impact_replay import ImpactReplay
@@ -122,9 +122,7 @@ class Wear(EnvironmentEffect):
 
 
 @pytest.mark.slow
-def test_an_effect_of_a_users_own_acts_though_its_equation_takes_no_arrays(monkeypatch):
-    monkeypatch.setattr(registry, "_effects", dict(registry._effects))
-    monkeypatch.setattr(registry, "import_in_workers", lambda module: None)
+def test_an_effect_of_a_users_own_acts_though_its_equation_takes_no_arrays(own_effects):
     register_effect(Wear)
     scenario = load_scenario("removal_turned", QUIET)
     scenario.effects.append(Wear(depth=4e-4))
