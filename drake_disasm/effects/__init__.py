@@ -16,6 +16,7 @@ from drake_disasm.effects.base import (
     Environment,
     EnvironmentEffect,
     JointEffect,
+    JointMemoryEffect,
     JointSamples,
     MotionEffect,
     PoseEffect,
@@ -88,6 +89,8 @@ from drake_disasm.effects.arm.stribeck_friction import JointStribeckFriction
 from drake_disasm.effects.arm.asymmetric_friction import JointAsymmetricFriction
 from drake_disasm.effects.arm.load_friction import JointLoadFriction
 from drake_disasm.effects.arm.quadratic_friction import JointQuadraticFriction
+from drake_disasm.effects.arm.dahl_friction import JointDahlFriction
+from drake_disasm.effects.arm.joint_spring import JointSpring
 from drake_disasm.effects.arm.torque_offset import TorqueOffset
 from drake_disasm.effects.arm.torque_gain import TorqueGain
 from drake_disasm.effects.arm.rotor_inertia import RotorInertia
@@ -98,6 +101,7 @@ from drake_disasm.effects.arm.base_tilt import ArmTilt
 from drake_disasm.effects.arm.flange_payload import FlangePayload
 from drake_disasm.effects.arm.joint_elasticity import JointElasticity
 from drake_disasm.effects.arm.joint_backlash import JointBacklash
+from drake_disasm.effects.arm.encoder_error import EncoderError
 from drake_disasm.effects.arm.residual_model import ArmResidualModel
 # isort: on
 
@@ -121,6 +125,7 @@ __all__ = [
     "ContactStiffness",
     "DelayEffect",
     "Effect",
+    "EncoderError",
     "Environment",
     "EnvironmentEffect",
     "FlangePayload",
@@ -135,12 +140,15 @@ __all__ = [
     "JointBacklash",
     "JointCoulombFriction",
     "JointCoupling",
+    "JointDahlFriction",
     "JointDelay",
     "JointEffect",
     "JointElasticity",
     "JointLoadFriction",
+    "JointMemoryEffect",
     "JointQuadraticFriction",
     "JointSamples",
+    "JointSpring",
     "JointStribeckFriction",
     "JointViscousFriction",
     "MotionEffect",

@@ -21,6 +21,7 @@ of one's own may have places of its own: a class derived from Effect, which is g
 import abc
 import dataclasses
 import inspect
+import itertools
 import re
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
@@ -401,10 +402,24 @@ class ArmEffect(Effect):
         is_common: whether an arm that has it at one joint likely has it at the others.
         moves_the_arm: whether it acts on the motion, and not on the readings of torque
             sensors alone.
+        needs_both_ways: whether only motion of its joint in both directions can show
+            what it is.
     """
 
     is_common: ClassVar[bool] = True
     moves_the_arm: ClassVar[bool] = True
+    needs_both_ways: ClassVar[bool] = False
+
+    @classmethod
+    def least_shapes(cls, travel: float) -> dict[str, float]:
+        """Returns the least values of shape parameters that a motion can show.
+
+        By name; a smaller one is beyond what the motion could tell from others.
+
+        Args:
+            travel: from one end of its joint's motion to the other [rad].
+        """
+        return {}
 
 
 class ArmTorqueEffect(ArmEffect, abc.ABC):
@@ -436,11 +451,9 @@ class JointEffect(ArmTorqueEffect):
 
     Attributes:
         joint: its name in the URDF.
-        needs_both_ways: whether only motion in both directions can show what it is.
     """
 
     joint: str
-    needs_both_ways: ClassVar[bool] = False
 
     def torques(self, samples: ArmSamples) -> np.ndarray:
         """See ArmTorqueEffect."""
@@ -453,13 +466,39 @@ class JointEffect(ArmTorqueEffect):
     def torque(self, samples: JointSamples) -> np.ndarray:
         """Returns what it adds to the torque of the rigid bodies, (..., n) [N m]."""
 
-    @classmethod
-    def least_shapes(cls, travel: float) -> dict[str, float]:
-        """Returns the least values of shape parameters that a motion can show.
 
-        By name; a smaller one is beyond what the motion could tell from others.
+class JointMemoryEffect(ArmEffect, abc.ABC):
+    """Acts at one joint of an arm, by the path on which it came where it is.
+
+    It does not depend on the speed. What it remembers is a number, zero as an episode
+    begins.
+
+    Attributes:
+        joint: its name in the URDF.
+    """
+
+    joint: str
+
+    @abc.abstractmethod
+    def remember(self, memory: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+        """Returns the memory after a displacement in one direction.
+
+        Affine in the memory, and the same for a displacement in two parts.
 
         Args:
-            travel: from one end of the joint's motion to the other [rad].
+            memory: (...) before.
+            displacement: (...) of the joint [rad].
         """
-        return {}
+
+    @abc.abstractmethod
+    def torque(self, memory: np.ndarray) -> np.ndarray:
+        """Returns what it adds to the torque of the rigid bodies, (...) [N m]."""
+
+    def along(self, q: np.ndarray) -> np.ndarray:
+        """Returns the memory (n,) along a path (n,) of the joint, from its begin on."""
+        dq = np.diff(q)
+        to_zero = self.remember(np.zeros_like(dq), dq)
+        kept = self.remember(np.ones_like(dq), dq) - to_zero
+        steps = zip(kept.tolist(), to_zero.tolist(), strict=True)
+        path = itertools.accumulate(steps, lambda m, ab: ab[0] * m + ab[1], initial=0.0)
+        return np.fromiter(path, np.float64, len(q))

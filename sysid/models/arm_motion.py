@@ -14,16 +14,27 @@ from drake_disasm.effects import (
     ArmTilt,
     ArmTorqueEffect,
     DelayEffect,
+    EncoderError,
     FlangePayload,
     JointElasticity,
+    JointMemoryEffect,
 )
 from drake_disasm.logs import Episode
 from sysid.models.base import Array
-from sysid.models.elastic_torques import ElasticTorques
+from sysid.models.link_torques import LinkTorques
+from sysid.models.path_memory import PathMemory
 from sysid.models.regressor import ArmDynamics, BaseSet
 
 #: Effects that show in the torques of a motion: what `ArmMotion` knows.
-IN_TORQUES = (ArmTorqueEffect, DelayEffect, FlangePayload, ArmTilt, JointElasticity)
+IN_TORQUES = (
+    ArmTorqueEffect,
+    DelayEffect,
+    FlangePayload,
+    ArmTilt,
+    JointElasticity,
+    JointMemoryEffect,
+    EncoderError,
+)
 
 _BY_SAMPLE = (
     "row",
@@ -54,7 +65,8 @@ class ArmMotion:
         Y_tilt: (n, joints, b, 2) derivative of Y by a tilt [rx, ry] of the base.
         tilt: (n, joints, 2) the same of the torques by the nominal parameters.
         nominal: (b,) base parameters by the URDF.
-        elastic: of all samples of the log.
+        linked: of all samples of the log.
+        paths: of all samples of the log.
     """
 
     joints: tuple[str, ...]
@@ -69,7 +81,8 @@ class ArmMotion:
     Y_tilt: Array
     tilt: Array
     nominal: Array
-    elastic: ElasticTorques
+    linked: LinkTorques
+    paths: PathMemory
 
     @classmethod
     def of(
@@ -100,7 +113,8 @@ class ArmMotion:
             Y_tilt[:, :, base.independent],
             np.einsum("njkt,k->njt", Y_tilt, arm.inertia),
             base.beta(arm.inertia),
-            ElasticTorques(arm.urdf, joints, time, episode, np.stack([q, v, vd])),
+            LinkTorques(arm.urdf, joints, time, episode, np.stack([q, v, vd])),
+            PathMemory(joints, episode, q),
         )
 
     def rows(self, chosen: slice | NDArray[np.bool_]) -> Self:
@@ -121,6 +135,11 @@ class ArmMotion:
         for effect in effects:
             if isinstance(effect, ArmTorqueEffect) and not effect.is_null:
                 torque = torque + effect.torques(samples)
+            elif isinstance(effect, JointMemoryEffect) and not effect.is_null:
+                added = np.zeros_like(torque)
+                memory = self.paths.of(effect)[self.row]
+                added[:, self.joints.index(effect.joint)] = effect.torque(memory)
+                torque = torque + added
         return torque
 
     def samples(self, beta: Array, effects: Sequence[ArmEffect]) -> ArmSamples:
@@ -128,8 +147,8 @@ class ArmMotion:
 
         Args:
             beta: (b,) base parameters.
-            effects: on the arm; bodies that it carries, a tilt and gears that yield
-                are in the load.
+            effects: on the arm; bodies that it carries, a tilt, gears that yield and
+                encoders that are wrong are in the load.
         """
         load: Array = self.Y @ beta
         for effect in effects:
@@ -139,9 +158,21 @@ class ArmMotion:
                 by_base = np.einsum("njbt,b->njt", self.Y_tilt, beta - self.nominal)
                 load = load + (self.tilt + by_base) @ [effect.rx, effect.ry]
             elif isinstance(effect, JointElasticity) and not effect.is_null:
-                by_compliance = self.elastic.by_compliance(effect.joint)[self.row]
+                by_compliance = self.linked.by_compliance(effect.joint)[self.row]
                 load = load + effect.compliance * by_compliance
+            elif isinstance(effect, EncoderError):
+                load = load + self._by_encoder(effect)
         return ArmSamples(self.joints, self.q, self.v, self.vd, load)
+
+    def _by_encoder(self, effect: EncoderError) -> Array | float:
+        """Returns what an encoder's error changes of the load (n, joints)."""
+        linked, row, joint = self.linked, self.row, effect.joint
+        changed: Array | float = 0.0
+        if effect.offset:
+            changed = changed + effect.offset * linked.by_offset(joint)[row]
+        if effect.scale:
+            changed = changed + effect.scale * linked.by_scale(joint)[row]
+        return changed
 
     def shifted(self, torque: Array, effects: Sequence[DelayEffect]) -> Array:
         """Returns torques (n, joints) as they are read, late or early.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.effects import Effect, JointEffect
+from drake_disasm.effects import ArmEffect, Effect
 from sysid.parameters import Parameter
 
 _RESTS = 0.05  # of the greatest speed: noise of a filtered velocity is no motion
@@ -103,9 +103,9 @@ def is_shown(
         travel: of each joint, by name [rad or m]; none if the model has no joints.
         one_way: joints that move one way only.
     """
-    if not isinstance(effect, JointEffect):
+    if not isinstance(effect, ArmEffect):
         return True
-    if effect.needs_both_ways and effect.joint in one_way:
+    if effect.needs_both_ways and getattr(effect, "joint", "") in one_way:
         return False
     least = _least_shapes(effect, travel)
     return all(getattr(effect, name) >= value for name, value in least.items())
@@ -133,6 +133,7 @@ def within_travel(
 
 
 def _least_shapes(effect: Effect, travel: Mapping[str, float]) -> dict[str, float]:
-    if not isinstance(effect, JointEffect) or effect.joint not in travel:
+    joint = getattr(effect, "joint", "")
+    if not isinstance(effect, ArmEffect) or joint not in travel:
         return {}
-    return effect.least_shapes(travel[effect.joint])
+    return effect.least_shapes(travel[joint])

@@ -8,8 +8,8 @@ from drake_disasm.effects import Effect, JointElasticity
 from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.close_loop import close_loop
-from sysid.models.elastic_torques import time_derivatives
 from sysid.models.joint_motion import JointMotionModel
+from sysid.models.link_torques import time_derivatives
 from sysid.models.regressor import ArmDynamics
 from tests.sysid.models.arm import (
     JOINTS,
