@@ -14,7 +14,10 @@ from pydrake.multibody.tree import (
 from pydrake.symbolic import Expression, Variable
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import (
+    Adder,
     ConstantVectorSource,
+    Demultiplexer,
+    LinearSystem,
     Multiplexer,
     SymbolicVectorSystem,
 )
@@ -23,8 +26,8 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.effects import (
     ArmEffect,
+    EncoderError,
     FlangePayload,
-    JointEffect,
     JointViscousFriction,
     RotorInertia,
     TorqueGain,
@@ -33,18 +36,19 @@ from drake_disasm.effects import (
 from drake_disasm.stations.base import Parts
 from drake_disasm.stations.flange_payload import add_payload_body, payload_inertia
 from drake_disasm.stations.joint_friction import (
-    DRY_FRICTION,
+    IN_JOINTS,
     JointFriction,
     steepest_slope,
 )
 
 _CARRIED = (
-    *DRY_FRICTION,
+    *IN_JOINTS,
     JointViscousFriction,
     RotorInertia,
     TorqueGain,
     TorqueOffset,
     FlangePayload,
+    EncoderError,
 )
 
 
@@ -75,22 +79,25 @@ class _ArmNumbers:
         damping: (n,) of the joints [N m s/rad].
         friction: (k,) values of the friction's symbols.
         misreading: (2 n,) share and offset [N m] of each torque sensor's error.
+        encoders: (2 n,) offset [rad] and scale of each encoder's error.
     """
 
     rotor_inertia: list[float]
     damping: list[float]
     friction: np.ndarray
     misreading: np.ndarray
+    encoders: np.ndarray
 
 
 class ArmMechanics:
-    """The arm's friction, rotors, payload and sensors.
+    """The arm's friction, springs, rotors, payload and sensors.
 
     Viscous friction is a joint's damping, which the solver takes implicitly; a
     rotor's inertia and the payload are Drake's own as well. Drake's joints have no
     dry friction, so a separate system adds it as a generalized force in each
-    of the plant's steps. It is made of the effects' own equations as symbolic
-    expressions, which Drake evaluates without Python.
+    of the plant's steps, and the torque of a spring. It is made of the effects' own
+    equations as symbolic expressions, which Drake evaluates without Python. What
+    pre-sliding friction remembers is the state of a system of its own.
 
     A force by the velocity at a step's beginning overshoots where it is steeper than
     M / h (M the rotor's inertia, h the step), so a joint's `creep` is widened to what
@@ -98,7 +105,8 @@ class ArmMechanics:
     changes; slower, and at rest, the joint gives way at that speed.
 
     Torque sensor errors appear in `torque_measured` only: the cell's drives do not use
-    it, and `torque_external` is the true external torque.
+    it, and `torque_external` is the true external torque. Encoder errors reach the
+    controller, too: it takes the arm to where the encoders read what is commanded.
 
     Args:
         plant: with the arm, not yet finalized.
@@ -129,12 +137,17 @@ class ArmMechanics:
                 actuator.default_gear_ratio(),
                 joint.default_damping(),
             )
-        self._friction = [JointFriction(name) for name in self._joints]
+        h = plant.time_step()
+        self._friction = [JointFriction(name, h) for name in self._joints]
         self._defaults = self._numbers(effects)
         self._set_defaults()
 
     def wire(
-        self, builder: DiagramBuilder, velocity: OutputPort, torque: OutputPort
+        self,
+        builder: DiagramBuilder,
+        position: OutputPort,
+        velocity: OutputPort,
+        torque: OutputPort,
     ) -> OutputPort:
         """Adds friction and torque sensor to the diagram.
 
@@ -143,7 +156,7 @@ class ArmMechanics:
 
         Args:
             builder: of the station, whose plant is finalized.
-            velocity: of the joints.
+            position, velocity: of the joints.
             torque: of their drives, in the step before.
 
         Returns:
@@ -151,15 +164,18 @@ class ArmMechanics:
         """
         self._friction_values = ConstantVectorSource(self._defaults.friction)
         self._misreading = ConstantVectorSource(self._defaults.misreading)
+        count, h = len(self._joints), self._plant.time_step()
+        one, none = np.eye(count), np.zeros((count, count))
+        self._memory = LinearSystem(none, one, one, none, h)
+        builder.AddNamedSystem("arm_friction_memory", self._memory)
         friction = _add_symbolic(
             builder,
             "arm_friction",
             self._friction_system(),
-            [velocity, torque],
+            [position, velocity, torque, self._memory.get_output_port()],
             self._friction_values,
         )
-        forces = self._plant.get_applied_generalized_force_input_port()
-        builder.Connect(friction, forces)
+        self._connect_friction(builder, friction)
         return _add_symbolic(
             builder,
             "arm_torque_sensor",
@@ -167,6 +183,45 @@ class ArmMechanics:
             [torque],
             self._misreading,
         )
+
+    def wire_encoders(
+        self, builder: DiagramBuilder, state: OutputPort, desired: OutputPort
+    ) -> tuple[OutputPort, OutputPort]:
+        """Adds the encoders to the diagram.
+
+        Args:
+            builder: of the station.
+            state: (2 n,) positions and velocities of the joints.
+            desired: (2 n,) of them, as encoders should read.
+
+        Returns:
+            The port of what encoders read (2 n,), and that of the state (2 n,) which
+            the plant's own drives have to go for, as they know nothing of encoders.
+        """
+        self._encoder_errors = ConstantVectorSource(self._defaults.encoders)
+        size = state.size()
+        reading = _add_symbolic(
+            builder,
+            "arm_encoders",
+            _encoders(list(self._joints)),
+            [state],
+            self._encoder_errors,
+        )
+        split = builder.AddNamedSystem("arm_encoders_split", Demultiplexer([size] * 2))
+        builder.Connect(reading, split.get_input_port())
+        goal = builder.AddNamedSystem("arm_drives_desired", Adder(2, size))
+        builder.Connect(desired, goal.get_input_port(0))
+        builder.Connect(split.get_output_port(1), goal.get_input_port(1))
+        return split.get_output_port(0), goal.get_output_port()
+
+    def take_as_default(self, parts: Parts) -> None:
+        """Makes what friction remembers in a Context that of the default Context."""
+        memory = parts(self._memory).get_discrete_state_vector()
+        self._memory.configure_default_state(memory.CopyToVector())
+
+    def forget(self, parts: Parts) -> None:
+        """Lets friction remember nothing."""
+        parts(self._memory).SetDiscreteState(np.zeros(len(self._joints)))
 
     def set_effects(self, effects: Sequence[ArmEffect], parts: Parts) -> None:
         """Puts effects, and no others, onto the arm of a Context.
@@ -184,6 +239,7 @@ class ArmMechanics:
         for source, values in (
             (self._friction_values, numbers.friction),
             (self._misreading, numbers.misreading),
+            (self._encoder_errors, numbers.encoders),
         ):
             value = source.get_mutable_source_value(parts(source))
             value.SetFromVector(values)
@@ -198,17 +254,18 @@ class ArmMechanics:
             joint.actuator.set_default_rotor_inertia(rotor_inertia)
             joint.joint.set_default_damping(damping)
 
-    def _by_joint(self, effects: Sequence[ArmEffect]) -> dict[str, list[JointEffect]]:
-        own: dict[str, list[JointEffect]] = {name: [] for name in self._joints}
+    def _by_joint(self, effects: Sequence[ArmEffect]) -> dict[str, list[ArmEffect]]:
+        own: dict[str, list[ArmEffect]] = {name: [] for name in self._joints}
         for effect in effects:
-            if not isinstance(effect, JointEffect):
+            joint = getattr(effect, "joint", None)
+            if joint is None:
                 continue
-            if effect.joint not in own:
+            if joint not in own:
                 raise DisasmError(
                     f"{type(effect).__name__}.joint: the arm has no joint "
-                    f"'{effect.joint}'; {closest(effect.joint, list(own))}"
+                    f"'{joint}'; {closest(joint, list(own))}"
                 )
-            own[effect.joint].append(effect)
+            own[joint].append(effect)
         return own
 
     def _numbers(self, effects: Sequence[ArmEffect]) -> _ArmNumbers:
@@ -224,17 +281,28 @@ class ArmMechanics:
             [_damping(joint, own[name]) for name, joint in joints],
             np.array(friction),
             np.concatenate([_misreading(own[name]) for name in self._joints]),
+            np.concatenate([_encoder_error(own[name]) for name in self._joints]),
         )
 
     def _friction_system(self) -> SymbolicVectorSystem:
-        """Returns the system that adds friction to the plant."""
+        """Returns the system of the forces on the plant, and of friction's memory."""
         joints = self._friction
         applied = np.array([Expression(0.0)] * self._plant.num_velocities())
         for joint, symbols in zip(self._joints.values(), joints, strict=True):
             applied[joint.joint.velocity_start()] = symbols.applied()
-        inputs = [joint.v for joint in joints] + [joint.u for joint in joints]
+        inputs = [getattr(j, n) for n in ("q", "v", "u", "memory") for j in joints]
         inputs += [symbol for joint in joints for symbol in joint.parameters]
-        return SymbolicVectorSystem(input=np.array(inputs), output=applied)
+        output = [*applied, *(joint.remembered() for joint in joints)]
+        return SymbolicVectorSystem(input=np.array(inputs), output=np.array(output))
+
+    def _connect_friction(self, builder: DiagramBuilder, friction: OutputPort) -> None:
+        """Connects forces to the plant, and what is remembered to the memory."""
+        sizes = [self._plant.num_velocities(), len(self._joints)]
+        split = builder.AddNamedSystem("arm_friction_split", Demultiplexer(sizes))
+        builder.Connect(friction, split.get_input_port())
+        forces = self._plant.get_applied_generalized_force_input_port()
+        builder.Connect(split.get_output_port(0), forces)
+        builder.Connect(split.get_output_port(1), self._memory.get_input_port())
 
 
 def refuse_unknown_arm_effects(effects: Sequence[ArmEffect]) -> None:
@@ -282,19 +350,40 @@ def _torque_sensor(joints: Sequence[str]) -> SymbolicVectorSystem:
     )
 
 
-def _misreading(effects: Sequence[JointEffect]) -> np.ndarray:
+def _encoders(joints: Sequence[str]) -> SymbolicVectorSystem:
+    """Returns the system of what encoders read (2 n,), and of that less the truth."""
+    q, v = ([Variable(f"{name}.{x}") for name in joints] for x in "qv")
+    errors = [
+        EncoderError(n, Variable(f"{n}.offset"), Variable(f"{n}.scale")) for n in joints
+    ]
+    pairs = [e.reading(*state) for e, *state in zip(errors, q, v, strict=True)]
+    reading = [value for values in zip(*pairs, strict=True) for value in values]
+    ahead = [true - read for true, read in zip([*q, *v], reading, strict=True)]
+    parameters = [symbol for e in errors for symbol in (e.offset, e.scale)]
+    return SymbolicVectorSystem(
+        input=np.array([*q, *v, *parameters]), output=np.array([*reading, *ahead])
+    )
+
+
+def _misreading(effects: Sequence[ArmEffect]) -> np.ndarray:
     """Returns share and offset (2,) by which a joint's sensor is wrong."""
     share = sum(e.share for e in effects if isinstance(e, TorqueGain))
     offset = sum(e.size for e in effects if isinstance(e, TorqueOffset))
     return np.array([share, offset], dtype=float)
 
 
-def _rotor_inertia(joint: _Joint, effects: Sequence[JointEffect]) -> float:
+def _encoder_error(effects: Sequence[ArmEffect]) -> np.ndarray:
+    """Returns offset and scale (2,) by which a joint's encoder is wrong."""
+    wrong = [e for e in effects if isinstance(e, EncoderError)]
+    return np.array([sum(e.offset for e in wrong), sum(e.scale for e in wrong)], float)
+
+
+def _rotor_inertia(joint: _Joint, effects: Sequence[ArmEffect]) -> float:
     """Returns a drive's rotor inertia; effects add reflected inertia."""
     more = sum(e.inertia for e in effects if isinstance(e, RotorInertia))
     return joint.rotor_inertia + more / joint.gear_ratio**2
 
 
-def _damping(joint: _Joint, effects: Sequence[JointEffect]) -> float:
+def _damping(joint: _Joint, effects: Sequence[ArmEffect]) -> float:
     more = sum(e.coefficient for e in effects if isinstance(e, JointViscousFriction))
     return joint.damping + more

@@ -148,15 +148,17 @@ class CellStation(SimulatedStation):
             ),
         )
         connect(command.get_output_port(), desired.get_input_port())
-        self._wire_torques(builder, desired.get_output_port())
-        state = builder.AddNamedSystem("iiwa_state", Demultiplexer([7, 7]))
-        connect(plant.get_state_output_port(self.iiwa), state.get_input_port())
+        reading = self._wire_torques(builder, desired.get_output_port())
+        position, velocity = self._in_halves(
+            builder, "iiwa_state", plant.get_state_output_port(self.iiwa)
+        )
         torque = plant.get_net_actuation_output_port(self.iiwa)
-        measured = self._mechanics.wire(builder, state.get_output_port(1), torque)
+        measured = self._mechanics.wire(builder, position, velocity, torque)
+        position, velocity = self._in_halves(builder, "iiwa_reading", reading)
         outputs = {
             "position_commanded": command.get_output_port(),
-            "position_measured": state.get_output_port(0),
-            "velocity_estimated": state.get_output_port(1),
+            "position_measured": position,
+            "velocity_estimated": velocity,
             "torque_commanded": torque,
             "torque_measured": measured,
             "torque_external": self._external_torque(builder),
@@ -165,14 +167,26 @@ class CellStation(SimulatedStation):
             builder.ExportOutput(port, f"iiwa.{quantity}")
         export_ready_device(builder, "iiwa", self.time_step)
 
-    def _wire_torques(self, builder: DiagramBuilder, desired: OutputPort) -> None:
-        """Adds the controller: springs about a desired state (14,), and gravity's part.
+    @staticmethod
+    def _in_halves(
+        builder: DiagramBuilder, name: str, state: OutputPort
+    ) -> tuple[OutputPort, OutputPort]:
+        """Returns ports of the positions (7,) and velocities (7,) of a state (14,)."""
+        halves = builder.AddNamedSystem(name, Demultiplexer([7, 7]))
+        builder.Connect(state, halves.get_input_port())
+        return halves.get_output_port(0), halves.get_output_port(1)
 
-        Springs in the joints are the plant's own; gravity compensation is by the
-        controller's own model of arm and tool.
+    def _wire_torques(self, builder: DiagramBuilder, desired: OutputPort) -> OutputPort:
+        """Adds encoders and controller; returns the port of what encoders read (14,).
+
+        Springs about a desired state (14,), and gravity's part. Springs in the joints
+        are the plant's own; gravity compensation is by the controller's own model of
+        arm and tool.
         """
         plant, iiwa, connect = self.plant, self.iiwa, builder.Connect
-        state = plant.get_state_output_port(iiwa)
+        state, goal = self._mechanics.wire_encoders(
+            builder, plant.get_state_output_port(iiwa), desired
+        )
         weight = builder.AddNamedSystem(
             "iiwa_gravity_compensation",
             InverseDynamics(self._dynamics.plant, InverseDynamics.kGravityCompensation),
@@ -180,9 +194,9 @@ class CellStation(SimulatedStation):
         connect(state, weight.get_input_port(0))
         actuation = plant.get_actuation_input_port(iiwa)
         if self.scenario.arm.control != "cartesian_impedance":
-            connect(desired, plant.get_desired_state_input_port(iiwa))
+            connect(goal, plant.get_desired_state_input_port(iiwa))
             connect(weight.get_output_port(), actuation)
-            return
+            return state
         spring = builder.AddNamedSystem(
             "iiwa_cartesian_impedance",
             CartesianImpedance(self.scenario.arm, self._dynamics, self.start),
@@ -193,6 +207,7 @@ class CellStation(SimulatedStation):
         connect(weight.get_output_port(), torque.get_input_port(0))
         connect(spring.get_output_port(), torque.get_input_port(1))
         connect(torque.get_output_port(), actuation)
+        return state
 
     def _external_torque(self, builder: DiagramBuilder) -> OutputPort:
         """Returns the port of what pushes on the arm, the bolt being part of its tool.
@@ -277,6 +292,13 @@ class CellStation(SimulatedStation):
 
     def _set_arm_effects(self, context: Context, effects: Sequence[ArmEffect]) -> None:
         self._mechanics.set_effects(effects, self._parts(context))
+
+    def _take_as_default(self, settled: Context) -> None:
+        """Lets the arm begin with the friction that it has come to rest with."""
+        self._mechanics.take_as_default(self._parts(settled))
+
+    def _unsettle(self, context: Context) -> None:
+        self._mechanics.forget(self._parts(context))
 
     def _fix_commands(self, context: Context) -> None:
         super()._fix_commands(context)

@@ -3,6 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
+from drake_disasm.common.arrays import Array
 from drake_disasm.effects.base import ArmEffect
 from drake_disasm.effects.fields import amplitude, joint_name
 from drake_disasm.effects.registry import register_effect
@@ -46,3 +47,7 @@ class EncoderError(ArmEffect):
         "RotorInertia": "swings of this joint with two known payloads: a scale changes "
         "what the links take, a rotor's share stays",
     }
+
+    def reading(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Returns position and velocity (...) as they are read of the joint's own."""
+        return q + self.scale * q + self.offset, v + self.scale * v

@@ -87,6 +87,62 @@ def test_friction_does_not_chatter_when_the_joint_comes_to_rest(station):
     assert np.abs(np.diff(torques[-150:], 2)).max() < 0.01
 
 
+def test_a_joint_that_slides_takes_all_of_its_pre_sliding_friction(station, without):
+    measured = _forth_and_back(station, [fx.JointDahlFriction(NAME, 6.0, 0.002)])
+    np.testing.assert_allclose(measured - without, [6.0, -6.0], atol=0.03)
+
+
+def test_pre_sliding_friction_follows_the_path(station: CellStation) -> None:
+    """Dahl's closed form along the joint's path, through reversals ever smaller."""
+    effect = fx.JointDahlFriction(NAME, 6.0, 0.002)
+    t = station.control_period * np.arange(1, 201)
+    simulator = _lifted(station, [effect])
+    context, path = simulator.get_mutable_context(), [_joint(station, simulator)]
+    simulator.set_monitor(lambda _: path.append(_joint(station, simulator)))
+    _drive(station, simulator, 0.01 * np.exp(-4.0 * t) * np.sin(24.0 * t))
+    force = station.GetSubsystemByName("arm_friction").get_output_port()
+    forces = force.Eval(station.part_context(force.get_system(), context))
+    expected = effect.torque(effect.along(np.array(path)))
+    assert 0.1 < abs(expected[-1]) < 5.9
+    assert np.abs(forces + expected[-1]).min() < 1e-6
+
+
+def _joint(station: CellStation, simulator: Simulator) -> float:
+    """Returns where the joint truly is."""
+    context = simulator.get_mutable_context()
+    plant_context = station.part_context(station.plant, context)
+    return float(station.plant.GetPositions(plant_context, station.iiwa)[JOINT])
+
+
+def test_a_spring_is_held_by_the_drive(station: CellStation) -> None:
+    effect = fx.JointSpring(NAME, stiffness=30.0, preload=-12.0)
+    torques = []
+    for effects in ([], [effect]):
+        simulator = _lifted(station, effects)
+        simulator.AdvanceTo(0.6)
+        context = simulator.get_mutable_context()
+        torques.append(station.GetOutputPort("iiwa.torque_measured").Eval(context))
+    expected = np.zeros(7)
+    expected[JOINT] = 30.0 * _joint(station, simulator) - 12.0
+    np.testing.assert_allclose(torques[1] - torques[0], expected, atol=0.05)
+
+
+@pytest.mark.parametrize("control", ["position", "cartesian_impedance"])
+def test_an_arm_goes_where_its_encoders_read_the_command(control: str) -> None:
+    scenario = load_scenario("removal", [QUIET, "gripper.hold=weld"])
+    scenario.arm.control = control
+    station = CellStation(scenario)
+    effect = fx.EncoderError(NAME, offset=0.004, scale=-0.003)
+    simulator = _lifted(station, [effect])
+    simulator.AdvanceTo(0.8)
+    context = simulator.get_mutable_context()
+    true, command = _joint(station, simulator), (station.start + LIFT)[JOINT]
+    read = station.GetOutputPort("iiwa.position_measured").Eval(context)[JOINT]
+    assert read == pytest.approx(effect.reading(true, 0.0)[0], abs=1e-12)
+    assert read == pytest.approx(command, abs=1e-3)
+    assert true - command == pytest.approx(-0.004 + 0.003 * command, abs=1e-3)
+
+
 def test_a_rotor_takes_torque_while_it_speeds_up(station: CellStation) -> None:
     """2 kg m^2 at 0.5 rad/s^2 are 1 N m; at the first instants, near one place."""
     t = station.control_period * np.arange(1, 121)
@@ -118,8 +174,8 @@ def test_a_payload_bends_the_joints(station: CellStation) -> None:
 
 def _parameters(station: CellStation, context: Context) -> np.ndarray:
     """Returns all numbers that effects on the arm may change."""
-    systems = ("arm_friction_parameters", "arm_torque_sensor_parameters")
-    named = map(station.GetSubsystemByName, systems)
+    systems = ("arm_friction", "arm_torque_sensor", "arm_encoders")
+    named = [station.GetSubsystemByName(f"{name}_parameters") for name in systems]
     contexts = [station.part_context(part, context) for part in (station.plant, *named)]
     return np.concatenate(
         [
@@ -139,10 +195,13 @@ EVERY = (
     fx.RotorInertia(NAME, 2.0),
     fx.TorqueOffset(NAME, -2.0),
     fx.TorqueGain(NAME, 0.1),
+    fx.JointDahlFriction(NAME, 6.0),
+    fx.JointSpring(NAME, 30.0, -12.0),
+    fx.EncoderError(NAME, 0.004, -0.003),
     fx.FlangePayload(2.0, 0.1),
 )
 NULL = (
-    *(type(e)(NAME) for e in EVERY if isinstance(e, fx.JointEffect)),
+    *(type(e)(NAME) for e in EVERY if hasattr(e, "joint")),
     fx.FlangePayload(),
 )
 
@@ -171,6 +230,7 @@ def test_each_effect_changes_the_arm_which_the_twin_has_not_and_none_stays(
 @pytest.mark.parametrize(("effects", "words"), [
     ([fx.TorqueOffset("iiwa_join_4", 1.0)], ["did you mean 'iiwa_joint_4'"]),
     ([fx.RotorInertia("iiwa_join_4", 1.0)], ["did you mean 'iiwa_joint_4'"]),
+    ([fx.EncoderError("iiwa_join_4", 1.0)], ["did you mean 'iiwa_joint_4'"]),
     ([fx.JointLoadFriction(NAME, 0.1)] * 2, ["twice on iiwa_joint_4", "merge"]),
     ([fx.FlangePayload(cx=0.1)], ["no mass", "give it a mass"]),
 ])  # fmt: skip

@@ -27,6 +27,9 @@ ANYWHERE: list[fx.Effect] = [
 ON_ARM: list[fx.Effect] = [
     fx.JointViscousFriction(JOINT, 80.0),
     fx.JointCoulombFriction(JOINT, 9.0),
+    fx.JointDahlFriction(JOINT, 6.0),
+    fx.JointSpring(JOINT, 10.0, 15.0),
+    fx.EncoderError(JOINT, 1e-4, 1e-4),
     fx.RotorInertia(JOINT, 2.0),
     fx.TorqueOffset(JOINT, -2.0),
     fx.FlangePayload(0.3, 0.01, 0.0, 0.02),
