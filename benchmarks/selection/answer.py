@@ -11,6 +11,8 @@ from drake_disasm.common.files import write_text
 
 #: What an answer may say of a log as a whole.
 ENDINGS = ("none", "too short", "explained", "partly", "unexplained", "refused")
+#: What the text of an answer begins with where the selector failed.
+FAILED = "failed: "
 GROUPS = ("null", "one", "three", "left out", "real whole", "real half")
 
 

@@ -6,7 +6,6 @@ by the candidates' amplitudes, in SI units.
 """
 
 import dataclasses
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -179,9 +178,16 @@ class Columns:
         ambiguous: dict[str, tuple[str, ...]],
         sizes: dict[str, tuple[float, float, float]],
     ) -> Answer:
-        """Returns an answer with the held-out errors, which the time leaves out."""
-        begin = time.perf_counter()
-        columns = [int(c) for option in chosen for c in option.columns]
+        """Returns an answer with the held-out errors.
+
+        Args:
+            ending: of the answer.
+            chosen: options in the model; names that are not confirmed are suggested.
+            confirmed: names.
+            ambiguous: rivals of names.
+            sizes: values and intervals.
+        """
+        columns = columns_of(chosen)
         names = dict.fromkeys(n for option in chosen for n in option.names)
         return Answer(
             ending,
@@ -191,8 +197,12 @@ class Columns:
             sizes,
             self.held_out_error([]),
             self.held_out_error(columns),
-            text=f"errors took {time.perf_counter() - begin:.1f} s",
         )
+
+
+def columns_of(options: Sequence[Option]) -> list[int]:
+    """Returns the columns of options, each once."""
+    return list(dict.fromkeys(int(c) for o in options for c in o.columns))
 
 
 def without_base(columns: Array, base: Array) -> Array:

@@ -42,7 +42,7 @@ from drake_disasm.common.finished_work import FinishedWork
 from drake_disasm.common.program import ProgressBar, argument_parser, run
 from drake_disasm.common.progress import ProgressUpdate
 from selection import scores
-from selection.answer import Answer, Case, Select, refusal
+from selection.answer import FAILED, Answer, Case, Select, refusal
 from selection.cases import case_of, chosen
 
 _PROGRAM = "benchmarks/selection/judge.py"
@@ -143,6 +143,8 @@ def judged(
 ) -> list[scores.Judged]:
     """Returns cases with their answers; those that are kept are not asked for again.
 
+    But those at which the selector failed are.
+
     Args:
         select: answers.
         names: of the cases.
@@ -154,7 +156,8 @@ def judged(
     found = []
     for number, name in enumerate(names, start=1):
         case = case_of(name, logs)
-        if kept.get(name) is None:
+        known = kept.get(name)
+        if known is None or known["text"].startswith(FAILED):
             kept.keep(name, asked(select, case).plain)
         found.append(scores.Judged(case, Answer.of_plain(kept.get(name))))
         said = ", ".join(found[-1].answer.confirmed) or found[-1].answer.ending
@@ -174,7 +177,7 @@ def asked(select: Select, case: Case) -> Answer:
     except DisasmError as error:
         answer = refusal(error)
     except Exception as error:  # a selector's failure is a result, too
-        answer = Answer("refused", text=f"failed: {type(error).__name__}: {error}")
+        answer = Answer("refused", text=f"{FAILED}{type(error).__name__}: {error}")
     if answer.seconds:
         return answer
     took = time.perf_counter() - begin
@@ -196,7 +199,7 @@ def print_tables(found: dict[str, list[scores.Judged]], each: bool) -> None:
     if real:
         print(f"\n{markdown(scores.REAL_COLUMNS, real)}")
     for selector, own in found.items():
-        failed = [j for j in own if j.answer.text.startswith("failed: ")]
+        failed = [j for j in own if j.answer.text.startswith(FAILED)]
         if failed:
             first = f"{failed[0].case.name}: {failed[0].answer.text}"
             print(f"\n{selector}: failed at {len(failed)} cases, the first {first}")

@@ -15,7 +15,15 @@ import numpy as np
 from scipy import stats
 
 from selection.answer import Answer, Case
-from selection.columns import Array, Columns, Option, gain_of, solved, without_base
+from selection.columns import (
+    Array,
+    Columns,
+    Option,
+    columns_of,
+    gain_of,
+    solved,
+    without_base,
+)
 
 _ALPHA = 0.05  # family-wise, over all options
 _NEAR = 0.9  # of the best gain: as good an explanation
@@ -36,7 +44,7 @@ def select(case: Case) -> Answer:
     """Returns what the sketch says of a case."""
     columns, steps = Columns.of(case), list[Step]()
     while len(steps) < len(columns.options):
-        chosen = [c for step in steps for c in step.option.columns]
+        chosen = columns_of([step.option for step in steps])
         best, rivals = best_option(columns, chosen)
         if best is None or not _is_more_than_chance(columns, chosen, best):
             break
@@ -67,7 +75,10 @@ def best_option(
     left, size = without_base(X, base), np.linalg.norm(X, axis=0)
     residual = without_base(y[:, None], base)[:, 0]
     gains = [
-        gain_of(left[:, o.columns], residual, size[o.columns]) for o in columns.options
+        0.0
+        if set(o.columns) <= set(chosen)
+        else gain_of(left[:, o.columns], residual, size[o.columns])
+        for o in columns.options
     ]
     most = max(gains, default=0.0)
     if most <= 0.0:
@@ -101,7 +112,7 @@ def intervals(
     columns: Columns, options: Sequence[Option]
 ) -> dict[str, tuple[float, float, float]]:
     """Returns value and 95 % interval of each option's amplitudes, by name."""
-    chosen = [int(c) for o in options for c in o.columns]
+    chosen = columns_of(options)
     if not chosen:
         return {}
     weight = columns.weight(chosen)

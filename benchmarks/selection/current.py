@@ -1,0 +1,61 @@
+"""The package's own selection, as it stands in the tree."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drake_disasm.effects import registered_effects
+from drake_disasm.logs import read_logs
+from selection.answer import Answer, Case
+from sysid.effect_selection import close_loop
+from sysid.effect_selection.candidates import extended
+from sysid.models.base import LogModel
+from sysid.models.from_logs import ModelChoice, model_of
+
+
+def select(case: Case) -> Answer:
+    """Returns what closing the loop says of a case."""
+    return closed(case)
+
+
+def closed(case: Case, **arguments: Any) -> Answer:
+    """Returns what closing the loop says of a case.
+
+    Args:
+        case: to explain.
+        arguments: of `close_loop`, such as settings.
+    """
+    library = [e for e in registered_effects() if e.__name__ not in case.left_out]
+    found = close_loop(_model(case.logs), library=library, **arguments)
+    verdict, errors = found.verdict, found.errors
+    before, after = errors.relative(errors.before), errors.relative(errors.after)
+    if case.held_out:
+        other = _model(case.held_out)
+        before, after = (_error(other, fit) for fit in (found.first, found.last))
+    return Answer(
+        verdict.ending,
+        getattr(verdict, "confirmed", verdict.names),
+        getattr(verdict, "suggested", ()),
+        {
+            name: tuple(part for tie in ties for part in tie.name.split(" and "))
+            for name, ties in zip(verdict.names, verdict.ties, strict=True)
+            if ties
+        },
+        {value.name: (value.value, *value.interval) for value in verdict.values},
+        before,
+        after,
+        text=found.sentence,
+    )
+
+
+def _model(folders: tuple[str, ...]) -> LogModel:
+    logs = read_logs([Path(folder) for folder in folders])
+    return model_of(logs, ModelChoice(fixed=True))
+
+
+def _error(other: LogModel, fit: Any) -> float:
+    """Returns the relative error of a fit on another recording."""
+    model, _ = extended(other, fit.effects, with_shapes=True)
+    error = model.begun(fit.theta).predictions(fit.theta) - other.measurements.values
+    return float(np.linalg.norm(error) / np.linalg.norm(other.measurements.values))
