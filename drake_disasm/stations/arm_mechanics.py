@@ -17,6 +17,7 @@ from pydrake.systems.primitives import (
     Adder,
     ConstantVectorSource,
     Demultiplexer,
+    Gain,
     LinearSystem,
     Multiplexer,
     SymbolicVectorSystem,
@@ -200,19 +201,24 @@ class ArmMechanics:
         """
         self._encoder_errors = ConstantVectorSource(self._defaults.encoders)
         size = state.size()
-        reading = _add_symbolic(
+        wrong = _add_symbolic(
             builder,
             "arm_encoders",
             _encoders(list(self._joints)),
             [state],
             self._encoder_errors,
         )
-        split = builder.AddNamedSystem("arm_encoders_split", Demultiplexer([size] * 2))
-        builder.Connect(reading, split.get_input_port())
-        goal = builder.AddNamedSystem("arm_drives_desired", Adder(2, size))
+        against = builder.AddNamedSystem("arm_encoders_against", Gain(-1.0, size))
+        builder.Connect(wrong, against.get_input_port())
+        reading, goal = (
+            builder.AddNamedSystem(name, Adder(2, size))
+            for name in ("arm_encoders_reading", "arm_drives_desired")
+        )
+        builder.Connect(state, reading.get_input_port(0))
+        builder.Connect(wrong, reading.get_input_port(1))
         builder.Connect(desired, goal.get_input_port(0))
-        builder.Connect(split.get_output_port(1), goal.get_input_port(1))
-        return split.get_output_port(0), goal.get_output_port()
+        builder.Connect(against.get_output_port(), goal.get_input_port(1))
+        return reading.get_output_port(), goal.get_output_port()
 
     def take_as_default(self, parts: Parts) -> None:
         """Makes what friction remembers in a Context that of the default Context."""
@@ -351,17 +357,18 @@ def _torque_sensor(joints: Sequence[str]) -> SymbolicVectorSystem:
 
 
 def _encoders(joints: Sequence[str]) -> SymbolicVectorSystem:
-    """Returns the system of what encoders read (2 n,), and of that less the truth."""
+    """Returns the system of how far encoders' readings (2 n,) are off."""
     q, v = ([Variable(f"{name}.{x}") for name in joints] for x in "qv")
     errors = [
         EncoderError(n, Variable(f"{n}.offset"), Variable(f"{n}.scale")) for n in joints
     ]
-    pairs = [e.reading(*state) for e, *state in zip(errors, q, v, strict=True)]
-    reading = [value for values in zip(*pairs, strict=True) for value in values]
-    ahead = [true - read for true, read in zip([*q, *v], reading, strict=True)]
+    off = [e.off(*state) for e, *state in zip(errors, q, v, strict=True)]
     parameters = [symbol for e in errors for symbol in (e.offset, e.scale)]
     return SymbolicVectorSystem(
-        input=np.array([*q, *v, *parameters]), output=np.array([*reading, *ahead])
+        input=np.array([*q, *v, *parameters]),
+        output=np.array(
+            [value for values in zip(*off, strict=True) for value in values]
+        ),
     )
 
 

@@ -48,6 +48,6 @@ class EncoderError(ArmEffect):
         "what the links take, a rotor's share stays",
     }
 
-    def reading(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Returns position and velocity (...) as they are read of the joint's own."""
-        return q + self.scale * q + self.offset, v + self.scale * v
+    def off(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Returns by how much position and velocity (...) are read too large."""
+        return self.offset + self.scale * q, self.scale * v

@@ -138,7 +138,7 @@ def test_an_arm_goes_where_its_encoders_read_the_command(control: str) -> None:
     context = simulator.get_mutable_context()
     true, command = _joint(station, simulator), (station.start + LIFT)[JOINT]
     read = station.GetOutputPort("iiwa.position_measured").Eval(context)[JOINT]
-    assert read == pytest.approx(effect.reading(true, 0.0)[0], abs=1e-12)
+    assert read == pytest.approx(true + effect.off(true, 0.0)[0], abs=1e-12)
     assert read == pytest.approx(command, abs=1e-3)
     assert true - command == pytest.approx(-0.004 + 0.003 * command, abs=1e-3)
 
