@@ -10,7 +10,7 @@ import numpy as np
 
 from selection.answer import Answer, Case
 from selection.columns import Columns, Option, columns_of, gain_of, without_base
-from selection.sketch import ambiguous, intervals
+from selection.inference import ambiguous, intervals
 
 _VERY_STRONG = 10.0
 

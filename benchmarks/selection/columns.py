@@ -100,7 +100,7 @@ class Columns:
             -fit.residual * sigma,
             J[..., :own],
             J[..., own:],
-            tuple(c.only([field]) for c in chosen for field in c.fields),
+            _owners(longer, chosen, groups),
             _options(chosen, [np.array(g, dtype=np.int64) - own for g in groups]),
         )
 
@@ -251,12 +251,27 @@ def _library(case: Case) -> list[type[Effect]]:
     return [e for e in registered_effects() if e.__name__ not in case.left_out]
 
 
+def _owners(
+    longer: LogModel, chosen: Sequence[Candidate], groups: Sequence[range]
+) -> tuple[Candidate, ...]:
+    """Returns of each new parameter the candidate with that amplitude alone."""
+    return tuple(
+        candidate.only([longer.parameters[i].name.rpartition(".")[2]])
+        for candidate, own in zip(chosen, groups, strict=True)
+        for i in own
+    )
+
+
 def _options(
     chosen: Sequence[Candidate], groups: Sequence[NDArray[np.int64]]
 ) -> tuple[Option, ...]:
-    """Returns each candidate, and each kind at all joints, as an option."""
-    columns = {c.text: own for c, own in zip(chosen, groups, strict=True)}
-    sets = [*((c,) for c in chosen), *joint_groups(chosen)]
+    """Returns each candidate, and each kind at all joints, as an option.
+
+    But for those whose amplitudes are the model's own parameters.
+    """
+    columns = {c.text: own for c, own in zip(chosen, groups, strict=True) if len(own)}
+    new = [c for c in chosen if c.text in columns]
+    sets = [*((c,) for c in new), *joint_groups(new)]
     return tuple(
         Option(own, np.concatenate([columns[c.text] for c in own])) for own in sets
     )

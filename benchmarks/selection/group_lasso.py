@@ -13,7 +13,7 @@ import numpy as np
 from drake_disasm.common.errors import DisasmError
 from selection.answer import Answer, Case
 from selection.columns import FOLDS, Array, Columns, Option, without_base
-from selection.sketch import intervals
+from selection.inference import intervals
 
 _PENALTIES = np.geomspace(1.0, 1e-3, 30)  # of the least that leaves nothing
 _LEAST = 1e-5  # of a column, that the model's own parameters can't take up

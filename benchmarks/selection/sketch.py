@@ -16,7 +16,6 @@ from scipy import stats
 
 from selection.answer import Answer, Case
 from selection.columns import (
-    Array,
     Columns,
     Option,
     columns_of,
@@ -24,11 +23,11 @@ from selection.columns import (
     solved,
     without_base,
 )
+from selection.inference import ambiguous, covariance_of, intervals
 
 _ALPHA = 0.05  # family-wise, over all options
 _NEAR = 0.9  # of the best gain: as good an explanation
 _QUARTERS, _BETTER = 4, 0.01
-_NU, _MOST_NU = 0.41, 32  # cosines: 0.41 n^(2/3), at most 32
 
 
 @dataclasses.dataclass(frozen=True)
@@ -88,46 +87,6 @@ def best_option(
     return best, tuple(o for o in near if o is not best)
 
 
-def ambiguous(
-    found: Sequence[tuple[Option, Sequence[Option]]],
-) -> dict[str, tuple[str, ...]]:
-    """Returns the rivals of each name: of one at several joints those at its own."""
-    sets: dict[str, tuple[str, ...]] = {}
-    for option, rivals in found:
-        for name in option.names:
-            joint = name.partition(".")[2]
-            others = [
-                n
-                for rival in rivals
-                for n in rival.names
-                if n not in option.names
-                if len(option.names) == 1 or n.endswith(f".{joint}")
-            ]
-            if others:
-                sets[name] = tuple(dict.fromkeys((*sets.get(name, ()), *others)))
-    return sets
-
-
-def intervals(
-    columns: Columns, options: Sequence[Option]
-) -> dict[str, tuple[float, float, float]]:
-    """Returns value and 95 % interval of each option's amplitudes, by name."""
-    chosen = columns_of(options)
-    if not chosen:
-        return {}
-    weight = columns.weight(chosen)
-    y, B, X = columns.scaled(weight)
-    own = without_base(X[:, chosen], B)
-    found = solved(own, without_base(y[:, None], B)[:, 0])
-    residual = without_base(y[:, None], np.hstack([B, X[:, chosen]]))[:, 0]
-    covariance, nu = _covariance(columns, own, residual)
-    reach = stats.t.ppf(0.975, nu) * np.sqrt(np.diagonal(covariance))
-    rows = zip(chosen, found, reach, strict=True)
-    return {
-        columns.fields[c]: (float(v), float(v - r), float(v + r)) for c, v, r in rows
-    }
-
-
 def _is_more_than_chance(
     columns: Columns, chosen: Sequence[int], option: Option
 ) -> bool:
@@ -139,28 +98,13 @@ def _is_more_than_chance(
     own = own[:, np.linalg.norm(own, axis=0) > 1e-5 * size[option.columns]]
     residual = without_base(y[:, None], np.hstack([base, own]))[:, 0]
     found = solved(own, without_base(y[:, None], base)[:, 0])
-    covariance, nu = _covariance(columns, own, residual)
+    covariance, nu = covariance_of(columns, own, residual)
     k = own.shape[1]
     if not k or nu < k:
         return False
     wald = float(found @ np.linalg.pinv(covariance, hermitian=True) @ found)
     p = stats.f.sf(wald * (nu - k + 1) / (nu * k), k, nu - k + 1)
     return bool(p * len(columns.options) < _ALPHA)
-
-
-def _covariance(columns: Columns, own: Array, residual: Array) -> tuple[Array, int]:
-    """Returns the covariance (k, k) of coefficients, and its degrees of freedom.
-
-    Of the influence series psi_t = sum over channels of x e, projected on cosines.
-    """
-    rows, k = columns.rows, own.shape[1]
-    psi = (own * residual[:, None]).reshape(rows, -1, k).sum(axis=1)
-    nu = max(1, min(int(_NU * rows ** (2.0 / 3.0)), _MOST_NU))
-    at = (np.arange(rows) + 0.5) / rows
-    waves = np.sqrt(2.0) * np.cos(np.pi * np.outer(np.arange(1, nu + 1), at))
-    parts = waves @ psi
-    bread = np.linalg.pinv(own.T @ own, hermitian=True)
-    return bread @ (parts.T @ parts / nu) @ bread, nu
 
 
 def _repeats(columns: Columns, chosen: Sequence[int], option: Option) -> bool:
