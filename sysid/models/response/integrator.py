@@ -72,6 +72,7 @@ def integrate(
     h: float,
     terms: Callable[[Array, Array, int], Terms],
     missing: Missing[Terms],
+    at_end: Callable[[Array], None] = lambda _: None,
 ) -> Motion:
     """Returns how lanes move from where they begin; NaN where no step was found.
 
@@ -81,6 +82,7 @@ def integrate(
         h: of a step [s].
         terms: rigid bodies at (lanes, joints) positions and velocities, of a step.
         missing: see there.
+        at_end: of a step, told where the lanes (lanes, joints) are.
     """
     a = np.zeros_like(q)
     path_q, path_v = [q], [v]
@@ -96,6 +98,7 @@ def integrate(
         v = v + _GAMMA * h * second
         q = q + _GAMMA * h * v
         a = second
+        at_end(q)
         path_q.append(q)
         path_v.append(v)
     return Motion(np.stack(path_q), np.stack(path_v))

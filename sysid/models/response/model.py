@@ -9,7 +9,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.effects import ArmEffect, ArmTorqueEffect, Effect
+from drake_disasm.effects import (
+    ArmEffect,
+    ArmTorqueEffect,
+    Effect,
+    JointMemoryEffect,
+)
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
@@ -68,7 +73,7 @@ class JointResponseModel(LogModel):
     damping, and all have a delay T of the goal. Those are the parameters.
     """
 
-    effect_types = (ArmTorqueEffect, *ON_BODIES, *ON_GEARS)
+    effect_types = (ArmTorqueEffect, JointMemoryEffect, *ON_BODIES, *ON_GEARS)
     makes_contact = False
 
     def __init__(
@@ -139,7 +144,10 @@ class JointResponseModel(LogModel):
             own, number = segments_of(episode, self._settings, length, reach)
             measured = episode["q"], interpolated(at, fit.v, episode["time"])
             numbers.append(number + len(segments))
-            segments += [dataclasses.replace(s, measured=measured) for s in own]
+            path = at, fit.q
+            segments += [
+                dataclasses.replace(s, measured=measured, path=path) for s in own
+            ]
         self._segments = tuple(segments)
         self._segment = np.concatenate(numbers)
         self._time = np.concatenate([episode["time"] for episode in episodes])
@@ -165,7 +173,7 @@ class JointResponseModel(LogModel):
         self._state = np.concatenate(states, axis=1)
         q, v, vd = np.concatenate(motions, axis=1)
         load = self._bodies.terms(q, v, ()).load(vd)
-        self._most = _largest(load, v, vd)
+        self._most = _largest(load, q, v, vd)
         self._most_per_load = _largest_per_load(self._joints, load)
         by_delay = {t: joined(own) for t, *own in zip(delays, *inputs, strict=True)}
         limit, holding = self._settings.limit, self._bodies.holding(q)
@@ -414,17 +422,19 @@ def _smoothed(
     ]
 
 
-def _largest(load: Array, v: Array, vd: Array) -> dict[str, float]:
+def _largest(load: Array, q: Array, v: Array, vd: Array) -> dict[str, float]:
     """Returns how large effects may be, by the unit of their amplitudes.
 
     Args:
         load: (n, joints) torques of the rigid bodies.
-        v, vd: (n, joints) the motion.
+        q, v, vd: (n, joints) the motion.
     """
     torque = _MANY * float(np.abs(load).max())
+    spread = float(np.sqrt(np.mean(np.var(q, axis=0))))
     speed, acceleration = (float(np.sqrt(np.mean(a**2))) for a in (v, vd))
     sizes = {
         "N m": torque,
+        "N m/rad": torque / spread,
         "N m s/rad": torque / speed,
         "kg m^2": torque / acceleration,
     }

@@ -131,6 +131,8 @@ class Segment:
         vd: (joints,) accelerations there.
         measured: positions and velocities of the episode, row by row, (n, joints)
             each, which simulated ones should be near; None: not known.
+        path: times (m,) [s] and smoothed positions (m, joints) of the episode, on which
+            the joints came where the segment begins; None: not known.
     """
 
     start: float
@@ -140,6 +142,7 @@ class Segment:
     inputs: Inputs
     vd: Array
     measured: tuple[Array, Array] | None = None
+    path: tuple[Array, Array] | None = None
 
     def inputs_at(self, times: Array, delay: float) -> Inputs:
         """Returns what goes into the drives at times (..., ), with a late goal.

@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,6 @@ from drake_disasm.effects import (
     ArmEffect,
     ArmSamples,
     ArmTilt,
-    ArmTorqueEffect,
     FlangePayload,
 )
 from sysid.models.base import Array
@@ -25,6 +23,8 @@ from sysid.models.response.integrator import (
     Motion,
     integrate,
 )
+from sysid.models.response.lane_effects import torques_in_lanes
+from sysid.models.response.memories import Memories
 from sysid.models.response.near_motion import Bodies, BodyTerms, Expansion
 from sysid.models.response.segments import Segment
 
@@ -84,12 +84,13 @@ def simulate(
         for name in ("q", "v", "vd")
     )
     gears = Gears.of(arm.joints, [s.effects for s in sets]).repeated(len(segments))
+    memories = Memories.of(arm.joints, [s.effects for s in sets], segments)
     of_lanes = (arm, gears, sets, segments, steps, h)
-    terms, missing = _terms(*of_lanes), _missing(*of_lanes)
+    terms, missing = _terms(*of_lanes), _missing(*of_lanes, memories)
     if gears.any:
         load, rate = _loads_at_begin(gears, (q, v, vd), h, terms, missing)
         q, v = gears.start(q, v, load, rate)
-    motion = integrate(q, v, steps, h, terms, missing)
+    motion = integrate(q, v, steps, h, terms, missing, memories.remember)
     motors = (gears.motors(x) for x in (motion.q, motion.v))
     return Motion(*(x.reshape(steps + 1, *shape) for x in motors))
 
@@ -182,6 +183,7 @@ def _missing(
     segments: Sequence[Segment],
     steps: int,
     h: float,
+    memories: Memories,
 ) -> Missing[BodyTerms]:
     """Returns what gives the torques that are missing for accelerations."""
     inputs = _inputs(sets, segments, steps, h)
@@ -190,7 +192,7 @@ def _missing(
         np.repeat([s.drive.damping for s in sets], len(segments), axis=0),
         sets[0].drive.limit,
     )
-    effects = _stacked([s.effects for s in sets], len(segments))
+    effects = torques_in_lanes([s.effects for s in sets], len(segments))
 
     def missing(
         q: Array,
@@ -211,6 +213,7 @@ def _missing(
             acting, own = effect.of(lanes)
             samples = ArmSamples(arm.joints, *(x[..., own, :] for x in (*motors, load)))
             needed[..., own, :] += acting.torques(samples)
+        memories.add_torques(needed, motors[0], lanes)
         if not gears.any:
             return needed
         return np.concatenate([needed, gears.missing(q, a, load, lanes)], axis=-1)
@@ -232,65 +235,6 @@ def _inputs(
     order = [lanes[n, delays[w]] for w in which for n in range(len(segments))]
     names = [f.name for f in dataclasses.fields(Inputs)]
     return Inputs(*(np.stack([getattr(i, n) for i in order], axis=2) for n in names))
-
-
-@dataclass(frozen=True)
-class _LaneEffect:
-    """An effect in neighbouring lanes.
-
-    Attributes:
-        effect: with fields (n,), one for each lane.
-        lanes: which n.
-    """
-
-    effect: ArmTorqueEffect
-    lanes: slice
-
-    @classmethod
-    def of_sets(
-        cls, alternatives: Sequence[ArmTorqueEffect], segments: int, begin: int
-    ) -> Self:
-        """Returns one of neighbouring sets from `begin` on, so many segments each."""
-        effect = _with_numbers(
-            alternatives[0],
-            lambda name: np.repeat([getattr(e, name) for e in alternatives], segments),
-        )
-        first = begin * segments
-        return cls(effect, slice(first, first + len(alternatives) * segments))
-
-    def of(self, lanes: Lanes) -> tuple[ArmTorqueEffect, slice]:
-        """Returns the effect in some lanes, and which of those it acts in."""
-        if isinstance(lanes, slice):
-            return self.effect, self.lanes
-        ends = np.searchsorted(lanes, [self.lanes.start, self.lanes.stop])
-        own = slice(*ends.tolist())
-        chosen = lanes[own] - self.lanes.start
-        effect = self.effect
-        return _with_numbers(effect, lambda name: getattr(effect, name)[chosen]), own
-
-
-def _with_numbers(
-    effect: ArmTorqueEffect, of: Callable[[str], Array]
-) -> ArmTorqueEffect:
-    """Returns an effect with other numbers, by the names of its fields."""
-    names = [f.name for f in dataclasses.fields(effect) if isinstance(f.default, float)]
-    return dataclasses.replace(effect, **{name: of(name) for name in names})
-
-
-def _stacked(sets: Sequence[tuple[ArmEffect, ...]], segments: int) -> list[_LaneEffect]:
-    """Returns the effects of all sets, in the lanes (sets segments,) where they act.
-
-    Those of sets before the first in which an effect is not null, and after the last,
-    are none of its.
-    """
-    found = []
-    for alternatives in zip(*sets, strict=True):
-        acts = np.flatnonzero([not effect.is_null for effect in alternatives])
-        torques = [e for e in alternatives if isinstance(e, ArmTorqueEffect)]
-        if torques and len(acts):
-            first, end = int(acts[0]), int(acts[-1]) + 1
-            found.append(_LaneEffect.of_sets(torques[first:end], segments, first))
-    return found
 
 
 def positions_at(

@@ -15,7 +15,8 @@ from drake_disasm.scenario import Scenario
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.path_memory import PathMemory
 from sysid.models.regressor import ArmDynamics
-from tests.sysid.models.arm import JOINTS, fitted, smooth_motion, write_two_link_arm
+from tests.sysid.models.arm import JOINTS, smooth_motion, write_two_link_arm
+from tests.sysid.models.fitted import fitted
 
 PERIOD, ROWS, NOISE = 0.005, 1000, 0.02  # s, N m
 SLOW = 0.25  # of the smooth motion's speed

@@ -9,11 +9,11 @@ from sysid.models.joint_motion import JointMotionModel
 from sysid.models.regressor import ArmDynamics
 from tests.sysid.models.arm import (
     JOINTS,
-    fitted,
     smooth_motion,
     write_motion_log,
     write_two_link_arm,
 )
+from tests.sysid.models.fitted import fitted
 
 _TIME = 0.01 * np.arange(600)
 _NOISE = 0.01  # N m
