@@ -1,5 +1,7 @@
 """The package's own selection, as it stands in the tree."""
 
+import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ from drake_disasm.logs import read_logs
 from selection.answer import Answer, Case
 from sysid.effect_selection import close_loop
 from sysid.effect_selection.candidates import extended
+from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.models.base import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 
@@ -17,6 +20,17 @@ from sysid.models.from_logs import ModelChoice, model_of
 def select(case: Case) -> Answer:
     """Returns what closing the loop says of a case."""
     return closed(case)
+
+
+def defaults() -> dict[str, Any]:
+    """Returns the default settings, by name."""
+    return dataclasses.asdict(DEFAULT_SETTINGS)
+
+
+def asked(case: Case, settings: Mapping[str, Any]) -> Answer:
+    """Returns what closing the loop says of a case with some settings changed."""
+    changes = {k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()}
+    return closed(case, settings=dataclasses.replace(DEFAULT_SETTINGS, **changes))
 
 
 def closed(case: Case, **arguments: Any) -> Answer:
