@@ -96,7 +96,7 @@ class ArmExperiment:
             q, v, vd: (n, joints).
         """
         episode = {"time": time, "q": q, "v": v, "vd": vd}
-        motion = ArmMotion.of(self._arm, self._base, self.joints, [episode])  # type: ignore[list-item]
+        motion = ArmMotion.of(self._arm, self._base, self.joints, [episode])
         still = motion.torques(self._beta, [])
         of_effects = [
             (self._with(motion, still, effect, field) - still) / _STEP

@@ -1,7 +1,7 @@
 """The recorded motion of an arm, and the torques that it takes with given effects."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Self
 
 import numpy as np
@@ -90,9 +90,16 @@ class ArmMotion:
         arm: ArmDynamics,
         base: BaseSet,
         joints: Sequence[str],
-        episodes: Sequence[Episode],
+        episodes: Sequence[Episode | Mapping[str, Array]],
     ) -> Self:
-        """Returns all samples of episodes, in their order."""
+        """Returns all samples of episodes, in their order.
+
+        Args:
+            arm: that moves.
+            base: its base parameters.
+            joints: their names.
+            episodes: each with time, q, v and vd.
+        """
         q, v, vd, time = (
             np.concatenate([e[name] for e in episodes])
             for name in ("q", "v", "vd", "time")
@@ -113,7 +120,9 @@ class ArmMotion:
             Y_tilt[:, :, base.independent],
             np.einsum("njkt,k->njt", Y_tilt, arm.inertia),
             base.beta(arm.inertia),
-            LinkTorques(arm.urdf, joints, time, episode, np.stack([q, v, vd])),
+            LinkTorques(
+                arm.urdf, joints, time, episode, np.stack([q, v, vd]), arm.gravity
+            ),
             PathMemory(joints, episode, q),
         )
 

@@ -28,17 +28,23 @@ class ArmPlant:
     columns: list[int]
 
     @classmethod
-    def of(cls, urdf: str, joints: Sequence[str]) -> Self:
+    def of(
+        cls, urdf: str, joints: Sequence[str], gravity: Sequence[float] | None = None
+    ) -> Self:
         """Returns the arm of a URDF.
 
         Args:
             urdf: a path, or `package://`.
             joints: names of the actuated joints, in the order of a log's columns.
+            gravity: (3,) in the base's frame [m/s^2]; None for an arm that stands
+                upright.
 
         Raises:
             DisasmError: the URDF lacks one of them.
         """
         plant = MultibodyPlant(0.0)
+        if gravity is not None:
+            plant.mutable_gravity_field().set_gravity_vector(gravity)
         instance = add_model(plant, urdf)
         bodies = [plant.get_body(i) for i in plant.GetBodyIndices(instance)]
         weld_root(plant, bodies)

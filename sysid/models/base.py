@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Effect
 from drake_disasm.scenario import Scenario
+from sysid.models.bookkeeping import Bookkeeping
 from sysid.models.effects import (
     at_null,
     field_of,
@@ -408,6 +409,13 @@ class LogModel(abc.ABC):
             theta: (p,) values of `parameters`.
         """
         return {}
+
+    def bookkeeping(self) -> list[Bookkeeping[Self]]:
+        """Returns how the log may have been written otherwise than it says.
+
+        Those ways that its rows speak for; none is known by default.
+        """
+        return []
 
     # Copies.
 

@@ -1,25 +1,36 @@
 """An arm's joint torques from its motion: rigid bodies, of any URDF."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.multibody.tree import UniformGravityFieldElement
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
-from drake_disasm.effects import ArmEffect, ArmResidualModel, DelayEffect, Effect
+from drake_disasm.effects import (
+    ArmDelay,
+    ArmEffect,
+    ArmResidualModel,
+    DelayEffect,
+    Effect,
+)
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
 from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_logs
 from sysid.models.arm_motion import IN_TORQUES, ArmMotion
 from sysid.models.base import Array, LogModel
+from sysid.models.bookkeeping import Bookkeeping
 from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints
 from sysid.models.measurements import Channel, Measurements
+from sysid.models.motion_bookkeeping import TorqueFits, angle_between, likely
+from sysid.models.rate_factors import in_degrees, rate_text, right_rates
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
+from sysid.models.signed_order import SignedOrder
 from sysid.parameters import Parameter
 
 _NEEDED = ("q", "v", "vd", "tau")
@@ -60,7 +71,9 @@ class JointMotionModel(LogModel):
         refuse_other_logs(logs, "joint_motion", "inverse dynamics")
         _refuse_missing(episodes)
         header = logs[0].header
-        arm = ArmDynamics(arm_urdf(logs, urdf), header.joints)
+        self._urdf = arm_urdf(logs, urdf)
+        self._gravity = tuple(UniformGravityFieldElement().gravity_vector())
+        arm = ArmDynamics(self._urdf, header.joints)
         base = base_set(arm.random_regressor())
         self._scenario = scenario or Scenario()
         self._effects = tuple(self._scenario.effects)
@@ -165,6 +178,180 @@ class JointMotionModel(LogModel):
             )
             for i, value in enumerate(self._motion.nominal)
         )
+
+    def bookkeeping(self) -> list[Bookkeeping[Self]]:
+        """See LogModel: rates and units first, on which the other ways rest."""
+        rates = self._in_degrees() or self._wrong_rates()
+        if rates:
+            return rates
+        fits = TorqueFits(self._motion, self.measurements.values)
+        ways = [*self._wrong_columns(fits), *self._late(fits), *self._turned(fits)]
+        return likely(ways)
+
+    def _in_degrees(self) -> list[Bookkeeping[Self]]:
+        rotary = np.array([j not in self._prismatic for j in self.joints])
+        if not rotary.any() or not in_degrees(self._motion.q[:, rotary]):
+            return []
+        q = np.where(rotary, np.radians(self._whole.q), self._whole.q)
+        whole = self._whole
+        v, _ = right_rates(whole.time, whole.episode, q, whole.v)
+        vd, _ = right_rates(whole.time, whole.episode, v, whole.vd)
+        what = "joint positions are in degrees"
+        remedy = "give `unit: deg` of q in the map of import-log"
+        return [Bookkeeping("PositionUnit", what, remedy, self._rewritten(q, v, vd))]
+
+    def _wrong_rates(self) -> list[Bookkeeping[Self]]:
+        """Returns the velocities, or else accelerations, that are no derivatives."""
+        whole = self._whole
+        at = whole.time, whole.episode
+        v, by = right_rates(*at, whole.q, whole.v)
+        vd, by_v = right_rates(*at, v, whole.vd)
+        for name, rate, factors in (
+            ("Velocity", "v", by),
+            ("Acceleration", "vd", by_v),
+        ):
+            off = np.flatnonzero(factors != 1.0)
+            if len(off):
+                own = f".{self.joints[off[0]]}" if len(off) == 1 else ""
+                what = rate_text(rate, self.joints, factors)
+                remedy = (
+                    f"correct the unit, scale or sign of {rate} in the map of "
+                    "import-log, or leave it out: import-log makes it from q"
+                )
+                model = self._rewritten(whole.q, v, vd)
+                count = len(off)
+                return [Bookkeeping(f"{name}Factor{own}", what, remedy, model, count)]
+        return []
+
+    def _wrong_columns(
+        self, fits: TorqueFits
+    ) -> Iterator[tuple[Bookkeeping[Self], float]]:
+        """Yields another order, other signs and units of torques, with what is left."""
+        order = fits.signed_order()
+        if order.steps:
+            yield self._with_columns(
+                order.name(self.joints),
+                order.text(self.joints),
+                order.remedy,
+                order,
+                np.ones(len(self.joints)),
+            )
+        for i, factor in fits.torque_units().items():
+            scale = np.where(np.arange(len(self.joints)) == i, factor, 1.0)
+            yield self._with_columns(
+                f"TorqueUnit.{self.joints[i]}",
+                f"the torque of {self.joints[i]} is {factor:g} times what it should be",
+                f"correct the unit or scale of tau.{i} in the map of import-log",
+                SignedOrder.as_written(len(self.joints)),
+                scale,
+            )
+
+    def _with_columns(
+        self, name: str, what: str, remedy: str, order: SignedOrder, scale: Array
+    ) -> tuple[Bookkeeping[Self], float]:
+        """Returns a way of writing torques, with what it leaves.
+
+        Args:
+            name, what, remedy: of Bookkeeping.
+            order: of the columns.
+            scale: (joints,) what each joint's torque is to be divided by.
+        """
+        measured = self.measurements
+        columns = list(order.order)
+        channels = tuple(
+            dataclasses.replace(
+                channel, noise=measured.channels[i].noise / s, origin=own.origin
+            )
+            for channel, i, s in zip(measured.channels, columns, scale, strict=True)
+            for own in [measured.channels[i]]
+        )
+        values = measured.values @ (order.matrix / scale[:, None]).T
+        right = dataclasses.replace(measured, values=values, channels=channels)
+        model = self.with_measurements(right)
+        lost = TorqueFits(self._motion, right.values).lost()
+        return Bookkeeping(name, what, remedy, model), lost
+
+    def _late(self, fits: TorqueFits) -> Iterator[tuple[Bookkeeping[Self], float]]:
+        """Yields a delay of all torques, and what it leaves."""
+        delay = fits.common_delay()
+        if delay:
+            late = "late" if delay.value > 0.0 else "early"
+            what = (
+                f"all torques are {late} by {1e3 * abs(delay.value):.3g} ms (standard "
+                f"error {1e3 * delay.error:.2g} ms) against the motion"
+            )
+            remedy = (
+                "stamp torques and motion by one clock, and pass both through one "
+                "filter; or shift the torques by that in the log"
+            )
+            model = self.with_effects([*self.effects, ArmDelay(delay.value)])
+            way = Bookkeeping("CommonDelay", what, remedy, model, 1)
+            yield way, fits.lost(delay.value)
+
+    def _turned(self, fits: TorqueFits) -> Iterator[tuple[Bookkeeping[Self], float]]:
+        """Yields another gravity than the URDF's upright base has, or none."""
+        written = np.array(self._gravity)
+        if self._own_parameters is not None or not written.any():
+            return  # base parameters are others under another gravity
+        gravity = fits.gravity(self._arm_under, written)
+        if gravity is None:
+            return
+        if gravity.any():
+            name, angle = "GravityDirection", angle_between(gravity, written)
+            down = np.round(gravity / np.linalg.norm(gravity), 2).tolist()
+            what = (
+                f"the arm's base is turned by {np.degrees(angle):.0f} degrees: gravity "
+                f"is along {down} in it"
+            )
+            remedy = (
+                "turn the base in the URDF, by the joint that fixes it to the world"
+            )
+        else:
+            name, what = "GravityRemoved", "the torques have no gravity in them"
+            remedy = (
+                "log what motors or sensors measure, or add the gravity torque that "
+                "the controller takes away"
+            )
+        model = self._rewritten(gravity=gravity)
+        lost = TorqueFits(model._motion, self.measurements.values).lost()
+        yield Bookkeeping(name, what, remedy, model, 2 * int(gravity.any())), lost
+
+    def _arm_under(self, gravity: Array) -> ArmDynamics:
+        return ArmDynamics(self._urdf, self.joints, gravity)
+
+    def _rewritten(
+        self,
+        q: Array | None = None,
+        v: Array | None = None,
+        vd: Array | None = None,
+        gravity: Array | None = None,
+    ) -> Self:
+        """Returns the model of another motion (rows, joints), or of other gravity."""
+        whole = self._whole
+        parts = {
+            "time": whole.time,
+            "q": whole.q if q is None else q,
+            "v": whole.v if v is None else v,
+            "vd": whole.vd if vd is None else vd,
+        }
+        under = np.array(self._gravity) if gravity is None else gravity
+        arm = self._arm_under(under)
+        base = base_set(arm.random_regressor())
+        episodes = [
+            {name: part[whole.episode == number] for name, part in parts.items()}
+            for number in np.unique(whole.episode)
+        ]
+        whole = ArmMotion.of(arm, base, whole.joints, episodes)
+        model = self.replace(
+            _whole=whole, _motion=whole.rows(self._taken), _gravity=tuple(under)
+        )
+        of_base = model._base_parameters(arm, base)
+        if gravity is not None:
+            rest = [p for p in self.parameters if p.path]
+            return model.replace(parameters=(*of_base, *rest))
+        named = {p.name: p for p in of_base}
+        renewed = tuple(named.get(p.name, p) for p in self.parameters)
+        return model.replace(parameters=renewed)
 
     def select_rows(self, mask: NDArray[np.bool_]) -> Self:
         """See LogModel."""

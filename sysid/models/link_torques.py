@@ -38,6 +38,7 @@ class LinkTorques:
         joints: their names.
         time, episode: (n,) of the samples [s].
         motion: (3, n, joints) q, v, vd.
+        gravity: of the arm, see ArmDynamics.
     """
 
     def __init__(
@@ -47,8 +48,9 @@ class LinkTorques:
         time: Array,
         episode: NDArray[np.int64],
         motion: Array,
+        gravity: Sequence[float] | None = None,
     ) -> None:
-        self._urdf, self._joints = urdf, tuple(joints)
+        self._urdf, self._joints, self._gravity = urdf, tuple(joints), gravity
         self._time, self._episode, self._motion = time, episode, motion
         self._load: Array | None = None
         self._known: dict[tuple[str, str], Array] = {}
@@ -88,13 +90,13 @@ class LinkTorques:
         step = _SHIFT / largest
         linked = self._motion.copy()
         linked[:, :, i] -= step * behind
-        arm = ArmDynamics(self._urdf, self._joints)
+        arm = ArmDynamics(self._urdf, self._joints, self._gravity)
         return (arm.torques(*linked) - loads) / step
 
     def _loads(self) -> Array:
         """Returns the torques (n, joints) by the URDF."""
         if self._load is None:
-            arm = ArmDynamics(self._urdf, self._joints)
+            arm = ArmDynamics(self._urdf, self._joints, self._gravity)
             self._load = arm.torques(*self._motion)
         return self._load
 

@@ -36,6 +36,7 @@ class ArmDynamics:
 
     Attributes:
         urdf: of the arm.
+        gravity: see Args.
         links: names of the links that move, in the order of pi.
         inertia: pi by the URDF.
         prismatic: names of the joints that slide; others turn.
@@ -44,11 +45,17 @@ class ArmDynamics:
     Args:
         urdf: a path, or `package://`.
         joints: names of the actuated joints, in the order of q, v, vd and tau.
+        gravity: (3,) in the base's frame [m/s^2]; None for an arm that stands upright.
     """
 
-    def __init__(self, urdf: str, joints: Sequence[str]) -> None:
-        self.urdf = urdf
-        arm = ArmPlant.of(urdf, joints)
+    def __init__(
+        self,
+        urdf: str,
+        joints: Sequence[str],
+        gravity: Sequence[float] | None = None,
+    ) -> None:
+        self.urdf, self.gravity = urdf, gravity
+        arm = ArmPlant.of(urdf, joints, gravity)
         self._plant, self._columns = arm.plant, arm.columns
         self._bodies = arm.bodies
         self._context = arm.plant.CreateDefaultContext()
@@ -80,12 +87,12 @@ class ArmDynamics:
     def tilt_regressor(self, q: Array) -> Array:
         """Returns dY (n, joints, parameters, 2) by a tilt [rx, ry] of the base.
 
-        By the gravity that the base then sees, which is linear in Y.
+        By the gravity that the base then sees, which is linear in Y: turned by w, it
+        sees g - w x g.
         """
         zero = np.zeros_like(q)
         links = self._links(q, zero, zero)
-        size = np.linalg.norm(self._plant.gravity_field().gravity_vector())
-        changes = size * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+        changes = -np.cross(np.eye(3)[:2], self._plant.gravity_field().gravity_vector())
         parts = []
         for dg in changes:
             blocks = [

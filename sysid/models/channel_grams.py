@@ -1,0 +1,225 @@
+"""Least squares by blocks of rows, for many targets and one set of columns."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+Array = NDArray[np.float64]
+
+MOST_BLOCKS = 8  # enough for a standard error, and each long against correlations
+#: Rows per block at least: of fewer blocks less can be said.
+LEAST_ROWS = 2
+LEAST_GAIN = 0.01  # of the loss: as much as closing the loop asks of an effect
+STANDARD_ERRORS = 3.0  # Student's t of eight blocks: one in a hundred by chance
+_ROUNDED = 1e-9  # of a loss: less is rounding
+_RANK = 1e-10  # of the largest eigenvalue of the columns' scaled products
+
+
+def blocks_of(rows: int) -> NDArray[np.int64]:
+    """Returns the number of the contiguous block of each row (rows,)."""
+    count = max(1, min(MOST_BLOCKS, rows // LEAST_ROWS))
+    return np.arange(rows) * count // max(rows, 1)
+
+
+@dataclass(frozen=True)
+class ChannelGrams:
+    """Products of columns and targets, by contiguous blocks of rows and by channel.
+
+    Each channel is fitted by columns whose coefficients all channels share, and by
+    columns of its own; the last of these may not be negative: friction takes power.
+
+    Attributes:
+        G: (blocks, channels, m, m) of [shared, own, targets].
+        count: (blocks,) of rows.
+        shared, own: how many columns.
+        positive: how many of a channel's own, the last ones, are not negative.
+    """
+
+    G: Array
+    count: Array
+    shared: int
+    own: int
+    positive: int
+
+    @classmethod
+    def of(
+        cls,
+        shared: Array,
+        targets: Array,
+        own: Array | None = None,
+        positive: int = 0,
+    ) -> Self:
+        """Sums the products.
+
+        Args:
+            shared: (rows, channels, s).
+            targets: (rows, channels, t), of which a choice is fitted.
+            own: (rows, channels, o).
+            positive: of the own ones.
+        """
+        own = np.zeros((*shared.shape[:2], 0)) if own is None else own
+        all_columns = np.concatenate([shared, own, targets], axis=-1)
+        block = blocks_of(len(shared))
+        by_channel = np.swapaxes(all_columns, 0, 1)
+        parts = [by_channel[:, block == k] for k in range(block[-1] + 1)]
+        G = np.array([np.swapaxes(part, 1, 2) @ part for part in parts])
+        count = np.bincount(block).astype(float)
+        return cls(G, count, shared.shape[-1], own.shape[-1], positive)
+
+    def losses(self, choice: Array, scale: Array) -> Array:
+        """Returns held-out losses (blocks, channels), by a fit to all other blocks.
+
+        Args:
+            choice: (channels, t) what is fitted at each channel, of its targets.
+            scale: (channels,) in units of which errors are.
+        """
+        fits = self._fits(choice, scale)
+        left = [
+            self._left(G, fit, choice, scale)
+            for G, fit in zip(self.G, fits, strict=True)
+        ]
+        return np.array(left) / self.count[:, None]
+
+    def loss(self, choice: Array, scale: Array) -> Array:
+        """Returns what a fit to all blocks leaves (channels,); see `losses`."""
+        A, b = (part.sum(axis=0) for part in self._normal(choice, scale))
+        G = self.G.sum(axis=0)
+        left = self._left(G, self._solved(A, b), choice, scale)
+        return left / float(self.count.sum())
+
+    def shared_by_block(self, choice: Array, scale: Array) -> Array:
+        """Returns the shared coefficients (blocks, s) without each block in turn.
+
+        Args:
+            choice, scale: see `losses`.
+        """
+        return np.array(self._fits(choice, scale))[:, : self.shared]
+
+    def _fits(self, choice: Array, scale: Array) -> list[Array]:
+        """Returns the coefficients (p,) without each block in turn."""
+        A, b = self._normal(choice, scale)
+        return [
+            self._solved(A.sum(axis=0) - of_block, b.sum(axis=0) - by_block)
+            for of_block, by_block in zip(A, b, strict=True)
+        ]
+
+    def _left(self, G: Array, x: Array, choice: Array, scale: Array) -> Array:
+        """Returns the sum of squares (channels,) that coefficients (p,) leave.
+
+        Args:
+            G: (channels, m, m) products.
+            x: coefficients.
+            choice, scale: see `losses`.
+        """
+        channels = len(scale)
+        shared = np.tile(x[: self.shared], (channels, 1))
+        z = np.hstack([shared, x[self.shared :].reshape(channels, -1), -choice])
+        left = np.einsum("cm,cmn,cn->c", z, G, z) / scale**2
+        return np.asarray(np.maximum(left, 0.0))
+
+    @property
+    def _columns(self) -> int:
+        return self.shared + self.own
+
+    @cached_property
+    def _norm(self) -> Array:
+        """Root of the mean square of each coefficient's column."""
+        square = np.diagonal(self.G.sum(axis=0), axis1=1, axis2=2)
+        own = square[:, self.shared : self._columns].reshape(-1)
+        norm = np.sqrt(np.concatenate([square[:, : self.shared].sum(axis=0), own]))
+        return np.where(norm > 0.0, norm, 1.0)
+
+    def _normal(self, choice: Array, scale: Array) -> tuple[Array, Array]:
+        """Returns the normal equations' A (blocks, p, p) and b (blocks, p)."""
+        s, m = self.shared, self._columns
+        channels = self.G.shape[1]
+        weighted = self.G / scale[None, :, None, None] ** 2
+        size = s + channels * self.own
+        A = np.zeros((len(self.G), size, size))
+        b = np.zeros((len(self.G), size))
+        A[:, :s, :s] = weighted[:, :, :s, :s].sum(axis=1)
+        by_target = np.einsum("kcmt,ct->kcm", weighted[:, :, :m, m:], choice)
+        b[:, :s] = by_target[:, :, :s].sum(axis=1)
+        for i in range(channels):
+            at = slice(s + i * self.own, s + (i + 1) * self.own)
+            A[:, :s, at] = weighted[:, i, :s, s:m]
+            A[:, at, :s] = weighted[:, i, s:m, :s]
+            A[:, at, at] = weighted[:, i, s:m, s:m]
+            b[:, at] = by_target[:, i, s:]
+        return A, b
+
+    @cached_property
+    def _is_positive(self) -> NDArray[np.bool_]:
+        channels = self.G.shape[1]
+        last = np.arange(self.own) >= self.own - self.positive
+        return np.concatenate([np.zeros(self.shared, bool), np.tile(last, channels)])
+
+    def _solved(self, A: Array, b: Array) -> Array:
+        """Returns the coefficients (p,), those of friction not negative.
+
+        All others are eliminated first (Schur complement), which leaves a small problem
+        of non-negative least squares (Lawson and Hanson 1974).
+        """
+        A, b = A / np.outer(self._norm, self._norm), b / self._norm
+        held = self._is_positive
+        free = ~held
+        inverse = np.linalg.pinv(A[np.ix_(free, free)], _RANK, hermitian=True)
+        x = np.zeros(len(b))
+        if held.any():
+            through = A[np.ix_(held, free)] @ inverse
+            S = A[np.ix_(held, held)] - through @ A[np.ix_(free, held)]
+            x[held] = _non_negative(S, b[held] - through @ b[free])
+        x[free] = inverse @ (b[free] - A[np.ix_(free, held)] @ x[held])
+        return np.asarray(x / self._norm)
+
+
+def _non_negative(S: Array, r: Array) -> Array:
+    """Returns x >= 0 with the least x S x / 2 - r x, of a positive semidefinite S."""
+    values, vectors = np.linalg.eigh(S)
+    kept = values > _RANK * max(float(values[-1]), 1e-300)
+    root = np.sqrt(values[kept])
+    x = nnls(root[:, None] * vectors[:, kept].T, (vectors[:, kept].T @ r) / root)[0]
+    return np.asarray(x)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its standard error."""
+
+    value: float
+    error: float
+
+    def is_off(self, expected: float, least: float = 0.0) -> bool:
+        """Returns whether it differs from what is expected, beyond its error."""
+        off = abs(self.value - expected)
+        return bool(off > max(least, STANDARD_ERRORS * self.error))
+
+
+def is_lower(losses: Array, than: Array) -> bool:
+    """Returns whether losses by block (blocks,) are lower than others beyond chance.
+
+    By their ratios, so that no single block decides.
+    """
+    floor = _ROUNDED * float(than.mean()) + 1e-300
+    gain = np.log((than + floor) / (losses + floor))
+    if len(gain) < 2 or float(gain.mean()) <= LEAST_GAIN:
+        return False
+    error = float(gain.std(ddof=1)) / np.sqrt(len(gain))
+    return float(gain.mean()) > STANDARD_ERRORS * error
+
+
+def jackknife_error(without: Sequence[float] | Array) -> float:
+    """Returns the standard error of a value, from those without each block in turn.
+
+    Args:
+        without: (blocks,) or (blocks, k); of a vector, the norm of its error.
+    """
+    values = np.asarray(without, dtype=float)
+    n = len(values)
+    square = np.sum((values - values.mean(axis=0)) ** 2) * (n - 1) / n
+    return float(np.sqrt(square))

@@ -1,0 +1,335 @@
+"""Estimates of how the torques of an arm were written: order, signs, clocks, gravity.
+
+All compare rigid bodies with free inertial parameters, and an offset, dry and viscous
+friction at each joint, with the torques as they are and as they might have been. Dry
+and viscous friction may only take power: without that, a torque of the wrong sign would
+be explained by friction that drives the joint.
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.optimize import linear_sum_assignment
+
+from drake_disasm.effects import ArmTilt
+from sysid.models.arm_motion import ArmMotion
+from sysid.models.channel_grams import (
+    STANDARD_ERRORS,
+    ChannelGrams,
+    Estimate,
+    is_lower,
+    jackknife_error,
+)
+from sysid.models.regressor import ArmDynamics
+from sysid.models.signed_order import SignedOrder
+
+Array = NDArray[np.float64]
+#: Gives an arm under a gravity (3,) in the base's frame.
+ArmUnder = Callable[[Array], ArmDynamics]
+Way = TypeVar("Way")
+
+_EQUAL = 0.9  # of the least loss: ways that leave less than it / this tie
+_MOST_ROWS = 2500  # that are looked at, evenly spread: bodies have some 50 parameters
+#: Of the loss of the torques that a sign or an order concerns: a wrong one leaves at
+#: least as much again. Effects that the model lacks change it by less.
+_HALF = 0.5
+#: Base tilts up to here are an effect of their own.
+_MOST_TILT = next(f.metadata["high"] for f in fields(ArmTilt) if f.name == "rx")
+_FEW_ROWS = 300  # at which an arm that stands otherwise is evaluated
+_ROUNDED = 1e-12  # of a torque's variance: less is rounding
+_THOUSAND = 1000.0
+_LATEST, _STEP = 0.1, 0.005  # s; delays that are tried, and their spacing
+_FINE = 10  # steps of the second scan in one of the first
+
+
+class TorqueFits:
+    """Fits of an arm's motion to its torques, written one way or another.
+
+    Args:
+        motion: at all rows.
+        tau: (rows, joints) as written [N m or N].
+    """
+
+    def __init__(self, motion: ArmMotion, tau: Array) -> None:
+        self._motion, self._tau = motion, tau
+        self._taken = spread_rows(len(tau), _MOST_ROWS)
+        self._thin = motion.rows(self._taken)
+        self._scale = _positive(tau[self._taken].std(axis=0))
+        self._friction = friction_columns(self._thin.v)
+
+    def signed_order(self) -> SignedOrder:
+        """Returns the order and signs of torques that explain them far better.
+
+        By steps of steepest descent: from the order as written, from its reverse, and
+        from that in which each torque is most like its joint's own.
+        """
+        tau = self._tau[self._taken]
+        joints = tau.shape[1]
+        targets = np.repeat(tau[:, None, :], joints, axis=1)
+        grams = self._grams(targets)
+        written = SignedOrder.as_written(joints)
+        reverse = SignedOrder(written.order[::-1], written.sign)
+        starts = {written, reverse, *self._most_like()}
+        ends = [self._descended(grams, start) for start in starts]
+        best = min(ends, key=lambda end: float(self._loss(grams, end).sum()))
+        needed = self._needed(grams, best)
+        # Where the order is another one, that of no joint can be taken as written.
+        found = best if needed.order != written.order else needed
+        is_far_better = found.steps and self._is_far_better(grams, found, written)
+        return found if is_far_better else written
+
+    def torque_units(self) -> dict[int, float]:
+        """Returns joints whose torque has another unit, with the factor to divide by.
+
+        That of one joint shows by the bodies that it shares with others.
+        """
+        tau = self._tau[self._taken]
+        grams = self._grams(tau[..., None])
+        ones = np.ones_like(self._scale)
+        found = {}
+        for i, factor in itertools.product(
+            range(len(ones)), (_THOUSAND, 1 / _THOUSAND)
+        ):
+            by = np.where(np.arange(len(ones)) == i, factor, 1.0)
+            one, other = (
+                grams.losses((1.0 / each)[:, None], self._scale / each).sum(axis=1)
+                for each in (by, ones)
+            )
+            if one.sum() < _HALF * other.sum() and is_lower(one, other):
+                found[i] = factor
+        return found
+
+    def lost(self, delay: float = 0.0) -> float:
+        """Returns what is left of torques that are late [s], to compare ways by."""
+        return float(self._delayed(np.array([delay])).sum())
+
+    def _most_like(self) -> tuple[SignedOrder, SignedOrder]:
+        """Returns the order in which torques are best explained one by one.
+
+        By the nominal torque of the joint, whatever its scale and sign, and by its
+        friction: bodies with free parameters explain too much of another joint's. With
+        the signs as they are, and with those of the nominal torques.
+        """
+        tau = self._tau[self._taken]
+        nominal = self._thin.Y @ self._thin.nominal
+        left, scale = np.empty((2, *self._scale.shape, len(self._scale)))
+        for i in range(tau.shape[1]):
+            A = np.column_stack([nominal[:, i], self._friction[:, i]])
+            fit = np.linalg.lstsq(A, tau, rcond=None)[0]
+            left[i] = np.mean((tau - A @ fit) ** 2, axis=0) / self._scale**2
+            scale[i] = fit[0]
+        joints, columns = linear_sum_assignment(np.log(left + _ROUNDED))
+        signs = np.where(scale[joints, columns] < 0.0, -1.0, 1.0)
+        order = tuple(columns.tolist())
+        same = SignedOrder(order, (1.0,) * len(order))
+        return same, SignedOrder(order, tuple(signs.tolist()))
+
+    def _loss(self, grams: ChannelGrams, of: SignedOrder) -> Array:
+        """Returns the loss of each joint's torque (joints,)."""
+        return grams.loss(of.matrix, self._scale[list(of.order)])
+
+    def _descended(self, grams: ChannelGrams, order: SignedOrder) -> SignedOrder:
+        """Returns the best order and signs that single steps lead to."""
+        lost = float(self._loss(grams, order).sum())
+        while True:
+            near = {each: float(self._loss(grams, each).sum()) for each in order.near()}
+            best = min(near, key=lambda each: near[each])
+            if near[best] >= lost:
+                return order
+            order, lost = best, near[best]
+
+    def _needed(self, grams: ChannelGrams, best: SignedOrder) -> SignedOrder:
+        """Returns what is left of an order when steps are undone that do not matter."""
+        while best.steps:
+            undone = min(
+                (each for each in best.near() if each.steps < best.steps),
+                key=lambda each: float(self._loss(grams, each).sum()),
+            )
+            if self._is_far_better(grams, best, undone):
+                return best
+            best = undone
+        return best
+
+    def _is_far_better(
+        self, grams: ChannelGrams, one: SignedOrder, other: SignedOrder
+    ) -> bool:
+        """Returns whether an order halves the loss of the torques that it moves."""
+        moved = np.flatnonzero((one.matrix != other.matrix).any(axis=1))
+        left, lost = (self._loss(grams, each)[moved].sum() for each in (one, other))
+        if left > _HALF * lost:
+            return False
+        losses = [
+            grams.losses(each.matrix, self._scale[list(each.order)])[:, moved].sum(1)
+            for each in (one, other)
+        ]
+        return is_lower(*losses)
+
+    def common_delay(self) -> Estimate | None:
+        """Returns by how much all torques are late [s]; None if they are not.
+
+        The delay with the least sum of the logarithms of all joints' losses: each
+        joint counts by how sharply its torque tells the delay. At least half of it has
+        to be there without each joint, too: what single joints do is another matter.
+        """
+        count = round(_LATEST / _STEP)
+        coarse = _STEP * np.arange(-count, count + 1)
+        near = coarse[int(np.argmin(_log_sum(self._delayed(coarse))))]
+        fine = near + _STEP * np.arange(-_FINE, _FINE + 1) / _FINE
+        curve, written = self._delayed(fine), self._delayed(np.zeros(1))[0]
+        late = _least_at(fine, curve)
+        joints = range(curve.shape[2] if curve.shape[2] > 1 else 0)
+        without = [_least_at(fine, np.delete(curve, i, axis=2)) for i in joints]
+        best = curve[int(np.argmin(_log_sum(curve)))]
+        found = Estimate(late, _delay_error(fine, curve))
+        is_common = all(each / late > _HALF for each in without) if late else False
+        is_better = is_lower(_by_block(best, written), np.ones(len(best)))
+        is_inside = abs(near) < coarse[-1]
+        is_late = is_inside and is_better and found.is_off(0.0)
+        return found if is_late and is_common else None
+
+    def gravity(self, arm_under: ArmUnder, written: Array) -> Array | None:
+        """Returns the gravity (3,) that is in the torques, None if it is that written.
+
+        The nominal weights under gravity along each axis of the base are fitted to the
+        torques, with the rest of each joint's nominal torque at a scale of its own, and
+        friction. Zero, if less than half of gravity is in the torques.
+
+        Args:
+            arm_under: gives the arm under a gravity.
+            written: (3,) in the base's frame [m/s^2].
+        """
+        few = spread_rows(len(self._thin.time), _FEW_ROWS)
+        thin, tau = self._thin.rows(few), self._tau[self._taken][few]
+        size = float(np.linalg.norm(written))
+        columns, rest = _weights(thin, arm_under, size)
+        by_written = columns @ (written[:, None] / size)
+        if not np.abs(by_written).max() > _ROUNDED * self._scale.max():
+            return None
+        own = np.concatenate([rest[..., None], friction_columns(thin.v)], axis=-1)
+        choice = np.ones((tau.shape[1], 1))
+        free, bound, none = (
+            ChannelGrams.of(weights, tau[..., None], own, positive=2)
+            for weights in (columns, by_written, by_written[..., :0])
+        )
+        if bound.shared_by_block(choice, self._scale).mean() < 0.0:
+            bound = none  # what pulls up is not the gravity that is written
+        without = free.shared_by_block(choice, self._scale)
+        share, error = without.mean(axis=0), jackknife_error(without)
+        length = float(np.linalg.norm(share))
+        if length + STANDARD_ERRORS * error < _HALF:
+            return np.zeros(3)
+        turned = angle_between(share, written)
+        lost = (
+            grams.losses(choice, self._scale).sum(axis=1) for grams in (free, bound)
+        )
+        if turned < _MOST_TILT + STANDARD_ERRORS * error / length or not is_lower(
+            *lost
+        ):
+            return None
+        return size * share / length
+
+    def _delayed(self, delays: Array) -> Array:
+        """Returns held-out losses (delays, blocks, joints) of torques shifted back."""
+        motion, joints = self._motion, self._tau.shape[1]
+        targets = np.empty((len(self._thin.time), joints, len(delays)))
+        for number in np.unique(motion.episode):
+            rows, own = motion.episode == number, self._thin.episode == number
+            time, at = motion.time[rows], self._thin.time[own]
+            if len(time) < 2:
+                targets[own] = self._tau[rows][:, :, None]
+                continue
+            read = CubicSpline(time, self._tau[rows])
+            shifted = np.clip(at[:, None] + delays, time[0], time[-1])
+            targets[own] = np.swapaxes(read(shifted), 1, 2)
+        grams = self._grams(targets)
+        choices = np.eye(len(delays))
+        return np.array(
+            [
+                grams.losses(np.tile(choice, (joints, 1)), self._scale)
+                for choice in choices
+            ]
+        )
+
+    def _grams(self, targets: Array) -> ChannelGrams:
+        return ChannelGrams.of(self._thin.Y, targets, self._friction, positive=2)
+
+
+def _weights(
+    motion: ArmMotion, arm_under: ArmUnder, size: float
+) -> tuple[Array, Array]:
+    """Returns nominal torques of weight (n, joints, 3) by axis, and all others.
+
+    Args:
+        motion: at some rows.
+        arm_under: gives the arm under a gravity.
+        size: of gravity [m/s^2].
+    """
+    zero = np.zeros_like(motion.v)
+    rest = arm_under(np.zeros(3)).torques(motion.q, motion.v, motion.vd)
+    by_axis = [arm_under(g).torques(motion.q, zero, zero) for g in size * np.eye(3)]
+    return np.stack(by_axis, axis=-1), rest
+
+
+def angle_between(a: Array, b: Array) -> float:
+    """Returns the angle between two vectors (3,) [rad]."""
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+
+
+def _log_sum(curve: Array) -> Array:
+    """Returns the sum of the logarithms of joints' losses (..., blocks, joints)."""
+    return np.asarray(np.log(curve.sum(axis=-2) + 1e-300).sum(axis=-1))
+
+
+def _by_block(losses: Array, than: Array) -> Array:
+    """Returns the geometric mean of joints' ratios of losses, by block (blocks,)."""
+    return np.asarray(np.exp(np.log((losses + 1e-300) / (than + 1e-300)).mean(axis=1)))
+
+
+def _least_at(delays: Array, curve: Array) -> float:
+    """Returns where the losses are least, by a parabola through three points."""
+    lost = _log_sum(curve)
+    k = int(np.clip(np.argmin(lost), 1, len(delays) - 2))
+    quadratic = np.polyfit(delays[k - 1 : k + 2] - delays[k], lost[k - 1 : k + 2], 2)
+    if quadratic[0] <= 0.0:
+        return float(delays[int(np.argmin(lost))])
+    least = delays[k] - quadratic[1] / (2.0 * quadratic[0])
+    return float(np.clip(least, delays[0], delays[-1]))
+
+
+def _delay_error(delays: Array, curve: Array) -> float:
+    """Returns the standard error of a delay, over blocks."""
+    blocks = range(curve.shape[1])
+    if len(blocks) < 2:
+        return np.inf
+    return jackknife_error(
+        [_least_at(delays, np.delete(curve, k, axis=1)) for k in blocks]
+    )
+
+
+def likely(ways: Sequence[tuple[Way, float]]) -> list[Way]:
+    """Returns those of some ways of writing that leave about the least.
+
+    Args:
+        ways: each with what it leaves.
+    """
+    least = min((lost for _, lost in ways), default=0.0)
+    return [way for way, lost in ways if lost * _EQUAL <= least]
+
+
+def friction_columns(v: Array) -> Array:
+    """Returns columns (n, joints, 3): an offset, viscous and dry friction."""
+    return np.stack([np.ones_like(v), v, np.sign(v)], axis=-1)
+
+
+def spread_rows(rows: int, most: int) -> NDArray[np.bool_]:
+    """Returns which rows (rows,) are looked at: at most so many, evenly spread."""
+    return np.arange(rows) % max(1, -(-rows // most)) == 0
+
+
+def _positive(scale: Array) -> Array:
+    return np.where(scale > 0.0, scale, 1.0)
