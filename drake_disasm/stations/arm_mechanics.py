@@ -42,7 +42,7 @@ from drake_disasm.stations.joint_friction import (
     steepest_slope,
 )
 
-_CARRIED = (
+_CARRIED: tuple[type[ArmEffect], ...] = (
     *IN_JOINTS,
     JointViscousFriction,
     RotorInertia,

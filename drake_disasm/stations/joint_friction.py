@@ -142,8 +142,7 @@ def _numbers(kind: type[ArmEffect]) -> list[str]:
 
 def _torque(effect: JointEffect, q: Variable, v: Variable, load: float) -> Expression:
     """Returns a joint effect's own equation in symbols."""
-    none = np.array([Expression(0.0)])
-    motion = (np.array([Expression(symbol)]) for symbol in (q, v))
-    samples = JointSamples(*motion, none, none + load)
+    none, *motion = (np.array([Expression(symbol)]) for symbol in (0.0, q, v))
+    samples = JointSamples(motion[0], motion[1], none, none + load)
     with np.errstate(all="ignore"):  # symbols are NaN on the way
         return effect.torque(samples)[0]

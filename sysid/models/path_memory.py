@@ -46,6 +46,6 @@ class PathMemory:
 def _shape(effect: JointMemoryEffect) -> tuple[object, ...]:
     """Returns all that a memory depends on: the kind, and fields but amplitudes."""
     kind = type(effect)
-    names = [f.name for f in dataclasses.fields(kind)]  # type: ignore[arg-type]
+    names = [f.name for f in dataclasses.fields(kind)]
     shape = [getattr(effect, n) for n in names if n not in amplitudes(kind)]
     return kind, *shape

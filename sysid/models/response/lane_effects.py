@@ -53,13 +53,9 @@ class LaneEffect(Generic[Kind]):
 
 def _with_numbers(effect: Kind, of: Callable[[str], Array]) -> Kind:
     """Returns an effect with other numbers, by the names of its fields."""
-    names = [
-        f.name
-        for f in dataclasses.fields(effect)  # type: ignore[arg-type]
-        if isinstance(f.default, float)
-    ]
+    names = [f.name for f in dataclasses.fields(effect) if isinstance(f.default, float)]
     changed = {name: of(name) for name in names}
-    return dataclasses.replace(effect, **changed)  # type: ignore[type-var]
+    return dataclasses.replace(effect, **changed)
 
 
 def torques_in_lanes(
@@ -72,7 +68,7 @@ def torques_in_lanes(
 
 def in_lanes(
     sets: Sequence[tuple[ArmEffect, ...]], segments: int, kind: type[Kind]
-) -> list[tuple[Sequence[Kind], LaneEffect[Kind]]]:
+) -> list[tuple[list[Kind], LaneEffect[Kind]]]:
     """Returns the effects of all sets, in the lanes (sets segments,) where they act.
 
     Those of sets before the first in which an effect is not null, and after the last,
