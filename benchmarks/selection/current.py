@@ -29,7 +29,9 @@ def defaults() -> dict[str, Any]:
 
 def asked(case: Case, settings: Mapping[str, Any]) -> Answer:
     """Returns what closing the loop says of a case with some settings changed."""
-    changes = {k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()}
+    changes: Any = {
+        k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()
+    }
     return closed(case, settings=dataclasses.replace(DEFAULT_SETTINGS, **changes))
 
 

@@ -54,7 +54,9 @@ def _answered(request: dict[str, Any]) -> Answer:
 
 def _closed(case: Case, settings: dict[str, Any]) -> Answer:
     """Returns the verdict: all names are confirmed, ties are ambiguous sets."""
-    changes = {k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()}
+    changes: Any = {
+        k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()
+    }
     library = [e for e in registered_effects() if e.__name__ not in case.left_out]
     found = close_loop(
         _model(case.logs),

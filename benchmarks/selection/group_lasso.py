@@ -9,6 +9,7 @@ which is no dependency of the package: pip install skglm
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
 from selection.answer import Answer, Case
@@ -78,7 +79,7 @@ def _path(
     return found
 
 
-def _group_lasso(groups: list[Array]) -> Any:
+def _group_lasso(groups: list[NDArray[Any]]) -> Any:
     try:
         from skglm import GroupLasso
     except ImportError:
@@ -94,7 +95,7 @@ def _group_lasso(groups: list[Array]) -> Any:
     )
 
 
-def _groups(values: Array, options: list[Option]) -> list[Array]:
+def _groups(values: NDArray[Any], options: list[Option]) -> list[NDArray[Any]]:
     """Returns an array (k,) in parts, one for each option."""
     ends = np.cumsum([len(option.columns) for option in options])
     return np.split(values, ends[:-1])

@@ -36,8 +36,11 @@ _UR10E_JOINTS = (
     "wrist_3",
 )
 _ROKAE_CUTOFF = 6.0  # Hz, as the recording's README has it
-_SERVO_FITTED = ("sin_sin_kp100", "sin_sin_kp200", "lift_and_drop_kp100")
-_SERVO_FITTED = (*_SERVO_FITTED, "lift_and_drop_kp200")
+_SERVO_FITTED = tuple(
+    f"{motion}_kp{gain}"
+    for motion in ("sin_sin", "lift_and_drop")
+    for gain in (100, 200)
+)
 _SERVO_HELD_OUT = ("sin_time_square_kp100", "up_and_down_kp200")
 
 

@@ -117,7 +117,7 @@ def fourier(random: np.random.Generator, joints: int, seconds: float) -> Motion:
         random: draws sizes and phases.
         joints, seconds: of the motion.
     """
-    time = np.arange(round(seconds / PERIOD)) * PERIOD
+    time = np.arange(round(seconds / PERIOD), dtype=np.float64) * PERIOD
     q, v, vd = np.zeros((3, len(time), joints))
     for about in _HARMONICS:
         omega = 2.0 * np.pi * max(1, round(about * seconds)) / seconds
