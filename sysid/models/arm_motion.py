@@ -167,7 +167,7 @@ class ArmMotion:
                 by_base = np.einsum("njbt,b->njt", self.Y_tilt, beta - self.nominal)
                 load = load + (self.tilt + by_base) @ [effect.rx, effect.ry]
             elif isinstance(effect, JointElasticity) and not effect.is_null:
-                by_compliance = self.linked.by_compliance(effect.joint)[self.row]
+                by_compliance = self.linked.by_compliance(effect.joint, self.row)
                 load = load + effect.compliance * by_compliance
             elif isinstance(effect, EncoderError):
                 load = load + self._by_encoder(effect)
@@ -178,9 +178,9 @@ class ArmMotion:
         linked, row, joint = self.linked, self.row, effect.joint
         changed: Array | float = 0.0
         if effect.offset:
-            changed = changed + effect.offset * linked.by_offset(joint)[row]
+            changed = changed + effect.offset * linked.by_offset(joint, row)
         if effect.scale:
-            changed = changed + effect.scale * linked.by_scale(joint)[row]
+            changed = changed + effect.scale * linked.by_scale(joint, row)
         return changed
 
     def shifted(self, torque: Array, effects: Sequence[DelayEffect]) -> Array:

@@ -31,7 +31,8 @@ _LEAST_WINDOW = 2 * _ORDER + 1  # samples, so that the fit is overdetermined
 class LinkTorques:
     """Derivatives of an arm's torques by where links are, computed when asked for.
 
-    Each takes an evaluation of the inverse dynamics for each sample, once.
+    Each takes an evaluation of the inverse dynamics for each sample that is asked for,
+    once.
 
     Args:
         urdf: of the arm.
@@ -52,53 +53,62 @@ class LinkTorques:
     ) -> None:
         self._urdf, self._joints, self._gravity = urdf, tuple(joints), gravity
         self._time, self._episode, self._motion = time, episode, motion
-        self._load: Array | None = None
+        self._load = np.full(motion.shape[1:], np.nan)
         self._known: dict[tuple[str, str], Array] = {}
 
-    def by_compliance(self, joint: str) -> Array:
-        """Returns dtau/dc (n, joints) by the compliance of a joint [(N m)^2/rad]."""
-        return self._by("compliance", joint)
+    def by_compliance(self, joint: str, rows: NDArray[np.int64]) -> Array:
+        """Returns dtau/dc (rows, joints) by the compliance of a joint [(N m)^2/rad]."""
+        return self._by("compliance", joint, rows)
 
-    def by_offset(self, joint: str) -> Array:
-        """Returns dtau/do (n, joints) by the offset of an encoder [N m/rad]."""
-        return self._by("offset", joint)
+    def by_offset(self, joint: str, rows: NDArray[np.int64]) -> Array:
+        """Returns dtau/do (rows, joints) by the offset of an encoder [N m/rad]."""
+        return self._by("offset", joint, rows)
 
-    def by_scale(self, joint: str) -> Array:
-        """Returns dtau/ds (n, joints) by the scale of an encoder [N m]."""
-        return self._by("scale", joint)
+    def by_scale(self, joint: str, rows: NDArray[np.int64]) -> Array:
+        """Returns dtau/ds (rows, joints) by the scale of an encoder [N m]."""
+        return self._by("scale", joint, rows)
 
-    def _by(self, cause: str, joint: str) -> Array:
-        if (cause, joint) not in self._known:
+    def _by(self, cause: str, joint: str, rows: NDArray[np.int64]) -> Array:
+        known = self._known.setdefault((cause, joint), np.full_like(self._load, np.nan))
+        asked = rows[np.isnan(known[rows, 0])]
+        if len(asked):
             i = self._joints.index(joint)
-            self._known[cause, joint] = self._derivative(i, self._behind(cause, i))
-        return self._known[cause, joint]
+            known[asked] = self._derivative(i, self._behind(cause, i), asked)
+        return known[rows]
 
     def _behind(self, cause: str, i: int) -> Array:
         """Returns how far a link is behind its encoder for a cause of one: (3, n)."""
-        motion = self._motion[:, :, i]
         if cause == "compliance":
-            return self._with_derivatives(self._loads()[:, i])
+            every = np.arange(len(self._time))
+            return self._with_derivatives(self._loads(every)[:, i])
         if cause == "scale":
-            return motion
+            return self._motion[:, :, i]
         return np.stack([np.ones(len(self._time)), *np.zeros((2, len(self._time)))])
 
-    def _derivative(self, i: int, behind: Array) -> Array:
-        """Returns how torques change (n, joints) if the link of a joint is behind."""
-        loads, largest = self._loads(), float(np.abs(behind[0]).max())
-        if not largest or not loads.any():
-            return np.zeros_like(loads)
-        step = _SHIFT / largest
-        linked = self._motion.copy()
-        linked[:, :, i] -= step * behind
-        arm = ArmDynamics(self._urdf, self._joints, self._gravity)
-        return (arm.torques(*linked) - loads) / step
+    def _derivative(self, i: int, behind: Array, rows: NDArray[np.int64]) -> Array:
+        """Returns how torques change (rows, joints) if the link of a joint is behind.
 
-    def _loads(self) -> Array:
-        """Returns the torques (n, joints) by the URDF."""
-        if self._load is None:
+        Args:
+            i: number of the joint.
+            behind: (3, n) by how much, at all samples.
+            rows: of the samples that are asked for.
+        """
+        largest = float(np.abs(behind[0]).max())
+        if not largest:
+            return np.zeros((len(rows), len(self._joints)))
+        step = _SHIFT / largest
+        linked = self._motion[:, rows].copy()
+        linked[:, :, i] -= step * behind[:, rows]
+        arm = ArmDynamics(self._urdf, self._joints, self._gravity)
+        return (arm.torques(*linked) - self._loads(rows)) / step
+
+    def _loads(self, rows: NDArray[np.int64]) -> Array:
+        """Returns the torques (rows, joints) by the URDF."""
+        asked = rows[np.isnan(self._load[rows, 0])]
+        if len(asked):
             arm = ArmDynamics(self._urdf, self._joints, self._gravity)
-            self._load = arm.torques(*self._motion)
-        return self._load
+            self._load[asked] = arm.torques(*self._motion[:, asked])
+        return self._load[rows]
 
     def _with_derivatives(self, load: Array) -> Array:
         """Returns a load (n,) with its first two derivatives in time, (3, n)."""

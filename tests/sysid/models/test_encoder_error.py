@@ -76,11 +76,12 @@ def test_the_last_joints_offset_turns_its_links_weight_alone(urdf, tmp_path):
 def test_it_acts_on_any_rows_and_is_linear(urdf, tmp_path):
     log = _log(tmp_path / "log", urdf)
     theta = np.array([p.nominal for p in JointMotionModel([log]).parameters])
-    effect = EncoderError("elbow", 0.1, 0.05)
-    model = JointMotionModel([log], scenario=Scenario(effects=[effect]))
-    whole, mask = model.predictions(theta), np.arange(len(_TIME)) % 7 == 3
-    found = model.of_rows(mask).predictions(theta)
-    np.testing.assert_allclose(found, whole[mask], rtol=1e-12)
+    scenario = Scenario(effects=[EncoderError("elbow", 0.1, 0.05)])
+    of_some, of_all = (JointMotionModel([log], scenario=scenario) for _ in range(2))
+    mask = np.arange(len(_TIME)) % 7 == 3
+    some, whole = of_some.of_rows(mask).predictions(theta), of_all.predictions(theta)
+    np.testing.assert_allclose(some, whole[mask], rtol=1e-12)
+    np.testing.assert_allclose(of_some.predictions(theta), whole, rtol=1e-12)
     parts = [EncoderError("elbow", 0.1), EncoderError("elbow", scale=0.05)]
     both = JointMotionModel([log], scenario=Scenario(effects=parts))
     np.testing.assert_allclose(both.predictions(theta), whole, rtol=1e-12)
