@@ -1,13 +1,12 @@
 """The list of cases; each is written to a folder when it is first asked for."""
 
 import fnmatch
+import hashlib
 import re
 import shutil
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-
-import numpy as np
 
 from drake_disasm.common.errors import DisasmError
 from selection.answer import Case
@@ -18,8 +17,8 @@ from selection.simulated import arm_plans, write_arm_case
 
 #: Patterns that stand for several: what takes seconds, and what takes minutes.
 SETS = {
-    "fast": ("joint/*", "filter/*", "static*", "real/[!s]*"),
-    "all": ("joint/*", "filter/*", "static*", "real/*", "cell/*"),
+    "fast": ("joint/*", "filter/*", "unmodelled/*", "static*", "real/[!s]*"),
+    "all": ("joint/*", "filter/*", "unmodelled/*", "static*", "real/*", "cell/*"),
 }
 _SEEDS, _MORE = (0,), (1, 2, 3, 4)
 
@@ -52,7 +51,8 @@ def known_cases() -> dict[str, Writer]:
 def chosen(patterns: list[str]) -> list[str]:
     """Returns the names of the cases that patterns or names of SETS stand for.
 
-    In an order that is drawn once, so that the first ones stand for all.
+    In an order by their hashes, so that the first ones stand for all, and that more
+    cases do not change.
 
     Raises:
         DisasmError: a pattern stands for none.
@@ -67,8 +67,7 @@ def chosen(patterns: list[str]) -> list[str]:
                 f"`cases` {pattern}: no case has such a name; --list prints all names"
             )
         kept |= own
-    order = np.random.default_rng(57_000).permutation(len(names))
-    return [names[i] for i in order if names[i] in kept]
+    return sorted(kept, key=lambda name: hashlib.sha256(name.encode()).digest())
 
 
 def case_of(name: str, cache: Path) -> Case:

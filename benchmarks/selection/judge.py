@@ -9,6 +9,7 @@ Cases are made when they are first asked for. Their names are paths:
 
   joint/one/2x/white/JointDelay_0   an arm's torques, one effect, at twice the noise
   filter/...                        the same through the filter of import-log
+  unmodelled/...                    an arm that does what no library has, too
   static100/..., static900/...      readings of a sensor: 100 poses, or 900 rows
   cell/...                          transitions of the cell; minutes each
   real/ur10e_unloaded/first         a real recording: whole, first or second half

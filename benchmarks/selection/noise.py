@@ -12,6 +12,8 @@ from drake_disasm.common.errors import DisasmError
 
 Array = NDArray[np.float64]
 
+#: Noise, half of which are torques that no library has; see `simulated.unmodelled`.
+UNMODELLED = "unmodelled"
 NOISES = ("white", "ar0.9", "ar0.98", "t3", "residual")
 
 _FORGETS = 1000  # rows, after which a process knows nothing of its first row

@@ -12,7 +12,7 @@ from drake_disasm.importing.recording import Recording
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from selection.answer import Case
 from selection.hidden import Truth, hide, hide_at_all_joints
-from selection.noise import drawn_noise
+from selection.noise import UNMODELLED, drawn_noise
 from sysid.models.base import LogModel
 from sysid.models.joint_motion import JointMotionModel
 
@@ -90,7 +90,7 @@ def write_arm_case(plan: Plan, folder: Path) -> Case:
     truth = _hidden(plan, _device(models[0], random), random)
     logs = []
     for name, motion, model in zip(("log", "held_out"), motions, models, strict=True):
-        noise = drawn_noise(plan.noise, random, *motion.q.shape) * truth.noise
+        noise = _noise(plan, motion, random) * truth.noise
         tau = truth.on(model) + noise * _as_filtered(plan.cutoff)
         logs.append(folder / name)
         if plan.cutoff:
@@ -144,6 +144,37 @@ def _hidden(plan: Plan, truth: Truth, random: np.random.Generator) -> Truth:
     if plan.at_all_joints:
         truth = hide_at_all_joints(truth, _COMMON, plan.level, random)
     return truth
+
+
+def _noise(plan: Plan, motion: Motion, random: np.random.Generator) -> Array:
+    """Returns noise (n, joints) of about unit variance."""
+    if plan.noise != UNMODELLED:
+        return drawn_noise(plan.noise, random, *motion.q.shape)
+    white = drawn_noise("white", random, *motion.q.shape)
+    own = np.random.default_rng([plan.seed, 1])  # the same on both recordings
+    return (white + unmodelled(own, motion)) / np.sqrt(2.0)
+
+
+def unmodelled(random: np.random.Generator, motion: Motion) -> Array:
+    """Returns torques (n, joints) that no library has, of about unit variance.
+
+    Each joint's friction and load vary with its angle, and its neighbour's, in waves
+    of a tenth of a turn to a whole one, as worn gears and cables make them.
+
+    Args:
+        random: draws waves.
+        motion: on which they act.
+    """
+    q, v = motion.q, motion.v
+    neighbour = np.roll(q, 1, axis=1)
+    torque = np.zeros_like(q)
+    for factor in (np.ones_like(q), np.tanh(v / 0.05), v / v.std(axis=0)):
+        for _ in range(3):
+            waves = random.uniform(1.0, 10.0, q.shape[1])
+            cross = random.uniform(-1.0, 1.0, q.shape[1])
+            phase = random.uniform(0.0, 2.0 * np.pi, q.shape[1])
+            torque += factor * np.sin(waves * q + cross * neighbour + phase)
+    return np.asarray(torque / np.sqrt(np.mean(torque**2, axis=0)))
 
 
 def _as_filtered(cutoff: float | None) -> float:
@@ -211,6 +242,7 @@ def arm_plans(seeds: Sequence[int], prefix: str = "") -> list[Plan]:
     for seed in seeds:
         plans += [*_singles(seed, prefix), *_several(seed, prefix)]
         plans += [*_nulls(seed, prefix), *_left_out(seed, prefix)]
+        plans += _unmodelled_plans(seed, prefix)
     return plans
 
 
@@ -280,6 +312,20 @@ def _left_out(seed: int, prefix: str) -> list[Plan]:
         made = Plan(name, "left out", noise, (_from(i),), 5.0, _seed(seed, 50, i))
         made = dataclasses.replace(made, joints=joints, seconds=seconds)
         found.append(dataclasses.replace(made, leaves_out=True))
+    return found
+
+
+def _unmodelled_plans(seed: int, prefix: str) -> list[Plan]:
+    """Returns plans of arms that do what no library has, too."""
+    found = []
+    for i, (joints, seconds) in enumerate(ARMS * 4):
+        level = (0.0, 0.0, 2.0, 5.0)[i // len(ARMS)]
+        kinds = (_from(3 * i),) if level else ()
+        group, own = "one" if level else "null", _seed(seed, 60, i)
+        size = f"{level:g}x/" if level else ""
+        name = f"{prefix}unmodelled/{group}/{size}{joints}_{i}_{seed}"
+        plan = Plan(name, group, UNMODELLED, kinds, level, own, joints, seconds)
+        found.append(plan)
     return found
 
 
