@@ -13,6 +13,7 @@ looks at. `DataSettings` has the thresholds.
 """
 
 from sysid.data_checks.check import check_data, without_flagged_rows
+from sysid.data_checks.contradictions import contradicting_rows
 from sysid.data_checks.finding import (
     ACCEPTABLE,
     KINDS,
@@ -30,6 +31,7 @@ __all__ = [
     "DataSettings",
     "Severity",
     "check_data",
+    "contradicting_rows",
     "refuse",
     "without_flagged_rows",
 ]

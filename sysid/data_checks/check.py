@@ -12,6 +12,7 @@ from sysid.data_checks.constancy import (
     quantum_findings,
     stuck_findings,
 )
+from sysid.data_checks.contradictions import contradicting_rows
 from sysid.data_checks.delays import delay_findings
 from sysid.data_checks.derivatives import derivative_findings
 from sysid.data_checks.expectation import expectation_of
@@ -35,9 +36,15 @@ def assumption_findings(subject: Subject) -> list[DataFinding]:
     ]
 
 
+def kind_findings(subject: Subject) -> list[DataFinding]:
+    """Returns rows that contradict the kind of the log."""
+    return contradicting_rows(subject.model, subject.settings)
+
+
 #: What logs show by themselves, and what shows against a model's expectation.
 _OF_LOGS = (
     clock_findings,
+    kind_findings,
     derivative_findings,
     stuck_findings,
     processing_findings,

@@ -1,10 +1,9 @@
-"""Time that jumps or stands, and readings at rest that move."""
+"""Time that jumps or stands."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.importing.signals import stretches
-from drake_disasm.logs import Episode, rotation_matrices
 from sysid.data_checks.finding import DataFinding, rows_of
 from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject
@@ -12,12 +11,9 @@ from sysid.models.base import Array
 
 
 def clock_findings(subject: Subject) -> list[DataFinding]:
-    """Finds what is wrong with `time`, and rows that moved though they say they rest.
-
-    Readings at rest may be as far apart as they like.
-    """
+    """Finds what is wrong with `time`; readings at rest may be as far apart as any."""
     if subject.kind == "static_wrench":
-        return _moving(subject)
+        return []
     return _jumps(subject) + _wrong_periods(subject)
 
 
@@ -69,51 +65,3 @@ def _wrong_periods(subject: Subject) -> list[DataFinding]:
             remedy = "give time in seconds, and the period between rows"
             found.append(DataFinding("time", what, remedy))
     return found
-
-
-def _moving(subject: Subject) -> list[DataFinding]:
-    rows = rows_of(subject.where(lambda e: _turning(e, subject.settings)))
-    if not rows:
-        return []
-    what = (
-        "readings that should be at rest, but whose orientation changes within "
-        f"{subject.settings.rest_window:g} s before and after"
-    )
-    return [
-        DataFinding("moving", what, "leave them out: `drop_flagged_rows`", rows=rows)
-    ]
-
-
-def _turning(episode: Episode, settings: DataSettings) -> NDArray[np.bool_]:
-    """Returns the rows (n,) that turn on both sides, as far as there are rows near.
-
-    A row that has no other one near in time may well be at rest.
-    """
-    if "time" not in episode or episode.rows < 2:
-        return np.zeros(episode.rows, dtype=bool)
-    time, R_WS = episode["time"], rotation_matrices(episode["R_WS"])
-    near, resting = np.zeros((2, episode.rows), dtype=bool)
-    for side in (-1, 1):
-        some, still = _still(time[::side], R_WS[::side], settings)
-        near |= some[::side]
-        resting |= (some & still)[::side]
-    return near & ~resting
-
-
-def _still(
-    time: Array, R_WS: Array, settings: DataSettings
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Returns which rows (n,) have rows before them in the window, and rest in it."""
-    n = len(time)
-    some, still = np.zeros(n, dtype=bool), np.ones(n, dtype=bool)
-    for back in range(1, n):
-        since = np.abs(time[back:] - time[:-back])
-        near = since <= settings.rest_window
-        if not near.any():
-            break
-        trace = np.einsum("nij,nij->n", R_WS[back:], R_WS[:-back])
-        angle = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
-        limit = settings.rest_angle + settings.rest_rate * since
-        some[back:] |= near
-        still[back:] &= ~near | (angle <= limit)
-    return some, still

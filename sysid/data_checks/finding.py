@@ -14,6 +14,7 @@ from drake_disasm.common.errors import DisasmError
 KINDS: Mapping[str, str] = {
     "assumed": "what the model takes for granted, since the log doesn't say it",
     "axes": "axes are swapped or have the wrong sign",
+    "contact": "readings of a load at rest whose forces change at one orientation",
     "constant": "a channel never changes, where it should",
     "derivatives": "velocities or accelerations are not the derivatives",
     "late": "a channel is late by whole rows",

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from sysid.models.rate_factors import MOST_TURN
 from sysid.thresholds import threshold
 
 _FALSE_ALARMS = "false alarms: docs/guides/identify.md"
@@ -26,6 +27,27 @@ class DataSettings:
     )
     rest_angle: float = threshold(
         2e-3, "rad", "the noise of an orientation that two rows may differ by"
+    )
+
+    # Contact in readings at rest.
+    contact_angle: float = threshold(
+        0.02,
+        "rad",
+        "between directions of gravity in S: they change a weight by a fiftieth",
+    )
+    contact_share: float = threshold(
+        0.1,
+        "of the variance of the forces",
+        "what a sensor does fast at one orientation is far less than a load's weight",
+    )
+    contact_noise: float = threshold(
+        3.0, "times the noise from row to row", "white noise is one"
+    )
+    contact_rows: int = threshold(
+        30, "rows", "that others have the orientation of: fewer tell no spread"
+    )
+    contact_most_rows: int = threshold(
+        1500, "rows", "that are compared with each other, in pairs"
     )
 
     # Time.
@@ -107,7 +129,7 @@ class DataSettings:
         20.0, "times the task's travel", "a bolt is never so far from its groove"
     )
     most_turn: float = threshold(
-        20.0, "rad or m", "half of an arm's joints never go so far: three turns"
+        MOST_TURN, "rad or m", "half of an arm's joints never go so far: three turns"
     )
 
     # Axes and delays.

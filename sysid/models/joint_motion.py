@@ -24,10 +24,11 @@ from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_lo
 from sysid.models.arm_motion import IN_TORQUES, ArmMotion
 from sysid.models.base import Array, LogModel
 from sysid.models.bookkeeping import Bookkeeping
+from sysid.models.channel_grams import angle_between, likely
 from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints
 from sysid.models.measurements import Channel, Measurements
-from sysid.models.motion_bookkeeping import TorqueFits, angle_between, likely
+from sysid.models.motion_bookkeeping import TorqueFits
 from sysid.models.rate_factors import in_degrees, rate_text, right_rates
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
 from sysid.models.signed_order import SignedOrder

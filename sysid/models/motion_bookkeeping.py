@@ -7,9 +7,8 @@ be explained by friction that drives the joint.
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import fields
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +18,11 @@ from scipy.optimize import linear_sum_assignment
 from drake_disasm.effects import ArmTilt
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.channel_grams import (
+    FAR_BETTER,
     STANDARD_ERRORS,
     ChannelGrams,
     Estimate,
+    angle_between,
     is_lower,
     jackknife_error,
 )
@@ -31,13 +32,8 @@ from sysid.models.signed_order import SignedOrder
 Array = NDArray[np.float64]
 #: Gives an arm under a gravity (3,) in the base's frame.
 ArmUnder = Callable[[Array], ArmDynamics]
-Way = TypeVar("Way")
 
-_EQUAL = 0.9  # of the least loss: ways that leave less than it / this tie
 _MOST_ROWS = 2500  # that are looked at, evenly spread: bodies have some 50 parameters
-#: Of the loss of the torques that a sign or an order concerns: a wrong one leaves at
-#: least as much again. Effects that the model lacks change it by less.
-_HALF = 0.5
 #: Base tilts up to here are an effect of their own.
 _MOST_TILT = next(f.metadata["high"] for f in fields(ArmTilt) if f.name == "rx")
 _FEW_ROWS = 300  # at which an arm that stands otherwise is evaluated
@@ -100,7 +96,7 @@ class TorqueFits:
                 grams.losses((1.0 / each)[:, None], self._scale / each).sum(axis=1)
                 for each in (by, ones)
             )
-            if one.sum() < _HALF * other.sum() and is_lower(one, other):
+            if one.sum() < FAR_BETTER * other.sum() and is_lower(one, other):
                 found[i] = factor
         return found
 
@@ -161,7 +157,7 @@ class TorqueFits:
         """Returns whether an order halves the loss of the torques that it moves."""
         moved = np.flatnonzero((one.matrix != other.matrix).any(axis=1))
         left, lost = (self._loss(grams, each)[moved].sum() for each in (one, other))
-        if left > _HALF * lost:
+        if left > FAR_BETTER * lost:
             return False
         losses = [
             grams.losses(each.matrix, self._scale[list(each.order)])[:, moved].sum(1)
@@ -186,7 +182,7 @@ class TorqueFits:
         without = [_least_at(fine, np.delete(curve, i, axis=2)) for i in joints]
         best = curve[int(np.argmin(_log_sum(curve)))]
         found = Estimate(late, _delay_error(fine, curve))
-        is_common = all(each / late > _HALF for each in without) if late else False
+        is_common = all(each / late > 0.5 for each in without) if late else False
         is_better = is_lower(_by_block(best, written), np.ones(len(best)))
         is_inside = abs(near) < coarse[-1]
         is_late = is_inside and is_better and found.is_off(0.0)
@@ -221,7 +217,7 @@ class TorqueFits:
         without = free.shared_by_block(choice, self._scale)
         share, error = without.mean(axis=0), jackknife_error(without)
         length = float(np.linalg.norm(share))
-        if length + STANDARD_ERRORS * error < _HALF:
+        if length + STANDARD_ERRORS * error < 0.5:
             return np.zeros(3)
         turned = angle_between(share, written)
         lost = (
@@ -275,11 +271,6 @@ def _weights(
     return np.stack(by_axis, axis=-1), rest
 
 
-def angle_between(a: Array, b: Array) -> float:
-    """Returns the angle between two vectors (3,) [rad]."""
-    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
-
-
 def _log_sum(curve: Array) -> Array:
     """Returns the sum of the logarithms of joints' losses (..., blocks, joints)."""
     return np.asarray(np.log(curve.sum(axis=-2) + 1e-300).sum(axis=-1))
@@ -309,16 +300,6 @@ def _delay_error(delays: Array, curve: Array) -> float:
     return jackknife_error(
         [_least_at(delays, np.delete(curve, k, axis=1)) for k in blocks]
     )
-
-
-def likely(ways: Sequence[tuple[Way, float]]) -> list[Way]:
-    """Returns those of some ways of writing that leave about the least.
-
-    Args:
-        ways: each with what it leaves.
-    """
-    least = min((lost for _, lost in ways), default=0.0)
-    return [way for way, lost in ways if lost * _EQUAL <= least]
 
 
 def friction_columns(v: Array) -> Array:

@@ -1,6 +1,7 @@
 """Static readings of a force/torque sensor: payload, bias, and any sensor effect."""
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Iterator, Sequence
 from typing import Self
 
 import numpy as np
@@ -24,8 +25,11 @@ from drake_disasm.logs.refusal import refusal
 from drake_disasm.logs.schema import WRENCH
 from drake_disasm.scenario import Scenario
 from sysid.models.base import Array
+from sysid.models.bookkeeping import Bookkeeping
+from sysid.models.channel_grams import likely
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.scenario_model import ScenarioModel
+from sysid.models.wrench_bookkeeping import Readings, better_ways, has_no_weight
 from sysid.parameters import Parameter
 
 #: Mass, first moment and bias: all that a rigid load on an ideal sensor can have.
@@ -39,6 +43,7 @@ DEFAULT_PARAMETERS = tuple(
 )
 
 _GRAVITY_W = UniformGravityFieldElement().gravity_vector()
+_NOTHING = Payload(0.0, np.zeros(3), _GRAVITY_W)
 
 
 class StaticWrenchModel(ScenarioModel):
@@ -82,13 +87,15 @@ class StaticWrenchModel(ScenarioModel):
                     "name such a log",
                 )
         self.parameters, self.scenario = tuple(parameters), scenario
-        nothing = Payload(0.0, np.zeros(3), _GRAVITY_W)
-        self._payload = _payload(scenario) if known_payload else nothing
+        self._g_W = _GRAVITY_W
+        self._in_W = all(log.header.frames.get("wrench") == "W" for log in logs)
+        self._payload = _payload(scenario) if known_payload else _NOTHING
         episodes = [episode for log in logs for episode in log.episodes]
         self._R_WS = np.concatenate(
             [rotation_matrices(episode["R_WS"]) for episode in episodes]
         )
         self._time = np.concatenate([_clock(episode) for episode in episodes])
+        self._has_time = all("time" in episode for episode in episodes)
         self.measurements = Measurements.of_logs(
             logs, _channels(), lambda log, e: sensor_wrench(log.header, e)
         )
@@ -97,8 +104,18 @@ class StaticWrenchModel(ScenarioModel):
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
         effects = sensor_chain(self.scenario_at(theta).effects)
-        sensing = Sensing(self._time[rows], self._R_WS[rows], _GRAVITY_W)
+        sensing = Sensing(self._time[rows], self._R_WS[rows], self._g_W)
         return sensed(self._payload.weight(self._R_WS[rows]), effects, sensing)
+
+    @property
+    def orientations(self) -> Array:
+        """R_WS (rows, 3, 3) of the readings."""
+        return self._R_WS
+
+    @property
+    def clock(self) -> Array | None:
+        """Time (rows,) since each log began [s]; None: only an order is known."""
+        return self._time if self._has_time else None
 
     @property
     def duration(self) -> float:
@@ -119,7 +136,7 @@ class StaticWrenchModel(ScenarioModel):
         for effect in self.scenario_at(theta).effects:
             if isinstance(effect, PayloadError) and effect.mass != 0.0:
                 moment = {"x": effect.cx, "y": effect.cy, "z": effect.cz}
-                weight = effect.mass * float(np.linalg.norm(_GRAVITY_W))
+                weight = effect.mass * float(np.linalg.norm(self._g_W))
                 centre = {
                     f"centre of mass {axis}": (value / effect.mass, "m")
                     for axis, value in moment.items()
@@ -129,15 +146,59 @@ class StaticWrenchModel(ScenarioModel):
 
     def residual_inputs(self, theta: Array) -> dict[str, Array]:
         """See LogModel."""
-        sensing = Sensing(self._time, self._R_WS, _GRAVITY_W)
+        sensing = Sensing(self._time, self._R_WS, self._g_W)
         inputs = SensorResidualModel.inputs_of(self.predictions(theta), sensing)
         return {channel.name: inputs for channel in self.measurements.channels}
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: time, and gravity's direction in S."""
-        down = np.einsum("nji,j->ni", self._R_WS, _GRAVITY_W)
+        down = np.einsum("nji,j->ni", self._R_WS, self._g_W)
         axes = {f"gravity along {a}_S": down[:, i] for i, a in enumerate("xyz")}
         return {"time": self._time, **axes}
+
+    def bookkeeping(self) -> list[Bookkeeping[Self]]:
+        """See LogModel."""
+        readings = Readings(self._R_WS, self.measurements.values, self._g_W, self._in_W)
+        known = self._payload.mass * float(np.linalg.norm(self._g_W))
+        ways = likely(better_ways(readings))
+        if not ways and has_no_weight(readings, known):
+            return list(self._without_weight(known))
+        return [
+            Bookkeeping(
+                way.name, way.what, way.remedy, self._read(way.readings), way.estimated
+            )
+            for way in ways
+        ]
+
+    def _read(self, readings: Readings) -> Self:
+        """Returns the model of the same readings, written otherwise."""
+        return self.replace(
+            _R_WS=readings.R_WS,
+            _g_W=readings.g_W,
+            _in_W=readings.in_W,
+            _payload=dataclasses.replace(self._payload, g_W=readings.g_W),
+            measurements=self.measurements.with_values(readings.wrench),
+        )
+
+    def _without_weight(self, known: float) -> Iterator[Bookkeeping[Self]]:
+        """Yields a wrench without weight, where the model has one [N]."""
+        carried = [
+            p.name
+            for p in self.parameters
+            if isinstance(
+                self.scenario.effects[int(p.path.split(".")[1])], PayloadError
+            )
+        ]
+        if not carried and not known:
+            return
+        what = "the wrench has no weight in it"
+        what += f", of {known:.3g} N on the sensor" if known else ""
+        remedy = (
+            "record the sensor's raw reading, before the controller takes the weight "
+            "of the tool away"
+        )
+        model = self.replace(_payload=_NOTHING).freeze(dict.fromkeys(carried, 0.0))
+        yield Bookkeeping("WeightRemoved", what, remedy, model)
 
     def _refuse_other_parameters(self) -> None:
         for parameter in self.parameters:

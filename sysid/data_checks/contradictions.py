@@ -1,0 +1,187 @@
+"""Rows that are not what the kind of a log says: motion and contact among rests."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.data_checks.finding import DataFinding, rows_of
+from sysid.data_checks.settings import DEFAULT_DATA_SETTINGS, DataSettings
+from sysid.models.base import Array, LogModel
+from sysid.models.measurements import Measurements
+from sysid.models.static_wrench import StaticWrenchModel
+
+_SLOW = 8  # cosines over a log: drift, warm-up and a step are made of these
+
+
+def contradicting_rows(
+    model: LogModel, settings: DataSettings = DEFAULT_DATA_SETTINGS
+) -> list[DataFinding]:
+    """Finds rows of a model's log that contradict the kind of the log.
+
+    Of readings at rest: rows that move, and forces that change at one orientation, as
+    in contact. A model that leaves such rows unexplained does not lack an effect, and
+    what it leaves is not noise.
+
+    Args:
+        model: of all rows, or of those that are to be explained.
+        settings: thresholds.
+
+    Returns:
+        Findings; rows are numbered in the model's episodes.
+    """
+    if not isinstance(model, StaticWrenchModel) or model.clock is None:
+        return []
+    moving = _moving_rows(model, model.clock, settings)
+    found = _moving(model.measurements, moving, settings)
+    return found + _contact(model, model.clock, ~moving, settings)
+
+
+def _moving(
+    measured: Measurements, moving: NDArray[np.bool_], settings: DataSettings
+) -> list[DataFinding]:
+    """Returns the finding of rows (n,) that move."""
+    if not moving.any():
+        return []
+    what = (
+        "readings that should be at rest, but whose orientation changes within "
+        f"{settings.rest_window:g} s before and after"
+    )
+    rows = rows_of(
+        {
+            name: moving[measured.episode == number]
+            for number, name in enumerate(measured.names)
+        }
+    )
+    return [
+        DataFinding("moving", what, "leave them out: `drop_flagged_rows`", rows=rows)
+    ]
+
+
+def _moving_rows(
+    model: StaticWrenchModel, clock: Array, settings: DataSettings
+) -> NDArray[np.bool_]:
+    """Returns which rows (n,) turn on both sides, as far as there are rows near.
+
+    A row that has no other one near in time may well be at rest.
+    """
+    moving = np.zeros(len(clock), dtype=bool)
+    for number in np.unique(model.measurements.episode):
+        own = model.measurements.episode == number
+        time, R_WS = clock[own], model.orientations[own]
+        near, resting = np.zeros((2, len(time)), dtype=bool)
+        for side in (-1, 1):
+            some, still = _still(time[::side], R_WS[::side], settings)
+            near |= some[::side]
+            resting |= (some & still)[::side]
+        moving[own] = near & ~resting
+    return moving
+
+
+def _still(
+    time: Array, R_WS: Array, settings: DataSettings
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Returns which rows (n,) have rows before them in the window, and rest in it."""
+    n = len(time)
+    some, still = np.zeros(n, dtype=bool), np.ones(n, dtype=bool)
+    for back in range(1, n):
+        since = np.abs(time[back:] - time[:-back])
+        near = since <= settings.rest_window
+        if not near.any():
+            break
+        trace = np.einsum("nij,nij->n", R_WS[back:], R_WS[:-back])
+        angle = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
+        limit = settings.rest_angle + settings.rest_rate * since
+        some[back:] |= near
+        still[back:] &= ~near | (angle <= limit)
+    return some, still
+
+
+def _contact(
+    model: StaticWrenchModel,
+    clock: Array,
+    resting: NDArray[np.bool_],
+    settings: DataSettings,
+) -> list[DataFinding]:
+    """Returns a finding if forces change where a load at rest changes nothing.
+
+    Two readings of an episode under gravity of one direction in S differ by noise, and
+    by what the sensor does slowly: its drift is taken out first. They contradict a load
+    if they differ by more than row-to-row noise, and by much of what all orientations
+    make.
+    """
+    squares = [
+        _changes(
+            model, clock, resting & (model.measurements.episode == number), settings
+        )
+        for number in np.unique(model.measurements.episode)
+    ]
+    changes = np.concatenate(squares)
+    if not len(changes):
+        return []
+    force = model.measurements.values[resting, :3]
+    varied = float(np.mean((force - force.mean(axis=0)) ** 2))
+    changed, noise = float(np.mean(changes)), _step_noise(force)
+    is_large = changed > settings.contact_share * varied
+    if not is_large or changed < settings.contact_noise**2 * noise**2:
+        return []
+    what = (
+        f"forces change by {np.sqrt(changed):.2g} N (rms) at one orientation, and by "
+        f"{noise:.2g} N from one row to the next: these are no readings of a load at "
+        "rest"
+    )
+    remedy = (
+        "record the raw reading of the sensor in free space, at rest in six or more "
+        "orientations; for contact, a log of transitions"
+    )
+    return [DataFinding("contact", what, remedy)]
+
+
+def _changes(
+    model: StaticWrenchModel,
+    clock: Array,
+    rows: NDArray[np.bool_],
+    settings: DataSettings,
+) -> Array:
+    """Returns half the squared changes (pairs, 3) of forces at one orientation [N^2].
+
+    None, if too few rows have another one with their orientation.
+    """
+    if rows.sum() <= settings.contact_rows:
+        return np.zeros((0, 3))
+    R_SW = np.swapaxes(model.orientations[rows], 1, 2)
+    first, second = _pairs(R_SW[:, :, 2], settings)
+    if len(np.union1d(first, second)) <= settings.contact_rows:
+        return np.zeros((0, 3))
+    left = _fast(model.measurements.values[rows, :3], R_SW, clock[rows])
+    return 0.5 * np.asarray(left[first] - left[second]) ** 2
+
+
+def _fast(force: Array, R_SW: Array, clock: Array) -> Array:
+    """Returns forces (n, 3) without a weight, a bias and what changes slowly."""
+    n = len(force)
+    span = max(float(np.ptp(clock)), 1e-300)
+    phase = np.pi * (clock - clock.min()) / span
+    slow = np.cos(phase[:, None] * np.arange(_SLOW + 1))
+    of_slow = np.einsum("nk,ij->nijk", slow, np.eye(3)).reshape(n, 3, -1)
+    columns = np.concatenate([R_SW, of_slow], axis=2).reshape(3 * n, -1)
+    flat = force.reshape(-1)
+    fit = np.linalg.lstsq(columns, flat, rcond=None)[0]
+    return np.asarray((flat - columns @ fit).reshape(n, 3))
+
+
+def _pairs(
+    up_S: Array, settings: DataSettings
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Returns pairs of rows with the vertical (n, 3) in one direction in S.
+
+    Of rows that are spread evenly, if there are many.
+    """
+    rows = np.arange(0, len(up_S), -(-len(up_S) // settings.contact_most_rows))
+    cosine = np.clip(up_S[rows] @ up_S[rows].T, -1.0, 1.0)
+    first, second = np.nonzero(np.triu(np.arccos(cosine) < settings.contact_angle, 1))
+    return rows[first], rows[second]
+
+
+def _step_noise(force: Array) -> float:
+    """Returns the noise of forces (n, 3) by differences of neighbours [N]."""
+    steps = np.median(np.abs(np.diff(force, axis=0)), axis=0)
+    return float(np.sqrt(np.mean((1.4826 * steps) ** 2) / 2.0))
