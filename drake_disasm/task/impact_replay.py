@@ -21,7 +21,7 @@ from drake_disasm.common.rotations import rotation_vectors
 from drake_disasm.devices.sensor_chain import sensed, sensed_at_zeroing
 from drake_disasm.scenario import Scenario, validate
 from drake_disasm.stations.twin import TwinStation
-from drake_disasm.task.replay import Steps, bolt_motion, noise_free
+from drake_disasm.task.replay import Ends, Steps, bolt_motion, noise_free
 
 _COARSE = 0.01  # s: with 20 ms, steps under friction ended twice as far off
 _REST = 1e-6  # m/s, rad/s: in half a second less than the sensor can tell
@@ -66,10 +66,21 @@ class ImpactReplay:
         Args:
             steps: n of each of the k twins; n may differ from one to the next.
         """
-        found = [np.zeros((len(each), 12)) for each in steps]
+        return [ends.states for ends in self.ends(steps)]
+
+    def ends(self, steps: Sequence[Steps]) -> list[Ends]:
+        """Returns where independent steps lead, each from its own start.
+
+        NaN where contact finds no balance.
+
+        Args:
+            steps: of each of the k twins; see `transitions`.
+        """
+        nothing = Ends(np.zeros((0, 12)), np.zeros((0, 6)))
+        found = [nothing] * len(steps)
         for which, replay in self._parts:
-            states = replay.transitions([steps[i] for i in which])
-            for i, own in zip(which, states, strict=True):
+            ends = replay.ends([steps[i] for i in which])
+            for i, own in zip(which, ends, strict=True):
                 found[i] = own
         return found
 
@@ -96,14 +107,15 @@ class _EvenReplay:
         self._time_steps = [coarse_step] * begun + [fine] * rest
         self._zero(coarse_step or fine)
 
-    def transitions(self, steps: Sequence[Steps]) -> list[np.ndarray]:
+    def ends(self, steps: Sequence[Steps]) -> list[Ends]:
         """See ImpactReplay."""
         counts = [len(each) for each in steps]
         which = np.repeat(np.arange(len(steps)), counts)
         # Steps without a balance may overflow, they end as NaN; others don't care.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            states = self._after(which, Steps.concatenated(steps))
-        return np.split(states, np.cumsum(counts)[:-1])
+            ends = self._after(which, Steps.concatenated(steps))
+        parts = (np.split(part, np.cumsum(counts)[:-1]) for part in ends)
+        return [Ends(*each) for each in zip(*parts, strict=True)]
 
     def _zero(self, h: float) -> None:
         """Lets the bolts settle at A and zeroes the sensors.
@@ -131,8 +143,8 @@ class _EvenReplay:
         self.reading_at_zeroing = np.where(step.is_solved[:, None], reading, np.nan)
         self._offset = twins.processing.offset(self.reading_at_zeroing)
 
-    def _after(self, which: np.ndarray, steps: Steps) -> np.ndarray:
-        """Returns the states (n, 12) after steps of some of the twins (n,)."""
+    def _after(self, which: np.ndarray, steps: Steps) -> Ends:
+        """Returns where steps of some of the twins (n,) lead."""
         twins = {h: batch.twins(which) for h, batch in self._batches.items()}
         numbers = twins[self._time_steps[-1]].numbers
         q_bolt = steps.q + numbers.deflection(steps.wrench)
@@ -150,7 +162,9 @@ class _EvenReplay:
             step = plant_step(state, steps.qd_rate, arm_step, body, conditions[h])
             state, is_solved = step.state, is_solved & step.is_solved
         found = _observed(twins[h], step, end, self._offset[which])
-        return np.where(is_solved[:, None], found, np.nan)
+        give = state.q - state.arm[:, :6]
+        parts = (np.where(is_solved[:, None], each, np.nan) for each in (found, give))
+        return Ends(*parts)
 
 
 @dataclasses.dataclass(frozen=True)

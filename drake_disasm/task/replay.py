@@ -6,7 +6,7 @@ measured wrench: a step begins where pose and wrench agree with what was measure
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -82,6 +82,18 @@ class Steps:
         )
 
 
+class Ends(NamedTuple):
+    """Where steps lead; a row is a step.
+
+    Attributes:
+        states: (n, 12) of the task.
+        give: (n, 6) by how much the grip has given way then, in coordinates.
+    """
+
+    states: np.ndarray
+    give: np.ndarray
+
+
 class TwinReplay:
     """Simulates measured steps of the task, each from a given state.
 
@@ -130,11 +142,21 @@ class TwinReplay:
         Raises:
             RuntimeError: Drake's contact solver did not converge.
         """
-        states = []
+        return self.ends(steps).states
+
+    def ends(self, steps: Steps) -> Ends:
+        """Returns where n independent steps lead, each from its own start.
+
+        Raises:
+            RuntimeError: Drake's contact solver did not converge.
+        """
+        states, give = np.zeros((len(steps), 12)), np.zeros((len(steps), 6))
         for i in range(len(steps)):
             self._start(steps, i)
-            states.append(self.advance(steps.qd_rate[i]))
-        return np.array(states).reshape(-1, 12)
+            states[i] = self.advance(steps.qd_rate[i])
+            reached = self._diagram.state()
+            give[i] = reached.q_bolt - reached.q
+        return Ends(states, give)
 
     def episode(self, steps: Steps) -> np.ndarray:
         """Returns the states (n, 12) after consecutive steps from the first state.

@@ -5,12 +5,14 @@ import functools
 from typing import Self
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from drake_disasm.cell.grip import AXIS_ORDER, Springs
 from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import Scenario
 from sysid.models.base import Array
+from sysid.models.sensor_reading import at_bolt
 
 _FORGOTTEN = 0.1  # of a step: with less, e^-10 of what was before is left
 
@@ -97,6 +99,45 @@ class GripLag:
             wrench: (n, 6) on the bolt at Bo in Gn, [f; tau].
         """
         return np.asarray(wrench @ self.to_grip.T / self.springs.stiffness)
+
+    def carried(self, give: Array, weight: Array) -> Array:
+        """Returns the springs' wrench (n, 6) at Bo in Gn where the grip has given way.
+
+        The inverse of `drake_disasm.cell.grip.deflection`.
+
+        Args:
+            give: (n, 6) in the twin's coordinates.
+            weight: (3,) of what the sensor carries, in Gn [N].
+        """
+        given = give[:, list(AXIS_ORDER)]
+        at_grip = given * self.springs.stiffness
+        at_grip[:, 3:] += np.cross(given[:, :3], at_grip[:, :3] + weight)
+        return self._at_bolt(at_grip)
+
+    def after_growth(self, wrench: Array) -> Array:
+        """Returns the springs' share (n, 6) of a wrench that grew evenly in a step.
+
+        Args:
+            wrench: (n, 6) at the step's end, [f; tau] at Bo in Gn.
+        """
+        return self._at_bolt(self._weights[2] * (wrench @ self.to_grip.T))
+
+    def scatter(self, noise: Array, X_SB: RigidTransform) -> Array:
+        """Returns the standard deviation of the springs' wrench (6,) at the pads.
+
+        That of `along` in a long episode: e' = f e + b w + c w' of white noise w has
+        the variance (b^2 + c^2 + 2 f b c) / (1 - f^2) times that of w.
+
+        Args:
+            noise: (6,) of the sensor's readings, [f; tau] at So in S.
+            X_SB: the bolt in the sensor's frame.
+        """
+        forgets, of_begin, of_end = self._weights
+        one = np.hstack([np.zeros((6, 6)), np.diag(noise)])
+        by_channel = at_bolt(one, X_SB)[:, 6:] @ self.to_grip.T
+        gain = of_begin**2 + of_end**2 + 2.0 * forgets * of_begin * of_end
+        variance = np.sum(by_channel**2, axis=0) * gain / (1.0 - forgets**2)
+        return np.asarray(np.sqrt(variance))
 
     def rates(self, elastic: Array, wrench: Array) -> Array:
         """Returns the bolt's rates (n, 6) against the arm, in the twin's coordinates.

@@ -17,7 +17,7 @@ import numpy as np
 
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.impact_replay import ImpactReplay
-from drake_disasm.task.replay import Steps, TwinReplay
+from drake_disasm.task.replay import Ends, Steps, TwinReplay
 
 _MOST_BYTES = 2**26  # of simulations that are kept
 
@@ -27,10 +27,13 @@ class Replayed(NamedTuple):
 
     Attributes:
         states: (n, 12) after the steps; NaN where contact finds no balance.
+        give: (n, 6) by how much the grip has given way then, in coordinates; zeros
+            of whole episodes.
         reading_at_zeroing: (6,) of the sensor, [f; tau] in S.
     """
 
     states: np.ndarray
+    give: np.ndarray
     reading_at_zeroing: np.ndarray
 
 
@@ -62,8 +65,11 @@ class DiagramReplays:
 
     def _replayed(self, scenario: Scenario, steps: Steps) -> Replayed:
         replay = twin_replay(scenario)
-        run = replay.episode if self._whole else replay.transitions
-        return Replayed(run(steps), replay.reading_at_zeroing)
+        if self._whole:
+            ends = Ends(replay.episode(steps), np.zeros((len(steps), 6)))
+        else:
+            ends = replay.ends(steps)
+        return Replayed(*ends, replay.reading_at_zeroing)
 
 
 class ImpactReplays:
@@ -93,9 +99,9 @@ class ImpactReplays:
         asked = tuple(self._scenarios[i] for i in which)
         text = "".join(self._texts[i] for i in which)
         replay = _impact_replay(_Asked(text, asked), self._coarse)
-        states = replay.transitions([steps[i] for i in which])
-        pairs = zip(states, replay.reading_at_zeroing, strict=True)
-        return [Replayed(*pair) for pair in pairs]
+        ends = replay.ends([steps[i] for i in which])
+        pairs = zip(ends, replay.reading_at_zeroing, strict=True)
+        return [Replayed(*each, zero) for each, zero in pairs]
 
 
 def _remembered(
@@ -132,10 +138,10 @@ class _Kept:
         """Keeps a simulation."""
         with self._lock:
             self._found[key] = found
-            self._bytes += found.states.nbytes
+            self._bytes += found.states.nbytes + found.give.nbytes
             while self._bytes > _MOST_BYTES:
                 oldest = self._found.pop(next(iter(self._found)))
-                self._bytes -= oldest.states.nbytes
+                self._bytes -= oldest.states.nbytes + oldest.give.nbytes
 
 
 _kept = _Kept()

@@ -68,6 +68,8 @@ class Transitions:
         sway: (rows, 6) what moving loads the sensor with besides, at So in S.
         elsewhere: (rows, 6) by how much the bolt is elsewhere in the grip as a step
             begins, in coordinates.
+        seen: (steps, 12) of all steps of the episodes, by how much the grip's springs
+            carry another wrench than `GripLag` says as they begin, and its rates.
         period: of the MDP [s].
         p_BoTo_B: (3,) of the twin's coordinates [m].
     """
@@ -82,6 +84,7 @@ class Transitions:
     commands: tuple[Commands, ...]
     sway: Array
     elsewhere: Array
+    seen: Array
     period: float
     p_BoTo_B: Array
 
@@ -126,6 +129,7 @@ class Transitions:
             commands=tuple(Commands.of(e, period) for e in episodes),
             sway=np.concatenate([_sway(log, scenario, sensing) for log in logs]),
             elsewhere=np.concatenate([each.elsewhere[:-1] for each in begun]),
+            seen=np.zeros((len(steps), 12)),
             period=period,
             p_BoTo_B=p_BoTo_B,
         )
@@ -150,6 +154,11 @@ class Transitions:
         if not any(one.begins_elsewhere(other, _NOTICEABLE) for one, other in pairs):
             return self
         begun = Steps.concatenated([e.steps() for e in episodes])
+        begun = dataclasses.replace(
+            begun,
+            wrench=begun.wrench + self.seen[:, :6],
+            give_rate=begun.give_rate + self.seen[:, 6:],
+        )
         elsewhere = np.concatenate([each.elsewhere[:-1] for each in episodes])
         found = dataclasses.replace(
             self,
@@ -159,8 +168,38 @@ class Transitions:
         )
         return dataclasses.replace(found, steps=found._moved(begun.qd, begun.qd_rate))
 
-    def select(self, mask: NDArray[np.bool_]) -> Self:
-        """Returns the transitions where the mask (rows,) is true."""
+    def beginning(self, rows: NDArray[np.int64], elastic: Array, rates: Array) -> Self:
+        """Returns all transitions, some of which begin with another give of the grip.
+
+        Args:
+            rows: (n,) their numbers; these are all transitions.
+            elastic: (n, 6) wrench that the springs carry, on the bolt at Bo in Gn.
+            rates: (n, 6) of the bolt against the arm.
+        """
+        wrench, give_rate = self.steps.wrench.copy(), self.steps.give_rate.copy()
+        wrench[rows], give_rate[rows] = elastic, rates
+        more = np.hstack([wrench - self.steps.wrench, give_rate - self.steps.give_rate])
+        steps = dataclasses.replace(self.steps, wrench=wrench, give_rate=give_rate)
+        return dataclasses.replace(self, steps=steps, seen=self.seen + more)
+
+    @property
+    def carried(self) -> Array:
+        """The measured wrench (steps, 6) as all steps of the episodes begin.
+
+        On the bolt at Bo in Gn, see `RecordedEpisode`.
+        """
+        return np.concatenate([each.carried[:-1] for each in self.episodes])
+
+    def read(self, sensing: SensorReading) -> Array:
+        """Returns the states (steps, 12) as all steps of the episodes begin.
+
+        The wrench is at So in S, without effects and offset.
+        """
+        states = [e.at_sensor(sensing, self.p_BoTo_B)[:-1] for e in self.episodes]
+        return np.concatenate(states)
+
+    def select(self, mask: NDArray[np.bool_] | NDArray[np.int64]) -> Self:
+        """Returns the transitions of a mask (rows,), or of some rows."""
         return dataclasses.replace(
             self,
             steps=self.steps.select(mask),

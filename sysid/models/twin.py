@@ -29,6 +29,7 @@ from drake_disasm.scenario.names import find_field
 from drake_disasm.task.replay import Steps
 from sysid.models.base import Array, PredictionError, even_chunks
 from sysid.models.commands import bolt_path, twin_coordinates
+from sysid.models.grip_observer import GripObserver, Led
 from sysid.models.late_pose import LatePoses
 from sysid.models.replays import DiagramReplays, ImpactReplays, Replayed
 from sysid.models.scenario_model import ScenarioModel
@@ -41,6 +42,7 @@ _CHUNK = 32  # transitions: a tenth of a second of work
 _IMPACT_CHUNK = 512  # large enough for arrays, small enough to share
 _IMPACT_BATCH = 4096  # with more an array operation hardly gets faster
 _N_PER_MM = 1e-3  # of N/m
+_PASSES = 2  # the second where the first has changed much
 _KEPT = 64  # steps of that many parameter sets
 _T = TypeVar("_T")
 _RUN = 6  # rows that follow each other in a thinned log: 0.6 s
@@ -91,7 +93,7 @@ class TwinModel(ScenarioModel):
         self.reading = SensorReading.of(logs, scenario)
         recorded = Transitions.of(logs, scenario, self.reading)
         effects = sensor_chain(scenario.effects)
-        self._transitions = recorded.begun(effects, self.reading)
+        self._whole = self._transitions = recorded.begun(effects, self.reading)
         self.measurements = measured_states(logs, scenario, self.reading)
         self._begins_vary = False  # with parameters of effects on the sensor
         self._displacement: Array | None = None  # (rows, 2, 3) of begin and end
@@ -127,6 +129,12 @@ class TwinModel(ScenarioModel):
 
         NaN where contact finds no balance.
         """
+        return [self._at_sensor_and_zero(*own, rows) for own in self._led(thetas, rows)]
+
+    def _led(
+        self, thetas: Array, rows: slice
+    ) -> list[tuple[Replayed, Transitions, Steps]]:
+        """Returns where steps lead, how they begin, and the steps, of sets (k, p)."""
         scenarios = [self.scenario_at(theta) for theta in thetas]
         executed = [self._executed_at(scenario) for scenario in scenarios]
         steps = [self._displaced(own.select(rows), rows) for own, _ in executed]
@@ -136,10 +144,8 @@ class TwinModel(ScenarioModel):
             late = [poses for _, poses in executed]
             self._carry_on(replays, steps, [each.states for each in found], late, rows)
         begun = [self._begun_at(scenario) for scenario in scenarios]
-        return [
-            self._at_sensor_and_zero(each, own, went, rows)
-            for each, own, (went, _) in zip(found, begun, executed, strict=True)
-        ]
+        went = [own for own, _ in executed]
+        return list(zip(found, begun, went, strict=True))
 
     def _at_sensor_and_zero(
         self, found: Replayed, begun: Transitions, steps: Steps, rows: slice
@@ -226,12 +232,56 @@ class TwinModel(ScenarioModel):
         return self.replace(coarse=False) if is_coarse else None
 
     def begun(self, theta: Array) -> Self:
-        """See LogModel: steps begin where the wrench says, without sensor effects."""
+        """See LogModel: steps begin where the wrench says, without sensor effects.
+
+        And where the model has the grip at the end of the step before: `GripObserver`.
+        """
         effects = sensor_chain(self.scenario_at(theta).effects)
-        transitions = self._transitions.begun(effects, self.reading)
-        if transitions is self._transitions:
+        whole = self._whole.begun(effects, self.reading)
+        if not self.rollout:
+            whole = self._observed(theta, whole)
+        if whole is self._whole:
             return self
-        return self.replace(_transitions=transitions)
+        own = whole.select(self._transitions.rows)
+        return self.replace(_whole=whole, _transitions=own)
+
+    def _observed(self, theta: Array, whole: Transitions) -> Transitions:
+        """Returns all transitions, those of this model beginning as it has the grip.
+
+        The same, if that makes no noticeable difference. Steps that follow one whose
+        begin was surely another are led there once more.
+
+        Args:
+            theta: (p,) values of `parameters`.
+            whole: all transitions.
+        """
+        model, known = self.surrogate(), whole
+        if model.costly:
+            return whole
+        noise, rows = self.measurements.noise[6:], self._transitions.rows
+        observer = GripObserver.of(whole, noise, self.reading.X_SB)
+        ends, read = rows[whole.steps.index[rows] > 0], whole.read(self.reading)
+        for _ in range(_PASSES):
+            if not len(ends):
+                break
+            led = model.replace(_whole=known, _displacement=None)._ends(theta, ends - 1)
+            before, known = known, observer.corrected(known, ends, led, read[ends])
+            ends = ends[observer.changed(known, before)[ends - 1]]
+        change = observer.change(known.select(rows), self._transitions)
+        is_new = not self._whole.seen.any()
+        noticeable = is_new or np.mean(change**2, axis=0).max() > 1.0
+        return known if noticeable or whole is not self._whole else self._whole
+
+    def _ends(self, theta: Array, rows: NDArray[np.int64]) -> Led:
+        """Returns where some steps of the log lead, by their numbers (n,)."""
+        model = self.replace(_transitions=self._whole.select(rows))
+        parts = []
+        for each in even_chunks(len(rows), _IMPACT_CHUNK):
+            [own] = model._led(theta[None], each)
+            states = model._at_sensor_and_zero(*own, each)[:, :12]
+            parts.append((own[0].give, states))
+        give, states = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return Led(give, states)
 
     def varying(self) -> Self:
         """See LogModel: steps begin where the wrench says, at each parameter set."""

@@ -1,0 +1,111 @@
+"""How far the grip gives as a step begins, of the step before as a model has it."""
+
+import dataclasses
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+
+from sysid.models.base import Array
+from sysid.models.grip_lag import GripLag
+from sysid.models.sensor_reading import at_bolt
+from sysid.models.transitions import Transitions
+
+_SURE = 3.0  # standard deviations: by chance one in four hundred
+
+
+@dataclasses.dataclass(frozen=True)
+class Led:
+    """Where a model leads some steps.
+
+    Attributes:
+        give: (n, 6) by how much the grip gives at their ends, in coordinates.
+        states: (n, 12) there, the wrench at So in S, without effects on the sensor.
+    """
+
+    give: Array
+    states: Array
+
+
+@dataclasses.dataclass(frozen=True)
+class GripObserver:
+    """Estimates how a step begins from a model of the step before, and the wrench.
+
+    Between two readings `GripLag` takes the wrench for linear in time. It is not where
+    the force on the bolt jumps as a step begins: a drag that grows with the commanded
+    velocity, friction that turns with the sliding. The springs, which lag by half a
+    step, then carry up to half of the jump more or less. A model of that step has the
+    jump in it. What it misses of the wrench at the step's end is taken to have grown
+    evenly, and is believed as far as it exceeds the sensor's noise: the mean of a
+    normal variable with an unknown mean, shrunk by its positive part (James and Stein
+    1961), b = max(0, 1 - (sigma / m)^2) m of what is missed, m.
+
+    Attributes:
+        grip: that lags.
+        weight: (3,) that its springs carry at the start, in Gn [N].
+        noise: (6,) of the sensor's readings.
+        X_SB: the bolt in the sensor's frame.
+    """
+
+    grip: GripLag
+    weight: Array
+    noise: Array
+    X_SB: RigidTransform
+
+    @classmethod
+    def of(cls, whole: Transitions, noise: Array, X_SB: RigidTransform) -> Self:
+        """Returns the observer of a log.
+
+        Args:
+            whole: all transitions.
+            noise: (6,) of the sensor's readings.
+            X_SB: the bolt in the sensor's frame.
+        """
+        episode = whole.episodes[0]
+        return cls(episode.grip, episode.offset.rest[:3], noise, X_SB)
+
+    def corrected(
+        self, whole: Transitions, ends: NDArray[np.int64], led: Led, read: Array
+    ) -> Transitions:
+        """Returns all transitions, some of which begin where the step before led.
+
+        Steps that the model does not lead anywhere are left as they are.
+
+        Args:
+            whole: all transitions.
+            ends: (n,) numbers of those that begin where the others end.
+            led: where the n steps before them lead.
+            read: (n, 12) states that were measured there, without effects.
+        """
+        is_known = np.isfinite(led.give).all(axis=1)
+        ends, read = ends[is_known], read[is_known]
+        give, states = led.give[is_known], led.states[is_known]
+        missed = read[:, 6:] - states[:, 6:]
+        believed = shrunk(missed, self.noise)
+        elastic = self.grip.carried(give, self.weight)
+        elastic += self.grip.after_growth(self._on_bolt(read, believed))
+        wrench = whole.carried[ends] - self._on_bolt(read, missed - believed)
+        return whole.beginning(ends, elastic, self.grip.rates(elastic, wrench))
+
+    def change(self, one: Transitions, other: Transitions) -> Array:
+        """Returns how differently the grip begins (n, 6), in units of what is known.
+
+        That is the standard deviation of what `GripLag` makes of noise, at the pads.
+        """
+        change = (one.steps.wrench - other.steps.wrench) @ self.grip.to_grip.T
+        return np.asarray(change / self.grip.scatter(self.noise, self.X_SB))
+
+    def changed(self, one: Transitions, other: Transitions) -> NDArray[np.bool_]:
+        """Returns which steps (n,) surely begin differently."""
+        return np.asarray(np.abs(self.change(one, other)).max(axis=1) > _SURE)
+
+    def _on_bolt(self, states: Array, wrench: Array) -> Array:
+        """Returns wrenches (n, 6) at Bo in Gn, of those at So in S."""
+        return at_bolt(np.hstack([states[:, :6], wrench]), self.X_SB)[:, 6:]
+
+
+def shrunk(missed: Array, noise: Array) -> Array:
+    """Returns how much of what is missed is believed: see `GripObserver`."""
+    share = 1.0 - (noise / np.maximum(np.abs(missed), noise)) ** 2
+    return np.asarray(share * missed)
