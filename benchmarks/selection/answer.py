@@ -74,7 +74,7 @@ class Answer:
         sizes: value and 95 % interval of parameters, by "name.field", SI.
         before, after: held-out error without and with the effects, relative: the norm
             of the error over that of what was measured. None: not given.
-        seconds: from reading the log to the answer.
+        seconds: of the processor, from reading the log to the answer.
         text: what else the selector says.
     """
 
