@@ -32,7 +32,7 @@ class JointDahlFriction(JointMemoryEffect):
     joint: str = joint_name()
     size: float = amplitude("N m", 0.0, 200.0, "F_c, when it slides")
     displacement: float = shape_parameter(
-        0.002, "rad", 1e-4, 0.1, "x_s, over which it builds up", (5e-4, 5e-3)
+        0.002, "rad", 1e-4, 0.05, "x_s, over which it builds up", (5e-4, 5e-3)
     )
 
     needs_both_ways = True

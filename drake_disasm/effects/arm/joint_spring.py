@@ -15,16 +15,16 @@ from drake_disasm.effects.registry import register_effect
 class JointSpring(JointEffect):
     """A spring between two links: a counterbalance, or cables that a joint winds up.
 
-    Equation: tau = k q + c = k (q - q_0) with q_0 = -c / k, where the spring is slack:
-    Hooke's law by the joint's angle. A counterbalance may act with a negative k; one
-    whose torque is a sine of the angle is `TorqueRipple` with one period per turn.
+    Equation: tau = k q, Hooke's law by the joint's angle. Of a spring that is slack
+    at q_0, tau = k (q - q_0), the constant part -k q_0 is a `TorqueOffset`; one whose
+    torque is a sine of the angle is `TorqueRipple` with one period per turn. A
+    counterbalance may act with a negative k.
     Where it acts: one joint of the arm, on the torque that its sensor measures, or that
-    its drive has to give. With k = 0 it is an offset of the torque.
+    its drive has to give. In the cell it is slack at q = 0.
     """
 
     joint: str = joint_name()
     stiffness: float = amplitude("N m/rad", -2000.0, 2000.0, "k, of the spring")
-    preload: float = amplitude("N m", -2000.0, 2000.0, "c, its torque at q = 0")
 
     noun = "a spring"
     experiment = (
@@ -43,4 +43,4 @@ class JointSpring(JointEffect):
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""
-        return self.stiffness * samples.q + self.preload
+        return self.stiffness * samples.q

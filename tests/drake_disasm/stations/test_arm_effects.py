@@ -115,7 +115,7 @@ def _joint(station: CellStation, simulator: Simulator) -> float:
 
 
 def test_a_spring_is_held_by_the_drive(station: CellStation) -> None:
-    effect = fx.JointSpring(NAME, stiffness=30.0, preload=-12.0)
+    effect = fx.JointSpring(NAME, stiffness=30.0)
     torques = []
     for effects in ([], [effect]):
         simulator = _lifted(station, effects)
@@ -123,7 +123,7 @@ def test_a_spring_is_held_by_the_drive(station: CellStation) -> None:
         context = simulator.get_mutable_context()
         torques.append(station.GetOutputPort("iiwa.torque_measured").Eval(context))
     expected = np.zeros(7)
-    expected[JOINT] = 30.0 * _joint(station, simulator) - 12.0
+    expected[JOINT] = 30.0 * _joint(station, simulator)
     np.testing.assert_allclose(torques[1] - torques[0], expected, atol=0.05)
 
 
@@ -196,7 +196,7 @@ EVERY = (
     fx.TorqueOffset(NAME, -2.0),
     fx.TorqueGain(NAME, 0.1),
     fx.JointDahlFriction(NAME, 6.0),
-    fx.JointSpring(NAME, 30.0, -12.0),
+    fx.JointSpring(NAME, 30.0),
     fx.EncoderError(NAME, 0.004, -0.003),
     fx.FlangePayload(2.0, 0.1),
 )

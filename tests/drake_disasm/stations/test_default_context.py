@@ -28,7 +28,7 @@ ON_ARM: list[fx.Effect] = [
     fx.JointViscousFriction(JOINT, 80.0),
     fx.JointCoulombFriction(JOINT, 9.0),
     fx.JointDahlFriction(JOINT, 6.0),
-    fx.JointSpring(JOINT, 10.0, 15.0),
+    fx.JointSpring(JOINT, 10.0),
     fx.EncoderError(JOINT, 1e-4, 1e-4),
     fx.RotorInertia(JOINT, 2.0),
     fx.TorqueOffset(JOINT, -2.0),

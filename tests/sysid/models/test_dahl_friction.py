@@ -9,6 +9,7 @@ from drake_disasm.effects import (
     JointDahlFriction,
     JointDelay,
     JointSpring,
+    TorqueOffset,
 )
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.scenario import Scenario
@@ -63,7 +64,7 @@ def test_least_squares_get_its_size_back_and_rivals_do_not_fit(urdf, tmp_path):
 
 def test_a_spring_is_got_back_besides_gravity(urdf, tmp_path):
     log = _log(tmp_path / "log", urdf, spring=(1.5, -0.4))
-    effects = [JointSpring("elbow", stiffness=1.0), JointSpring("elbow", preload=1.0)]
+    effects = [JointSpring("elbow", 1.0), TorqueOffset("elbow", 1.0)]
     found, left = fitted(log, effects)
     np.testing.assert_allclose(found, [1.5, -0.4], rtol=0.03)
     assert left == pytest.approx(NOISE, rel=0.05)
