@@ -4,16 +4,17 @@ Runs a selector over some cases with its default settings, and again with one se
 changed: numbers are halved and doubled, switches are switched, all of a tuple is
 scaled. The table says how many answers changed, and what that did to the scores (see
 `judge.py --help`), as changes in numbers of effects and of logs. A setting that changes
-no answer does nothing on these cases.
+no answer does nothing on these cases; where it is not even read it is not tried.
 
-The selector's module has, beside `select`, the functions `defaults()`, which returns
-the settings by name, and `asked(case, changes)`: `frozen` and `current` do.
+The selector's module has, in addition to `select`, the functions `defaults()`, which
+returns the settings by name, `asked(case, changes)` and `settings_read(case)`, the
+names of those that it reads: `frozen` and `current` do.
 """
 
 import argparse
 import importlib
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,7 @@ _CASES = ("joint/*/[23]_*", "joint/one/*", "static100/*", "real/rack*", "real/ft
 _COLUMNS = (
     *("setting", "value", "default", "answers changed", "named", "in set"),
     *("logs with wrong names", "false none", "alarms", "error after", "time"),
+    "read in",
 )
 _TITLE = "What each setting is worth"
 
@@ -76,23 +78,29 @@ def scaled(value: Any, factor: float) -> Any:
 def main(arguments: Sequence[str]) -> int:
     """Runs the selector with each setting changed, and prints the table."""
     args = parse(arguments)
-    defaults, ask = _functions(args.selector)
+    selector = _selector(args.selector)
     logs = (args.logs or args.out / "cases").resolve()
     cases = [case_of(name, logs) for name in chosen(args.cases)[: args.limit]]
-    settings = defaults()
+    settings = selector.defaults()
     _refuse_unknown(args.settings, settings)
     changes: list[Change] = [()]
     for name in args.settings or settings:
         changes += variants(name, settings[name])
     kept = FinishedWork(args.out / "ablation" / args.selector)
+    read = {case.name: _read(kept, selector, case) for case in cases}
     baseline: list[Judged] = []
     rows = []
     with ProgressBar(unit="variant") as progress:
         for number, change in enumerate(changes, start=1):
-            found = [Judged(c, _answer(kept, ask, c, change)) for c in cases]
+            # Where a setting is not read, the answer is that with the defaults.
+            used = [change if _matters(change, read[c.name]) else () for c in cases]
+            found = [
+                Judged(c, _answer(kept, selector, c, own))
+                for c, own in zip(cases, used, strict=True)
+            ]
             baseline = baseline or found
             default = settings[change[0]] if change else "-"
-            rows.append(row(change, default, baseline, found))
+            rows.append([*row(change, default, baseline, found), sum(map(bool, used))])
             progress(ProgressUpdate("ablation", number, len(changes)))
     print(markdown(_COLUMNS, rows))
     write_result(args.results, _TITLE, _COLUMNS, rows, _PROGRAM, arguments)
@@ -178,35 +186,39 @@ def _said(answer: Answer) -> tuple[Any, ...]:
     return answer.ending, set(answer.confirmed), set(answer.suggested), sets
 
 
-def _answer(
-    kept: FinishedWork,
-    ask: Callable[[Case, dict[str, Any]], Answer],
-    case: Case,
-    change: Change,
-) -> Answer:
+def _matters(change: Change, read: Sequence[str]) -> bool:
+    return not change or change[0] in read
+
+
+def _answer(kept: FinishedWork, selector: Any, case: Case, change: Change) -> Answer:
     key = [*change, case.name]
     if kept.get(key) is None:
         settings = dict([change]) if change else {}
-        kept.keep(key, asked(lambda each: ask(each, settings), case).plain)
+        kept.keep(key, asked(lambda each: selector.asked(each, settings), case).plain)
     return Answer.of_plain(kept.get(key))
 
 
-def _functions(
-    name: str,
-) -> tuple[Callable[[], dict[str, Any]], Callable[[Case, dict[str, Any]], Answer]]:
-    """Returns a selector's `defaults` and `asked`.
+def _read(kept: FinishedWork, selector: Any, case: Case) -> list[str]:
+    key = ["read", case.name]
+    if kept.get(key) is None:
+        kept.keep(key, sorted(selector.settings_read(case)))
+    found: list[str] = kept.get(key)
+    return found
+
+
+def _selector(name: str) -> Any:
+    """Returns a selector's module.
 
     Raises:
         DisasmError: it has no settings.
     """
     module = importlib.import_module(f"selection.{name}")
-    try:
-        return module.defaults, module.asked
-    except AttributeError:
+    if not hasattr(module, "settings_read"):
         raise DisasmError(
-            f"`selector` {name}: has no settings; its module needs defaults() and "
-            "asked(case, changes), as current has"
-        ) from None
+            f"`selector` {name}: has no settings; its module needs defaults(), "
+            "asked(case, changes) and settings_read(case), as current has"
+        )
+    return module
 
 
 def _refuse_unknown(names: Sequence[str] | None, known: dict[str, Any]) -> None:

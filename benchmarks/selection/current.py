@@ -10,6 +10,7 @@ import numpy as np
 from drake_disasm.effects import registered_effects
 from drake_disasm.logs import read_logs
 from selection.answer import Answer, Case
+from selection.watched import watched
 from sysid.effect_selection import close_loop
 from sysid.effect_selection.candidates import extended
 from sysid.effect_selection.settings import DEFAULT_SETTINGS
@@ -33,6 +34,13 @@ def asked(case: Case, settings: Mapping[str, Any]) -> Answer:
         k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()
     }
     return closed(case, settings=dataclasses.replace(DEFAULT_SETTINGS, **changes))
+
+
+def settings_read(case: Case) -> set[str]:
+    """Returns the names of the settings that closing the loop reads for a case."""
+    read = set[str]()
+    closed(case, settings=watched(DEFAULT_SETTINGS, read))
+    return read
 
 
 def closed(case: Case, **arguments: Any) -> Answer:

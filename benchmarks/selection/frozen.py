@@ -33,24 +33,30 @@ def select(case: Case) -> Answer:
 
 def asked(case: Case, settings: dict[str, Any]) -> Answer:
     """Returns what it says of a case with some settings changed."""
+    return Answer.of_plain(_reply({"case": vars(case), "settings": settings}))
+
+
+def settings_read(case: Case) -> set[str]:
+    """Returns the names of the settings that it reads for a case."""
+    return set(_reply({"case": vars(case), "settings": None}))
+
+
+def defaults() -> dict[str, Any]:
+    """Returns the default settings."""
+    found: dict[str, Any] = _reply({})
+    return found
+
+
+def _reply(request: dict[str, Any]) -> Any:
+    """Returns the worker's reply to a request, as plain data."""
     process = _worker()
-    request = {"case": vars(case), "settings": settings}
     assert process.stdin is not None and process.stdout is not None
     print(json.dumps(request), file=process.stdin, flush=True)
     line = process.stdout.readline()
     if not line:
         _worker.cache_clear()
-        raise DisasmError(f"{_WORKER.name}: the process ended at {case.name}")
-    return Answer.of_plain(json.loads(line))
-
-
-def defaults() -> dict[str, Any]:
-    """Returns the default settings."""
-    process = _worker()
-    assert process.stdin is not None and process.stdout is not None
-    print(json.dumps({"defaults": True}), file=process.stdin, flush=True)
-    found: dict[str, Any] = json.loads(process.stdout.readline())
-    return found
+        raise DisasmError(f"{_WORKER.name}: the process ended")
+    return json.loads(line)
 
 
 @cache

@@ -22,6 +22,7 @@ from drake_disasm.common.errors import DisasmError  # noqa: E402
 from drake_disasm.effects import registered_effects  # noqa: E402
 from drake_disasm.logs import read_logs  # noqa: E402
 from selection.answer import FAILED, Answer, Case, refusal  # noqa: E402
+from selection.watched import watched  # noqa: E402
 from sysid.effect_selection.candidates import extended  # noqa: E402
 from sysid.effect_selection.close_loop import close_loop  # noqa: E402
 from sysid.effect_selection.settings import DEFAULT_SETTINGS  # noqa: E402
@@ -32,19 +33,30 @@ def main() -> None:
     """Reads requests, a line each, until there is none."""
     for line in sys.stdin:
         request = json.loads(line)
-        is_question = "case" in request
-        found = _answered(request).plain if is_question else _defaults()
-        print(json.dumps(found), file=_ANSWERS, flush=True)
+        print(json.dumps(_reply(request)), file=_ANSWERS, flush=True)
+
+
+def _reply(request: dict[str, Any]) -> Any:
+    """Returns an answer, the names of settings read for it, or the default settings."""
+    if "case" not in request:
+        return _defaults()
+    if request["settings"] is not None:
+        return _answered(request["case"], request["settings"]).plain
+    read = set[str]()
+    _answered(request["case"], {}, watched(DEFAULT_SETTINGS, read))
+    return sorted(read)
 
 
 def _defaults() -> dict[str, Any]:
     return dataclasses.asdict(DEFAULT_SETTINGS)
 
 
-def _answered(request: dict[str, Any]) -> Answer:
+def _answered(
+    case: dict[str, Any], changes: dict[str, Any], settings: Any = DEFAULT_SETTINGS
+) -> Answer:
     begin = time.process_time()
     try:
-        answer = _closed(Case(**request["case"]), request["settings"])
+        answer = _closed(Case(**case), changes, settings)
     except DisasmError as error:
         answer = refusal(error)
     except Exception as error:  # a selector's failure is a result, too
@@ -52,16 +64,14 @@ def _answered(request: dict[str, Any]) -> Answer:
     return dataclasses.replace(answer, seconds=time.process_time() - begin)
 
 
-def _closed(case: Case, settings: dict[str, Any]) -> Answer:
+def _closed(case: Case, given: dict[str, Any], settings: Any) -> Answer:
     """Returns the verdict: all names are confirmed, ties are ambiguous sets."""
-    changes: Any = {
-        k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()
-    }
+    changes: Any = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
     library = [e for e in registered_effects() if e.__name__ not in case.left_out]
     found = close_loop(
         _model(case.logs),
         library=library,
-        settings=dataclasses.replace(DEFAULT_SETTINGS, **changes),
+        settings=dataclasses.replace(settings, **changes) if changes else settings,
     )
     verdict, errors = found.verdict, found.errors
     before, after = errors.relative(errors.before), errors.relative(errors.after)
