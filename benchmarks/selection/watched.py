@@ -22,7 +22,7 @@ def watched(settings: Any, read: set[str]) -> Any:
         """Returns an attribute."""
         if name in names and sys._getframe(1).f_code.co_name not in _COPYING:
             read.add(name)
-        return kind.__getattribute__(self, name)
+        return object.__getattribute__(self, name)
 
     values = {name: getattr(settings, name) for name in names}
     return type(kind.__name__, (kind,), {"__getattribute__": noted})(**values)
