@@ -89,7 +89,8 @@ def main(arguments: Sequence[str]) -> int:
     kept = FinishedWork(args.out / "ablation" / args.selector)
     read = {case.name: _read(kept, selector, case) for case in cases}
     baseline: list[Judged] = []
-    rows = []
+    rows: list[list[Cell]] = []
+    print(markdown(_COLUMNS, rows), flush=True)
     with ProgressBar(unit="variant") as progress:
         for number, change in enumerate(changes, start=1):
             # Where a setting is not read, the answer is that with the defaults.
@@ -101,8 +102,8 @@ def main(arguments: Sequence[str]) -> int:
             baseline = baseline or found
             default = settings[change[0]] if change else "-"
             rows.append([*row(change, default, baseline, found), sum(map(bool, used))])
+            print(f"| {' | '.join(map(str, rows[-1]))} |", flush=True)
             progress(ProgressUpdate("ablation", number, len(changes)))
-    print(markdown(_COLUMNS, rows))
     write_result(args.results, _TITLE, _COLUMNS, rows, _PROGRAM, arguments)
     return 0
 
