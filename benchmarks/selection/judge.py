@@ -37,6 +37,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from real_data import MissingDataError
 from results import add_results_argument, markdown, write_result
 
 from drake_disasm.common import options
@@ -146,7 +147,8 @@ def judged(
 ) -> list[scores.Judged]:
     """Returns cases with their answers; those that are kept are not asked for again.
 
-    But those at which the selector failed are.
+    But those at which the selector failed are. Cases whose data are missing are left
+    out.
 
     Args:
         select: answers.
@@ -158,7 +160,11 @@ def judged(
     """
     found = []
     for number, name in enumerate(names, start=1):
-        case = case_of(name, logs)
+        try:
+            case = case_of(name, logs)
+        except MissingDataError as error:
+            progress(ProgressUpdate(stage, message=f"{name} is left out: {error}"))
+            continue
         known = kept.get(name)
         if known is None or known["text"].startswith(FAILED):
             kept.keep(name, asked(select, case).plain)

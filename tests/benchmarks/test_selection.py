@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from selection import judge, scores, sketch
+from selection import ablation, judge, scores, sketch
 from selection.ablation import scaled, variants
 from selection.answer import FAILED, Answer, Case
 from selection.cases import case_of, chosen, known_cases
@@ -14,6 +14,7 @@ from selection.hidden import Truth, hide
 from selection.noise import drawn_noise
 from selection.readings import Plan, write_sensor_case
 from selection.simulated import fourier
+from selection.watched import watched
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.finished_work import FinishedWork
@@ -212,6 +213,35 @@ def test_an_unknown_selector_is_one_line() -> None:
     """That names those there are."""
     with pytest.raises(DisasmError, match="no module of benchmarks/selection"):
         judge.selector_of("nobody")
+
+
+def test_a_read_setting_is_noted() -> None:
+    """Not those that a copy or a comparison reads."""
+
+    @dataclasses.dataclass(frozen=True)
+    class Settings:
+        """Two of them."""
+
+        alpha: float = 0.05
+        rows: int = 10
+
+    read = set[str]()
+    settings = watched(Settings(), read)
+    copied = dataclasses.replace(settings, rows=20)
+    assert copied != settings and not read
+    assert copied.rows == 20 and read == {"rows"}
+
+
+def test_an_ablation_counts_what_changes() -> None:
+    """One name lost, and one wrong name more."""
+    found = ablation.row(
+        ("alpha", 0.1),
+        0.05,
+        [_judged(confirmed=("JointDelay.joint_1",), after=0.1)],
+        [_judged(confirmed=("ArmDelay",), after=0.2)],
+    )
+    assert found[:4] == ["alpha", "0.1", "0.05", 1]
+    assert found[4:9] == ["-1", "-1", "+1", "0", "0"] and found[9] == "x 2.000"
 
 
 def test_a_setting_is_halved_doubled_or_switched() -> None:
