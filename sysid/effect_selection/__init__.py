@@ -3,13 +3,15 @@
 `close_loop(model)` fits a model, tests effects of the library on what they explain of
 rows that were not fitted, and adds those that are confirmed. From the top:
 
-    close_loop                          the library call and its result
-    search, refit_search                which effect is added: by evidence, or by fits
-    trial_comparison, simplification    which of their fits, and with how little in it
-    survey, evidence, prescreen         how candidates are ranked
-    fitter, fit, fit_cache              a model with chosen effects, fitted
-    block_regression, significance      what blocks of rows gain, and whether by chance
-    verdict, verdict_text, output       what is said in the end
+    close_loop                              the library call and its result
+    search, refit_selection, prescreen      which effects: by the linear account, by fits
+    forward_selection                       the rule: loss, ambiguity, stopping
+    replication                             confirmed, ambiguous or suggested
+    linear_system, linear_account           a fit linearised with all candidates
+    block_grams                             sufficient statistics of blocks of rows
+    fitter, fit, fit_cache                  a model with chosen effects, fitted
+    detection, whiteness, contradictions    what the log could show, and what is left
+    verdict, verdict_sentence, output       what is said in the end
 """
 
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop

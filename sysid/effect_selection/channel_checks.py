@@ -22,9 +22,16 @@ from sysid.objective import pseudo_residual
 
 Array = NDArray[np.float64]
 
+_NEAR_ROW = 3.0  # standard deviations, within which no row is outlying, if stated
 _NEAR = 2  # frequencies over which a window spreads a line
 _FINE = 41  # frequencies between a line's neighbours
 _SHOWN = 5  # rows that a text lists: a size of output, no threshold
+_ALPHA = 0.001  # of one check of one channel: a verdict has two dozen of them
+_OUTLYING_ALPHA = 0.003  # that a channel's largest row is beyond what its tail says
+_OUTLYING = 4.0  # times what nine of ten rows are below: no outlier is smaller
+_LINE_ALPHA = 1e-4  # stricter: the spectrum around a line is taken for smooth
+_LINE_POWER = 0.2  # share of a channel's power
+_NEIGHBOURS = 8  # frequencies on either side that a line is compared with
 
 
 @dataclass(frozen=True)
@@ -50,8 +57,8 @@ def channel_findings(fit: Fit) -> list[ChannelFinding]:
     for number, channel in enumerate(measured.channels):
         r = residual[:, number]
         least = fit.noticeable(number)
-        rows = _outlying(r, measured, fit.settings, fit.noticeable_row(number))
-        line = _line(r, measured, fit.settings, least)
+        rows = _outlying(r, measured, max(_NEAR_ROW, least) if least else 0.0)
+        line = _line(r, measured, least)
         excess = _excess(r, measured, fit.settings) if fit.noise_is_stated else ""
         for text, verb in ((rows, "has"), (line, "is"), (excess, "")):
             clause = f"{verb} {text.partition(' (')[0]}" if verb else ""
@@ -69,22 +76,22 @@ def _excess(r: Array, measured: Measurements, settings: SelectionSettings) -> st
     size = float(np.sqrt(np.mean(pseudo_residual(r, HUBER_DELTA) ** 2)))
     freedom = len(r) / block_length(r[:, None], measured.episode)
     p = float(chi2.sf(size**2 * freedom, freedom))
-    if size < settings.max_objective_at_noise or p > settings.channel_alpha:
+    if size < settings.max_objective_at_noise or p > _ALPHA:
         return ""
     return f"{size:.2g} times its noise, of unknown origin"
 
 
 def _outlying(
-    r: Array, measured: Measurements, settings: SelectionSettings, least: float
+    r: Array, measured: Measurements, least: float
 ) -> str:
     """Returns which rows of a residual (n,) are beyond what its tail has elsewhere.
 
     Of heavy-tailed noise no row is outlying.
     """
-    limit, usual = tail_limit(r, settings.outlying_alpha)
+    limit, usual = tail_limit(r, _OUTLYING_ALPHA)
     if not usual:
         return ""
-    limit = max(limit, settings.outlying_row * usual, least)
+    limit = max(limit, _OUTLYING * usual, least)
     rows = np.flatnonzero(np.abs(r) > limit)
     if not len(rows):
         return ""
@@ -97,7 +104,7 @@ def _outlying(
 
 
 def _line(
-    r: Array, measured: Measurements, settings: SelectionSettings, least: float
+    r: Array, measured: Measurements, least: float
 ) -> str:
     """Returns the frequency at which a residual (n,) is periodic, in words.
 
@@ -113,14 +120,14 @@ def _line(
     bins = range(_NEAR, len(power) - 1)
     if not bins or not power.any():
         return ""
-    around = [_around(level, bin_, settings.line_neighbours) for bin_ in bins]
+    around = [_around(level, bin_, _NEIGHBOURS) for bin_ in bins]
     ratio = np.array([level[b] / a.mean() for b, a in zip(bins, around, strict=True)])
     best = int(np.argmax(ratio))
     freedom = 2 * len(parts)
     tail = f.sf(ratio[best], freedom, freedom * len(around[best]))
     share = float(power[bins[best] - 1 : bins[best] + 2].sum() / power[1:].sum())
-    is_small = share < settings.line_power or share * np.mean(r**2) < least**2
-    if is_small or len(bins) * tail > settings.line_alpha:
+    is_small = share < _LINE_POWER or share * np.mean(r**2) < least**2
+    if is_small or len(bins) * tail > _LINE_ALPHA:
         return ""
     cycles = _refined(parts, bins[best], longest)
     if measured.period:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
+from drake_disasm.common.progress import Progress, ignore_progress
 from drake_disasm.effects import Effect, Imprecision, registered_effects
 from drake_disasm.scenario import Scenario
 from sysid.data_checks.constancy import dead_channels
@@ -19,23 +19,12 @@ from sysid.effect_selection.command_scatter import (
     CommandScatter,
     fit_command_scatter,
 )
-from sysid.effect_selection.contradictions import contradictions
-from sysid.effect_selection.data_sufficiency import refuse_few_rows, refuse_short_logs
-from sysid.effect_selection.detection import DetectionLimit, detection_limits
+from sysid.effect_selection.data_sufficiency import refuse_few_rows
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.held_out import HeldOut, held_out_errors
-from sysid.effect_selection.left_over import left_over
-from sysid.effect_selection.refit_search import RefitSearch
-from sysid.effect_selection.residual_model import fit_residual_model
-from sysid.effect_selection.search import (
-    ForwardSearch,
-    LinearSearch,
-    SearchResult,
-    SelectionRound,
-)
+from sysid.effect_selection.search import SearchResult, search
 from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
-from sysid.effect_selection.survey import Survey
 from sysid.effect_selection.verdict import Verdict, judge
 from sysid.effect_selection.verdict_sentence import (
     indistinguishable_text,
@@ -57,22 +46,26 @@ class ClosedLoop:
     """What closing the loop found.
 
     Attributes:
-        verdict: what is missing, with its ties and the values of its parameters.
+        verdict: what is missing, with where each effect stands and its parameters.
         errors: measured and predicted held-out rows, without and with the effects.
-        first, last: the model fitted without and with the effects.
-        rounds: how the effects were chosen.
-        begin, end: evidence for each candidate at the first and at the last fit.
+        search: how the effects were chosen.
         scatter: about the commands, if the arm has that.
     """
 
     verdict: Verdict
     errors: HeldOut
-    first: Fit
-    last: Fit
-    rounds: tuple[SelectionRound, ...]
-    begin: Survey
-    end: Survey
+    search: SearchResult
     scatter: CommandScatter | None
+
+    @property
+    def first(self) -> Fit:
+        """The model fitted without effects."""
+        return self.search.first
+
+    @property
+    def last(self) -> Fit:
+        """The model fitted with them."""
+        return self.search.last
 
     @property
     def is_provisional(self) -> bool:
@@ -99,7 +92,7 @@ class ClosedLoop:
         text = verdict_text(self.verdict, self.errors, most)
         if not self.is_provisional:
             return text
-        count = len(self.end.untested)
+        count = len(self.search.untested)
         untested = f" before {count} candidate effects were tested" if count else ""
         return f"{_PROVISIONAL.format(untested=untested)}\n{text}"
 
@@ -176,14 +169,15 @@ def close_loop(
     workers = workers or Workers()
     fitter = Fitter.of(model.of_episodes(train), workers, delta, settings, folder)
     base = fitter.base
-    refuse_few_rows(base, settings)
+    refuse_few_rows(base)
     refuse(dead_channels(base))
     applicable = _applicable(base, library)
-    found = _search(fitter, applicable, progress or ignore_progress, deadline)
-    limits = detection_limits(found.end.linearised)
-    refuse_short_logs(found.last, limits)
+    found = search(fitter, applicable, progress or ignore_progress, deadline)
     held_out = _with_noise_of(base, model.of_episodes(test)) if test else None
-    return _judged(fitter, found, held_out, limits, Imprecision in library)
+    errors = held_out_errors(found.first, found.last, held_out)
+    scatter = fit_command_scatter(fitter, found.last) if Imprecision in library else None
+    verdict = judge(found, errors, scatter, held_out)
+    return ClosedLoop(verdict, errors, found, scatter)
 
 
 def _applicable(
@@ -201,65 +195,6 @@ def _applicable(
             "classes of effects that its predict applies in effect_types"
         )
     return found
-
-
-def _search(
-    fitter: Fitter, library: Sequence[Candidate], progress: Progress, deadline: float
-) -> SearchResult:
-    """Returns what a search finds; costly models are searched on some rows only.
-
-    So are, at first, others that are not linear and leave more than noise.
-    """
-    base = fitter.base
-    if base.affine:
-        return LinearSearch(fitter, library, progress, deadline).run()
-    thinned = fitter.affordable
-    if thinned is fitter:
-        return RefitSearch(fitter, library, progress, deadline).run()
-    if not base.costly and not _leaves_more_than_noise(thinned):
-        return RefitSearch(fitter, library, progress, deadline).run()
-    found = RefitSearch(thinned, library, progress, deadline).run()
-    if not base.costly:
-        return RefitSearch(fitter, library, progress, deadline).run(found)
-    progress(ProgressUpdate(ForwardSearch.stage, message="fitting all rows"))
-    exact = fitter.with_exact_derivatives()
-    first, last = exact.fit(()), exact.fit(found.last.effects, found.last)
-    return dataclasses.replace(found, first=first, last=last)
-
-
-def _judged(
-    fitter: Fitter,
-    found: SearchResult,
-    held_out: LogModel | None,
-    limits: Sequence[DetectionLimit],
-    may_scatter: bool,
-) -> ClosedLoop:
-    """Returns the verdict on what a search found, with the errors."""
-    first, last, end = found.first, found.last, found.end
-    errors = held_out_errors(fitter, first, last, held_out)
-    scatter = fit_command_scatter(fitter, last) if may_scatter else None
-    left = left_over(scatter.left_of(last) if scatter else last)
-    model = fit_residual_model(last, left, held_out)
-    against = contradictions(last, end.linearised, len(fitter.base.parameters))
-    verdict = judge(
-        first, last, end, found.rounds, against, scatter, limits, left, model
-    )
-    verdict = dataclasses.replace(verdict, is_provisional=not found.is_complete)
-    return ClosedLoop(
-        verdict,
-        errors,
-        first,
-        last,
-        found.rounds,
-        found.begin,
-        end,
-        scatter,
-    )
-
-
-def _leaves_more_than_noise(fitter: Fitter) -> bool:
-    """Returns whether effects are surely missing, so that rounds of fits are ahead."""
-    return fitter.fit(()).objective > fitter.settings.max_objective_at_noise
 
 
 def _with_noise_of(base: LogModel, held_out: LogModel) -> LogModel:

@@ -20,13 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.stats import pearsonr, ttest_1samp
+from scipy.stats import pearsonr, ttest_1samp, wilcoxon
 
 from sysid.confidence import Z
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.settings import SelectionSettings
-from sysid.effect_selection.significance import greater_p
 from sysid.identification.whiteness import ljung_box
 from sysid.models.base import LogModel
 from sysid.objective import Objective, pseudo_residual
@@ -35,7 +33,20 @@ Array = NDArray[np.float64]
 
 # Steps of the likelihood's second differences, not thresholds.
 _CURVATURE_STEP = 0.05  # of a standard deviation
-_LEAST_SIZE = 0.1  # of scatter_scale: the least size that the step is taken of
+_LEAST_SIZE = 0.1  # of the scale: the least size that the step is taken of
+
+_SCALE = 1e-4  # m, the unit of the search: the repeatability that arms declare
+_STEP = 2e-5  # m, of the derivatives by where a step led: encoders' repeatability
+_ROUNDS = 8  # derivatives are taken anew where steps likely led
+_PROGRESS = 0.01  # of the scale: an iteration that changes less is the last
+_DRAWS = 8  # trials of where a step led that is missed by far
+_MISSED = 2.0  # of the channels' number: noise alone loses 1 on average
+_EDGE_SHARE = 0.02  # rows that may lie beyond an edge that no derivative sees
+_FOLDS = 8
+_LEAST = 1e-3  # of the scale: a standard deviation of less is none
+_MOST = 1e3
+_LEAST_AXIS = 0.15  # of the axis that scatters most
+_ALPHA = 0.01  # stricter than usual: many covariates are asked of each axis
 
 
 @dataclass(frozen=True)
@@ -74,7 +85,6 @@ class _Likelihood:
     r: Array
     J: Array
     huber_delta: float
-    settings: SelectionSettings
 
     def rows(self, std: Array) -> tuple[Array, Array]:
         """Returns twice the negative log likelihood (n,), and the squares (n,) in it.
@@ -95,16 +105,15 @@ class _Likelihood:
         Those of axes that scatter little beside another are 0: the derivatives are not
         right so far from where they were taken.
         """
-        limits = self.settings
 
         def loss(log: Array) -> float:
             """Returns what is minimised, by the logarithm."""
             return float(self.rows(np.exp(log))[0].sum())
 
-        ends = (np.log(limits.scatter_min_ratio), np.log(limits.scatter_max_ratio))
+        ends = (np.log(_LEAST), np.log(_MOST))
         found = minimize(loss, np.zeros(3), method="L-BFGS-B", bounds=[ends] * 3)
         std: Array = np.exp(found.x)
-        least = max(2.0 * limits.scatter_min_ratio, limits.scatter_min_axis * std.max())
+        least = max(2.0 * _LEAST, _LEAST_AXIS * std.max())
         return np.where(std > least, std, 0.0)
 
     def whitened(self, std: Array) -> Array:
@@ -159,8 +168,7 @@ def fit_command_scatter(fitter: Fitter, fit: Fit) -> CommandScatter | None:
         fitter: its workers evaluate.
         fit: with all effects on the mean.
     """
-    limits = fitter.settings
-    at_noise = fit.objective <= limits.max_objective_at_noise
+    at_noise = fit.objective <= fitter.settings.max_objective_at_noise
     if not fit.model.has_commands or at_noise:
         return None
     likelihood, displaced = _likeliest(fitter, fit)
@@ -174,14 +182,13 @@ def fit_command_scatter(fitter: Fitter, fit: Fit) -> CommandScatter | None:
 
 def _likeliest(fitter: Fitter, fit: Fit) -> tuple[_Likelihood, Array]:
     """Returns the likelihood where steps likely led, and where that is (n, 3)."""
-    limits = fitter.settings
     random = np.random.default_rng(0)
     steps = _Steps(fitter, fit, np.zeros((len(fit.linearisation.residual), 3)))
     likelihood, before = steps.likelihood(), np.full(3, np.inf)
-    for _ in range(limits.scatter_rounds):
+    for _ in range(_ROUNDS):
         std = likelihood.best()
         progress = float(np.abs(std - before).max())
-        if not std.any() or progress < limits.scatter_min_progress:
+        if not std.any() or progress < _PROGRESS:
             break
         target = likelihood.displacements(std)
         steps = steps.improved(std, target, random)
@@ -191,14 +198,13 @@ def _likeliest(fitter: Fitter, fit: Fit) -> tuple[_Likelihood, Array]:
 
 def _summary(likelihood: _Likelihood, std: Array) -> CommandScatter:
     """Returns a scatter (3,) with its interval and what it explains."""
-    limits = likelihood.settings
     before, after = (likelihood.rows(s)[1] for s in (np.zeros(3), std))
-    is_usual = after <= np.quantile(after, 1.0 - limits.scatter_edge_share)
+    is_usual = after <= np.quantile(after, 1.0 - _EDGE_SHARE)
     away = Z * likelihood.standard_errors(std)
     ends = np.stack([np.maximum(std - away, 0.0), std + away], axis=-1)
     return CommandScatter(
-        std * limits.scatter_scale,
-        ends * limits.scatter_scale,
+        std * _SCALE,
+        ends * _SCALE,
         float(1.0 - after.sum() / before.sum()),
         float(np.sqrt(after[is_usual].mean() / likelihood.r.shape[1])),
         likelihood.whitened(std) * is_usual[:, None],
@@ -220,8 +226,8 @@ class _Steps:
 
     def likelihood(self) -> _Likelihood:
         """Returns residuals without scatter, and derivatives there."""
-        limits, r = self.fitter.settings, self._here
-        step = limits.scatter_step / limits.scatter_scale
+        r = self._here
+        step = _STEP / _SCALE
         ways = step * np.eye(3)[:, None] * np.ones((len(r), 1))
         surrogate = self.fit.model.surrogate()
         columns = [
@@ -231,7 +237,7 @@ class _Steps:
         ]
         J = np.stack(columns, axis=-1) / (2.0 * step)
         r = r - np.einsum("nci,ni->nc", J, self.displaced)
-        return _Likelihood(r, J, self.fitter.huber_delta, limits)
+        return _Likelihood(r, J, self.fitter.huber_delta)
 
     def improved(
         self, std: Array, target: Array, random: np.random.Generator
@@ -243,12 +249,11 @@ class _Steps:
             target: (n, 3) the likeliest displacements, were the steps linear.
             random: draws others, for steps that are missed by far.
         """
-        limits = self.fitter.settings
         found, all_rows = self.displaced.copy(), np.ones(len(target), bool)
         offset = self._surrogate_offset()
         least = self._losses(self._here, found, std)
-        for i in range(limits.scatter_draws):
-            missed = least > limits.scatter_missed * self._channels
+        for i in range(_DRAWS):
+            missed = least > _MISSED * self._channels
             rows = missed if i else all_rows
             if not rows.any():
                 break
@@ -265,7 +270,7 @@ class _Steps:
         """Returns the losses (m,) of steps with residuals (m, c) and ends (m, 3)."""
         level = np.sqrt(np.mean(r**2, axis=1))
         bent = pseudo_residual(level, self.fitter.huber_delta) ** 2
-        least = self.fitter.settings.scatter_min_ratio
+        least = _LEAST
         unlikely = ends / np.maximum(std, least)
         return self._channels * bent + np.sum(unlikely**2, axis=1)
 
@@ -285,7 +290,7 @@ class _Steps:
         self, model: LogModel, ends: Array, rows: NDArray[np.bool_] | None = None
     ) -> Array:
         """Returns residuals (n, c) of steps that end elsewhere (n, 3), from here on."""
-        scale = self.fitter.settings.scatter_scale
+        scale = _SCALE
         there = model.displaced(self.displaced * scale, (ends - self.displaced) * scale)
         if rows is not None:
             there = there.of_rows(rows)
@@ -299,18 +304,17 @@ class _Steps:
 
 def _generalises(likelihood: _Likelihood, blocks: NDArray[np.int64]) -> bool:
     """Returns whether blocks get likelier by a scatter that was fitted to others."""
-    limits = likelihood.settings
     gains = np.zeros(int(blocks.max()) + 1)
-    folds = blocks % limits.scatter_folds
-    for fold in range(limits.scatter_folds):
+    folds = blocks % _FOLDS
+    for fold in range(_FOLDS):
         own = folds == fold
         if not own.any() or own.all():
             continue
         std = likelihood.select(~own).best()
         before, after = (likelihood.select(own).rows(s)[0] for s in (np.zeros(3), std))
         np.add.at(gains, blocks[own], before - after)
-    p = greater_p(gains) if gains.any() else 1.0
-    return p < limits.scatter_alpha
+    p = wilcoxon(gains, alternative="greater").pvalue if gains.any() else 1.0
+    return p < _ALPHA
 
 
 def _is_dependent(fit: Fit, displaced: Array) -> bool:
@@ -323,4 +327,4 @@ def _is_dependent(fit: Fit, displaced: Array) -> bool:
     for d in displaced.T:
         p += [ljung_box(d), float(ttest_1samp(d, 0.0).pvalue)]
         p += [float(pearsonr(d, c).pvalue) for c in covariates]
-    return min(p) * len(p) < fit.settings.scatter_alpha
+    return min(p) * len(p) < _ALPHA

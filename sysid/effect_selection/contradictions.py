@@ -4,14 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
-from sysid.effect_selection.block_regression import BlockRegression, Columns
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.significance import Scores, family_p
-from sysid.effect_selection.survey import LinearSurvey
+from sysid.effect_selection.block_grams import Columns, NormalEquations
+from sysid.effect_selection.forward_selection import wald_p
+from sysid.effect_selection.linear_account import LinearAccount
 
 _OWN = "the model's own parameters"
+_MOST = 40  # episodes: of more, one by one, the time is not spent
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class Contradiction:
 
 
 def contradictions(
-    fit: Fit, survey: LinearSurvey, own: int
+    account: LinearAccount, names: tuple[str, ...], is_noise: bool
 ) -> tuple[Contradiction, ...]:
     """Returns the episodes that contradict the others, the worst first.
 
@@ -39,89 +38,73 @@ def contradictions(
     with common amplitudes, on blocks that were not fitted.
 
     Args:
-        fit: with all effects that all episodes have in common.
-        survey: at that fit.
-        own: number of the parameters that the model has anyway.
+        account: at the fit with all effects that the episodes have in common.
+        names: of the episodes.
+        is_noise: whether channels whose noise is known leave nothing to explain.
     """
-    names = fit.model.measurements.names
-    most = fit.settings.contradiction_max_episodes
-    if not 1 < len(names) <= most or _is_noise(fit):
+    blocks_each = len(account.grams.rows) // max(1, len(names))
+    if not 1 < len(names) <= _MOST or blocks_each < 2 or is_noise:
         return ()
     numbers = range(len(names)) if len(names) > 2 else [1]
-    found, raw = [], survey.raw()
+    found = []
     for number in numbers:
-        best = _difference(fit, survey, raw, own, number, len(numbers))
+        best = _difference(account, number, len(numbers))
         if best:
             which = (names[number],) if len(names) > 2 else names
             found.append(Contradiction(which, *best))
     return tuple(sorted(found, key=lambda each: -each.gain))
 
 
-def _is_noise(fit: Fit) -> bool:
-    """Returns whether channels whose noise is known leave nothing to explain."""
-    return fit.noise_is_stated and fit.objective < fit.settings.noise_level
-
-
 def _difference(
-    fit: Fit,
-    survey: LinearSurvey,
-    raw: BlockRegression,
-    own: int,
-    number: int,
-    tests: int,
+    account: LinearAccount, number: int, tests: int
 ) -> tuple[str, float] | None:
-    """Returns what differs in an episode and how much that explains; else None.
-
-    Most blocks have to gain, or the noise is stated and can't be so large, and all
-    other episodes are at the noise: what an episode alone has gains nothing in those,
-    if its rows weigh little in a fit. (Rows that are missed by far in every episode are
-    no contradiction.)
-    """
-    limits, size, begin = fit.settings, len(survey.fields), len(raw.scale)
-    both = raw.with_own_parameters(survey.episodes == number, size)
-    regression = both.project_out(np.arange(len(fit.theta)))
-    sets = [(text, columns) for text, columns in survey.groups.items() if len(columns)]
-    sets += [(e.text, fit.columns_of(e)) for e in fit.effects]
-    sets.append((_OWN, np.arange(own)))
-    gains = np.column_stack([_gains(regression, columns, begin) for _, columns in sets])
-    unit = gains / max(np.linalg.norm(gains, axis=0).max(), 1e-300)
-    scores = [Scores(g.sum(keepdims=True), g[:, None]) for g in unit.T]
-    p = family_p(scores, limits) * tests
-    share = np.mean(gains > 0.0, axis=0)
-    gain = gains.sum(axis=0) / regression.block_losses.sum()
-    passed = (p < limits.alpha) & (share >= limits.contradiction_min_block_share)
-    if fit.noise_is_stated and _are_at_noise(fit, regression, survey, number):
-        counts = np.array([len(columns) for _, columns in sets])
-        by_noise = chi2.sf(np.maximum(gains.sum(axis=0), 0.0), counts)
-        passed |= by_noise * len(sets) * tests < limits.alpha
-    passed &= gain >= limits.contradiction_min_gain
-    if not passed.any():
+    """Returns what differs in an episode and how much that explains; else None."""
+    whole = account.grams.weighted(account.weights)
+    own = np.setdiff1d(account.columns, np.concatenate([[], *account.owners.values()]))
+    sets = [(t.candidates[0].text, t.columns) for t in account.terms if len(t.names) == 1]
+    sets += [*account.owners.items(), (_OWN, own.astype(np.int64))]
+    passed = []
+    for text, columns in sets:
+        if not len(columns):
+            continue
+        base = np.union1d(account.columns, columns)
+        both = _with_own(whole.projected(np.setdiff1d(base, columns)), columns, number)
+        gain, p = _gain(both, len(columns), account.settings.folds)
+        if gain >= account.settings.min_gain and p * len(sets) * tests < 0.05:
+            passed.append((text, gain, len(columns)))
+    if not passed:
         return None
-    enough = (1.0 - limits.contradiction_parsimony_tolerance) * gain[passed].max()
-    good = np.flatnonzero(passed & (gain >= enough))
-    best = min(good, key=lambda i: len(sets[i][1]))
-    return sets[best][0], float(gain[best])
+    most = max(gain for _, gain, _ in passed)
+    good = [each for each in passed if each[1] >= 0.9 * most]
+    text, gain, _ = min(good, key=lambda each: each[2])
+    return text, gain
 
 
-def _are_at_noise(
-    fit: Fit, regression: BlockRegression, survey: LinearSurvey, number: int
-) -> bool:
-    """Returns whether the episodes but one leave no more than the noise."""
-    others = survey.episodes != number
-    sizes = np.diff(regression.begins, append=len(regression.r))
-    left = regression.block_losses[others].sum() / sizes[others].sum()
-    return bool(np.sqrt(left) <= fit.settings.max_objective_at_noise)
+def _with_own(
+    equations: NormalEquations, columns: Columns, number: int
+) -> NormalEquations:
+    """Returns equations of columns, and of a copy of them that acts in one episode."""
+    small = equations.of_columns(columns)
+    k = len(columns)
+    order = np.concatenate([np.arange(k), np.arange(k), [k]])
+    blocks = small.blocks[:, order][:, :, order]
+    acts = small.episode == number
+    blocks[~acts, k : 2 * k] = 0.0
+    blocks[~acts, :, k : 2 * k] = 0.0
+    power = np.einsum("bii->i", blocks)[:-1]
+    return NormalEquations(
+        blocks, small.rows, small.episode, np.zeros(2 * k), power
+    )
 
 
-def _gains(
-    regression: BlockRegression, columns: Columns, begin: int
-) -> NDArray[np.float64]:
-    """Returns what blocks gain, (B,), if columns may differ in the episode.
-
-    Than with the same in all, or without them where that leaves less.
-    """
-    common = regression.held_out_losses(columns)
-    if common.sum() > regression.block_losses.sum():
-        common = regression.block_losses
-    both = np.concatenate([columns, begin + columns])
-    return common - regression.held_out_losses(both)
+def _gain(both: NormalEquations, k: int, folds: int) -> tuple[float, float]:
+    """Returns what the copies gain beside common columns, and its p-value."""
+    left = both.projected(np.arange(k))
+    copies: NDArray[np.int64] = np.arange(k, 2 * k)
+    copies = copies[left.is_new(copies)]
+    if not len(copies):
+        return 0.0, 1.0
+    parts = left.folds(folds)
+    gain = 1.0 - parts.held_out(copies).sum() / max(parts.losses.sum(), 1e-300)
+    x, C = left.solution(copies), left.covariance(copies)
+    return float(gain), wald_p(x, C, left.degrees_of_freedom)

@@ -6,16 +6,19 @@ from typing import Any
 import numpy as np
 
 from drake_disasm.effects import registered_effects
-from sysid.confidence import Z
 from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.data_sufficiency import refuse_few_rows
-from sysid.effect_selection.detection import DetectionLimit, detection_limits
+from sysid.effect_selection.detection import (
+    DetectionLimit,
+    detection_limits,
+    is_detectable,
+)
 from sysid.effect_selection.experiments import revealing_kind
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
-from sysid.effect_selection.survey import survey_candidates
-from sysid.identification.uncertainty import uncertainty
+from sysid.effect_selection.linear_account import LinearAccount
+from sysid.effect_selection.linear_system import linear_system
 from sysid.models.base import LogModel
 from sysid.parameters import Scaling
 from sysid.workers import Workers
@@ -60,9 +63,10 @@ class Excitation:
 
         By the kind's name, with the recording that shows it.
         """
-        shown = {kind_of(x.effect) for x in self.limits if x.amplitude is not None}
-        kinds = dict.fromkeys(kind_of(limit.effect) for limit in self.limits)
-        return {kind: revealing_kind(kind) for kind in kinds if kind not in shown}
+        limits = list(self.limits)
+        kinds = dict.fromkeys(kind_of(limit.effect) for limit in limits)
+        hidden = [kind for kind in kinds if not is_detectable(limits, kind)]
+        return {kind: revealing_kind(kind) for kind in hidden}
 
     def to_mapping(self) -> dict[str, Any]:
         """Returns it as plain data."""
@@ -99,10 +103,11 @@ def excitation_of(
     fitter = Fitter.of(model, workers or Workers(), delta, settings)
     if not model.affine:
         fitter = fitter.affordable
-    refuse_few_rows(fitter.base, settings)
+    refuse_few_rows(fitter.base)
     fit = fitter.fit(())
     library = candidates(fitter.base, registered_effects())
-    limits = detection_limits(survey_candidates(fitter, fit, library).linearised)
+    account = LinearAccount.of_fit(linear_system(fitter, fit, library), fit)
+    limits = detection_limits(account)
     return Excitation(_parameters(fit), tuple(limits))
 
 
@@ -110,10 +115,9 @@ def _parameters(fit: Fit) -> tuple[ParameterExcitation, ...]:
     parameters = fit.model.parameters
     if not parameters:
         return ()
-    found = uncertainty(fit.linearisation, fit.model.measurements.episode)
     scaling = Scaling(parameters)
     u = scaling.to_unit(fit.theta)
-    half = Z * np.sqrt(np.diagonal(found.bootstrap_covariance))
+    half = fit.half_intervals
     ends = scaling.from_unit(np.clip(np.stack([u - half, u + half]), 0.0, 1.0))
     spreads = 0.5 * np.ptp(ends, axis=0)
     return tuple(

@@ -1,24 +1,31 @@
-"""A fitted model with effects, and which of its parameters are significant."""
+"""A fitted model with effects, and how well its parameters are determined."""
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+import functools
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as t_distribution
 
-from sysid.confidence import Z
-from sysid.effect_selection.block_regression import BlockRegression, blocks_of
-from sysid.effect_selection.candidates import Candidate, is_joint_group
-from sysid.effect_selection.prewhitening import Prewhitening
+from sysid.effect_selection.block_grams import (
+    BlockGrams,
+    NormalEquations,
+    blocks_of,
+)
+from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.settings import SelectionSettings
-from sysid.effect_selection.significance import greater_p
 from sysid.identification.linearisation import Linearisation
 from sysid.models.base import LogModel
 from sysid.objective import pseudo_residual
 from sysid.parameters import Scaling, nominal_values
 
 Array = NDArray[np.float64]
+
+_BOUND = 1e-6  # of a parameter's range: within this of a bound it is at the bound
+_NOTICEABLE = 0.3  # times a stated noise: what is below is of no consequence
+_UNDETERMINED = 1e-6  # of the largest singular value: nothing fixes such a direction
 
 
 @dataclass(frozen=True)
@@ -50,18 +57,15 @@ class Fit:
         return float(np.sum(self.bounded_residual**2))
 
     @property
-    def worst_channel(self) -> float:
-        """The objective of the channel that has the largest.
-
-        Of a log of the twin, whose poses are exact, half of the channels are silent.
-        """
-        return float(np.sqrt(np.mean(self.bounded_residual**2, axis=0)).max())
-
-    @property
     def bounded_residual(self) -> Array:
         """Residuals (rows, channels) whose squares add up to the loss."""
         linear = self.linearisation
         return pseudo_residual(linear.residual, linear.huber_delta)
+
+    @property
+    def states_model_error(self) -> bool:
+        """Whether it is known by how much the model itself is off."""
+        return self.model.measurements.model_error is not None
 
     def noticeable(self, channel: int) -> float:
         """Returns the rms, in units of sigma, below which a finding is none.
@@ -73,49 +77,56 @@ class Fit:
             return 0.0
         share = self.model.measurements.model_error_share[:, channel]
         own = self.settings.model_error_reach * float(np.sqrt(np.mean(share**2)))
-        return max(self.settings.noticeable, own)
-
-    def noticeable_row(self, channel: int) -> float:
-        """Returns the residual, in units of sigma, below which a row is no finding."""
-        if not self.noise_is_stated:
-            return 0.0
-        return max(self.settings.noticeable_row, self.noticeable(channel))
+        return max(_NOTICEABLE, own)
 
     @property
-    def states_model_error(self) -> bool:
-        """Whether it is known by how much the model itself is off."""
-        return self.model.measurements.model_error is not None
+    def is_at_noise(self) -> bool:
+        """Whether the noise is stated, and the residual is no larger."""
+        return self.noise_is_stated and self.objective <= self.settings.noise_level
 
     @property
     def blocks(self) -> NDArray[np.int64]:
         """Number of the block (rows,) of each row."""
-        episode = self.model.measurements.episode
-        return blocks_of(self.linearisation.residual, episode, self.settings)
+        return blocks_of(self.model.measurements.episode, self.settings.blocks)
 
-    def regression(
-        self,
-        blocks: NDArray[np.int64] | None = None,
-        filtered: Prewhitening | None = None,
-    ) -> BlockRegression:
-        """Returns its normal equations, by blocks (rows,) of its own or of another.
-
-        Args:
-            blocks: (rows,) number of each row's block.
-            filtered: what residuals and derivatives are filtered by.
-        """
-        chosen = self.blocks if blocks is None else blocks
-        linear = self.linearisation
-        linear = filtered.whitened(linear) if filtered else linear
-        return BlockRegression.of(linear, chosen, self.settings)
+    @functools.cached_property
+    def equations(self) -> NormalEquations:
+        """Its normal equations, by blocks."""
+        linear, episode = self.linearisation, self.model.measurements.episode
+        grams = BlockGrams.of(
+            [linear.jacobian],
+            linear.residual,
+            linear.weights,
+            self.blocks,
+            episode,
+            np.zeros(len(linear.u)),
+            pooled=True,
+        )
+        return grams.weighted(np.ones(1))
 
     @property
-    def prewhitening(self) -> Prewhitening:
-        """What whitens its residual."""
-        linear, settings = self.linearisation, self.settings
-        episode = self.model.measurements.episode
-        return Prewhitening.of(
-            linear.residual, episode, linear.huber_delta, settings, [linear.jacobian]
-        )
+    def standard_errors(self) -> Array:
+        """Standard error (p,) of each parameter in the unit box, see `covariance`."""
+        numbers = np.arange(len(self.theta))
+        if not len(numbers):
+            return np.zeros(0)
+        diagonal = np.diagonal(self.equations.covariance(numbers))
+        return np.sqrt(np.maximum(diagonal, 0.0))
+
+    @property
+    def half_intervals(self) -> Array:
+        """Half the 95 % interval (p,) of each parameter in the unit box.
+
+        Student's t, with as many degrees of freedom as the covariance has cosines.
+        """
+        nu = self.equations.degrees_of_freedom
+        return np.asarray(t_distribution.ppf(0.975, nu) * self.standard_errors)
+
+    @property
+    def held_out_losses(self) -> Array:
+        """Loss of each fold (F,) with all parameters fitted to the others."""
+        numbers = np.arange(len(self.theta))
+        return self.equations.folds(self.settings.folds).held_out(numbers)
 
     @property
     def values(self) -> dict[str, float]:
@@ -133,146 +144,57 @@ class Fit:
         return np.array(own, dtype=np.int64)
 
     @property
-    def significant(self) -> NDArray[np.bool_]:
-        """Which parameters' (p,) 95 % intervals exclude their null value.
+    def is_at_bound(self) -> NDArray[np.bool_]:
+        """Which parameters (p,) are at a bound: their value is none of their own."""
+        u = self.linearisation.u
+        return np.asarray((u < _BOUND) | (u > 1.0 - _BOUND))
 
-        By a sandwich estimate over blocks: right for any correlation within a block.
-        """
-        away = np.abs(self.linearisation.u - self.null)
-        return np.asarray(away > Z * self.regression().standard_errors())
+    def without_unphysical(self, known: int) -> tuple[Candidate, ...]:
+        """Returns its effects, those after the first few without amplitudes at null.
 
-    def all_significant(self, names: Sequence[str]) -> bool:
-        """Returns whether each of some effects has a significant amplitude."""
-        effects = [effect for effect in self.effects if effect.name in names]
-        which = self.significant
-        return bool(effects) and all(which[self.columns_of(e)].any() for e in effects)
-
-    def at_bound(self, names: Sequence[str]) -> bool:
-        """Returns whether an amplitude of some effects is at a bound: unphysical.
-
-        Or at null; see `inside`.
-        """
-        effects = [effect for effect in self.effects if effect.name in names]
-        return not all(self.inside(self.columns_of(e)).all() for e in effects)
-
-    def inside(self, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Returns which of some parameters (k,) are not at a bound.
-
-        A bound that is not null, and past which hardly anything would be gained, is as
-        good an estimate as any: the true value may be near it.
-        """
-        u, null = self.linearisation.u[columns], self.null[columns]
-        is_null = np.abs(u - null) <= self.settings.bound_tolerance
-        is_content = np.array([not self._is_held_back(i) for i in columns], dtype=bool)
-        return self._between_bounds(columns) | (is_content & ~is_null)
-
-    def _between_bounds(self, columns: NDArray[np.int64]) -> NDArray[np.bool_]:
-        margin, u = self.settings.bound_tolerance, self.linearisation.u[columns]
-        return np.asarray((u > margin) & (u < 1.0 - margin))
-
-    def is_misshapen(self, names: Sequence[str]) -> bool:
-        """Returns whether some effects would explain more beyond a shape's bound.
-
-        Dry friction whose transition is as wide as it may be, say, where what is
-        missing is viscous.
-        """
-        effects = [effect for effect in self.effects if effect.name in names]
-        shapes = [i for e in effects for i in self._columns(e, e.shape)]
-        return any(self._is_held_back(i) for i in shapes)
-
-    def _is_held_back(self, column: int) -> bool:
-        """Returns whether a parameter is at a bound past which it would lower the loss
-        by `min_gain`.
-        """
-        if self._between_bounds(np.array([column])).all():
-            return False
-        linear, least = self.linearisation, self.settings.min_gain * self.loss
-        derivative = linear.jacobian[..., column]
-        slope = float(np.sum(linear.weights * derivative * linear.residual))
-        power = float(np.sum(linear.weights * derivative**2))
-        outward = np.sign(2.0 * linear.u[column] - 1.0)
-        return bool(outward * slope < 0.0 and slope**2 > least * power)
-
-    def harmed_channels(self, before: "Fit") -> list[str]:
-        """Returns the channels that are significantly worse than in another fit."""
-        limits, blocks = self.settings, before.blocks
-        count = int(blocks.max()) + 1
-        gain = before.loss - self.loss
-        found = []
-        for number, channel in enumerate(self.model.measurements.channels):
-            own = [
-                _channel_losses(fit, number, blocks, count) for fit in (before, self)
-            ]
-            rise, rows = own[1] - own[0], len(blocks)
-            large = rise.sum() > limits.max_channel_rise * max(own[0].sum(), rows)
-            is_quiet = self.noise_is_stated and own[1].sum() <= rows
-            if is_quiet and rise.sum() <= limits.max_rise_per_gain * gain:
-                continue
-            is_doubled = rise.sum() > own[0].sum()
-            if not is_doubled and rise.sum() <= limits.max_undoubled_per_gain * gain:
-                continue
-            if large and greater_p(rise) < limits.channel_alpha:
-                found.append(channel.name)
-        return found
-
-    def within_bounds(self, added: Sequence[Candidate]) -> list[Candidate]:
-        """Returns new effects without amplitudes that end at a bound: unphysical.
-
-        Of one kind of effect at several joints, those that are not significant go.
-        """
-        found, which = [], self.significant
-        for effect in added:
-            columns = self.columns_of(effect)
-            kept = self.inside(columns)
-            fields = [f for f, keep in zip(effect.fields, kept, strict=True) if keep]
-            if fields and (not is_joint_group(added) or which[columns].any()):
-                found.append(effect.only(fields))
-        return found
-
-    def significant_only(self, known: int) -> tuple[Candidate, ...]:
-        """Returns its effects, those after the first few with significant amplitudes.
+        And without those that have been driven to a bound.
 
         Args:
             known: number of the effects that keep all amplitudes.
         """
-        which, new = self.significant, []
+        which, new = self.is_at_bound, []
         for effect in self.effects[known:]:
             pairs = zip(effect.fields, self.columns_of(effect), strict=True)
-            if fields := [field for field, column in pairs if which[column]]:
+            if fields := [field for field, column in pairs if not which[column]]:
                 new.append(effect.only(fields))
         return (*self.effects[:known], *new)
 
     @property
     def effect_gains(self) -> dict[str, float]:
-        """What each effect gains, by its name; see `gains_of`."""
-        gains = self.gains_of([self.columns_of(effect) for effect in self.effects])
-        names = [effect.name for effect in self.effects]
-        return dict(zip(names, gains, strict=True))
-
-    def gains_of(self, groups: Sequence[NDArray[np.int64]]) -> list[float]:
-        """Returns what groups of parameters (k,) gain, as shares of the loss without.
+        """What each effect gains, by its name, as a share of the loss without.
 
         Of blocks that are not fitted; all other parameters are fitted again.
         """
-        regression, null = self.regression(), self.null
-        unbounded = np.zeros(len(null))  # seen from null, a bound is no limit
-        found = []
-        for columns in groups:
-            own = np.isin(np.arange(len(null)), columns)
-            change = np.where(own, null - self.linearisation.u, 0.0)
-            without = dataclasses.replace(regression.shifted(change), side=unbounded)
-            projected = without.project_out(np.flatnonzero(~own))
-            total = projected.block_losses.sum()
-            left = projected.held_out_losses(columns).sum()
-            found.append(float((total - left) / total))
+        found = {}
+        for effect in self.effects:
+            columns = self.columns_of(effect)
+            rest = np.setdiff1d(np.arange(len(self.theta)), columns)
+            without = self._at_null(columns).projected(rest).folds(self.settings.folds)
+            left = without.held_out(columns).sum() / max(without.losses.sum(), 1e-300)
+            found[effect.name] = float(1.0 - left)
         return found
+
+    def _at_null(self, columns: NDArray[np.int64]) -> NormalEquations:
+        """Returns the normal equations with some parameters at null."""
+        u = self.linearisation.u
+        change = np.zeros(len(u))
+        change[columns] = (self.null - u)[columns]
+        to = np.eye(len(u) + 1)
+        to[:-1, -1] = change
+        blocks = to.T @ self.equations.blocks @ to
+        return dataclasses.replace(self.equations, blocks=blocks)
 
     @property
     def error_of_steps(self) -> Array:
         """By how much the estimate (p,) is off, in the unit box, for its coarse steps.
 
         One Gauss-Newton step towards the optimum of the same model in finer time
-        steps. No bootstrap of rows sees such an error.
+        steps. No interval of rows sees such an error.
         """
         linear, finer = self.linearisation, self.model.refined()
         if finer is None or not len(linear.u):
@@ -286,7 +208,7 @@ class Fit:
         """By how much the estimate (p,) may be off, in the unit box, for its model.
 
         Were that off in each row by `model_error_reach` standard deviations to the side
-        that matters: the same in all episodes, so that no bootstrap sees it either.
+        that matters: the same in all episodes, so that no interval of rows sees it.
         """
         if not self.states_model_error:
             return np.zeros_like(self.theta)
@@ -300,18 +222,10 @@ class Fit:
         """What weighted residuals (rows channels,) move the estimate by (p, ...)."""
         linear = self.linearisation
         J = np.sqrt(linear.weights).reshape(-1, 1) * linear.flat_jacobian
-        return np.asarray(np.linalg.pinv(J, rcond=self.settings.held_out_rcond))
+        return np.asarray(np.linalg.pinv(J, rcond=_UNDETERMINED))
 
     @property
     def null(self) -> Array:
         """The point (p,) of the unit box at which no parameter has an effect."""
         parameters = self.model.parameters
         return Scaling(parameters).to_unit(nominal_values(parameters))
-
-
-def _channel_losses(
-    fit: Fit, channel: int, blocks: NDArray[np.int64], count: int
-) -> Array:
-    """Returns what a channel adds to the loss of each block (B,)."""
-    squares = fit.bounded_residual[:, channel] ** 2
-    return np.asarray(np.bincount(blocks, squares, minlength=count), dtype=float)

@@ -12,20 +12,44 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import wilcoxon
 from sklearn.ensemble import (  # type: ignore[import-untyped]
     HistGradientBoostingRegressor,
 )
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.settings import SelectionSettings
-from sysid.effect_selection.significance import gained_p
 from sysid.models.base import HUBER_DELTA
 from sysid.objective import pseudo_residual
 
 Array = NDArray[np.float64]
 
+_ROWS = 1500  # more are thinned out evenly: a channel then takes half a second
+_LAGS = (1, 4, 16)  # rows back in time, at which quantities are seen, too
+_ALPHA = 0.001  # of one channel: there are up to a dozen
+_IMPORTANCE = 0.25  # of what the most important quantity is worth, to be listed
+FOLDS = 5  # contiguous, so that time can't be read off
 _SHOWN = 3  # quantities that a text lists: a size of output, no threshold
+
+
+@dataclass(frozen=True)
+class Learner:
+    """Boosted trees: a standard model of a small table, near scikit-learn's defaults.
+
+    Attributes:
+        rate: shrinkage of each tree.
+        trees: number of them.
+        leaves: of a tree: interactions of up to three quantities.
+        leaf_rows: rows in a leaf.
+    """
+
+    rate: float = 0.15
+    trees: int = 50
+    leaves: int = 8
+    leaf_rows: int = 20
+
+
+LEARNER = Learner()
 
 
 @dataclass(frozen=True)
@@ -74,7 +98,6 @@ class _Inputs:
         own: Mapping[str, Array],
         other: Mapping[str, Array],
         episode: NDArray[np.int64],
-        settings: SelectionSettings,
     ) -> Self:
         """Returns quantities (rows,) by name, and the recent past of some.
 
@@ -85,7 +108,7 @@ class _Inputs:
         """
         columns = [*other.values(), *own.values()]
         names = [*other, *own]
-        for back in settings.learner_lags:
+        for back in _LAGS:
             before = _rows_before(episode, back)
             columns += [values[before] for values in own.values()]
             names += own
@@ -103,25 +126,25 @@ def left_over(fit: Fit) -> list[LeftOver]:
     and blocks within them; Bonferroni over the channels) and more than a small share.
     """
     measured, settings = fit.model.measurements, fit.settings
-    kept = every_few(measured.rows, settings.learner_rows)
+    kept = every_few(measured.rows, _ROWS)
     blocks = fit.blocks[kept]
-    folds = contiguous_blocks(blocks, settings.learner_folds)
+    folds = contiguous_blocks(blocks, FOLDS)
     sigma = np.broadcast_to(measured.sigma, measured.values.shape)
     covariates = [fit.model.covariates(n) for n in range(len(measured.channels))]
     found = []
     for number, channel in enumerate(measured.channels):
         inputs = _inputs_of(fit, number, covariates).select(kept)
         target = pseudo_residual(fit.linearisation.residual[kept, number], HUBER_DELTA)
-        learned = _Learned.of(inputs, target, folds, settings)
+        learned = _Learned.of(inputs, target, folds)
         gains = np.bincount(blocks, learned.gain).astype(float)
         share = float(gains.sum() / max(np.sum(target**2), 1e-300))
-        p = len(measured.channels) * gained_p(gains, settings)
-        if share < settings.min_left_over or p >= settings.channel_alpha:
+        p = len(measured.channels) * _gained_p(gains)
+        if share < settings.min_left_over or p >= _ALPHA:
             continue
         if gains.sum() < fit.noticeable(number) ** 2 * len(target):
             continue
         size = float(np.sqrt(np.mean((learned.predicted * sigma[kept, number]) ** 2)))
-        needed = learned.depends_on(inputs, target, folds, settings.learner_importance)
+        needed = learned.depends_on(inputs, target, folds)
         found.append(LeftOver(channel.name, share, size, channel.unit, needed))
     return found
 
@@ -146,21 +169,20 @@ class _Learned:
         inputs: _Inputs,
         target: Array,
         folds: NDArray[np.int64],
-        settings: SelectionSettings,
     ) -> Self:
         """Returns learners of a residual (rows,), each fitted to all folds but one."""
         learners, predicted = [], np.zeros_like(target)
         with threadpool_limits(1):  # threads cost more than they gain on so few rows
             for fold in range(int(folds.max()) + 1):
                 out = folds == fold
-                learner = _learner(settings).fit(inputs.values[~out], target[~out])
+                learner = _learner().fit(inputs.values[~out], target[~out])
                 predicted[out] = learner.predict(inputs.values[out])
                 learners.append(learner)
         gain = target**2 - (target - predicted) ** 2
         return cls(learners, predicted, gain)
 
     def depends_on(
-        self, inputs: _Inputs, target: Array, folds: NDArray[np.int64], share: float
+        self, inputs: _Inputs, target: Array, folds: NDArray[np.int64]
     ) -> tuple[str, ...]:
         """Returns the quantities without which the gain is lost, the first the most.
 
@@ -181,18 +203,26 @@ class _Learned:
             lost[name] = worse
         most = max(lost.values())
         ranked = sorted(lost, key=lambda name: -lost[name])
-        return tuple(n for n in ranked[:_SHOWN] if lost[n] >= share * most)
+        return tuple(n for n in ranked[:_SHOWN] if lost[n] >= _IMPORTANCE * most)
 
 
-def _learner(settings: SelectionSettings) -> HistGradientBoostingRegressor:
+def _learner() -> HistGradientBoostingRegressor:
     return HistGradientBoostingRegressor(
-        learning_rate=settings.learner_rate,
-        max_iter=settings.learner_trees,
-        max_leaf_nodes=settings.learner_leaves,
-        min_samples_leaf=settings.learner_leaf_rows,
+        learning_rate=LEARNER.rate,
+        max_iter=LEARNER.trees,
+        max_leaf_nodes=LEARNER.leaves,
+        min_samples_leaf=LEARNER.leaf_rows,
         early_stopping=False,
         random_state=0,
     )
+
+
+def _gained_p(gains: Array) -> float:
+    """Returns the p-value that blocks gain (B,) by chance, by their signed ranks."""
+    changed = gains[np.abs(gains) > 0.0]
+    if not len(changed):
+        return 1.0
+    return float(wilcoxon(changed, alternative="greater").pvalue)
 
 
 def _inputs_of(
@@ -215,7 +245,7 @@ def _inputs_of(
     load = measured.predicted(fit.linearisation.residual)[:, channel]
     own = {**covariates[channel], "the load": load}
     own.setdefault("time", np.arange(measured.rows, dtype=float))
-    return _Inputs.of(own, other, measured.episode, fit.settings)
+    return _Inputs.of(own, other, measured.episode)
 
 
 def _rows_before(episode: NDArray[np.int64], back: int) -> NDArray[np.int64]:

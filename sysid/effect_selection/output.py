@@ -4,25 +4,20 @@ import dataclasses
 from typing import Any
 
 from sysid.effect_selection.close_loop import ClosedLoop
-from sysid.effect_selection.evidence import Evidence
 from sysid.effect_selection.fit import Fit
+from sysid.effect_selection.forward_selection import Gain, Step
 from sysid.effect_selection.held_out import HeldOut
+from sysid.effect_selection.replication import Standing
 from sysid.effect_selection.residual_diagnosis import diagnose
 from sysid.effect_selection.residual_model import ResidualModel
-from sysid.effect_selection.search import SelectionRound
-from sysid.effect_selection.survey import Survey
 from sysid.effect_selection.verdict import Verdict
 from sysid.models.effects import field_of
-
-_DEPENDENCES = 10  # listed of each survey, the best ones: a size, no threshold
 
 
 def to_mapping(closed: ClosedLoop) -> dict[str, Any]:
     """Returns everything that a program may want to know of a closed loop."""
-    before, after = (
-        diagnose(fit, survey)
-        for fit, survey in ((closed.first, closed.begin), (closed.last, closed.end))
-    )
+    before, after = (diagnose(fit) for fit in (closed.first, closed.last))
+    found = closed.search
     return {
         **_verdict(closed.verdict),
         "model_parameters": _of_model(closed.last),
@@ -31,11 +26,11 @@ def to_mapping(closed: ClosedLoop) -> dict[str, Any]:
         "text": closed.text,
         "provisional": closed.is_provisional,
         "errors": _errors(closed.errors),
-        "channels_made_worse": closed.last.harmed_channels(closed.first),
         "residual_before": [dataclasses.asdict(channel) for channel in before],
         "residual_after": [dataclasses.asdict(channel) for channel in after],
-        "rounds": [_round(each) for each in closed.rounds],
-        "end": _survey(closed.end),
+        "steps": [_step(each) for each in found.steps],
+        "candidates": [_gain(each) for each in found.begin],
+        "untested": list(found.untested),
     }
 
 
@@ -53,7 +48,10 @@ def _verdict(found: Verdict) -> dict[str, Any]:
     return {
         "ending": found.ending,
         "effects": list(found.names),
-        "rise_without": dict(zip(found.names, found.gains, strict=True)),
+        "confirmed": list(found.confirmed),
+        "ambiguous": list(found.ambiguous),
+        "suggested": list(found.suggested),
+        "standings": [_standing(each) for each in found.standings],
         "ties": {
             name: {tie.name: tie.experiment for tie in ties}
             for name, ties in zip(found.names, found.ties, strict=True)
@@ -72,8 +70,9 @@ def _verdict(found: Verdict) -> dict[str, Any]:
         "dependence_left": found.dependence,
         "left_in_channels": [dataclasses.asdict(each) for each in found.findings],
         "would_have_been_found": [dataclasses.asdict(each) for each in found.limits],
-        "share_explained": found.explained,
-        "undecided": [dataclasses.asdict(each) for each in found.undecided],
+        "would_not_have_been_found": found.undetectable,
+        "correlated_channels": list(found.correlated),
+        "misfits": list(found.misfits),
         "left_over": [dataclasses.asdict(each) for each in found.left_over],
         "residual_model": _residual_model(found.residual_model),
     }
@@ -114,30 +113,20 @@ def _errors(errors: HeldOut) -> dict[str, Any]:
     }
 
 
-def _round(each: SelectionRound) -> dict[str, Any]:
+def _standing(each: Standing) -> dict[str, Any]:
+    found = dataclasses.asdict(each)
+    found["rivals"] = [list(names) for names in each.rivals]
+    return found
+
+
+def _step(each: Step) -> dict[str, Any]:
+    return {**_gain(each.chosen), "rivals": [_gain(rival) for rival in each.rivals]}
+
+
+def _gain(gain: Gain) -> dict[str, Any]:
     return {
-        "added": each.chosen.name,
-        "objective": each.objective,
-        "ties": [tie.name for tie in each.ties],
-        **_survey(each.survey),
-    }
-
-
-def _survey(survey: Survey) -> dict[str, Any]:
-    return {
-        "blocks": survey.blocks,
-        "untested": list(survey.untested),
-        "candidates": [_evidence(e) for e in survey.effects],
-        "dependences": [_evidence(e) for e in survey.dependences[:_DEPENDENCES]],
-    }
-
-
-def _evidence(evidence: Evidence) -> dict[str, Any]:
-    return {
-        "name": evidence.name,
-        "gain": evidence.gain,
-        "p": evidence.p,
-        "share_of_blocks": evidence.block_share,
-        "parameters": evidence.parameter_count,
-        "passes": evidence.accepted,
+        "name": gain.text,
+        "effects": list(gain.term.names),
+        "gain": gain.share,
+        "parameters": len(gain.term.columns),
     }

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.effect_selection.settings import SelectionSettings
 from sysid.models.base import LogModel
 
 Array = NDArray[np.float64]
+
+_WIDTH = 0.1  # of the largest value: of the step at zero
 
 
 @dataclass(frozen=True)
@@ -36,16 +37,14 @@ class Dependence:
         return f"{self.channel} depends on {self.covariate}"
 
 
-def dependence_curves(
-    model: LogModel, settings: SelectionSettings
-) -> tuple[Array, list[Dependence]]:
+def dependence_curves(model: LogModel) -> tuple[Array, list[Dependence]]:
     """Returns the columns (rows, channels, k) of all curves, and what they are."""
     measured = model.measurements
     columns: list[Array] = []
     dependences = []
     for number, channel in enumerate(measured.channels):
         for name, values in model.covariates(number).items():
-            basis = _basis(values, settings.curve_step_width)
+            basis = _basis(values)
             begin = len(columns)
             for column in basis.T:
                 full = np.zeros((measured.rows, len(measured.channels)))
@@ -58,8 +57,8 @@ def dependence_curves(
     return np.stack(columns, axis=2), dependences
 
 
-def _basis(values: Array, width: float) -> Array:
+def _basis(values: Array) -> Array:
     """Returns a cubic and a step at zero (rows, 4) of a covariate (rows,)."""
     size = max(float(np.abs(values).max()), 1e-300)
     x = values / size
-    return np.column_stack([x, x**2, x**3, np.tanh(x / width)])
+    return np.column_stack([x, x**2, x**3, np.tanh(x / _WIDTH)])

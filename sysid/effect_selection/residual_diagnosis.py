@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.survey import Survey
 from sysid.identification.whiteness import ljung_box
 
 
@@ -19,9 +18,6 @@ class ChannelDiagnosis:
         whiteness: p-value of Ljung and Box's test that it is white.
         between_episodes: share of its power that lies in the episodes' means; 0 if
             there is one episode.
-        dependence: covariate that it depends on most; empty without covariates.
-        gain: share of the channels' common loss that this dependence explains.
-        is_significant: whether that is more than chance.
     """
 
     channel: str
@@ -29,18 +25,13 @@ class ChannelDiagnosis:
     rms: float
     whiteness: float
     between_episodes: float
-    dependence: str
-    gain: float
-    is_significant: bool
 
 
-def diagnose(fit: Fit, survey: Survey) -> list[ChannelDiagnosis]:
+def diagnose(fit: Fit) -> list[ChannelDiagnosis]:
     """Returns the diagnosis of each channel at a fit."""
     measured, residual = fit.model.measurements, fit.linearisation.residual
     found = []
     for i, channel in enumerate(measured.channels):
-        own = [d for d in survey.dependences if d.name.startswith(f"{channel.name} ")]
-        best = own[0] if own else None
         found.append(
             ChannelDiagnosis(
                 channel.name,
@@ -48,9 +39,6 @@ def diagnose(fit: Fit, survey: Survey) -> list[ChannelDiagnosis]:
                 float(np.sqrt(np.mean(residual[:, i] ** 2))),
                 ljung_box(residual[:, i]),
                 _between(residual[:, i], measured.episode),
-                best.name.removeprefix(f"{channel.name} depends on ") if best else "",
-                best.gain if best else 0.0,
-                best.accepted if best else False,
             )
         )
     return found

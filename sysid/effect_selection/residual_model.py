@@ -13,12 +13,20 @@ from drake_disasm.effects import Effect
 from drake_disasm.effects.learned import BoostedTrees, LearnedFunctions
 from sysid.effect_selection.candidates import extended
 from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.left_over import LeftOver, contiguous_blocks, every_few
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.effect_selection.left_over import (
+    FOLDS,
+    LEARNER,
+    LeftOver,
+    contiguous_blocks,
+    every_few,
+)
 from sysid.models.base import HUBER_DELTA, LogModel
 from sysid.objective import pseudo_residual
 
 Array = NDArray[np.float64]
+
+_ROWS = 5000  # more are thinned out evenly: a channel then takes a second
+_LEAST_GAIN = 0.1  # of the held-out error: a residual model that gains less is no use
 
 
 @dataclass(frozen=True)
@@ -81,7 +89,7 @@ def fit_residual_model(
         held_out: model of the held-out episodes; None if there are none: then
             contiguous folds are predicted by what all others teach.
     """
-    kind, settings = last.model.residual_effect, last.settings
+    kind = last.model.residual_effect
     channels = [c.name for c in last.model.measurements.channels]
     wanted = [channels.index(x.channel) for x in left] if kind else []
     known = last.model.residual_inputs(last.theta) if wanted else {}
@@ -90,13 +98,13 @@ def fit_residual_model(
     outputs, errors = {}, []
     for number in (n for n in wanted if channels[n] in known):
         name = channels[number]
-        learned = rows.learned(number, name, settings)
+        learned = rows.learned(number, name)
         error = (
             test.error(number, name, learned)
             if test
-            else rows.cross_error(number, name, settings)
+            else rows.cross_error(number, name)
         )
-        if error.gain >= settings.min_residual_model_gain:
+        if error.gain >= _LEAST_GAIN:
             outputs[name] = learned
             errors.append(error)
     if kind is None or not outputs:
@@ -138,10 +146,10 @@ class _Rows:
         return cls(model, inputs, missing, model.measurements.episode)
 
     def learned(
-        self, channel: int, name: str, settings: SelectionSettings
+        self, channel: int, name: str
     ) -> BoostedTrees:
         """Returns what a channel's rows teach."""
-        return _taught(self.inputs[name], self.missing[:, channel], settings)
+        return _taught(self.inputs[name], self.missing[:, channel])
 
     def error(self, channel: int, name: str, learned: BoostedTrees) -> ChannelError:
         """Returns a channel's error without and with what other rows taught."""
@@ -149,15 +157,15 @@ class _Rows:
         return self._error(channel, missing - learned(self.inputs[name]))
 
     def cross_error(
-        self, channel: int, name: str, settings: SelectionSettings
+        self, channel: int, name: str
     ) -> ChannelError:
         """Returns a channel's error where each fold is predicted by all others."""
-        folds = contiguous_blocks(self.blocks, settings.learner_folds)
+        folds = contiguous_blocks(self.blocks, FOLDS)
         inputs, missing = self.inputs[name], self.missing[:, channel]
         left = missing.copy()
         for fold in range(int(folds.max()) + 1):
             out = folds == fold
-            left[out] -= _taught(inputs[~out], missing[~out], settings)(inputs[out])
+            left[out] -= _taught(inputs[~out], missing[~out])(inputs[out])
         return self._error(channel, left)
 
     def _error(self, channel: int, left: Array) -> ChannelError:
@@ -169,20 +177,20 @@ class _Rows:
         return ChannelError(each.name, each.unit, before, after)
 
 
-def _taught(inputs: Array, missing: Array, settings: SelectionSettings) -> BoostedTrees:
+def _taught(inputs: Array, missing: Array) -> BoostedTrees:
     """Returns what rows of inputs (n, k) teach of what is missing (n,) there."""
-    kept = every_few(len(inputs), settings.residual_model_rows)
-    learner = _learner(settings).fit(inputs[kept], missing[kept])
+    kept = every_few(len(inputs), _ROWS)
+    learner = _learner().fit(inputs[kept], missing[kept])
     return _trees(learner, inputs[kept])
 
 
-def _learner(settings: SelectionSettings) -> GradientBoostingRegressor:
+def _learner() -> GradientBoostingRegressor:
     """Returns boosted trees whose nodes scikit-learn shows, to be written to a file."""
     return GradientBoostingRegressor(
-        learning_rate=settings.learner_rate,
-        n_estimators=settings.learner_trees,
-        max_leaf_nodes=settings.learner_leaves,
-        min_samples_leaf=settings.learner_leaf_rows,
+        learning_rate=LEARNER.rate,
+        n_estimators=LEARNER.trees,
+        max_leaf_nodes=LEARNER.leaves,
+        min_samples_leaf=LEARNER.leaf_rows,
         random_state=0,
     )
 

@@ -1,45 +1,49 @@
-"""Judges what a search found: no effect missing, effects, or unexplained."""
+"""Judges what a search found: nothing missing, effects, or something unexplained."""
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from drake_disasm.effects import Imprecision
-from sysid.effect_selection.candidates import is_joint_group
 from sysid.effect_selection.channel_checks import ChannelFinding, channel_findings
 from sysid.effect_selection.command_scatter import CommandScatter
-from sysid.effect_selection.contradictions import Contradiction
-from sysid.effect_selection.detection import DetectionLimit
-from sysid.effect_selection.evidence import Evidence
-from sysid.effect_selection.experiments import separating
+from sysid.effect_selection.contradictions import Contradiction, contradictions
+from sysid.effect_selection.detection import (
+    DetectionLimit,
+    detection_limits,
+    is_detectable,
+)
+from sysid.effect_selection.experiments import revealing_kind, separating
 from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.left_over import LeftOver
-from sysid.effect_selection.residual_curves import Dependence
-from sysid.effect_selection.residual_model import ResidualModel
-from sysid.effect_selection.search import SelectionRound
+from sysid.effect_selection.held_out import HeldOut
+from sysid.effect_selection.left_over import LeftOver, left_over
+from sysid.effect_selection.replication import Standing
+from sysid.effect_selection.residual_model import ResidualModel, fit_residual_model
+from sysid.effect_selection.search import SearchResult
 from sysid.effect_selection.strokes import joints_of_one_stroke
-from sysid.effect_selection.survey import Survey
-from sysid.identification.uncertainty import uncertainty
+from sysid.effect_selection.whiteness import correlated_channels
+from sysid.models.base import LogModel
 from sysid.parameters import Scaling
 
 _SCATTER = Imprecision.__name__
 
-#: Nothing is missing; effects explain the residual; they do but for something that
-#: is left in a channel; no library effect explains it.
-Ending = Literal["none", "explained", "partly", "unexplained"]
+#: Nothing is missing; confirmed effects explain the residual; they do but for something
+#: that is left; no effect is confirmed, and the residual is not noise; the log could
+#: not have shown most effects.
+Ending = Literal["none", "explained", "partly", "unexplained", "too short"]
 
 
 @dataclass(frozen=True)
 class ParameterValue:
-    """A parameter of an effect that was found.
+    """A parameter of an effect.
 
     Attributes:
         name: with the effect's.
         value, unit: SI.
-        interval: 95 %, by a block bootstrap.
+        interval: 95 %.
         null: at which the effect vanishes; None for a shape parameter.
         is_at_bound: whether the fit ended at a bound: the value is none of its own.
     """
@@ -61,7 +65,7 @@ class ParameterValue:
 
 @dataclass(frozen=True)
 class Tie:
-    """Something that explains as much as an effect that was found.
+    """Something that explains as much as an effect that was selected.
 
     Attributes:
         name: of the other effect, or effects.
@@ -73,146 +77,180 @@ class Tie:
 
 
 @dataclass(frozen=True)
-class Undecided:
-    """A kind of effect that gains much in nearly all blocks, of which there are few.
-
-    Attributes:
-        kind: name of its class.
-        gain: share of what is left that it takes away, of blocks that were not fitted.
-    """
-
-    kind: str
-    gain: float
-
-
-@dataclass(frozen=True)
 class Verdict:
     """What a log shows of its model.
 
     Attributes:
-        ending: "none", "explained", "partly" (explained) or "unexplained".
-        names: of the effects that are missing, the most important first; of an
-            unexplained residual, the nearest.
-        gains: for each, the share of the loss without it that it takes away.
-        ties: for each, effects that explain as much.
+        ending: see Ending.
+        standings: of the effects that lower the held-out error: confirmed ones first,
+            then those that are ambiguous, then those that are suggested.
+        ties: for each, effects that are ambiguous with it.
         values: of their parameters.
         dependence: the strongest that is left, in words; empty if none is.
-        explained: share of what could be explained that the effects explain.
         contradictions: episodes that no common effect explains.
         excess: objective that is left, in units of the noise, if it is more than noise;
             else 0.
+        correlated: channels whose residual is no white noise.
+        relative_error: of held-out rows, with the effects, as a share of the readings;
+            NaN if that means nothing.
         findings: what is left in single channels.
         limits: how large effects that are not named would have to be to be found.
         left_over: what a flexible learner explains of what the effects leave.
         residual_model: learned in their place; not physical. None if it gains little.
-        single_strokes: joints of effects with ties that make a single stroke.
-        undecided: more effects that may be there; the log is too short to tell.
-        is_provisional: whether the time was over before the search was: effects that
-            would explain more may not have been tried.
+        single_strokes: joints of ambiguous effects that make a single stroke.
+        misfits: rows that contradict the kind of log, in words.
+        is_provisional: whether the time was over before the search was.
     """
 
     ending: Ending
-    names: tuple[str, ...]
-    gains: tuple[float, ...]
+    standings: tuple[Standing, ...]
     ties: tuple[tuple[Tie, ...], ...]
     values: tuple[ParameterValue, ...]
-    dependence: str
-    explained: float
-    contradictions: tuple[Contradiction, ...]
-    excess: float
+    dependence: str = ""
+    contradictions: tuple[Contradiction, ...] = ()
+    excess: float = 0.0
+    correlated: tuple[str, ...] = ()
+    relative_error: float = float("nan")
     findings: tuple[ChannelFinding, ...] = ()
-    limits: tuple[DetectionLimit, ...] = ()
+    limits: tuple[DetectionLimit, ...] = field(default=(), repr=False)
     left_over: tuple[LeftOver, ...] = ()
     residual_model: ResidualModel | None = None
     single_strokes: tuple[str, ...] = ()
-    undecided: tuple[Undecided, ...] = ()
+    misfits: tuple[str, ...] = ()
     is_provisional: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all effects that were selected, as in `standings`."""
+        return tuple(each.name for each in self.standings)
+
+    @property
+    def gains(self) -> tuple[float, ...]:
+        """Share of the held-out loss without each that it takes away."""
+        return tuple(each.gain for each in self.standings)
+
+    @property
+    def confirmed(self) -> tuple[str, ...]:
+        """Effects that parts of the log confirm which had no say in choosing them."""
+        return self._of_status("confirmed")
+
+    @property
+    def ambiguous(self) -> tuple[str, ...]:
+        """Effects each of which is one of a set; see `ties`."""
+        return self._of_status("ambiguous")
+
+    @property
+    def suggested(self) -> tuple[str, ...]:
+        """Effects that lower the error, and are not confirmed."""
+        return self._of_status("suggested")
+
+    @property
+    def undetectable(self) -> dict[str, str]:
+        """Kinds of effects that the log could not have shown, and what would."""
+        limits = list(self.limits)
+        kinds = dict.fromkeys(x.effect.partition(".")[0] for x in limits)
+        hidden = [kind for kind in kinds if not is_detectable(limits, kind)]
+        return {kind: revealing_kind(kind) for kind in hidden}
+
+    def _of_status(self, status: str) -> tuple[str, ...]:
+        return tuple(each.name for each in self.standings if each.status == status)
 
 
 def judge(
-    first: Fit,
-    last: Fit,
-    end: Survey,
-    rounds: Sequence[SelectionRound],
-    against: tuple[Contradiction, ...] = (),
+    found: SearchResult,
+    errors: HeldOut,
     scatter: CommandScatter | None = None,
-    limits: Sequence[DetectionLimit] = (),
-    left_over: Sequence[LeftOver] = (),
-    residual_model: ResidualModel | None = None,
+    held_out: LogModel | None = None,
+    misfits: Sequence[str] = (),
 ) -> Verdict:
-    """Returns the verdict of a search.
+    """Returns the verdict on a search.
 
     Args:
-        first, last: the fits without and with the effects.
-        end: the survey at which it ended.
-        rounds: how the effects were chosen.
-        against: episodes that contradict each other.
+        found: by it.
+        errors: on rows that were not fitted.
         scatter: how the arm scatters about its commands, if it does.
-        limits: of detection, at the last fit.
-        left_over: what a flexible learner finds in what the last fit leaves.
-        residual_model: of it, if it lowers the held-out error.
+        held_out: model of the held-out episodes; None if there are none.
+        misfits: rows that contradict the kind of log, in words.
     """
-    left = [d for d in end.dependences if d.accepted and _is_noticeable(d, last)]
-    gains = last.effect_gains | ({_SCATTER: scatter.gain} if scatter else {})
-    names = tuple(sorted(gains, key=lambda name: -gains[name]))
-    found = Verdict(
+    last = found.last
+    white = scatter.left_of(last) if scatter else last
+    left = left_over(white)
+    placed = _ordered(found.standings) + _of_scatter(scatter)
+    names = last.model.measurements.names
+    dependence = _dependence(found, last)
+    verdict = Verdict(
         "none",
-        names,
-        tuple(gains[name] for name in names),
-        tuple(_ties(name, rounds, last.model.has_commands) for name in names),
-        parameter_values(last, len(first.theta)) + _scatter_values(scatter),
-        left[0].name if left else "",
-        _explained(first, last, left[0].gain if left else 0.0),
-        against,
+        placed,
+        tuple(_ties(each, last.model.has_commands) for each in placed),
+        parameter_values(last, len(found.first.theta)) + _scatter_values(scatter),
+        dependence,
+        contradictions(found.account, names, last.is_at_noise),
         _excess(last, scatter),
-        tuple(channel_findings(scatter.left_of(last) if scatter else last)),
-        tuple(limit for limit in limits if limit.effect not in names),
-        tuple(left_over),
-        residual_model,
-        undecided=_undecided(end, last),
+        correlated_channels(white),
+        errors.relative(errors.after) if errors.has_meaningful_share else float("nan"),
+        tuple(channel_findings(white)),
+        tuple(detection_limits(found.account)),
+        tuple(left),
+        fit_residual_model(last, left, held_out),
+        misfits=tuple(misfits),
+        is_provisional=not found.is_complete,
     )
-    ending, strokes = _ending(found, last), _single_strokes(found, last)
-    return dataclasses.replace(found, ending=ending, single_strokes=strokes)
+    ending, strokes = _ending(verdict, last), _single_strokes(verdict, last)
+    return dataclasses.replace(verdict, ending=ending, single_strokes=strokes)
 
 
-def _single_strokes(found: Verdict, last: Fit) -> tuple[str, ...]:
-    """Returns the joints of effects with ties that make a single stroke."""
-    pairs = zip(found.names, found.ties, strict=True)
-    tied = {name.partition(".")[2] for name, ties in pairs if ties}
-    return joints_of_one_stroke(last.model, tied, last.settings)
-
-
-def _undecided(end: Survey, last: Fit) -> tuple[Undecided, ...]:
-    """Returns what may be missing besides, were there more blocks to say so.
-
-    Where effects are found the model surely lacked something, and signed ranks of few
-    blocks can't tell what else: a verdict must not say that nothing is left.
-    """
-    if not last.effects or last.noise_is_stated:
-        return ()
-    limits, kinds = last.settings, dict[str, float]()
-    for e in end.effects:
-        if e.gain >= limits.min_undecided and e.block_share >= limits.min_block_share:
-            kinds.setdefault(e.candidates[0].name.partition(".")[0], e.gain)
-    return tuple(Undecided(kind, gain) for kind, gain in kinds.items())
-
-
-def _is_noticeable(dependence: Evidence, last: Fit) -> bool:
-    """Returns whether a dependence takes more out than is `Fit.noticeable`."""
-    measured, curve = last.model.measurements, dependence.explanation
-    if not isinstance(curve, Dependence):
-        return True
-    channel = [each.name for each in measured.channels].index(curve.channel)
-    return dependence.gain * last.loss >= last.noticeable(channel) ** 2 * measured.rows
+def _ordered(placed: Sequence[Standing]) -> tuple[Standing, ...]:
+    """Returns standings, confirmed ones first."""
+    order = ("confirmed", "ambiguous", "suggested")
+    return tuple(sorted(placed, key=lambda each: (order.index(each.status), -each.gain)))
 
 
 def _ending(found: Verdict, last: Fit) -> Ending:
-    enough = found.explained >= last.settings.min_explained_share
-    of_channels = found.dependence or found.findings or found.left_over
-    left = bool(of_channels or found.contradictions or found.undecided)
-    if found.names and enough and not found.excess:
-        return "partly" if left else "explained"
-    return "unexplained" if left or found.names or found.excess else "none"
+    limits = last.settings
+    is_large = found.relative_error > limits.max_relative_error
+    left = bool(
+        found.contradictions
+        or found.excess
+        or found.findings
+        or found.left_over
+        or found.misfits
+        or is_large
+    )
+    if found.confirmed or found.ambiguous:
+        return "partly" if left or found.suggested else "explained"
+    if left or found.suggested or found.dependence:
+        return "unexplained"
+    if found.correlated and not last.noise_is_stated:
+        return "unexplained"
+    kinds = {x.effect.partition(".")[0] for x in found.limits}
+    shown = len(kinds) - len(found.undetectable)
+    return "none" if shown >= limits.min_detectable * len(kinds) else "too short"
+
+
+def _single_strokes(found: Verdict, last: Fit) -> tuple[str, ...]:
+    """Returns the joints of ambiguous effects that make a single stroke."""
+    pairs = zip(found.names, found.ties, strict=True)
+    tied = {name.partition(".")[2] for name, ties in pairs if ties}
+    return joints_of_one_stroke(last.model, tied)
+
+
+def _dependence(found: SearchResult, last: Fit) -> str:
+    """Returns the strongest dependence that is left, in words; empty for none."""
+    measured = last.model.measurements
+    names = [channel.name for channel in measured.channels]
+    for curve, gain, p in found.account.dependence_left():
+        least = last.noticeable(names.index(curve.channel)) ** 2 * measured.rows
+        is_large = gain >= last.settings.min_gain and gain * last.loss >= least
+        if is_large and p < last.settings.alpha:
+            return curve.text
+    return ""
+
+
+def _of_scatter(scatter: CommandScatter | None) -> tuple[Standing, ...]:
+    """Returns how an arm scatters as an effect: a test of its own confirms it."""
+    if scatter is None:
+        return ()
+    return (Standing(_SCATTER, "confirmed", scatter.gain, 0, 0),)
 
 
 def _scatter_values(scatter: CommandScatter | None) -> tuple[ParameterValue, ...]:
@@ -237,38 +275,24 @@ def _excess(last: Fit, scatter: CommandScatter | None) -> float:
     return objective if is_more else 0.0
 
 
-def _explained(first: Fit, last: Fit, left: float) -> float:
-    """Returns the share that effects explain of what could be explained.
-
-    Args:
-        first, last: the fits without and with them.
-        left: share of the last's loss that a dependence would take away.
-    """
-    gained = max(first.loss - last.loss, 0.0)
-    missing = left * last.loss
-    return gained / (gained + missing) if gained + missing > 0.0 else 1.0
-
-
 def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
     """Returns the effects' parameters with their intervals.
 
-    An interval is that of a bootstrap, and as much wider as the model's time steps, and
-    the model itself, are known to be off. Without shape parameters on which no row of
-    the log depends: they are as assumed.
+    As wide as the covariance of correlated residuals says, and as much wider as the
+    model's time steps, and the model itself, are known to be off. Without shape
+    parameters on which no row of the log depends: they are as assumed.
 
     Args:
         fit: with the effects.
         own: number of the parameters that the model has anyway, the first ones.
     """
-    spread = uncertainty(fit.linearisation, fit.model.measurements.episode)
-    scaling = Scaling(fit.model.parameters)
-    off, around = fit.error_of_steps[:, None], fit.error_of_model[:, None]
-    ends = spread.bootstrap + np.hstack(
-        [np.minimum(off, 0.0) - around, np.maximum(off, 0.0) + around]
-    )
-    ends = np.clip(fit.linearisation.u[:, None] + ends, 0.0, 1.0)
-    low, high = (scaling.from_unit(side) for side in ends.T)
-    inside = fit.inside(np.arange(len(fit.theta)))
+    if len(fit.theta) == own:
+        return ()
+    scaling, half = Scaling(fit.model.parameters), fit.half_intervals
+    off, around = fit.error_of_steps, fit.error_of_model
+    u = fit.linearisation.u
+    low = scaling.from_unit(np.clip(u - half + np.minimum(off, 0) - around, 0, 1))
+    high = scaling.from_unit(np.clip(u + half + np.maximum(off, 0) + around, 0, 1))
     shows = fit.linearisation.effect > 0.0
     return tuple(
         ParameterValue(
@@ -277,31 +301,15 @@ def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
             p.unit,
             (float(low[i]), float(high[i])),
             None if p.is_shape else 0.0,
-            bool(not inside[i] and fit.theta[i] != p.nominal),
+            bool(fit.is_at_bound[i] and fit.theta[i] != p.nominal),
         )
         for i, p in enumerate(fit.model.parameters)
         if i >= own and (shows[i] or not p.is_shape)
     )
 
 
-def _ties(
-    name: str, rounds: Sequence[SelectionRound], at_task: bool
-) -> tuple[Tie, ...]:
-    """Returns what explained as much when an effect was added, each once."""
-    joint = name.partition(".")[2]
-    for found in rounds:
-        if name in found.chosen.effects:
-            others = [_other(tie, joint) for tie in found.ties]
-            return tuple(
-                Tie(other, separating(name, other, at_task))
-                for other in dict.fromkeys(others)
-                if name not in other.split(" and ")
-            )
-    return ()
-
-
-def _other(tie: Evidence, joint: str) -> str:
-    """Returns the effects of a tie; of one at all joints, that of the same joint."""
-    same = [name for name in tie.effects if joint and name.endswith(f".{joint}")]
-    is_group = is_joint_group(tie.candidates)
-    return " and ".join(same if is_group and same else tie.effects)
+def _ties(standing: Standing, at_task: bool) -> tuple[Tie, ...]:
+    """Returns what is ambiguous with an effect, each once."""
+    others = dict.fromkeys(" and ".join(rival) for rival in standing.rivals)
+    name = standing.name
+    return tuple(Tie(other, separating(name, other, at_task)) for other in others)

@@ -1,9 +1,8 @@
-"""A verdict in plain English: one sentence, and one on what a log can't tell apart.
+"""A verdict in plain English: what is confirmed, what is not, and what is left.
 
 The model lacks dry friction at six joints and an offset of the torque at four; with
-them the held-out error falls from 6.7 % to 2.1 % of the torque.
-
-Whatever a verdict has to say of what is left is a clause in `left_in_words`.
+them the held-out error falls from 6.7 % to 2.1 % of the torque. Suggested, not
+confirmed: elasticity of a gear at joint_2.
 """
 
 from collections.abc import Sequence
@@ -23,7 +22,8 @@ from sysid.effect_selection.effect_names import (
 )
 from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.left_over import LeftOver
-from sysid.effect_selection.verdict import Undecided, Verdict
+from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.effect_selection.verdict import Verdict
 
 _SHOWN = 3  # effects that a clause lists: a size of output, no threshold
 
@@ -44,7 +44,7 @@ class Rivals:
 
 
 def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
-    """Returns a verdict as one sentence.
+    """Returns a verdict in a sentence or two.
 
     Args:
         verdict: of a search.
@@ -52,17 +52,80 @@ def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
     """
     if verdict.ending == "none":
         return f"{_nothing(verdict, errors)}."
-    effects, improved = effects_in_words(verdict.names), improvement_in_words(errors)
-    them = "it" if len(verdict.names) == 1 else "them"
+    if verdict.ending == "too short":
+        return _too_short(verdict)
+    named = (*verdict.confirmed, *verdict.ambiguous)
     left = left_in_words(verdict)
-    if verdict.ending == "unexplained":
-        nearest = f"; the nearest is {effects}, with which {improved}"
-        why = f", since {left}" if left else ""
-        tried = "tried so far" if verdict.is_provisional else "of the library"
-        text = f"The model lacks something that no effect {tried} explains{why}"
-        return f"{text}{nearest if effects else ''}."
+    if not named:
+        return _unexplained(verdict, errors, left)
+    them = "it" if len(verdict.names) == 1 else "them"
+    more = ""
+    if verdict.suggested:
+        more = f" Suggested, not confirmed: {effects_in_words(verdict.suggested)}."
+        them = "these and what is suggested"
     rest = f", but not all is explained: {left}" if left else ""
-    return f"The model lacks {effects}; with {them} {improved}{rest}."
+    improved = improvement_in_words(errors)
+    return f"The model lacks {effects_in_words(named)}; with {them} {improved}{rest}.{more}"
+
+
+def _unexplained(verdict: Verdict, errors: HeldOut, left: str) -> str:
+    """Returns that no effect is confirmed, and what is suggested."""
+    why = f": {left}" if left else ""
+    if not verdict.suggested:
+        tried = "tried so far" if verdict.is_provisional else "of the library"
+        return (
+            f"The model lacks something that no effect {tried} explains{why}; "
+            f"{_size_of_error(errors)} is left."
+        )
+    effects, improved = effects_in_words(verdict.suggested), improvement_in_words(errors)
+    them = "it" if len(verdict.suggested) == 1 else "them"
+    reasons = dict.fromkeys(x.reason for x in verdict.standings if x.reason)
+    return (
+        f"The model lacks something, and no effect is confirmed{why}. The log suggests "
+        f"{effects}, with which {improved}; not confirmed, since {'; '.join(reasons)}. "
+        f"A second recording could confirm {them}."
+    )
+
+
+def _too_short(verdict: Verdict) -> str:
+    """Returns that the log could not have shown most effects, and what would."""
+    hidden = verdict.undetectable
+    kinds = by_kind([limit.effect for limit in verdict.limits])
+    shown = [in_words(kind) for kind in list(hidden)[:_SHOWN]]
+    more = f" and {len(hidden) - _SHOWN} more" if len(hidden) > _SHOWN else ""
+    record = [text for text in dict.fromkeys(hidden.values()) if text][:_SHOWN]
+    return (
+        f"This log is too short to decide: nothing is missing that it shows, and "
+        f"{len(hidden)} of {len(kinds)} kinds of effects would not have been found, such "
+        f"as {enumeration(shown)}{more}; record: {'; '.join(record)}."
+    )
+
+
+def _nothing(verdict: Verdict, errors: HeldOut) -> str:
+    """Returns that nothing is missing, and what would have been found."""
+    if verdict.is_provisional:
+        return "So far nothing was found that the model lacks"
+    text = "This log shows nothing that the model lacks: the residual is noise"
+    if errors.model_error is not None:
+        text += " and what the model states of its own error"
+    kinds = by_kind([limit.effect for limit in verdict.limits])
+    seen = len(kinds) - len(verdict.undetectable)
+    if not kinds:
+        return text
+    return (
+        f"{text}, in which {seen} of {len(kinds)} kinds of effects would have been found "
+        "if they were large enough"
+    )
+
+
+def _size_of_error(errors: HeldOut) -> str:
+    """Returns the held-out error: "12 % of the torque", or "0.3 N"."""
+    if errors.has_meaningful_share:
+        unit = next(iter(errors.rms_by_unit(errors.after)))
+        word = _QUANTITIES.get(unit, "readings")
+        return f"{_two_digits(100.0 * errors.relative(errors.after))} % of the {word}"
+    each = errors.rms_by_unit(errors.after)
+    return enumeration([f"{rms:.2g} {unit}" for unit, rms in each.items()])
 
 
 def indistinguishable_text(verdict: Verdict) -> str:
@@ -145,12 +208,14 @@ def left_in_words(verdict: Verdict) -> str:
     if verdict.excess and not against:
         excess = f"the residual is {verdict.excess:.2g} times the noise"
     clauses = (
+        _correlated(verdict),
         verdict.dependence,
         against,
         excess,
         _findings(verdict.findings),
         _left_over(verdict.left_over),
-        undecided_text(verdict.undecided),
+        enumeration(verdict.misfits),
+        _large_error(verdict),
     )
     return enumeration([clause for clause in clauses if clause])
 
@@ -218,34 +283,22 @@ def _left_over(found: Sequence[LeftOver]) -> str:
     return f"{share} of what is left in {channels} depends on {enumeration(causes)}"
 
 
-def undecided_text(found: Sequence[Undecided]) -> str:
-    """Returns which more effects may be there; empty for none."""
-    if not found:
+def _correlated(verdict: Verdict) -> str:
+    """Returns which channels are no white noise, if no effect is named."""
+    channels = verdict.correlated
+    if not channels or verdict.confirmed or verdict.ambiguous:
         return ""
-    kinds = [in_words(each.kind) for each in found[:_SHOWN]]
-    more = " or more" if len(found) > _SHOWN else ""
-    share = _two_digits(100.0 * found[0].gain)
-    return (
-        f"{share} % of what is left may be {enumeration(kinds, 'or')}{more}, for which "
-        "this log is too short"
-    )
+    shown = enumeration(channels[:_SHOWN])
+    shown += f" and {len(channels) - _SHOWN} more" * (len(channels) > _SHOWN)
+    return f"the residual of {shown} is correlated from row to row"
 
 
-def _nothing(verdict: Verdict, errors: HeldOut) -> str:
-    """Returns that nothing is missing, and what would have been found."""
-    if verdict.is_provisional:
-        return "So far nothing was found that the model lacks"
-    text = "This log shows nothing that the model lacks: the residual is noise"
-    if errors.model_error is not None:
-        text += " and what the model states of its own error"
-    kinds = by_kind([limit.effect for limit in verdict.limits])
-    seen = by_kind([x.effect for x in verdict.limits if x.amplitude is not None])
-    if not kinds:
-        return text
-    return (
-        f"{text}, in which {len(seen)} of {len(kinds)} kinds of effects would have "
-        "been found if they were large enough"
-    )
+def _large_error(verdict: Verdict) -> str:
+    """Returns the share of the readings that is not predicted, if it is large."""
+    share = verdict.relative_error
+    if not share > DEFAULT_SETTINGS.max_relative_error:
+        return ""
+    return f"{_two_digits(100.0 * share)} % of what was measured is not predicted"
 
 
 def _two_digits(value: float) -> str:

@@ -17,7 +17,6 @@ from sysid.effect_selection.verdict_sentence import (
     contradictions_text,
     indistinguishable,
     single_strokes_text,
-    undecided_text,
     verdict_sentence,
 )
 
@@ -55,14 +54,25 @@ def improvement_text(errors: HeldOut) -> str:
 
 def _missing_line(verdict: Verdict, most: int) -> str:
     """Returns what is missing, or that nothing is, or that no effect explains it."""
-    if verdict.ending == "none":
+    if verdict.ending in ("none", "too short"):
         return f"missing: none; {_limits_text(verdict)}"
     left, effects = _left_text(verdict), _effects_text(verdict, most)
-    if verdict.ending == "unexplained":
-        nearest = f". Nearest: {effects}" if effects else ""
-        tried = "effect tried so far" if verdict.is_provisional else "library effect"
-        return f"No {tried} explains the residual: {left}{nearest}"
-    return f"missing: {effects}" + (f". Left unexplained: {left}" if left else "")
+    status = _status_text(verdict)
+    if not (verdict.confirmed or verdict.ambiguous):
+        nearest = f". Suggested: {effects}{status}" if effects else ""
+        return f"No effect is confirmed: {left or 'see the report'}{nearest}"
+    return f"missing: {effects}{status}" + (f". Left unexplained: {left}" if left else "")
+
+
+def _status_text(verdict: Verdict) -> str:
+    """Returns where effects stand, if not all are confirmed."""
+    counts = {
+        "confirmed": len(verdict.confirmed),
+        "ambiguous": len(verdict.ambiguous),
+        "suggested": len(verdict.suggested),
+    }
+    shown = [f"{count} {status}" for status, count in counts.items() if count]
+    return f" ({', '.join(shown)})"
 
 
 def _effects_text(verdict: Verdict, most: int) -> str:
@@ -103,25 +113,19 @@ def _left_text(verdict: Verdict) -> str:
     if verdict.excess and not other:
         other = f"the residual is {verdict.excess:.2g} times the noise"
     learned = "; ".join(each.text for each in verdict.left_over)
-    findings, more = findings_text(verdict.findings), undecided_text(verdict.undecided)
+    findings = findings_text(verdict.findings)
+    more = "; ".join(verdict.misfits)
     parts = (verdict.dependence, other, findings, learned, more)
     return "; ".join(part for part in parts if part)
 
 
 def _limits_text(verdict: Verdict) -> str:
     """Returns what would have been found, in words."""
-    effects = list(dict.fromkeys(limit.effect for limit in verdict.limits))
-    hidden = [
-        effect
-        for effect in effects
-        if all(x.amplitude is None for x in verdict.limits if x.effect == effect)
-    ]
-    text = "the residual is consistent with noise"
-    if effects:
-        text += (
-            f"; {len(effects) - len(hidden)} of {len(effects)} effects would have been "
-            "found (from which amplitude on: result.json)"
-        )
+    kinds, hidden = by_kind([x.effect for x in verdict.limits]), verdict.undetectable
+    if not kinds:
+        return "the residual is consistent with noise"
+    text = f"{len(kinds) - len(hidden)} of {len(kinds)} kinds of effects would have been "
+    text += "found (from which amplitude on: result.json)"
     return text + (f", not {', '.join(hidden)}" if hidden else "")
 
 

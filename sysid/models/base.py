@@ -159,6 +159,11 @@ class LogModel(abc.ABC):
         return self.measurements.episode
 
     @property
+    def filter_rows(self) -> int:
+        """Over how many rows a filter of the log correlates noise; 1: there is none."""
+        return 1
+
+    @property
     def one_way(self) -> tuple[str, ...]:
         """Joints that move one way only; by default none is known."""
         return ()

@@ -55,23 +55,24 @@ def _plots(closed: ClosedLoop, found: LossMap) -> dict[str, plots.Plot | None]:
         "losses": plots.loss_plot(found, errors.channels),
         "dependence": plots.dependence_plot(residuals, covariates, channels),
         "candidates": plots.candidate_plot(
-            [r.survey for r in closed.rounds] + [closed.end]
+            closed.search.begin,
+            closed.search.account.gains(),
+            closed.last.settings.min_gain,
         ),
     }
 
 
 def _made_worse(closed: ClosedLoop) -> set[str]:
-    """Returns the channels that effects make worse, in the fit or on held-out rows."""
+    """Returns the channels that effects make worse on held-out rows."""
     errors = closed.errors
     before, after = (errors.interval(p) for p in (errors.before, errors.after))
-    held_out = {
+    return {
         channel.name
         for channel, (_, high), (low, _) in zip(
             errors.channels, before, after, strict=True
         )
         if low > high
     }
-    return held_out | set(closed.last.harmed_channels(closed.first))
 
 
 def _noise_origin(closed: ClosedLoop) -> str:

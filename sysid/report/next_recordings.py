@@ -65,12 +65,9 @@ def recordings(verdict: Verdict, at_task: bool) -> list[Recording]:
             for name in dict.fromkeys(n.partition(".")[0] for n in verdict.names)
             if (text := revealing_kind(name, at_task))
         ]
-    rows = limit_rows(verdict.limits)
-    shown = {row.kind for row in rows if row.least}
-    hidden = [row for row in rows if row.kind not in shown]
     found += [
         Recording(f"{in_words(kind)}, which this log could not have shown", text)
-        for kind in dict.fromkeys(row.kind for row in hidden)
+        for kind in verdict.undetectable
         if (text := revealing_kind(kind, at_task))
     ]
     return found

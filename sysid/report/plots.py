@@ -14,9 +14,8 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from sysid.effect_selection.evidence import Evidence
+from sysid.effect_selection.forward_selection import Gain
 from sysid.effect_selection.held_out import HeldOut
-from sysid.effect_selection.survey import Survey
 from sysid.models.measurements import Channel
 from sysid.report.loss_map import LossMap, place
 from sysid.report.thinning import even_rows, extreme_rows
@@ -170,20 +169,27 @@ def dependence_plot(
     )
 
 
-def candidate_plot(surveys: Sequence[Survey]) -> Plot:
-    """Returns what each candidate would explain, in the first and the last survey."""
+def candidate_plot(
+    begin: Sequence[Gain], end: Sequence[Gain], least: float
+) -> Plot:
+    """Returns what each candidate would explain, without and with the effects.
+
+    Args:
+        begin, end: the best first.
+        least: gain from which on an effect is selected.
+    """
     titles = ("without added effects", "with added effects")
     figure = make_subplots(1, 2, subplot_titles=titles, horizontal_spacing=0.3)
-    for column, survey in ((1, surveys[0]), (2, surveys[-1])):
-        best = _best_shapes(survey.effects)[:_CANDIDATES][::-1]
+    for column, gains in ((1, begin), (2, end)):
+        best = _best_shapes(gains)[:_CANDIDATES][::-1]
         bars = go.Bar(
-            y=[e.name for e in best],
-            x=[max(100.0 * e.gain, 0.0) for e in best],
+            y=[gain.text for gain in best],
+            x=[max(100.0 * gain.share, 0.0) for gain in best],
             orientation="h", showlegend=False,
-            marker_color=[_PASSES if e.accepted else _FAILS for e in best],
+            marker_color=[_PASSES if g.share >= least else _FAILS for g in best],
             hovertext=[
-                f"p {e.p:.2g}; {100.0 * e.block_share:.0f} % of the blocks better"
-                for e in best
+                f"{100.0 * float(np.mean(g.of_blocks > 0.0)):.0f} % of the folds better"
+                for g in best
             ],
         )  # fmt: skip
         figure.add_trace(bars, row=1, col=column)
@@ -300,11 +306,11 @@ def _against(
     return [*points, *means]
 
 
-def _best_shapes(evidence: Sequence[Evidence]) -> list[Evidence]:
+def _best_shapes(gains: Sequence[Gain]) -> list[Gain]:
     """Returns each effect once, with the shape parameters that explain most."""
-    found: dict[str, Evidence] = {}
-    for each in evidence:
-        found.setdefault(" and ".join(each.effects), each)
+    found: dict[tuple[str, ...], Gain] = {}
+    for each in gains:
+        found.setdefault(each.term.names, each)
     return list(found.values())
 
 

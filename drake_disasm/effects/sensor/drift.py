@@ -34,6 +34,7 @@ class SensorDrift(SensorEffect):
     )
 
     present_at_zeroing = False
+    is_of_time = True
     noun = "a drift of the sensor"
     experiment = "the first pose again at the end, and a rest of some minutes"
     task_experiment = "the first steps again at the end, with a rest before them"

@@ -37,6 +37,7 @@ class SensorStep(SensorEffect):
         0.05, "s", 0.001, 1e4, "w, how long it takes to set in", (0.05,)
     )
 
+    is_of_time = True
     noun = "a step of the sensor's zero"
     present_at_zeroing = False
     experiment = "a rest before and after whatever may have knocked the sensor"

@@ -32,6 +32,7 @@ class SensorWarmUp(SensorEffect):
     )
 
     present_at_zeroing = False
+    is_of_time = True
     noun = "warm-up of the sensor"
     experiment = "a rest from switching on until the reading stays, pose unchanged"
 

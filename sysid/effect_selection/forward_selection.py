@@ -1,0 +1,382 @@
+"""Forward selection of effects: one loss, one rule for ties, one for stopping.
+
+The loss is that of contiguous blocks of rows, each predicted with coefficients that were
+fitted to the others. In each step the candidate that lowers it most is added; of those
+that are about as good, the one with the fewest coefficients.
+"""
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
+from scipy.stats import t as t_distribution
+
+from sysid.effect_selection.block_grams import (
+    Array,
+    BlockGrams,
+    Columns,
+    NormalEquations,
+)
+from sysid.effect_selection.candidates import Candidate, kind_text
+from sysid.effect_selection.settings import SelectionSettings
+
+
+@dataclass(frozen=True)
+class Term:
+    """Effects that enter a model together: one, or one kind at all joints.
+
+    Attributes:
+        candidates: the effects.
+        columns: (k,) of their amplitudes.
+        owners: (k,) number of the candidate that each column is of.
+    """
+
+    candidates: tuple[Candidate, ...]
+    columns: Columns
+    owners: NDArray[np.int64]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the effects, whatever their shapes."""
+        return tuple(candidate.name for candidate in self.candidates)
+
+    @property
+    def kind(self) -> str:
+        """Name of the effects' class."""
+        return type(self.candidates[0].effect).__name__
+
+    def of_columns(self, columns: Columns) -> "Term":
+        """Returns the same with some of its columns, and effects that have any."""
+        kept = np.isin(self.columns, columns)
+        numbers, owners = np.unique(self.owners[kept], return_inverse=True)
+        candidates = tuple(self.candidates[i] for i in numbers)
+        return Term(candidates, self.columns[kept], owners)
+
+    def of_name(self, name: str) -> Columns:
+        """Returns the columns of one of its effects."""
+        number = self.names.index(name)
+        return self.columns[self.owners == number]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What a term takes away of the loss of blocks that were not fitted.
+
+    Attributes:
+        term: with the columns that can help.
+        share: of the loss.
+        of_blocks: (F,) of each fold's loss, in units of the loss of all.
+    """
+
+    term: Term
+    share: float
+    of_blocks: Array
+
+    @property
+    def text(self) -> str:
+        """The effects, with the values of their shapes."""
+        first, *rest = self.term.candidates
+        if not rest:
+            return first.text
+        return f"{kind_text(first)} of {len(rest) + 1} joints"
+
+    def is_about_as_good_as(self, best: "Gain", settings: SelectionSettings) -> bool:
+        """Returns whether it gains and leaves nearly as much as another, the best."""
+        margin = settings.ambiguity_margin * min(best.share, 1.0 - best.share)
+        return self.share >= best.share - margin
+
+    def is_ambiguous_with(self, other: "Gain", settings: SelectionSettings) -> bool:
+        """Returns whether folds can't distinguish this, which gains less, from another.
+
+        Because it gains nearly as much, or more in so many folds that the difference is
+        chance (paired, one-sided t-test over the folds).
+        """
+        if self.is_about_as_good_as(other, settings):
+            return True
+        if self.share < settings.ambiguity_least * other.share:
+            return False
+        difference = other.of_blocks - self.of_blocks
+        count = len(difference)
+        error = float(difference.std(ddof=1)) * np.sqrt(count)
+        critical = t_distribution.isf(settings.alpha, count - 1)
+        return bool(other.share - self.share < critical * error)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A term that was added, and others that would have gained about as much.
+
+    Attributes:
+        chosen: what was added.
+        rivals: effects of another kind or place, the best first.
+    """
+
+    chosen: Gain
+    rivals: tuple[Gain, ...]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Effects that lower the loss of blocks that were not fitted.
+
+    Attributes:
+        steps: in the order in which they were added.
+        columns: of the base, and of the effects.
+        weights: (channels,) of the channels in the loss.
+    """
+
+    steps: tuple[Step, ...]
+    columns: Columns
+    weights: Array
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """What was added."""
+        return tuple(step.chosen.term for step in self.steps)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the effects, in the order in which they were added."""
+        each = itertools.chain.from_iterable(term.names for term in self.terms)
+        return tuple(dict.fromkeys(each))
+
+
+def select(
+    grams: BlockGrams,
+    base: Columns,
+    terms: Sequence[Term],
+    settings: SelectionSettings,
+    weights: Array | None = None,
+    groups: Sequence[int] | None = None,
+) -> Selection:
+    """Returns the effects that lower the held-out loss.
+
+    Args:
+        grams: of all columns, by blocks.
+        base: columns of the model without effects, which are in any case.
+        terms: that may be added.
+        settings: thresholds.
+        weights: (channels,) in the loss, where the noise is stated. Otherwise each
+            channel is divided by what is left of it: first without effects, then with
+            those that are selected so.
+        groups: label of each channel; those of one label have one unknown noise.
+    """
+    if weights is not None:
+        return _selected(grams, base, terms, settings, weights)
+    columns = base
+    for _ in range(settings.reweightings):
+        weights = channel_weights(grams, columns, groups)
+        found = _selected(grams, base, terms, settings, weights)
+        columns = found.columns
+    return found
+
+
+def channel_weights(
+    grams: BlockGrams, columns: Columns, groups: Sequence[int] | None
+) -> Array:
+    """Returns the weight (channels,) that makes what columns leave of unit power."""
+    power = grams.channel_powers(columns)
+    labels = np.arange(len(power)) if groups is None else np.array(groups)
+    pooled = np.array([power[labels == label].mean() for label in labels])
+    return np.asarray(1.0 / np.maximum(pooled, 1e-12 * pooled.max() + 1e-300))
+
+
+def _selected(
+    grams: BlockGrams,
+    base: Columns,
+    terms: Sequence[Term],
+    settings: SelectionSettings,
+    weights: Array,
+) -> Selection:
+    """Returns the effects that lower the loss with given weights of channels."""
+    whole = grams.weighted(weights)
+    folds = whole.folds(settings.folds).projected(base)
+    steps = list(_forward(folds, terms, settings))
+    steps = _exchanged(folds, steps, terms, settings)
+    kept = significant_columns(
+        whole, base, [step.chosen.term for step in steps], settings
+    )
+    steps = [
+        Step(Gain(term, s.chosen.share, s.chosen.of_blocks), s.rivals)
+        for s in steps
+        if len((term := s.chosen.term.of_columns(kept)).columns)
+    ]
+    return Selection(tuple(steps), np.append(base, kept), weights)
+
+
+def _forward(
+    equations: NormalEquations, terms: Sequence[Term], settings: SelectionSettings
+) -> Iterator[Step]:
+    """Yields what is added, step by step."""
+    have: set[str] = set()
+    for _ in range(settings.max_steps):
+        open_terms = [term for term in terms if not have.issuperset(term.names)]
+        gains = ranked(equations, open_terms, settings)
+        if not gains or gains[0].share < settings.min_gain:
+            return
+        step = step_of(gains, settings)
+        yield step
+        have.update(step.chosen.term.names)
+        equations = equations.projected(step.chosen.term.columns)
+
+
+def step_of(gains: Sequence[Gain], settings: SelectionSettings) -> Step:
+    """Returns the simplest of the best, and its rivals."""
+    best = gains[0]
+    as_good = [gain for gain in gains if gain.is_about_as_good_as(best, settings)]
+    chosen = min(as_good, key=lambda gain: (len(gain.term.columns), -gain.share))
+    return Step(chosen, rivals_of(chosen, gains, settings))
+
+
+def rivals_of(
+    chosen: Gain, gains: Sequence[Gain], settings: SelectionSettings
+) -> tuple[Gain, ...]:
+    """Returns effects of another kind or place that explain about as much."""
+    found: dict[tuple[str, ...], Gain] = {}
+    for gain in gains:
+        if gain.term.kind == chosen.term.kind and (
+            set(gain.term.names) & set(chosen.term.names)
+        ):
+            continue
+        if gain.is_ambiguous_with(chosen, settings):
+            found.setdefault(gain.term.names, gain)
+    return tuple(found.values())
+
+
+def _exchanged(
+    equations: NormalEquations,
+    steps: list[Step],
+    terms: Sequence[Term],
+    settings: SelectionSettings,
+) -> list[Step]:
+    """Returns the steps, each judged again with all the others in the model.
+
+    What was added while others were missing may have stood for those in part: it goes
+    if it gains too little beside them, and gives way to what gains more.
+    """
+    for number, step in enumerate(steps):
+        others = [s for i, s in enumerate(steps) if i != number]
+        left = equations.projected(_columns_of(others))
+        gains = ranked(left, _others(terms, others), settings)
+        own = ranked(left, [step.chosen.term], settings)
+        gains = sorted([*own, *gains], key=lambda gain: -gain.share)
+        if not gains or gains[0].share < settings.min_gain:
+            steps[number] = Step(Gain(_nothing(), 0.0, np.zeros(1)), ())
+            continue
+        best = step_of(gains, settings)
+        if own and own[0].is_about_as_good_as(best.chosen, settings):
+            best = Step(own[0], rivals_of(own[0], gains, settings))
+        steps[number] = best
+    return [step for step in steps if len(step.chosen.term.columns)]
+
+
+def _nothing() -> Term:
+    return Term((), np.array([], np.int64), np.array([], np.int64))
+
+
+def _columns_of(steps: Sequence[Step]) -> Columns:
+    empty = np.array([], dtype=np.int64)
+    return np.unique(np.concatenate([empty, *(s.chosen.term.columns for s in steps)]))
+
+
+def _others(terms: Sequence[Term], steps: Sequence[Step]) -> list[Term]:
+    """Returns terms that have an effect which no step has added."""
+    have = {name for step in steps for name in step.chosen.term.names}
+    return [term for term in terms if not have.issuperset(term.names)]
+
+
+def ranked(
+    equations: NormalEquations, terms: Sequence[Term], settings: SelectionSettings
+) -> list[Gain]:
+    """Returns what terms gain, the best first; those that can't help are left out."""
+    folds = equations.folds(settings.folds)
+    before = folds.losses
+    total = max(float(before.sum()), 1e-300)
+    each = folds.held_out_each()
+    found = []
+    for term in terms:
+        columns = folds.feasible(term.columns)
+        if not len(columns):
+            continue
+        single = len(columns) == 1
+        after = each[:, columns[0]] if single else folds.held_out(columns)
+        gains = (before - after) / total
+        found.append(Gain(term.of_columns(columns), float(gains.sum()), gains))
+    return sorted(found, key=lambda gain: -gain.share)
+
+
+def significant_columns(
+    equations: NormalEquations,
+    base: Columns,
+    terms: Sequence[Term],
+    settings: SelectionSettings,
+) -> Columns:
+    """Returns the columns of effects whose coefficients are not zero by chance.
+
+    Backward elimination: the effect whose Wald test has the highest p-value goes, one
+    by one.
+
+    Args:
+        equations: by fine blocks, nothing projected out.
+        base: columns of the model without effects.
+        terms: the effects.
+        settings: thresholds.
+    """
+    owners = owned_columns(terms)
+    empty = np.array([], dtype=np.int64)
+    columns = np.concatenate([empty, *owners.values()])
+    small = equations.of_columns(np.append(base, columns))
+    small = small.projected(np.arange(len(base)))
+    at = {int(c): len(base) + i for i, c in enumerate(columns)}
+    while owners:
+        local = {n: np.array([at[int(c)] for c in own]) for n, own in owners.items()}
+        p = p_values(small, local)
+        worst = max(p, key=lambda name: p[name])
+        if p[worst] < settings.alpha:
+            break
+        del owners[worst]
+    return np.sort(np.concatenate([empty, *owners.values()]))
+
+
+def owned_columns(terms: Sequence[Term]) -> dict[str, Columns]:
+    """Returns the columns of each effect, by its name."""
+    owners: dict[str, Columns] = {}
+    for term in terms:
+        for name in term.names:
+            known = owners.get(name, np.array([], np.int64))
+            owners[name] = np.unique(np.append(known, term.of_name(name)))
+    return owners
+
+
+def p_values(
+    equations: NormalEquations, owners: dict[str, Columns]
+) -> dict[str, float]:
+    """Returns the p-value of each effect's coefficients, all fitted together.
+
+    A Wald test whose covariance allows for correlation, see `covariance`: F with k and
+    nu - k + 1 degrees of freedom.
+    """
+    columns = np.concatenate(list(owners.values()))
+    small = equations.of_columns(columns)
+    numbers = np.arange(len(columns))
+    x, C = small.solution(numbers), small.covariance(numbers)
+    nu = equations.degrees_of_freedom
+    found, at = {}, 0
+    for name, own in owners.items():
+        part = slice(at, at := at + len(own))
+        found[name] = wald_p(x[part], C[part, part], nu)
+    return found
+
+
+def wald_p(x: Array, C: Array, nu: int) -> float:
+    """Returns the p-value that coefficients (k,) with a covariance (k, k) are zero."""
+    k = len(x)
+    least = nu - k + 1
+    if least < 1:  # more coefficients than cosines: each by itself, Bonferroni
+        each = np.abs(x) / np.sqrt(np.maximum(np.diagonal(C), 1e-300))
+        return float(min(1.0, k * 2.0 * t_distribution.sf(each.max(), nu)))
+    statistic = float(x @ np.linalg.pinv(C, hermitian=True) @ x)
+    return float(f_distribution.sf(statistic * least / (nu * k), k, least))

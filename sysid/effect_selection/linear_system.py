@@ -1,0 +1,190 @@
+"""A fit linearised with all candidates at null: what the selection works on."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.effect_selection.block_grams import (
+    BlockGrams,
+    Columns,
+    NormalEquations,
+    blocks_of,
+)
+from sysid.effect_selection.candidates import Candidate, extended, joint_groups
+from sysid.effect_selection.fit import Fit
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.forward_selection import Term
+from sysid.effect_selection.residual_curves import Dependence, dependence_curves
+from sysid.effect_selection.settings import SelectionSettings
+from sysid.identification.linearisation import Linearisation, extend
+from sysid.models.base import LogModel
+from sysid.parameters import Parameter, nominal_values
+
+Array = NDArray[np.float64]
+
+_AT_BOUND = 1e-9  # of a parameter's range: rounding of a point on the bound
+
+
+@dataclass(frozen=True)
+class LinearSystem:
+    """Gram matrices of a fit's parameters, of candidates, and of dependence curves.
+
+    Attributes:
+        grams: by blocks; of one channel if the noise of all is stated.
+        own: columns of the fit's parameters.
+        terms: what may be added.
+        dependences: curves of covariates, with their columns.
+        labels: for each channel of the Gram matrices; those of one label have one
+            unknown noise.
+        noise_is_stated: whether channels keep their weights.
+        parameters: of the fit and of the candidates, as the columns are.
+        linearisation: from which fits with candidates begin; None where the model is
+            affine, so that they need no such.
+        untested: candidates, as text, for which the time was not enough.
+        settings: thresholds.
+    """
+
+    grams: BlockGrams
+    own: Columns
+    terms: tuple[Term, ...]
+    dependences: tuple[tuple[Dependence, Columns], ...]
+    labels: tuple[int, ...]
+    noise_is_stated: bool
+    parameters: tuple[Parameter, ...]
+    linearisation: Linearisation | None
+    untested: tuple[str, ...]
+    settings: SelectionSettings
+
+    @property
+    def weights(self) -> Array | None:
+        """Weight of each channel; None where it has to be estimated."""
+        if not self.noise_is_stated:
+            return None
+        return np.ones(self.grams.grams.shape[1])
+
+    def equations(self, weights: Array) -> NormalEquations:
+        """Returns the normal equations with the fit's parameters projected out."""
+        return self.grams.weighted(weights).projected(self.own)
+
+    def derivatives(self, term: Term) -> dict[str, Array]:
+        """Returns the derivatives (rows, channels) by a term's amplitudes, by name."""
+        if self.linearisation is None:
+            return {}
+        found = {}
+        for number, column in zip(term.owners, term.columns, strict=True):
+            field = field_of(self.parameters[column])
+            name = f"{term.candidates[number].name}.{field}"
+            found[name] = self.linearisation.jacobian[..., column]
+        return found
+
+    def candidates_of(self, term: Term) -> list[Candidate]:
+        """Returns a term's effects with those amplitudes free that it has columns of."""
+        fields: list[list[str]] = [[] for _ in term.candidates]
+        for number, column in zip(term.owners, term.columns, strict=True):
+            fields[number].append(field_of(self.parameters[column]))
+        pairs = zip(term.candidates, fields, strict=True)
+        return [candidate.only(own) for candidate, own in pairs]
+
+
+def field_of(parameter: Parameter) -> str:
+    """Returns the last part of a parameter's name."""
+    return parameter.name.rpartition(".")[2]
+
+
+def linear_system(
+    fitter: Fitter,
+    fit: Fit,
+    library: Sequence[Candidate],
+    deadline: float = math.inf,
+) -> LinearSystem:
+    """Returns the linear account of a fit and of the candidates that it does not have.
+
+    Costs one evaluation of the model for each amplitude of each candidate. Those whose
+    turn comes after a deadline, by `time.monotonic` [s], are not tested.
+    """
+    names = {candidate.name for candidate in fit.effects}
+    rest = [candidate for candidate in library if candidate.name not in names]
+    model, groups, linear = _linearised(fitter, fit, rest, deadline)
+    tested = rest[: len(groups)]
+    settings, measured = fitter.settings, model.measurements
+    curves, dependences = dependence_curves(model)
+    begin = len(model.parameters)
+    side = np.concatenate([_side(linear.u), np.zeros(curves.shape[2])])
+    blocks = blocks_of(measured.episode, settings.blocks)
+    columns = [linear.jacobian, curves]
+    grams = BlockGrams.of(
+        columns, linear.residual, linear.weights, blocks, measured.episode, side,
+        pooled=fit.noise_is_stated,
+    )
+    own_columns = _distinct(tested, groups, linear.jacobian)
+    labels = list(dict.fromkeys(model.noise_groups))
+    return LinearSystem(
+        grams,
+        np.arange(len(fit.theta)),
+        tuple(_terms(tested, own_columns)),
+        tuple((d, begin + np.array(d.columns, np.int64)) for d in dependences),
+        tuple(labels.index(label) for label in model.noise_groups),
+        fit.noise_is_stated,
+        model.parameters,
+        None if model.affine else linear,
+        tuple(candidate.text for candidate in rest[len(tested) :]),
+        settings,
+    )
+
+
+def _linearised(
+    fitter: Fitter, fit: Fit, library: Sequence[Candidate], deadline: float
+) -> tuple[LogModel, list[range], Linearisation]:
+    """Returns the model with as many candidates as there is time for, linearised."""
+    model, groups = extended(fit.model, library)
+    objective = fitter.objective(model)
+    rest = nominal_values(model.parameters)[len(fit.theta) :]
+    u = objective.scaling.to_unit(np.concatenate([fit.theta, rest]))
+    found = extend(fit.linearisation, objective, u, deadline=deadline)
+    if len(found.u) < len(u):
+        count = sum(group.stop <= len(found.u) for group in groups)
+        model, groups = extended(fit.model, library[:count])
+        found = found.of_first(len(model.parameters))
+    return model, groups, found
+
+
+def _side(u: Array) -> Array:
+    """Returns 1 or -1 for parameters (p,) that can go up or down only, else 0."""
+    return (u < _AT_BOUND).astype(float) - (u > 1.0 - _AT_BOUND)
+
+
+def _distinct(
+    library: Sequence[Candidate], groups: Sequence[range], jacobian: Array
+) -> list[Columns]:
+    """Returns the columns of each candidate that show in the log.
+
+    None of a shape that looks exactly like an earlier one of the same effect: a drift
+    that ends after the log has.
+    """
+    found: list[Columns] = []
+    shapes: dict[str, list[Array]] = {}
+    for candidate, group in zip(library, groups, strict=True):
+        own = jacobian[..., group.start : group.stop]
+        seen = shapes.setdefault(candidate.name, [])
+        is_known = any(np.array_equal(own, each) for each in seen)
+        shows = own.any(axis=(0, 1)) & (not is_known)
+        found.append(np.array(group, dtype=np.int64)[shows])
+        seen.append(own)
+    return found
+
+
+def _terms(library: Sequence[Candidate], columns: Sequence[Columns]) -> list[Term]:
+    """Returns each candidate by itself, and kinds that are common at all joints."""
+    pairs = zip(library, columns, strict=True)
+    of = {candidate.text: own for candidate, own in pairs if len(own)}
+    shown = [candidate for candidate in library if candidate.text in of]
+    sets = [(candidate,) for candidate in shown] + joint_groups(shown)
+    return [_term(each, [of[candidate.text] for candidate in each]) for each in sets]
+
+
+def _term(candidates: tuple[Candidate, ...], columns: Sequence[Columns]) -> Term:
+    owners = [np.full(len(own), i) for i, own in enumerate(columns)]
+    return Term(candidates, np.concatenate(columns), np.concatenate(owners))

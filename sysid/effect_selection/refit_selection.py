@@ -1,0 +1,255 @@
+"""Selection where the model is not linear in its effects: fits decide.
+
+The linear account at the present fit ranks the candidates; the best are fitted, and the
+fits are compared by the same loss and the same rules as terms of a linear model. Contact
+makes a derivative at null mean little far from the data: there every effect is fitted
+to a few rows.
+"""
+
+import dataclasses
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
+from sysid.effect_selection.candidates import Candidate
+from sysid.effect_selection.exceeds_noise import exceeds_noise_p
+from sysid.effect_selection.fit import Fit
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.forward_selection import Gain, Step, Term, ranked, step_of
+from sysid.effect_selection.linear_system import LinearSystem, linear_system
+from sysid.effect_selection.prescreen import prescreening_fits
+from sysid.effect_selection.settings import SelectionSettings
+from sysid.workers import Workers
+
+
+@dataclass
+class RefitSelection:
+    """Adds effects to a model one at a time, each confirmed by a fit.
+
+    Attributes:
+        fitter: of the rows that are searched.
+        library: candidates.
+        progress: gets a line after each step.
+        deadline: when to stop, by `time.monotonic` [s].
+        steps: what was added.
+        is_complete: whether it ended by itself, not because its time was over.
+    """
+
+    fitter: Fitter
+    library: Sequence[Candidate]
+    progress: Progress = ignore_progress
+    deadline: float = math.inf
+    steps: list[Step] = field(default_factory=list)
+    is_complete: bool = True
+
+    def run(self, fit: Fit) -> Fit:
+        """Returns the fit with effects that lower the held-out loss.
+
+        Args:
+            fit: without them.
+        """
+        for _ in range(self._settings.max_steps):
+            if fit.is_at_noise and not fit.states_model_error:
+                return fit
+            found = self._next(fit)
+            if time.monotonic() > self.deadline:
+                self.is_complete = False
+                return found or fit
+            if found is None:
+                return fit
+            fit = self._without_needless(found)
+        return fit
+
+    @property
+    def _settings(self) -> SelectionSettings:
+        return self.fitter.settings
+
+    def _next(self, fit: Fit) -> Fit | None:
+        """Returns the fit with one more effect; None if none is confirmed."""
+        self._report(f"comparing {len(self.library)} candidates")
+        system = linear_system(self.fitter, fit, self.library, self.deadline)
+        trials = self._trials(fit, system)
+        fits = self._fitted(fit, system, trials)
+        gains = {}
+        for trial, found in zip(trials, fits, strict=False):
+            gain = self._gain(fit, found, trial)
+            if gain is not None:
+                gains[gain.term.names] = (gain, found)
+        if not gains:
+            return None
+        order = sorted((gain for gain, _ in gains.values()), key=lambda g: -g.share)
+        step = step_of(order, self._settings)
+        if step.chosen.share < self._settings.min_gain:
+            return None
+        self.steps.append(step)
+        _, found = gains[step.chosen.term.names]
+        self._report(f"{step.chosen.text}: objective {found.objective:.4g}")
+        return found
+
+    def _trials(self, fit: Fit, system: LinearSystem) -> list[Gain]:
+        """Returns what is fitted: each effect in its best shape, the best first."""
+        equations = system.equations(np.ones(system.grams.grams.shape[1]))
+        gains = ranked(equations, system.terms, self._settings)
+        best: dict[tuple[str, ...], Gain] = {}
+        for gain in gains:
+            best.setdefault(gain.term.names, gain)
+        is_far = fit.noise_is_stated and (
+            fit.objective > self._settings.max_linear_objective
+        )
+        if is_far:
+            known = {gain.term.names for gain in best.values()}
+            rest = [t for t in system.terms if t.names not in known]
+            unknown = [Gain(term, 0.0, np.zeros(1)) for term in rest]
+            best |= {gain.term.names: gain for gain in unknown[::-1]}
+            return self._prescreened(fit, list(best.values()))
+        least = 0.5 * self._settings.min_gain
+        promising = [gain for gain in best.values() if gain.share >= least]
+        return promising[: self._settings.trials]
+
+    def _prescreened(self, fit: Fit, gains: Sequence[Gain]) -> list[Gain]:
+        """Returns the effects that explain most by fits to a few rows."""
+        self._report(f"fitting {len(gains)} candidates to a few rows")
+        sets = [gain.term.candidates for gain in gains]
+        _, fits = prescreening_fits(self.fitter, fit, sets, self.deadline)
+        pairs = sorted(
+            zip(gains, fits, strict=False), key=lambda pair: pair[1].loss
+        )[: self._settings.trials]
+        self._starts = {gain.term.names: found for gain, found in pairs}
+        return [gain for gain, _ in pairs]
+
+    def _fitted(
+        self, fit: Fit, system: LinearSystem, trials: Sequence[Gain]
+    ) -> list[Fit]:
+        """Returns a fit for each trial for which there is time."""
+        jobs = []
+        for trial in trials:
+            start = self._starts.get(trial.term.names)
+            derivatives = {} if start else system.derivatives(trial.term)
+            added = tuple(system.candidates_of(trial.term))
+            if start:
+                added = start.effects[len(fit.effects) :]
+            jobs.append(_TrialFit(self.fitter, fit, added, start, derivatives))
+        workers, found = self.fitter.workers, []
+        self._starts = {}
+        if workers.in_this_process or self.fitter.base.costly:
+            for job in jobs:
+                if time.monotonic() > self.deadline:
+                    break
+                found.append(job.run())
+                self._report(f"{job.text}: objective {found[-1].objective:.4g}")
+        elif jobs:
+            found = list(workers.map(_TrialFit.run, [job.alone for job in jobs]))
+        return found
+
+    def _gain(self, before: Fit, after: Fit, trial: Gain) -> Gain | None:
+        """Returns what a fit gains in blocks that it was not fitted to.
+
+        None if no amplitude is left, or noise and the model's own error can explain it.
+        """
+        added = after.effects[len(before.effects) :]
+        names = {candidate.name for candidate in added}
+        if not names:
+            return None
+        count = sum(len(candidate.fields) for candidate in added)
+        if after.noise_is_stated:
+            tests = len({candidate.name for candidate in self.library})
+            if tests * exceeds_noise_p(before, after, count) >= self._settings.alpha:
+                return None
+        losses = before.held_out_losses, after.held_out_losses
+        total = max(float(losses[0].sum()), 1e-300)
+        of_folds = (losses[0] - losses[1]) / total
+        columns = np.arange(count)
+        owners = np.repeat(
+            np.arange(len(added)), [len(candidate.fields) for candidate in added]
+        )
+        return Gain(Term(added, columns, owners), float(of_folds.sum()), of_folds)
+
+    def _without_needless(self, fit: Fit) -> Fit:
+        """Returns the fit without effects that later ones have made needless."""
+        gains = fit.effect_gains
+        for effect in sorted(fit.effects, key=lambda each: gains[each.name]):
+            if gains[effect.name] >= self._settings.min_gain:
+                return fit
+            rest = tuple(each for each in fit.effects if each is not effect)
+            without = self.fitter.fit(rest, fit)
+            if without.loss <= fit.loss / (1.0 - self._settings.min_gain):
+                self._report(f"without {effect.text}: {without.objective:.4g}")
+                self.steps = [
+                    s for s in self.steps if s.chosen.term.names != (effect.name,)
+                ]
+                return self._without_needless(without)
+        return fit
+
+    def _report(self, text: str) -> None:
+        self.progress(ProgressUpdate("selecting effects", message=text))
+
+    _starts: dict[tuple[str, ...], Fit] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _TrialFit:
+    """A fit with more effects, as work for a process.
+
+    Attributes:
+        fitter: makes it.
+        before: the fit without them.
+        added: the effects.
+        start: where it begins; None for the fit without.
+        derivatives: by their amplitudes, by name.
+    """
+
+    fitter: Fitter
+    before: Fit
+    added: tuple[Candidate, ...]
+    start: Fit | None
+    derivatives: dict[str, np.ndarray]
+
+    @property
+    def text(self) -> str:
+        """What is added."""
+        return " and ".join(candidate.text for candidate in self.added)
+
+    @property
+    def alone(self) -> "_TrialFit":
+        """The same for a process of its own, which has no workers."""
+        fitter = dataclasses.replace(self.fitter, workers=Workers())
+        return dataclasses.replace(self, fitter=fitter)
+
+    def run(self) -> Fit:
+        """Returns the fit, with as few amplitudes as explain about as much."""
+        effects, known = (*self.before.effects, *self.added), len(self.before.effects)
+        begin = self.start or self.before
+        derivatives = None if self.start else self.derivatives
+        fit = self.fitter.fit(effects, begin, derivatives)
+        while True:
+            kept = fit.without_unphysical(known)
+            if kept == fit.effects or len(kept) == known:
+                break
+            fit = self.fitter.fit(kept, fit)
+        return _simplified(self.fitter, fit, known)
+
+
+def _simplified(fitter: Fitter, fit: Fit, known: int) -> Fit:
+    """Returns the fit without amplitudes whose intervals hold null, if that is as good.
+
+    Args:
+        fitter: fits it.
+        fit: with all amplitudes.
+        known: number of effects that keep theirs.
+    """
+    away = np.abs(fit.linearisation.u - fit.null)
+    which, new = away > fit.half_intervals, []
+    for effect in fit.effects[known:]:
+        pairs = zip(effect.fields, fit.columns_of(effect), strict=True)
+        if fields := [name for name, column in pairs if which[column]]:
+            new.append(effect.only(fields))
+    effects = (*fit.effects[:known], *new)
+    if not new or effects == fit.effects:
+        return fit
+    found = fitter.fit(effects, fit)
+    most = (1.0 + fitter.settings.min_gain) * fit.loss
+    return found if found.loss <= most else fit
