@@ -106,7 +106,7 @@ def rate_text(rate: str, joints: Sequence[str], factors: Array) -> str:
     """
     of = {"v": "q", "vd": "v"}[rate]
     parts = [
-        f"{factor:.4g} times at {joint}{_unit_text(factor)}"
+        f"{factor:.3g} times at {joint}{_unit_text(factor)}"
         for joint, factor in zip(joints, factors, strict=True)
         if factor != 1.0
     ]
@@ -115,6 +115,8 @@ def rate_text(rate: str, joints: Sequence[str], factors: Array) -> str:
 
 def _unit_text(factor: float) -> str:
     """Returns which unit a factor is that of, in words; empty if of none."""
+    if abs(factor + 1.0) < _LEAST_FACTOR:
+        return " (the other sign)"
     for unit, size in _UNITS.items():
         if abs(factor / size - 1.0) < _LEAST_FACTOR:
             return f" (as in {unit})"

@@ -41,14 +41,22 @@ class SignedOrder:
     @property
     def steps(self) -> int:
         """How many signs and exchanges it takes; all signs at once are one."""
-        flips = self.sign.count(-1.0)
-        cycles, seen = 0, set[int]()
+        flips, joints = self.sign.count(-1.0), len(self.order)
+        return joints - len(self.cycles) + min(flips, 1 + joints - flips)
+
+    @property
+    def cycles(self) -> list[list[int]]:
+        """Joints that have each other's columns; a joint with its own is one alone."""
+        found: list[list[int]] = []
+        seen = set[int]()
         for start in range(len(self.order)):
-            cycles += start not in seen
+            cycle = []
             while start not in seen:
                 seen.add(start)
+                cycle.append(start)
                 start = self.order[start]
-        return len(self.order) - cycles + min(flips, 1 + len(self.sign) - flips)
+            found += [cycle] if cycle else []
+        return found
 
     def name(self, joints: Sequence[str]) -> str:
         """Returns the name of this way to write torques.
@@ -105,3 +113,14 @@ class SignedOrder:
             yield from (
                 self.exchanged(i, j) for i, j in itertools.combinations(joints, 2)
             )
+
+    def undone(self) -> Iterator[Self]:
+        """Yields those with fewer steps: one less, or all of one cycle."""
+        yield from (each for each in self.near() if each.steps < self.steps)
+        for cycle, sign in itertools.product(self.cycles, (1.0, -1.0)):
+            order, signs = list(self.order), list(self.sign)
+            for joint in cycle:
+                order[joint], signs[joint] = joint, sign
+            fewer = type(self)(tuple(order), tuple(signs))
+            if fewer.steps < self.steps:
+                yield fewer
