@@ -21,12 +21,13 @@ from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
 from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_logs
-from sysid.models.arm_motion import IN_TORQUES, ArmMotion
+from sysid.models.arm_motion import IN_TORQUES, ArmMotion, has_edges
 from sysid.models.base import Array, LogModel
 from sysid.models.bookkeeping import Bookkeeping
 from sysid.models.channel_grams import angle_between, likely
 from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints
+from sysid.models.log_filters import LogFilters
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.motion_bookkeeping import TorqueFits
 from sysid.models.rate_factors import in_degrees, rate_text, right_rates
@@ -44,7 +45,8 @@ class JointMotionModel(LogModel):
     Of ten inertial parameters per link, many have no effect on joint torques, and
     others only in linear combinations. `parameters` are those combinations; each is
     named by its first term, and `doc` has them all. Parameters of arm effects come
-    after the base parameters.
+    after the base parameters. Where a log's provenance states a low-pass filter, torques
+    of effects that are not linear in the motion pass through it, see LogFilters.
     """
 
     affine = True
@@ -79,7 +81,8 @@ class JointMotionModel(LogModel):
         self._scenario = scenario or Scenario()
         self._effects = tuple(self._scenario.effects)
         refuse_other_joints(self._effects, header.joints)
-        # Shifts in time need neighbours of rows that are not fitted themselves.
+        self._filters = LogFilters.of(logs)
+        # Shifts in time and filters need neighbours of rows that are not fitted.
         self._whole = ArmMotion.of(arm, base, header.joints, episodes)
         self._motion = self._whole
         self._taken = np.ones(len(self._whole.time), dtype=bool)
@@ -97,9 +100,11 @@ class JointMotionModel(LogModel):
         """See LogModel."""
         beta, on_arm = theta[: len(self._motion.nominal)], self._on_arm(theta)
         shifts = [e for e in on_arm if isinstance(e, DelayEffect) and not e.is_null]
-        if not shifts:
+        is_edged = bool(self._filters) and any(map(has_edges, on_arm))
+        if not shifts and not is_edged:
             return self._motion.rows(rows).torques(beta, on_arm)
-        torque = self._whole.torques(beta, on_arm)
+        filters = self._filters if is_edged else None
+        torque = self._whole.torques(beta, on_arm, filters)
         return self._whole.shifted(torque, shifts)[self._taken][rows]
 
     def _on_arm(self, theta: Array) -> list[ArmEffect]:
