@@ -198,18 +198,17 @@ def _processing(done: Done) -> dict[str, Any]:
 
 
 def low_pass_of(header: LogHeader) -> LowPass | None:
-    """Returns the filter that acted on a log, at the log's own rate.
+    """Returns the filter that acted on a log, at the rate of what was recorded.
 
-    None if its provenance states none, or one that lets through all that rows so far
-    apart can hold.
+    None if its provenance states none.
     """
     done: Any = header.provenance
     for key in ("import", "processing"):
         done = done.get(key) if isinstance(done, Mapping) else None
     if not isinstance(done, Mapping) or done.get("filter") != _FILTER:
         return None
-    cutoff, period = done.get("cutoff_Hz"), header.period
-    if type(cutoff) not in (int, float) or not period:
+    cutoff, every = done.get("cutoff_Hz"), done.get("decimation")
+    if type(cutoff) not in (int, float) or type(every) is not int or not header.period:
         return None
-    acts = 0.0 < cutoff < 0.5 / period
-    return LowPass(float(cutoff), period) if acts else None
+    is_possible = every > 0 and 0.0 < cutoff < 0.5 * every / header.period
+    return LowPass(float(cutoff), header.period / every) if is_possible else None

@@ -137,34 +137,24 @@ class ArmMotion:
         self,
         beta: Array,
         effects: Sequence[ArmEffect],
-        filters: Callable[[Array], Array] | None = None,
+        filtered: Callable[[Array, Sequence[ArmEffect]], Array] | None = None,
     ) -> Array:
         """Returns the joints' torques (n, joints), all but shifts in time.
 
         Args:
             beta: (b,) base parameters.
             effects: on the arm.
-            filters: what torques (n, joints) went through that the motion does not
-                show: those of effects that `has_edges`; None for nothing.
+            filtered: gives the torques of effects that `has_edges` under a load
+                (n, joints), as the log's filter left them; None for no filter.
         """
         samples = self.samples(beta, effects)
-        torque, edged = samples.load, np.zeros_like(samples.load)
+        torque, edged = samples.load, []
         for effect in effects:
-            if filters is not None and has_edges(effect):
-                edged += self._added(effect, samples)
+            if filtered is not None and has_edges(effect):
+                edged.append(effect)
             elif isinstance(effect, _ADDED) and not effect.is_null:
-                torque = torque + self._added(effect, samples)
-        return torque if filters is None else torque + filters(edged)
-
-    def _added(self, effect: ArmEffect, samples: ArmSamples) -> Array:
-        """Returns what an effect adds to the load (n, joints)."""
-        if isinstance(effect, ArmTorqueEffect):
-            return effect.torques(samples)
-        added = np.zeros_like(samples.load)
-        if isinstance(effect, JointMemoryEffect):
-            memory = self.paths.of(effect)[self.row]
-            added[:, self.joints.index(effect.joint)] = effect.torque(memory)
-        return added
+                torque = torque + torque_of(effect, samples, self.paths, self.row)
+        return torque if filtered is None else torque + filtered(samples.load, edged)
 
     def samples(self, beta: Array, effects: Sequence[ArmEffect]) -> ArmSamples:
         """Returns the motion with the load that the rigid bodies are.
@@ -213,6 +203,29 @@ class ArmMotion:
                 at = np.clip(t - late, t[0], t[-1])
                 read[own, i] = CubicSpline(t, torque[own, i])(at)
         return read
+
+
+def torque_of(
+    effect: ArmEffect,
+    samples: ArmSamples,
+    paths: PathMemory,
+    row: slice | NDArray[np.int64],
+) -> Array:
+    """Returns what an effect adds to the load of samples (n, joints).
+
+    Args:
+        effect: with torques of its own.
+        samples: of the motion.
+        paths: of the whole motion.
+        row: of the samples in that.
+    """
+    if isinstance(effect, ArmTorqueEffect):
+        return effect.torques(samples)
+    added = np.zeros_like(samples.load)
+    if isinstance(effect, JointMemoryEffect):
+        memory = paths.of(effect)[row]
+        added[:, samples.joints.index(effect.joint)] = effect.torque(memory)
+    return added
 
 
 def has_edges(effect: ArmEffect) -> bool:

@@ -27,10 +27,15 @@ from sysid.models.bookkeeping import Bookkeeping
 from sysid.models.channel_grams import angle_between, likely
 from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints
-from sysid.models.log_filters import LogFilters
+from sysid.models.log_filters import FilteredTorques, log_filters
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.motion_bookkeeping import TorqueFits
-from sysid.models.rate_factors import in_degrees, rate_text, right_rates
+from sysid.models.rate_factors import (
+    MOST_TURN,
+    median_reach,
+    rate_text,
+    right_rates,
+)
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
 from sysid.models.signed_order import SignedOrder
 from sysid.parameters import Parameter
@@ -45,8 +50,9 @@ class JointMotionModel(LogModel):
     Of ten inertial parameters per link, many have no effect on joint torques, and
     others only in linear combinations. `parameters` are those combinations; each is
     named by its first term, and `doc` has them all. Parameters of arm effects come
-    after the base parameters. Where a log's provenance states a low-pass filter, torques
-    of effects that are not linear in the motion pass through it, see LogFilters.
+    after the base parameters. Where a log's provenance states a low-pass filter,
+    effects' torques pass through it that are not linear in the motion, see
+    FilteredTorques.
     """
 
     affine = True
@@ -81,10 +87,11 @@ class JointMotionModel(LogModel):
         self._scenario = scenario or Scenario()
         self._effects = tuple(self._scenario.effects)
         refuse_other_joints(self._effects, header.joints)
-        self._filters = LogFilters.of(logs)
         # Shifts in time and filters need neighbours of rows that are not fitted.
         self._whole = ArmMotion.of(arm, base, header.joints, episodes)
         self._motion = self._whole
+        filters = log_filters(logs)
+        self._filtered = FilteredTorques(self._whole, filters) if filters else None
         self._taken = np.ones(len(self._whole.time), dtype=bool)
         self._prismatic = arm.prismatic
         channels = tuple(
@@ -100,11 +107,10 @@ class JointMotionModel(LogModel):
         """See LogModel."""
         beta, on_arm = theta[: len(self._motion.nominal)], self._on_arm(theta)
         shifts = [e for e in on_arm if isinstance(e, DelayEffect) and not e.is_null]
-        is_edged = bool(self._filters) and any(map(has_edges, on_arm))
-        if not shifts and not is_edged:
+        filtered = self._filtered if any(map(has_edges, on_arm)) else None
+        if not shifts and filtered is None:
             return self._motion.rows(rows).torques(beta, on_arm)
-        filters = self._filters if is_edged else None
-        torque = self._whole.torques(beta, on_arm, filters)
+        torque = self._whole.torques(beta, on_arm, filtered)
         return self._whole.shifted(torque, shifts)[self._taken][rows]
 
     def _on_arm(self, theta: Array) -> list[ArmEffect]:
@@ -185,6 +191,14 @@ class JointMotionModel(LogModel):
             for i, value in enumerate(self._motion.nominal)
         )
 
+    @property
+    def signed_order(self) -> SignedOrder:
+        """In which order, and with which signs, the torques are explained by far best.
+
+        As written, unless another one leaves less than half.
+        """
+        return TorqueFits(self._motion, self.measurements.values).signed_order()
+
     def bookkeeping(self) -> list[Bookkeeping[Self]]:
         """See LogModel: rates and units first, on which the other ways rest."""
         rates = self._in_degrees() or self._wrong_rates()
@@ -196,7 +210,7 @@ class JointMotionModel(LogModel):
 
     def _in_degrees(self) -> list[Bookkeeping[Self]]:
         rotary = np.array([j not in self._prismatic for j in self.joints])
-        if not rotary.any() or not in_degrees(self._motion.q[:, rotary]):
+        if not rotary.any() or median_reach(self._motion.q[:, rotary]) <= MOST_TURN:
             return []
         q = np.where(rotary, np.radians(self._whole.q), self._whole.q)
         whole = self._whole
@@ -233,7 +247,7 @@ class JointMotionModel(LogModel):
         self, fits: TorqueFits
     ) -> Iterator[tuple[Bookkeeping[Self], float]]:
         """Yields another order, other signs and units of torques, with what is left."""
-        order = fits.signed_order()
+        order = self.signed_order
         if order.steps:
             yield self._with_columns(
                 order.name(self.joints),
@@ -348,8 +362,12 @@ class JointMotionModel(LogModel):
             for number in np.unique(whole.episode)
         ]
         whole = ArmMotion.of(arm, base, whole.joints, episodes)
+        known = self._filtered
         model = self.replace(
-            _whole=whole, _motion=whole.rows(self._taken), _gravity=tuple(under)
+            _whole=whole,
+            _motion=whole.rows(self._taken),
+            _gravity=tuple(under),
+            _filtered=FilteredTorques(whole, known.filters) if known else None,
         )
         of_base = model._base_parameters(arm, base)
         if gravity is not None:
