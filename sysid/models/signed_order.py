@@ -69,21 +69,26 @@ class SignedOrder:
         flips = [j for j, s in zip(joints, self.sign, strict=True) if s < 0.0]
         return f"TorqueSign.{flips[0]}" if len(flips) == 1 else "TorqueSign"
 
-    def text(self, joints: Sequence[str]) -> str:
+    def text(self, joints: Sequence[str], column: str = "tau") -> str:
         """Returns it as a clause.
 
         Args:
             joints: their names.
+            column: of the table that is in this order.
         """
-        flips = [j for j, s in zip(joints, self.sign, strict=True) if s < 0.0]
+        flips = [i for i, s in enumerate(self.sign) if s < 0.0]
         if self.order == tuple(range(len(joints))):
-            where = "all joints" if len(flips) == len(joints) else ", ".join(flips)
-            return f"the torque of {where} has the other sign"
+            if len(flips) == len(joints):
+                return f"{column} has the other sign at all joints"
+            named = [f"{column}.{i} ({joints[i]})" for i in flips]
+            has = "has" if len(flips) == 1 else "have"
+            return f"{', '.join(named)} {has} the other sign"
+        signs = ["-" if sign < 0.0 else "" for sign in self.sign]
         columns = [
-            f"{'-' * (self.sign[i] < 0.0)}tau.{self.order[i]} is that of {joints[i]}"
+            f"{signs[i]}{column}.{self.order[i]} is that of {joints[i]}"
             for i in self.moved
         ]
-        return f"torques are in another order: {', '.join(columns)}"
+        return f"columns of {column} are in another order: {', '.join(columns)}"
 
     @property
     def remedy(self) -> str:

@@ -58,7 +58,7 @@ def test_a_right_log_has_no_other_way(right):
 @pytest.mark.parametrize(
     ("name", "damage", "words"),
     [
-        ("TorqueSign.elbow", scaled(-1.0, "tau.1"), "elbow has the other sign"),
+        ("TorqueSign.elbow", scaled(-1.0, "tau.1"), "tau.1 (elbow) has the other sign"),
         ("TorqueSign", scaled(-1.0, "tau"), "all joints"),
         ("JointOrder", swapped("tau.0", "tau.1"), "tau.1 is that of shoulder"),
         ("JointOrder", swapped("tau.0", "tau.1", -1.0), "-tau.0 is that of elbow"),
