@@ -15,6 +15,9 @@ Cases are made when they are first asked for. Their names are paths:
   real/ur10e_unloaded/first         a real recording: whole, first or second half
   more/...                          more of the same, with other seeds
 
+The kind of effect in a name is the one that is tried first; where a motion can't show
+it at that size, the next of the list is hidden.
+
 `fast` stands for all that takes seconds, `all` for those and the cell's.
 
 How to read the table. "named": hidden effects that are confirmed by name. "in set":
