@@ -205,8 +205,10 @@ class JointMotionModel(LogModel):
         if rates:
             return rates
         fits = TorqueFits(self._motion, self.measurements.values)
-        ways = [*self._wrong_columns(fits), *self._late(fits), *self._turned(fits)]
-        return likely(ways)
+        columns = list(self._wrong_columns(fits))
+        # Gravity is known by columns that are in their places.
+        turned = [] if columns else list(self._turned(fits))
+        return likely([*columns, *turned, *self._late(fits)])
 
     def _in_degrees(self) -> list[Bookkeeping[Self]]:
         rotary = np.array([j not in self._prismatic for j in self.joints])
@@ -249,13 +251,7 @@ class JointMotionModel(LogModel):
         """Yields another order, other signs and units of torques, with what is left."""
         order = self.signed_order
         if order.steps:
-            yield self._with_columns(
-                order.name(self.joints),
-                order.text(self.joints),
-                order.remedy,
-                order,
-                np.ones(len(self.joints)),
-            )
+            yield self._in_order(order)
         for i, factor in fits.torque_units().items():
             scale = np.where(np.arange(len(self.joints)) == i, factor, 1.0)
             yield self._with_columns(
@@ -265,6 +261,12 @@ class JointMotionModel(LogModel):
                 SignedOrder.as_written(len(self.joints)),
                 scale,
             )
+
+    def _in_order(self, order: SignedOrder) -> tuple[Bookkeeping[Self], float]:
+        """Returns another order or other signs of torques, with what it leaves."""
+        joints = self.joints
+        name, text, scale = order.name(joints), order.text(joints), np.ones(len(joints))
+        return self._with_columns(name, text, order.remedy, order, scale)
 
     def _with_columns(
         self, name: str, what: str, remedy: str, order: SignedOrder, scale: Array
@@ -313,9 +315,14 @@ class JointMotionModel(LogModel):
         written = np.array(self._gravity)
         if self._own_parameters is not None or not written.any():
             return  # base parameters are others under another gravity
-        gravity = fits.gravity(self._arm_under, written)
-        if gravity is None:
+        found = fits.gravity(self._arm_under, written)
+        if found is None:
             return
+        if found.is_reversed:
+            order = SignedOrder.as_written(len(self.joints))
+            yield self._in_order(order.flipped(range(len(self.joints))))
+            return
+        gravity = found.vector
         if gravity.any():
             name, angle = "GravityDirection", angle_between(gravity, written)
             down = np.round(gravity / np.linalg.norm(gravity), 2).tolist()

@@ -7,8 +7,6 @@ be explained by friction that drives the joint.
 """
 
 import itertools
-from collections.abc import Callable
-from dataclasses import fields
 from functools import cached_property
 
 import numpy as np
@@ -16,27 +14,25 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import linear_sum_assignment
 
-from drake_disasm.effects import ArmTilt
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.channel_grams import (
     FAR_BETTER,
-    STANDARD_ERRORS,
     ChannelGrams,
     Estimate,
-    angle_between,
     is_lower,
     jackknife_error,
 )
-from sysid.models.regressor import ArmDynamics
+from sysid.models.gravity_estimate import (
+    ArmUnder,
+    GravityEstimate,
+    friction_columns,
+    gravity_in,
+)
 from sysid.models.signed_order import SignedOrder
 
 Array = NDArray[np.float64]
-#: Gives an arm under a gravity (3,) in the base's frame.
-ArmUnder = Callable[[Array], ArmDynamics]
 
 _MOST_ROWS = 2500  # that are looked at, evenly spread: bodies have some 50 parameters
-#: Base tilts up to here are an effect of their own.
-_MOST_TILT = next(f.metadata["high"] for f in fields(ArmTilt) if f.name == "rx")
 _FEW_ROWS = 300  # at which an arm that stands otherwise is evaluated
 _ROUNDED = 1e-12  # of a torque's variance: less is rounding
 _THOUSAND = 1000.0
@@ -221,12 +217,8 @@ class TorqueFits:
         is_late = is_inside and is_better and found.is_off(0.0)
         return found if is_late and is_common else None
 
-    def gravity(self, arm_under: ArmUnder, written: Array) -> Array | None:
-        """Returns the gravity (3,) that is in the torques, None if it is that written.
-
-        The nominal weights under gravity along each axis of the base are fitted to the
-        torques, with the rest of each joint's nominal torque at a scale of its own, and
-        friction. Zero, if less than half of gravity is in the torques.
+    def gravity(self, arm_under: ArmUnder, written: Array) -> GravityEstimate | None:
+        """Returns the gravity that is in the torques, None if it is that written.
 
         Args:
             arm_under: gives the arm under a gravity.
@@ -234,33 +226,7 @@ class TorqueFits:
         """
         few = spread_rows(len(self._thin.time), _FEW_ROWS)
         thin, tau = self._thin.rows(few), self._tau[self._taken][few]
-        size = float(np.linalg.norm(written))
-        columns, rest = _weights(thin, arm_under, size)
-        by_written = columns @ (written[:, None] / size)
-        if not np.abs(by_written).max() > _ROUNDED * self._scale.max():
-            return None
-        own = np.concatenate([rest[..., None], friction_columns(thin.v)], axis=-1)
-        choice = np.ones((tau.shape[1], 1))
-        free, bound, none = (
-            ChannelGrams.of(weights, tau[..., None], own, positive=2)
-            for weights in (columns, by_written, by_written[..., :0])
-        )
-        if bound.shared_by_block(choice, self._scale).mean() < 0.0:
-            bound = none  # what pulls up is not the gravity that is written
-        without = free.shared_by_block(choice, self._scale)
-        share, error = without.mean(axis=0), jackknife_error(without)
-        length = float(np.linalg.norm(share))
-        if length + STANDARD_ERRORS * error < 0.5:
-            return np.zeros(3)
-        turned = angle_between(share, written)
-        lost = (
-            grams.losses(choice, self._scale).sum(axis=1) for grams in (free, bound)
-        )
-        if turned < _MOST_TILT + STANDARD_ERRORS * error / length or not is_lower(
-            *lost
-        ):
-            return None
-        return size * share / length
+        return gravity_in(thin, tau, arm_under, written)
 
     def _delayed(self, delays: Array) -> Array:
         """Returns held-out losses (delays, blocks, joints) of torques shifted back.
@@ -290,22 +256,6 @@ class TorqueFits:
 
     def _grams(self, targets: Array) -> ChannelGrams:
         return ChannelGrams.of(self._thin.Y, targets, self._friction, positive=2)
-
-
-def _weights(
-    motion: ArmMotion, arm_under: ArmUnder, size: float
-) -> tuple[Array, Array]:
-    """Returns nominal torques of weight (n, joints, 3) by axis, and all others.
-
-    Args:
-        motion: at some rows.
-        arm_under: gives the arm under a gravity.
-        size: of gravity [m/s^2].
-    """
-    zero = np.zeros_like(motion.v)
-    rest = arm_under(np.zeros(3)).torques(motion.q, motion.v, motion.vd)
-    by_axis = [arm_under(g).torques(motion.q, zero, zero) for g in size * np.eye(3)]
-    return np.stack(by_axis, axis=-1), rest
 
 
 def _smooth(values: Array) -> Array:
@@ -347,11 +297,6 @@ def _delay_error(delays: Array, curve: Array) -> float:
     return jackknife_error(
         [_least_at(delays, np.delete(curve, k, axis=1)) for k in blocks]
     )
-
-
-def friction_columns(v: Array) -> Array:
-    """Returns columns (n, joints, 3): an offset, viscous and dry friction."""
-    return np.stack([np.ones_like(v), v, np.sign(v)], axis=-1)
 
 
 def spread_rows(rows: int, most: int) -> NDArray[np.bool_]:

@@ -28,13 +28,15 @@ def motion(time):
     return q, v, vd
 
 
-def write(folder, gravity=None, lateness=0.0) -> Log:
+def write(folder, gravity=None, lateness=0.0, friction=1.0) -> Log:
     """Writes a log with friction and noise, of an arm that stands in any way."""
+    folder.mkdir(exist_ok=True)
     urdf = write_two_link_arm(folder / "two.urdf")
     time = 0.01 * np.arange(800)
     arm = ArmDynamics(str(urdf), JOINTS, gravity)
     q, v, vd = motion(time - lateness)
-    tau = arm.regressor(q, v, vd) @ arm.inertia + 0.3 * np.sign(v) + 0.1 * v
+    tau = arm.regressor(q, v, vd) @ arm.inertia
+    tau += friction * (0.3 * np.sign(v) + 0.1 * v)
     tau += 0.02 * np.random.default_rng(0).standard_normal(tau.shape)
     columns = dict(zip(("q", "v", "vd"), motion(time), strict=True))
     return write_motion_log(folder / "log", urdf, {"time": time, **columns, "tau": tau})
@@ -122,6 +124,15 @@ def test_a_base_that_is_mounted_otherwise(gravity, tmp_path):
     assert cosine > np.cos(np.radians(3.0))
     angle = np.degrees(np.arccos(-gravity[2] / _G))
     assert f"turned by {angle:.0f} degrees" in way.what
+
+
+def test_opposite_torques_without_friction_are_no_hanging_arm(tmp_path):
+    log = write(tmp_path, friction=0.0)
+    assert model(log).bookkeeping() == []
+    [way] = model(damaged(log, scaled(-1.0, "tau"))).bookkeeping()
+    assert way.name == "TorqueSign"
+    [way] = model(write(tmp_path / "up", (0.0, 0.0, _G), friction=0.0)).bookkeeping()
+    assert way.name == "GravityDirection"
 
 
 def test_torques_without_gravity_are_explained_by_a_model_without(tmp_path):
