@@ -33,6 +33,7 @@ class Case:
         left_out: classes of effects that the library lacks.
         level: rms of each effect in its worst channel, in units of the noise.
         partner: of a half, the name of the other half.
+        least_error: of the true model on the held-out recording, relative; 0: unknown.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Case:
     left_out: tuple[str, ...] = ()
     level: float = 0.0
     partner: str = ""
+    least_error: float = 0.0
 
     @property
     def kind(self) -> str:

@@ -15,6 +15,9 @@ Cases are made when they are first asked for. Their names are paths:
   real/ur10e_unloaded/first         a real recording: whole, first or second half
   more/...                          more of the same, with other seeds
 
+The kind of effect in a name is the one that is tried first; where a motion can't show
+it at that size, the next of the list is hidden.
+
 `fast` stands for all that takes seconds, `all` for those and the cell's.
 
 How to read the table. "named": hidden effects that are confirmed by name. "in set":
@@ -22,9 +25,11 @@ these, and those in the ambiguous set of a name. "wrong names": logs in which a 
 confirmed that was not put in, nor has one in its set that was. "false none": ending
 "none" though effects of twice the noise or more are there. "alarms": logs without an
 effect in which one is confirmed. "coverage": 95 % intervals that hold the true value.
-"error": on another recording, relative to what was measured, medians. "time": of the
-processor, from the log's folder to the answer; set OMP_NUM_THREADS=1, so that it is
-that of a clock on an idle machine.
+"error": on another recording, relative to what was measured, medians; "least": of the
+true model. An effect that the library lacks may have another's name with the same
+error: a drift is the begin of a warm-up. So logs of what is left out are counted apart.
+"time": of the processor, from the log's folder to the answer; set OMP_NUM_THREADS=1, so
+that it is that of a clock on an idle machine.
 """
 
 import argparse

@@ -72,7 +72,8 @@ def write_sensor_case(plan: Plan, folder: Path) -> Case:
     names = ("log", "held_out")
     for name, pose, model in zip(names, poses, models, strict=True):
         noise = drawn_noise(plan.noise, random, plan.rows, 6) * _NOISE
-        _write(folder / name, pose, truth.on(model) + noise)
+        wrench = truth.on(model) + noise
+        _write(folder / name, pose, wrench)
     return Case(
         plan.name,
         (str(folder / "log"),),
@@ -83,6 +84,7 @@ def write_sensor_case(plan: Plan, folder: Path) -> Case:
         values=truth.values,
         left_out=truth.hidden if plan.leaves_out else (),
         level=plan.level,
+        least_error=float(np.linalg.norm(noise) / np.linalg.norm(wrench)),
     )
 
 

@@ -17,7 +17,8 @@ _STRONG = 2.0  # times the noise: what is smaller may be missed
 COLUMNS = (
     *("selector", "logs of", "logs", "effects", "named [%]", "in set [%]"),
     *("suggested [%]", "logs with wrong names [%]", "false none [%]", "alarms [%]"),
-    *("coverage [%]", "error before", "error after", "median time [s]"),
+    *("coverage [%]", "error before", "error after", "after / least"),
+    "median time [s]",
 )
 HALVES_COLUMNS = (
     *("selector", "recording", "first", "second", "Jaccard index", "sizes agree"),
@@ -84,6 +85,12 @@ class Judged:
         return self.case.group == "null" and self.answer.is_named
 
     @property
+    def to_least(self) -> float | None:
+        """The held-out error over that of the true model; None if it is not known."""
+        after, least = self.answer.after, self.case.least_error
+        return after / least if after is not None and least else None
+
+    @property
     def covered(self) -> tuple[bool, ...]:
         """Whether each interval of a hidden effect's parameter holds its value."""
         true, sizes = self.case.values, self.answer.sizes
@@ -112,14 +119,15 @@ def table(found: Mapping[str, Sequence[Judged]]) -> list[list[Cell]]:
         groups: dict[str, list[Judged]] = {}
         for each in judged:
             groups.setdefault(group_of(each.case), []).append(each)
-        simulated = [each for each in judged if each.case.noise not in _APART]
+        whole = [each for each in judged if each.case.noise not in _APART]
+        simulated = [each for each in whole if not each.case.left_out]
         known = [j for j in simulated if j.case.group in ("one", "three")]
         strong = [j for j in known if j.case.level >= _STRONG]
         groups = dict(sorted(groups.items()))
         if strong:
             groups["all simulated, one and three, 2x and 5x"] = strong
         if simulated:
-            groups["all simulated"] = simulated
+            groups["all simulated, none left out"] = simulated
         rows += [row(selector, name, own) for name, own in groups.items()]
     return rows
 
@@ -149,6 +157,7 @@ def row(selector: str, name: str, judged: Sequence[Judged]) -> list[Cell]:
         f"{_share(covered)} of {len(covered)}" if covered else "-",
         _median(before),
         _median(after),
+        _median([j.to_least for j in judged]),
         _median([j.answer.seconds for j in judged]),
     ]
 

@@ -90,10 +90,11 @@ def write_arm_case(plan: Plan, folder: Path) -> Case:
     truth = _hidden(plan, _device(models[0], random), random)
     logs = []
     for name, motion, model in zip(("log", "held_out"), motions, models, strict=True):
-        noise = _noise(plan, motion, random) * truth.noise
-        tau = truth.on(model) + noise * _as_filtered(plan.cutoff)
+        noise = _noise(plan, motion, random) * truth.noise * _as_filtered(plan.cutoff)
+        tau = truth.on(model) + noise
         logs.append(folder / name)
         if plan.cutoff:
+            _, noise = _imported(motion, noise, plan.cutoff)
             motion, tau = _imported(motion, tau, plan.cutoff)
         _write(logs[-1], urdf, motion, tau)
     return Case(
@@ -107,6 +108,7 @@ def write_arm_case(plan: Plan, folder: Path) -> Case:
         truth.values,
         tuple({n.partition(".")[0] for n in truth.hidden}) if plan.leaves_out else (),
         plan.level,
+        least_error=float(np.linalg.norm(noise) / np.linalg.norm(tau)),
     )
 
 

@@ -425,7 +425,14 @@ class ArmEffect(Effect):
 
 
 class ArmTorqueEffect(ArmEffect, abc.ABC):
-    """Adds torques at an arm's joints that depend on the motion of all of them."""
+    """Adds torques at an arm's joints that depend on the motion of all of them.
+
+    Attributes:
+        is_filtered: whether of a filtered motion it gives filtered torques: it is
+            linear in the motion, or was learned from such torques.
+    """
+
+    is_filtered: ClassVar[bool] = False
 
     @abc.abstractmethod
     def torques(self, samples: ArmSamples) -> np.ndarray:

@@ -14,7 +14,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.importing.field_map import FieldMap, quantity_of
 from drake_disasm.importing.processing import Done, Processed, Processing, process
 from drake_disasm.importing.recording import Recording, recordings_of
-from drake_disasm.importing.signals import clock_of
+from drake_disasm.importing.signals import LowPass, clock_of
 from drake_disasm.importing.source import Source
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns
 from drake_disasm.logs.schema import KINDS, Form
@@ -22,6 +22,7 @@ from drake_disasm.logs.schema import KINDS, Form
 Array = NDArray[np.float64]
 
 _MADE = ("time", "v", "vd")  # by `recording` and `processing`
+_FILTER = "zero-phase FIR low-pass, sinc with Blackman window"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -184,9 +185,7 @@ def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
 def _processing(done: Done) -> dict[str, Any]:
     filtered = math.isfinite(done.cutoff)
     return {
-        "filter": "zero-phase FIR low-pass, sinc with Blackman window"
-        if filtered
-        else "none",
+        "filter": _FILTER if filtered else "none",
         "cutoff_Hz": float(done.cutoff) if filtered else None,
         "derivatives": "of the filter's kernel" if filtered else "as recorded",
         "rows_lost_at_each_end": done.reach,
@@ -196,3 +195,20 @@ def _processing(done: Done) -> dict[str, Any]:
         "gaps": sum(len(clock.gaps) for clock in done.clocks),
         "rows_lost": sum(clock.lost for clock in done.clocks),
     }
+
+
+def low_pass_of(header: LogHeader) -> LowPass | None:
+    """Returns the filter that acted on a log, at the rate of what was recorded.
+
+    None if its provenance states none.
+    """
+    done: Any = header.provenance
+    for key in ("import", "processing"):
+        done = done.get(key) if isinstance(done, Mapping) else None
+    if not isinstance(done, Mapping) or done.get("filter") != _FILTER:
+        return None
+    cutoff, every = done.get("cutoff_Hz"), done.get("decimation")
+    if type(cutoff) not in (int, float) or type(every) is not int or not header.period:
+        return None
+    is_possible = every > 0 and 0.0 < cutoff < 0.5 * every / header.period
+    return LowPass(float(cutoff), header.period / every) if is_possible else None

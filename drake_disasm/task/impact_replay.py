@@ -39,7 +39,7 @@ class ImpactReplay:
 
     Args:
         scenarios: what the k twins are, `contact.model` being impact.
-        coarse: whether all but the end of a step may be simulated in coarse steps.
+        coarse: whether the middle of a step may be simulated in coarse steps.
 
     Raises:
         DisasmError: a scenario is out of bounds.
@@ -102,9 +102,10 @@ class _EvenReplay:
         self._batches = {
             h: _SteppedBatch.of(scenarios, h) for h in {coarse_step or fine, fine}
         }
-        begun = round(self._period / coarse_step) - 1 if coarse and coarse_step else 0
-        rest = round((self._period - begun * coarse_step) / fine)
-        self._time_steps = [coarse_step] * begun + [fine] * rest
+        is_coarse = coarse and 0.0 < 2.0 * coarse_step < self._period
+        self._time_steps = _time_steps(
+            self._period, fine, coarse_step if is_coarse else fine
+        )
         self._zero(coarse_step or fine)
 
     def ends(self, steps: Sequence[Steps]) -> list[Ends]:
@@ -239,3 +240,13 @@ def _coarse_step(scenario: Scenario) -> float:
         return 0.0
     arm = TwinNumbers.of(_with_time_step(scenario, step)).arm
     return step if arm.is_stable else 0.0
+
+
+def _time_steps(period: float, fine: float, coarse: float) -> list[float]:
+    """Returns the time steps of a period [s]: coarse ones between fine ones.
+
+    Forces jump as a step of the task begins, and its end is read: there a coarse step
+    is made in fine ones.
+    """
+    ends = [fine] * round(coarse / fine)
+    return [*ends, *[coarse] * (round(period / coarse) - 2), *ends]

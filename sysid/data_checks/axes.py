@@ -14,6 +14,9 @@ from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject
 from sysid.data_checks.units import scale_between, sign_findings
 from sysid.models.base import Array
+from sysid.models.joint_motion import JointMotionModel
+from sysid.models.signed_order import SignedOrder
+from sysid.models.wrench_bookkeeping import signed_permutations, signed_text
 
 _REMEDY = "exchange the columns, or turn the signs, and write the log again"
 _FRAME_COST = 0.1  # the frame of the table is looked at first
@@ -137,49 +140,31 @@ def _wrench_changes(first: int, frames: Sequence[Frame]) -> Iterator[_Change]:
         frames: in each of these.
     """
     count = first + len(WRENCH)
-    for frame, (axes, signs) in itertools.product(frames, _signed_permutations()):
+    channels = [""] * first + list(WRENCH)
+    for frame, P in itertools.product(frames, signed_permutations()):
         for groups in ((0,), (3,), (0, 3)):
             matrix = np.eye(count)
             for group in groups:
                 at = first + group
-                block = np.zeros((3, 3))
-                block[range(3), axes] = signs
-                matrix[at : at + 3, at : at + 3] = block
+                matrix[at : at + 3, at : at + 3] = P
             moved = np.flatnonzero((matrix != np.eye(count)).any(axis=1))
-            names = [_signed(matrix[i], int(i), first) for i in moved]
+            names = [signed_text(channels, matrix, int(i)) for i in moved]
             where = f" ({frame.name})" if frame.name else ""
             # One that acts on forces and torques at once is one cause.
             cost = len(names) / len(groups) + _FRAME_COST * (frame is not frames[0])
             yield _Change(f"{', '.join(names)}{where}", matrix, frame, cost)
 
 
-def _signed(row: Array, channel: int, first: int) -> str:
-    """Returns what a channel should be, such as `fz = -fy`, of a row of a matrix."""
-    source = int(np.argmax(np.abs(row)))
-    sign = "-" if row[source] < 0 else ""
-    return f"{WRENCH[channel - first]} = {sign}{WRENCH[source - first]}"
-
-
-def _signed_permutations() -> Iterator[tuple[list[int], Array]]:
-    """Yields the 47 signed permutations of three axes that change something."""
-    for axes in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            if axes != (0, 1, 2) or min(signs) < 0:
-                yield list(axes), np.array(signs)
-
-
 def _joint_changes(subject: Subject, frame: Frame) -> Iterator[_Change]:
-    """Yields wrong signs of single joints' torques, and pairs that are exchanged."""
-    names = [channel.name for channel in subject.model.measurements.channels]
-    eye = np.eye(len(names))
-    for i, name in enumerate(names):
-        matrix = eye.copy()
-        matrix[i, i] = -1.0
-        yield _Change(f"the other sign of tau.{i} ({name})", matrix, frame, 1.0)
-    for i, j in itertools.combinations(range(len(names)), 2):
-        for sign in (1.0, -1.0):
-            matrix = eye.copy()
-            matrix[[i, j]] = sign * eye[[j, i]]
-            text = f"tau.{i} and tau.{j} exchanged"
-            text += ", with the other sign" if sign < 0 else ""
-            yield _Change(text, matrix, frame, 2.0 + (sign < 0))
+    """Yields another order or other signs of torques; of positions, single ones."""
+    model = subject.model
+    if isinstance(model, JointMotionModel):
+        order = model.signed_order
+        if order.steps:
+            text = f"that {order.text(model.joints)}"
+            yield _Change(text, order.matrix, frame, float(order.steps))
+        return
+    names = [channel.name for channel in model.measurements.channels]
+    for order in SignedOrder.as_written(len(names)).near():
+        text = f"that {order.text(names, 'q')}"
+        yield _Change(text, order.matrix, frame, float(order.steps))

@@ -61,19 +61,31 @@ def _moving_rows(
 ) -> NDArray[np.bool_]:
     """Returns which rows (n,) turn on both sides, as far as there are rows near.
 
+    Those that do so once others are left out, too: what remains has none.
+    """
+    resting = np.ones(len(clock), dtype=bool)
+    for number in np.unique(model.measurements.episode):
+        own = np.flatnonzero(model.measurements.episode == number)
+        while len(own):
+            moving = _turning(clock[own], model.orientations[own], settings)
+            resting[own[moving]] = False
+            if not moving.any():
+                break
+            own = own[~moving]
+    return ~resting
+
+
+def _turning(time: Array, R_WS: Array, settings: DataSettings) -> NDArray[np.bool_]:
+    """Returns which rows (n,) turn on both sides.
+
     A row that has no other one near in time may well be at rest.
     """
-    moving = np.zeros(len(clock), dtype=bool)
-    for number in np.unique(model.measurements.episode):
-        own = model.measurements.episode == number
-        time, R_WS = clock[own], model.orientations[own]
-        near, resting = np.zeros((2, len(time)), dtype=bool)
-        for side in (-1, 1):
-            some, still = _still(time[::side], R_WS[::side], settings)
-            near |= some[::side]
-            resting |= (some & still)[::side]
-        moving[own] = near & ~resting
-    return moving
+    near, resting = np.zeros((2, len(time)), dtype=bool)
+    for side in (-1, 1):
+        some, still = _still(time[::side], R_WS[::side], settings)
+        near |= some[::side]
+        resting |= (some & still)[::side]
+    return near & ~resting
 
 
 def _still(

@@ -41,7 +41,9 @@ class DataSettings:
         "what a sensor does fast at one orientation is far less than a load's weight",
     )
     contact_noise: float = threshold(
-        3.0, "times the noise from row to row", "white noise is one"
+        2.0,
+        "times the noise from row to row",
+        "white noise is one, with t's 3 degrees of freedom one and a half",
     )
     contact_rows: int = threshold(
         30, "rows", "that others have the orientation of: fewer tell no spread"

@@ -12,6 +12,7 @@ from sysid.data_checks.frames import frames_of
 from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject
 from sysid.models.base import Array
+from sysid.models.rate_factors import median_reach, rate_factors
 from sysid.models.twin import TwinModel
 
 #: Quantities of a log of joint motion, each with the one that is its derivative.
@@ -120,15 +121,40 @@ def _static_wrench(subject: Subject) -> list[DataFinding]:
 
 
 def _joint_motion(subject: Subject) -> list[DataFinding]:
-    """Compares v and vd with derivatives of q and v."""
+    """Compares v and vd with derivatives of q and v, of all joints and one by one."""
     found = _degrees_of_joints(subject)
+    time = np.concatenate([e["time"] for e in subject.episodes])
+    counts = [e.rows for e in subject.episodes]
+    episode = np.repeat(np.arange(len(counts)), counts)
     for of, by in RATES:
-        slopes, rates = derivatives(subject, of, by)
-        scale = scale_between(slopes, rates, subject.settings)
+        if of not in subject.episodes[0] or by not in subject.episodes[0]:
+            continue
+        values, rates = (
+            np.concatenate([e[name] for e in subject.episodes]) for name in (of, by)
+        )
+        factors = [
+            factor.value if factor.is_off(0.0) else np.nan
+            for factor in rate_factors(time, episode, values, rates)
+        ]
         name = f"{by}, beside the derivative of {of},"
-        found += _unit_findings(name, scale, subject.settings, _DEGREES)
-        found += sign_findings(name, scale, subject.settings)
+        wrong = _wrong_rate(name, _common(factors), subject.settings)
+        found += wrong
+        for i, factor in enumerate(factors if not wrong else ()):
+            name = f"{by}.{i}, beside the derivative of {of}.{i},"
+            found += _wrong_rate(name, factor, subject.settings)
     return found
+
+
+def _common(factors: Sequence[float]) -> float:
+    """Returns the median of factors that are known; NaN if none is."""
+    known = [factor for factor in factors if np.isfinite(factor)]
+    return float(np.median(known)) if known else np.nan
+
+
+def _wrong_rate(name: str, factor: float, settings: DataSettings) -> list[DataFinding]:
+    """Returns findings of a rate's unit and sign, by its factor; NaN for unknown."""
+    wrong = _unit_findings(name, factor, settings, _DEGREES)
+    return wrong + sign_findings(name, factor, settings)
 
 
 def _joint_response(subject: Subject) -> list[DataFinding]:
@@ -165,7 +191,7 @@ def _degrees_of_joints(subject: Subject) -> list[DataFinding]:
     if "q" not in subject.episodes[0]:
         return []
     q = np.concatenate([e["q"] for e in subject.episodes])
-    most = float(np.median(np.abs(q).max(axis=0)))
+    most = median_reach(q)
     if most <= subject.settings.most_turn:
         return []
     what = f"half of the joints are beyond q = {most:.3g}: degrees, or millimetres?"

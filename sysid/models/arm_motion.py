@@ -1,7 +1,7 @@
 """The recorded motion of an arm, and the torques that it takes with given effects."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Self
 
 import numpy as np
@@ -36,6 +36,7 @@ IN_TORQUES = (
     EncoderError,
 )
 
+_ADDED = (ArmTorqueEffect, JointMemoryEffect)
 _BY_SAMPLE = (
     "row",
     "time",
@@ -132,24 +133,28 @@ class ArmMotion:
             self, **{name: getattr(self, name)[chosen] for name in _BY_SAMPLE}
         )
 
-    def torques(self, beta: Array, effects: Sequence[ArmEffect]) -> Array:
+    def torques(
+        self,
+        beta: Array,
+        effects: Sequence[ArmEffect],
+        filtered: Callable[[Array, Sequence[ArmEffect]], Array] | None = None,
+    ) -> Array:
         """Returns the joints' torques (n, joints), all but shifts in time.
 
         Args:
             beta: (b,) base parameters.
             effects: on the arm.
+            filtered: gives the torques of effects that `has_edges` under a load
+                (n, joints), as the log's filter left them; None for no filter.
         """
         samples = self.samples(beta, effects)
-        torque = samples.load
+        torque, edged = samples.load, []
         for effect in effects:
-            if isinstance(effect, ArmTorqueEffect) and not effect.is_null:
-                torque = torque + effect.torques(samples)
-            elif isinstance(effect, JointMemoryEffect) and not effect.is_null:
-                added = np.zeros_like(torque)
-                memory = self.paths.of(effect)[self.row]
-                added[:, self.joints.index(effect.joint)] = effect.torque(memory)
-                torque = torque + added
-        return torque
+            if filtered is not None and has_edges(effect):
+                edged.append(effect)
+            elif isinstance(effect, _ADDED) and not effect.is_null:
+                torque = torque + torque_of(effect, samples, self.paths, self.row)
+        return torque if filtered is None else torque + filtered(samples.load, edged)
 
     def samples(self, beta: Array, effects: Sequence[ArmEffect]) -> ArmSamples:
         """Returns the motion with the load that the rigid bodies are.
@@ -198,3 +203,36 @@ class ArmMotion:
                 at = np.clip(t - late, t[0], t[-1])
                 read[own, i] = CubicSpline(t, torque[own, i])(at)
         return read
+
+
+def torque_of(
+    effect: ArmEffect,
+    samples: ArmSamples,
+    paths: PathMemory,
+    row: slice | NDArray[np.int64],
+) -> Array:
+    """Returns what an effect adds to the load of samples (n, joints).
+
+    Args:
+        effect: with torques of its own.
+        samples: of the motion.
+        paths: of the whole motion.
+        row: of the samples in that.
+    """
+    if isinstance(effect, ArmTorqueEffect):
+        return effect.torques(samples)
+    added = np.zeros_like(samples.load)
+    if isinstance(effect, JointMemoryEffect):
+        memory = paths.of(effect)[row]
+        added[:, samples.joints.index(effect.joint)] = effect.torque(memory)
+    return added
+
+
+def has_edges(effect: ArmEffect) -> bool:
+    """Returns whether an effect adds torques that a filter of the motion leaves as is.
+
+    False of one that is null, or acts through the load.
+    """
+    if isinstance(effect, ArmTorqueEffect):
+        return not (effect.is_null or effect.is_filtered)
+    return isinstance(effect, JointMemoryEffect) and not effect.is_null

@@ -63,7 +63,7 @@ class GripLag:
         if not self.lags:
             return wrench[:, 1]
         parts = np.stack([elastic, wrench[:, 0], wrench[:, 1]], axis=1) @ self.to_grip.T
-        return self._at_bolt(np.sum(self._weights * parts, axis=1))
+        return self.from_pads(np.sum(self._weights * parts, axis=1))
 
     def along(self, wrench: Array) -> Array:
         """Returns the springs' wrench (n, 6) along an episode, from the first row on.
@@ -78,7 +78,7 @@ class GripLag:
         elastic[1:] = of_begin * elastic[:-1] + of_end * elastic[1:]
         for k in range(1, len(elastic)):
             elastic[k] += forgets * elastic[k - 1]
-        return self._at_bolt(elastic)
+        return self.from_pads(elastic)
 
     @functools.cached_property
     def _weights(self) -> Array:
@@ -88,7 +88,7 @@ class GripLag:
         of_begin = lag / self.period * (1.0 - forgets) - forgets
         return np.array([forgets, of_begin, 1.0 - forgets - of_begin])
 
-    def _at_bolt(self, at_grip: Array) -> Array:
+    def from_pads(self, at_grip: Array) -> Array:
         """Returns wrenches (n, 6) at Bo in Gn, of those at the pads."""
         return np.asarray(np.linalg.solve(self.to_grip, at_grip.T).T)
 
@@ -112,7 +112,7 @@ class GripLag:
         given = give[:, list(AXIS_ORDER)]
         at_grip = given * self.springs.stiffness
         at_grip[:, 3:] += np.cross(given[:, :3], at_grip[:, :3] + weight)
-        return self._at_bolt(at_grip)
+        return self.from_pads(at_grip)
 
     def after_growth(self, wrench: Array) -> Array:
         """Returns the springs' share (n, 6) of a wrench that grew evenly in a step.
@@ -120,7 +120,7 @@ class GripLag:
         Args:
             wrench: (n, 6) at the step's end, [f; tau] at Bo in Gn.
         """
-        return self._at_bolt(self._weights[2] * (wrench @ self.to_grip.T))
+        return self.from_pads(self._weights[2] * (wrench @ self.to_grip.T))
 
     def scatter(self, noise: Array, X_SB: RigidTransform) -> Array:
         """Returns the standard deviation of the springs' wrench (6,) at the pads.
@@ -133,11 +133,26 @@ class GripLag:
             X_SB: the bolt in the sensor's frame.
         """
         forgets, of_begin, of_end = self._weights
-        one = np.hstack([np.zeros((6, 6)), np.diag(noise)])
-        by_channel = at_bolt(one, X_SB)[:, 6:] @ self.to_grip.T
         gain = of_begin**2 + of_end**2 + 2.0 * forgets * of_begin * of_end
-        variance = np.sum(by_channel**2, axis=0) * gain / (1.0 - forgets**2)
-        return np.asarray(np.sqrt(variance))
+        return self._noise_at_pads(noise, X_SB) * np.sqrt(gain / (1.0 - forgets**2))
+
+    def scatter_of_growth(self, noise: Array, X_SB: RigidTransform) -> Array:
+        """Returns the same if in each step only the noise of its end grows evenly.
+
+        e' = f e + c w' of white noise w: the variance is c^2 / (1 - f^2) times its.
+
+        Args:
+            noise, X_SB: see `scatter`.
+        """
+        forgets, _, of_end = self._weights
+        gain = of_end**2 / (1.0 - forgets**2)
+        return self._noise_at_pads(noise, X_SB) * np.sqrt(gain)
+
+    def _noise_at_pads(self, noise: Array, X_SB: RigidTransform) -> Array:
+        """Returns the standard deviations of a measured wrench (6,) at the pads."""
+        each = np.hstack([np.zeros((6, 6)), np.diag(noise)])
+        at_pads = at_bolt(each, X_SB)[:, 6:] @ self.to_grip.T
+        return np.asarray(np.linalg.norm(at_pads, axis=0))
 
     def rates(self, elastic: Array, wrench: Array) -> Array:
         """Returns the bolt's rates (n, 6) against the arm, in the twin's coordinates.

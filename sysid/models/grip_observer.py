@@ -13,6 +13,9 @@ from sysid.models.sensor_reading import at_bolt
 from sysid.models.transitions import Transitions
 
 _SURE = 3.0  # standard deviations: by chance one in four hundred
+#: Standard deviation of a standard normal variable once it is shrunk: of (m - 1 / m)^2
+#: where |m| > 1, the mean is 4 (phi(1) - Q(1)).
+_OF_NOISE = 0.577
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,6 +102,21 @@ class GripObserver:
     def changed(self, one: Transitions, other: Transitions) -> NDArray[np.bool_]:
         """Returns which steps (n,) surely begin differently."""
         return np.asarray(np.abs(self.change(one, other)).max(axis=1) > _SURE)
+
+    def uncertain(self, whole: Transitions, signs: Array) -> Transitions:
+        """Returns all transitions, which begin elsewhere by a standard deviation.
+
+        By that of what is believed of noise.
+
+        Args:
+            whole: all transitions.
+            signs: (steps, 6) to which side, along and about the axes of the pads.
+        """
+        sigma = self.grip.scatter_of_growth(_OF_NOISE * self.noise, self.X_SB)
+        away = self.grip.from_pads(signs * sigma)
+        rates = self.grip.rates(away, np.zeros_like(away))
+        steps, every = whole.steps, np.arange(len(whole.steps))
+        return whole.beginning(every, steps.wrench + away, steps.give_rate + rates)
 
     def _on_bolt(self, states: Array, wrench: Array) -> Array:
         """Returns wrenches (n, 6) at Bo in Gn, of those at So in S."""

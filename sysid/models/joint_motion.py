@@ -21,15 +21,21 @@ from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
 from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_logs
-from sysid.models.arm_motion import IN_TORQUES, ArmMotion
+from sysid.models.arm_motion import IN_TORQUES, ArmMotion, has_edges
 from sysid.models.base import Array, LogModel
 from sysid.models.bookkeeping import Bookkeeping
 from sysid.models.channel_grams import angle_between, likely
 from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints
+from sysid.models.log_filters import FilteredTorques, log_filters
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.motion_bookkeeping import TorqueFits
-from sysid.models.rate_factors import in_degrees, rate_text, right_rates
+from sysid.models.rate_factors import (
+    MOST_TURN,
+    median_reach,
+    rate_text,
+    right_rates,
+)
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
 from sysid.models.signed_order import SignedOrder
 from sysid.parameters import Parameter
@@ -44,7 +50,9 @@ class JointMotionModel(LogModel):
     Of ten inertial parameters per link, many have no effect on joint torques, and
     others only in linear combinations. `parameters` are those combinations; each is
     named by its first term, and `doc` has them all. Parameters of arm effects come
-    after the base parameters.
+    after the base parameters. Where a log's provenance states a low-pass filter,
+    effects' torques pass through it that are not linear in the motion, see
+    FilteredTorques.
     """
 
     affine = True
@@ -79,9 +87,11 @@ class JointMotionModel(LogModel):
         self._scenario = scenario or Scenario()
         self._effects = tuple(self._scenario.effects)
         refuse_other_joints(self._effects, header.joints)
-        # Shifts in time need neighbours of rows that are not fitted themselves.
+        # Shifts in time and filters need neighbours of rows that are not fitted.
         self._whole = ArmMotion.of(arm, base, header.joints, episodes)
         self._motion = self._whole
+        filters = log_filters(logs)
+        self._filtered = FilteredTorques(self._whole, filters) if filters else None
         self._taken = np.ones(len(self._whole.time), dtype=bool)
         self._prismatic = arm.prismatic
         channels = tuple(
@@ -97,9 +107,10 @@ class JointMotionModel(LogModel):
         """See LogModel."""
         beta, on_arm = theta[: len(self._motion.nominal)], self._on_arm(theta)
         shifts = [e for e in on_arm if isinstance(e, DelayEffect) and not e.is_null]
-        if not shifts:
+        filtered = self._filtered if any(map(has_edges, on_arm)) else None
+        if not shifts and filtered is None:
             return self._motion.rows(rows).torques(beta, on_arm)
-        torque = self._whole.torques(beta, on_arm)
+        torque = self._whole.torques(beta, on_arm, filtered)
         return self._whole.shifted(torque, shifts)[self._taken][rows]
 
     def _on_arm(self, theta: Array) -> list[ArmEffect]:
@@ -180,18 +191,28 @@ class JointMotionModel(LogModel):
             for i, value in enumerate(self._motion.nominal)
         )
 
+    @property
+    def signed_order(self) -> SignedOrder:
+        """In which order, and with which signs, the torques are explained by far best.
+
+        As written, unless another one leaves less than half.
+        """
+        return TorqueFits(self._motion, self.measurements.values).signed_order()
+
     def bookkeeping(self) -> list[Bookkeeping[Self]]:
         """See LogModel: rates and units first, on which the other ways rest."""
         rates = self._in_degrees() or self._wrong_rates()
         if rates:
             return rates
         fits = TorqueFits(self._motion, self.measurements.values)
-        ways = [*self._wrong_columns(fits), *self._late(fits), *self._turned(fits)]
-        return likely(ways)
+        columns = list(self._wrong_columns(fits))
+        # Gravity is known by columns that are in their places.
+        turned = [] if columns else list(self._turned(fits))
+        return likely([*columns, *turned, *self._late(fits)])
 
     def _in_degrees(self) -> list[Bookkeeping[Self]]:
         rotary = np.array([j not in self._prismatic for j in self.joints])
-        if not rotary.any() or not in_degrees(self._motion.q[:, rotary]):
+        if not rotary.any() or median_reach(self._motion.q[:, rotary]) <= MOST_TURN:
             return []
         q = np.where(rotary, np.radians(self._whole.q), self._whole.q)
         whole = self._whole
@@ -228,15 +249,9 @@ class JointMotionModel(LogModel):
         self, fits: TorqueFits
     ) -> Iterator[tuple[Bookkeeping[Self], float]]:
         """Yields another order, other signs and units of torques, with what is left."""
-        order = fits.signed_order()
+        order = self.signed_order
         if order.steps:
-            yield self._with_columns(
-                order.name(self.joints),
-                order.text(self.joints),
-                order.remedy,
-                order,
-                np.ones(len(self.joints)),
-            )
+            yield self._in_order(order)
         for i, factor in fits.torque_units().items():
             scale = np.where(np.arange(len(self.joints)) == i, factor, 1.0)
             yield self._with_columns(
@@ -246,6 +261,12 @@ class JointMotionModel(LogModel):
                 SignedOrder.as_written(len(self.joints)),
                 scale,
             )
+
+    def _in_order(self, order: SignedOrder) -> tuple[Bookkeeping[Self], float]:
+        """Returns another order or other signs of torques, with what it leaves."""
+        joints = self.joints
+        name, text, scale = order.name(joints), order.text(joints), np.ones(len(joints))
+        return self._with_columns(name, text, order.remedy, order, scale)
 
     def _with_columns(
         self, name: str, what: str, remedy: str, order: SignedOrder, scale: Array
@@ -294,9 +315,14 @@ class JointMotionModel(LogModel):
         written = np.array(self._gravity)
         if self._own_parameters is not None or not written.any():
             return  # base parameters are others under another gravity
-        gravity = fits.gravity(self._arm_under, written)
-        if gravity is None:
+        found = fits.gravity(self._arm_under, written)
+        if found is None:
             return
+        if found.is_reversed:
+            order = SignedOrder.as_written(len(self.joints))
+            yield self._in_order(order.flipped(range(len(self.joints))))
+            return
+        gravity = found.vector
         if gravity.any():
             name, angle = "GravityDirection", angle_between(gravity, written)
             down = np.round(gravity / np.linalg.norm(gravity), 2).tolist()
@@ -343,8 +369,12 @@ class JointMotionModel(LogModel):
             for number in np.unique(whole.episode)
         ]
         whole = ArmMotion.of(arm, base, whole.joints, episodes)
+        known = self._filtered
         model = self.replace(
-            _whole=whole, _motion=whole.rows(self._taken), _gravity=tuple(under)
+            _whole=whole,
+            _motion=whole.rows(self._taken),
+            _gravity=tuple(under),
+            _filtered=FilteredTorques(whole, known.filters) if known else None,
         )
         of_base = model._base_parameters(arm, base)
         if gravity is not None:

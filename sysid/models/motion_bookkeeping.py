@@ -7,35 +7,32 @@ be explained by friction that drives the joint.
 """
 
 import itertools
-from collections.abc import Callable
-from dataclasses import fields
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import linear_sum_assignment
 
-from drake_disasm.effects import ArmTilt
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.channel_grams import (
     FAR_BETTER,
-    STANDARD_ERRORS,
     ChannelGrams,
     Estimate,
-    angle_between,
     is_lower,
     jackknife_error,
 )
-from sysid.models.regressor import ArmDynamics
+from sysid.models.gravity_estimate import (
+    ArmUnder,
+    GravityEstimate,
+    friction_columns,
+    gravity_in,
+)
 from sysid.models.signed_order import SignedOrder
 
 Array = NDArray[np.float64]
-#: Gives an arm under a gravity (3,) in the base's frame.
-ArmUnder = Callable[[Array], ArmDynamics]
 
 _MOST_ROWS = 2500  # that are looked at, evenly spread: bodies have some 50 parameters
-#: Base tilts up to here are an effect of their own.
-_MOST_TILT = next(f.metadata["high"] for f in fields(ArmTilt) if f.name == "rx")
 _FEW_ROWS = 300  # at which an arm that stands otherwise is evaluated
 _ROUNDED = 1e-12  # of a torque's variance: less is rounding
 _THOUSAND = 1000.0
@@ -74,23 +71,27 @@ class TorqueFits:
         ends = [self._descended(grams, start) for start in starts]
         best = min(ends, key=lambda end: float(self._loss(grams, end).sum()))
         needed = self._needed(grams, best)
-        # Where the order is another one, that of no joint can be taken as written.
-        found = best if needed.order != written.order else needed
-        is_far_better = found.steps and self._is_far_better(grams, found, written)
-        return found if is_far_better else written
+        if self._is_refuted(needed) or not needed.steps:
+            return written
+        return needed if self._is_far_better(grams, needed, written) else written
 
     def torque_units(self) -> dict[int, float]:
         """Returns joints whose torque has another unit, with the factor to divide by.
 
-        That of one joint shows by the bodies that it shares with others.
+        The unit of one joint shows by the bodies that it shares with others; of which,
+        by the size of the nominal torques.
         """
         tau = self._tau[self._taken]
+        nominal = (self._thin.Y @ self._thin.nominal).std(axis=0)
         grams = self._grams(tau[..., None])
         ones = np.ones_like(self._scale)
         found = {}
         for i, factor in itertools.product(
             range(len(ones)), (_THOUSAND, 1 / _THOUSAND)
         ):
+            size = np.log(self._scale[i] / _positive(nominal)[i])
+            if abs(size - np.log(factor)) > abs(size):
+                continue
             by = np.where(np.arange(len(ones)) == i, factor, 1.0)
             one, other = (
                 grams.losses((1.0 / each)[:, None], self._scale / each).sum(axis=1)
@@ -107,23 +108,48 @@ class TorqueFits:
     def _most_like(self) -> tuple[SignedOrder, SignedOrder]:
         """Returns the order in which torques are best explained one by one.
 
-        By the nominal torque of the joint, whatever its scale and sign, and by its
-        friction: bodies with free parameters explain too much of another joint's. With
-        the signs as they are, and with those of the nominal torques.
+        By nominal torques and friction: bodies with free parameters explain too much
+        of another joint's. With the signs as they are, and with those of the nominal
+        torques.
         """
-        tau = self._tau[self._taken]
-        nominal = self._thin.Y @ self._thin.nominal
-        left, scale = np.empty((2, *self._scale.shape, len(self._scale)))
-        for i in range(tau.shape[1]):
-            A = np.column_stack([nominal[:, i], self._friction[:, i]])
-            fit = np.linalg.lstsq(A, tau, rcond=None)[0]
-            left[i] = np.mean((tau - A @ fit) ** 2, axis=0) / self._scale**2
-            scale[i] = fit[0]
+        left, scale, _ = self._by_nominal
         joints, columns = linear_sum_assignment(np.log(left + _ROUNDED))
         signs = np.where(scale[joints, columns] < 0.0, -1.0, 1.0)
         order = tuple(columns.tolist())
         same = SignedOrder(order, (1.0,) * len(order))
         return same, SignedOrder(order, tuple(signs.tolist()))
+
+    def _is_refuted(self, found: SignedOrder) -> bool:
+        """Returns whether most nominal torques speak for the opposite signs.
+
+        Of those joints that an order moves, and whose nominal torque explains the
+        column.
+        """
+        left, scale, without = self._by_nominal
+        at = found.moved, np.array(found.order)[found.moved]
+        explains = left[at] < FAR_BETTER * without[at]
+        votes = np.sign(scale[at]) * np.array(found.sign)[found.moved]
+        return bool(votes[explains].sum() < 0.0)
+
+    @cached_property
+    def _by_nominal(self) -> tuple[Array, Array, Array]:
+        """How each joint's nominal torque and friction explain each column.
+
+        The share of its variance that is left, the scale of the nominal torque, and the
+        share that friction alone leaves; each (joints, columns).
+        """
+        tau = self._tau[self._taken]
+        nominal = self._thin.Y @ self._thin.nominal
+        left, scale, without = np.empty((3, tau.shape[1], tau.shape[1]))
+        for i in range(tau.shape[1]):
+            friction = self._friction[:, i]
+            A = np.column_stack([nominal[:, i], friction])
+            fit = np.linalg.lstsq(A, tau, rcond=None)[0]
+            left[i] = np.mean((tau - A @ fit) ** 2, axis=0) / self._scale**2
+            alone = friction @ np.linalg.lstsq(friction, tau, rcond=None)[0]
+            without[i] = np.mean((tau - alone) ** 2, axis=0) / self._scale**2
+            scale[i] = fit[0]
+        return left, scale, without
 
     def _loss(self, grams: ChannelGrams, of: SignedOrder) -> Array:
         """Returns the loss of each joint's torque (joints,)."""
@@ -133,9 +159,13 @@ class TorqueFits:
         """Returns the best order and signs that single steps lead to."""
         lost = float(self._loss(grams, order).sum())
         while True:
-            near = {each: float(self._loss(grams, each).sum()) for each in order.near()}
-            best = min(near, key=lambda each: near[each])
-            if near[best] >= lost:
+            near = {
+                each: float(self._loss(grams, each).sum())
+                for each in order.near()
+                if not self._is_refuted(each)
+            }
+            best = min(near, key=lambda each: near[each], default=order)
+            if near.get(best, lost) >= lost:
                 return order
             order, lost = best, near[best]
 
@@ -143,8 +173,7 @@ class TorqueFits:
         """Returns what is left of an order when steps are undone that do not matter."""
         while best.steps:
             undone = min(
-                (each for each in best.near() if each.steps < best.steps),
-                key=lambda each: float(self._loss(grams, each).sum()),
+                best.undone(), key=lambda each: float(self._loss(grams, each).sum())
             )
             if self._is_far_better(grams, best, undone):
                 return best
@@ -188,12 +217,8 @@ class TorqueFits:
         is_late = is_inside and is_better and found.is_off(0.0)
         return found if is_late and is_common else None
 
-    def gravity(self, arm_under: ArmUnder, written: Array) -> Array | None:
-        """Returns the gravity (3,) that is in the torques, None if it is that written.
-
-        The nominal weights under gravity along each axis of the base are fitted to the
-        torques, with the rest of each joint's nominal torque at a scale of its own, and
-        friction. Zero, if less than half of gravity is in the torques.
+    def gravity(self, arm_under: ArmUnder, written: Array) -> GravityEstimate | None:
+        """Returns the gravity that is in the torques, None if it is that written.
 
         Args:
             arm_under: gives the arm under a gravity.
@@ -201,36 +226,14 @@ class TorqueFits:
         """
         few = spread_rows(len(self._thin.time), _FEW_ROWS)
         thin, tau = self._thin.rows(few), self._tau[self._taken][few]
-        size = float(np.linalg.norm(written))
-        columns, rest = _weights(thin, arm_under, size)
-        by_written = columns @ (written[:, None] / size)
-        if not np.abs(by_written).max() > _ROUNDED * self._scale.max():
-            return None
-        own = np.concatenate([rest[..., None], friction_columns(thin.v)], axis=-1)
-        choice = np.ones((tau.shape[1], 1))
-        free, bound, none = (
-            ChannelGrams.of(weights, tau[..., None], own, positive=2)
-            for weights in (columns, by_written, by_written[..., :0])
-        )
-        if bound.shared_by_block(choice, self._scale).mean() < 0.0:
-            bound = none  # what pulls up is not the gravity that is written
-        without = free.shared_by_block(choice, self._scale)
-        share, error = without.mean(axis=0), jackknife_error(without)
-        length = float(np.linalg.norm(share))
-        if length + STANDARD_ERRORS * error < 0.5:
-            return np.zeros(3)
-        turned = angle_between(share, written)
-        lost = (
-            grams.losses(choice, self._scale).sum(axis=1) for grams in (free, bound)
-        )
-        if turned < _MOST_TILT + STANDARD_ERRORS * error / length or not is_lower(
-            *lost
-        ):
-            return None
-        return size * share / length
+        return gravity_in(thin, tau, arm_under, written)
 
     def _delayed(self, delays: Array) -> Array:
-        """Returns held-out losses (delays, blocks, joints) of torques shifted back."""
+        """Returns held-out losses (delays, blocks, joints) of torques shifted back.
+
+        Of smoothed ones: between samples a spline averages noise, which would speak for
+        any delay that is no multiple of the period.
+        """
         motion, joints = self._motion, self._tau.shape[1]
         targets = np.empty((len(self._thin.time), joints, len(delays)))
         for number in np.unique(motion.episode):
@@ -239,7 +242,7 @@ class TorqueFits:
             if len(time) < 2:
                 targets[own] = self._tau[rows][:, :, None]
                 continue
-            read = CubicSpline(time, self._tau[rows])
+            read = CubicSpline(time, _smooth(self._tau[rows]))
             shifted = np.clip(at[:, None] + delays, time[0], time[-1])
             targets[own] = np.swapaxes(read(shifted), 1, 2)
         grams = self._grams(targets)
@@ -255,20 +258,14 @@ class TorqueFits:
         return ChannelGrams.of(self._thin.Y, targets, self._friction, positive=2)
 
 
-def _weights(
-    motion: ArmMotion, arm_under: ArmUnder, size: float
-) -> tuple[Array, Array]:
-    """Returns nominal torques of weight (n, joints, 3) by axis, and all others.
+def _smooth(values: Array) -> Array:
+    """Returns values (n, k) without what changes from sample to sample.
 
-    Args:
-        motion: at some rows.
-        arm_under: gives the arm under a gravity.
-        size: of gravity [m/s^2].
+    By binomial weights, which shift nothing.
     """
-    zero = np.zeros_like(motion.v)
-    rest = arm_under(np.zeros(3)).torques(motion.q, motion.v, motion.vd)
-    by_axis = [arm_under(g).torques(motion.q, zero, zero) for g in size * np.eye(3)]
-    return np.stack(by_axis, axis=-1), rest
+    padded = np.pad(values, ((2, 2), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0)
+    return np.asarray(windows @ (np.array([1.0, 4.0, 6.0, 4.0, 1.0]) / 16.0))
 
 
 def _log_sum(curve: Array) -> Array:
@@ -300,11 +297,6 @@ def _delay_error(delays: Array, curve: Array) -> float:
     return jackknife_error(
         [_least_at(delays, np.delete(curve, k, axis=1)) for k in blocks]
     )
-
-
-def friction_columns(v: Array) -> Array:
-    """Returns columns (n, joints, 3): an offset, viscous and dry friction."""
-    return np.stack([np.ones_like(v), v, np.sign(v)], axis=-1)
 
 
 def spread_rows(rows: int, most: int) -> NDArray[np.bool_]:

@@ -22,9 +22,9 @@ _UNITS = {
 }
 
 
-def in_degrees(q: Array) -> bool:
-    """Returns whether half of the joints' positions (n, joints) are beyond any arm."""
-    return float(np.median(np.abs(q).max(axis=0))) > MOST_TURN
+def median_reach(q: Array) -> float:
+    """Returns how far from zero half of the joints' positions (n, joints) go."""
+    return float(np.median(np.abs(q).max(axis=0)))
 
 
 def rate_factors(
@@ -92,8 +92,8 @@ def right_rates(
 
 
 def is_factor(factor: Estimate) -> bool:
-    """Returns whether a factor is known to be another than one."""
-    return factor.is_off(1.0, _LEAST_FACTOR)
+    """Returns whether a factor is known, and known to be another than one."""
+    return factor.is_off(0.0) and factor.is_off(1.0, _LEAST_FACTOR)
 
 
 def rate_text(rate: str, joints: Sequence[str], factors: Array) -> str:
@@ -106,7 +106,7 @@ def rate_text(rate: str, joints: Sequence[str], factors: Array) -> str:
     """
     of = {"v": "q", "vd": "v"}[rate]
     parts = [
-        f"{factor:.4g} times at {joint}{_unit_text(factor)}"
+        f"{factor:.3g} times at {joint}{_unit_text(factor)}"
         for joint, factor in zip(joints, factors, strict=True)
         if factor != 1.0
     ]
@@ -115,6 +115,8 @@ def rate_text(rate: str, joints: Sequence[str], factors: Array) -> str:
 
 def _unit_text(factor: float) -> str:
     """Returns which unit a factor is that of, in words; empty if of none."""
+    if abs(factor + 1.0) < _LEAST_FACTOR:
+        return " (the other sign)"
     for unit, size in _UNITS.items():
         if abs(factor / size - 1.0) < _LEAST_FACTOR:
             return f" (as in {unit})"

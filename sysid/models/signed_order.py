@@ -41,14 +41,22 @@ class SignedOrder:
     @property
     def steps(self) -> int:
         """How many signs and exchanges it takes; all signs at once are one."""
-        flips = self.sign.count(-1.0)
-        cycles, seen = 0, set[int]()
+        flips, joints = self.sign.count(-1.0), len(self.order)
+        return joints - len(self.cycles) + min(flips, 1 + joints - flips)
+
+    @property
+    def cycles(self) -> list[list[int]]:
+        """Joints that have each other's columns; a joint with its own is one alone."""
+        found: list[list[int]] = []
+        seen = set[int]()
         for start in range(len(self.order)):
-            cycles += start not in seen
+            cycle = []
             while start not in seen:
                 seen.add(start)
+                cycle.append(start)
                 start = self.order[start]
-        return len(self.order) - cycles + min(flips, 1 + len(self.sign) - flips)
+            found += [cycle] if cycle else []
+        return found
 
     def name(self, joints: Sequence[str]) -> str:
         """Returns the name of this way to write torques.
@@ -61,21 +69,26 @@ class SignedOrder:
         flips = [j for j, s in zip(joints, self.sign, strict=True) if s < 0.0]
         return f"TorqueSign.{flips[0]}" if len(flips) == 1 else "TorqueSign"
 
-    def text(self, joints: Sequence[str]) -> str:
+    def text(self, joints: Sequence[str], column: str = "tau") -> str:
         """Returns it as a clause.
 
         Args:
             joints: their names.
+            column: of the table that is in this order.
         """
-        flips = [j for j, s in zip(joints, self.sign, strict=True) if s < 0.0]
+        flips = [i for i, s in enumerate(self.sign) if s < 0.0]
         if self.order == tuple(range(len(joints))):
-            where = "all joints" if len(flips) == len(joints) else ", ".join(flips)
-            return f"the torque of {where} has the other sign"
+            if len(flips) == len(joints):
+                return f"{column} has the other sign at all joints"
+            named = [f"{column}.{i} ({joints[i]})" for i in flips]
+            has = "has" if len(flips) == 1 else "have"
+            return f"{', '.join(named)} {has} the other sign"
+        signs = ["-" if sign < 0.0 else "" for sign in self.sign]
         columns = [
-            f"{'-' * (self.sign[i] < 0.0)}tau.{self.order[i]} is that of {joints[i]}"
+            f"{signs[i]}{column}.{self.order[i]} is that of {joints[i]}"
             for i in self.moved
         ]
-        return f"torques are in another order: {', '.join(columns)}"
+        return f"columns of {column} are in another order: {', '.join(columns)}"
 
     @property
     def remedy(self) -> str:
@@ -105,3 +118,14 @@ class SignedOrder:
             yield from (
                 self.exchanged(i, j) for i, j in itertools.combinations(joints, 2)
             )
+
+    def undone(self) -> Iterator[Self]:
+        """Yields those with fewer steps: one less, or all of one cycle."""
+        yield from (each for each in self.near() if each.steps < self.steps)
+        for cycle, sign in itertools.product(self.cycles, (1.0, -1.0)):
+            order, signs = list(self.order), list(self.sign)
+            for joint in cycle:
+                order[joint], signs[joint] = joint, sign
+            fewer = type(self)(tuple(order), tuple(signs))
+            if fewer.steps < self.steps:
+                yield fewer

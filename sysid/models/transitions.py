@@ -190,6 +190,13 @@ class Transitions:
         """
         return np.concatenate([each.carried[:-1] for each in self.episodes])
 
+    def most_give(self) -> float:
+        """Returns by how much the grip gives within a step, at most [m]."""
+        give = self.episodes[0].grip.deflections(self.steps.wrench)[:, :3]
+        follows = (np.diff(self.rows) == 1) & (self.steps.index[1:] > 0)
+        change = np.linalg.norm(np.diff(give, axis=0)[follows], axis=1)
+        return float(change.max(initial=0.0))
+
     def read(self, sensing: SensorReading) -> Array:
         """Returns the states (steps, 12) as all steps of the episodes begin.
 

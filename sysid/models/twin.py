@@ -35,6 +35,7 @@ from sysid.models.replays import DiagramReplays, ImpactReplays, Replayed
 from sysid.models.scenario_model import ScenarioModel
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 from sysid.models.transitions import Transitions, measured_states
+from sysid.models.validity import Validity
 from sysid.parameters import Parameter
 
 _FRICTION = "contact.friction"  # which both kinds of contact have
@@ -44,6 +45,7 @@ _IMPACT_BATCH = 4096  # with more an array operation hardly gets faster
 _N_PER_MM = 1e-3  # of N/m
 _PASSES = 2  # the second where the first has changed much
 _KEPT = 64  # steps of that many parameter sets
+_FAILURES = (RuntimeError, DisasmError, ValueError)  # of a simulation
 _T = TypeVar("_T")
 _RUN = 6  # rows that follow each other in a thinned log: 0.6 s
 
@@ -82,8 +84,8 @@ class TwinModel(ScenarioModel):
             scenario: of the twin, at the parameters' nominal values.
             parameters: paths in that scenario.
             rollout: whether episodes are simulated whole.
-            coarse: whether a transition with IMPACT contact may begin in coarse time
-                steps (`ImpactReplay`).
+            coarse: whether the middle of a transition with IMPACT contact may be
+                simulated in coarse time steps (`ImpactReplay`).
 
         Raises:
             DisasmError: a log is of another kind or period.
@@ -118,7 +120,7 @@ class TwinModel(ScenarioModel):
         """See LogModel."""
         try:
             found = self._simulated(thetas, rows)
-        except (RuntimeError, DisasmError, ValueError) as error:
+        except _FAILURES as error:
             if len(thetas) > 1:  # it is not said of which
                 return super().simulate_all(thetas, rows)
             return [" ".join(str(error).split())]
@@ -239,11 +241,44 @@ class TwinModel(ScenarioModel):
         effects = sensor_chain(self.scenario_at(theta).effects)
         whole = self._whole.begun(effects, self.reading)
         if not self.rollout:
-            whole = self._observed(theta, whole)
+            try:
+                whole = self._observed(theta, whole)
+            except _FAILURES:  # steps begin as the wrench says
+                return self
         if whole is self._whole:
             return self
         own = whole.select(self._transitions.rows)
         return self.replace(_whole=whole, _transitions=own)
+
+    def validity(self, theta: Array) -> Validity | None:
+        """Returns how far predictions depend on how the grip gives as steps begin.
+
+        What the sensor's noise leaves unknown of that is put to one side or the other
+        at random. None for a model that does not know it: of whole episodes, or with
+        parameters of the hydroelastic contact alone.
+
+        Args:
+            theta: (p,) values of `parameters`.
+        """
+        model = self.surrogate().begun(theta)
+        if model.rollout or model.costly:
+            return None
+        observer, whole = model._observer, model._whole
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(whole.steps), 6))
+        away = observer.uncertain(whole, signs).select(model._transitions.rows)
+        try:
+            found = model.predictions(theta)
+            other = model.replace(_transitions=away).predictions(theta)
+        except PredictionError as error:
+            return Validity(1.0, np.nan, str(error))
+        spread = np.abs(other - found) / self.measurements.sigma
+        share = float(np.mean(spread.max(axis=1) > 3.0))
+        return Validity(share, model._transitions.most_give())
+
+    @property
+    def _observer(self) -> GripObserver:
+        noise = self.measurements.noise[6:]
+        return GripObserver.of(self._whole, noise, self.reading.X_SB)
 
     def _observed(self, theta: Array, whole: Transitions) -> Transitions:
         """Returns all transitions, those of this model beginning as it has the grip.
@@ -258,8 +293,7 @@ class TwinModel(ScenarioModel):
         model, known = self.surrogate(), whole
         if model.costly:
             return whole
-        noise, rows = self.measurements.noise[6:], self._transitions.rows
-        observer = GripObserver.of(whole, noise, self.reading.X_SB)
+        observer, rows = self._observer, self._transitions.rows
         ends, read = rows[whole.steps.index[rows] > 0], whole.read(self.reading)
         for _ in range(_PASSES):
             if not len(ends):

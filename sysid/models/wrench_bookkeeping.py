@@ -111,7 +111,7 @@ def has_no_weight(readings: Readings, known: float) -> bool:
     """Returns whether there is no weight in readings.
 
     Less than half of the weight that is known to hang on the sensor; or, if none is
-    known, less than one reading's error.
+    known, less than single readings scatter by.
 
     Args:
         readings: at rest.
@@ -122,7 +122,7 @@ def has_no_weight(readings: Readings, known: float) -> bool:
     weight, error = readings.weight()
     most = float(np.linalg.norm(weight)) + STANDARD_ERRORS * error
     varied = readings.wrench[:, _FORCE] - readings.wrench[:, _FORCE].mean(axis=0)
-    scatter = float(np.sqrt(np.mean(varied**2)))
+    scatter = float(np.sqrt(np.mean(np.sum(varied**2, axis=1))))
     return most < (0.5 * known if known else scatter)
 
 

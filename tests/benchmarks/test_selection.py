@@ -90,6 +90,20 @@ def test_an_interval_covers_or_does_not() -> None:
     assert _judged(sizes=sizes).covered == (False,)
 
 
+def test_a_table_counts_effects_and_logs_apart() -> None:
+    """What is left out of the library is no name that could be given."""
+    case = dataclasses.replace(_CASE, least_error=0.05)
+    left_out = dataclasses.replace(
+        case, name="joint/left out/x", group="left out", left_out=("JointDelay",)
+    )
+    found = [_judged(case, confirmed=case.hidden, after=0.1), _judged(left_out)]
+    rows = {row[1]: row for row in scores.table({"x": found})}
+    assert {len(row) for row in rows.values()} == {len(scores.COLUMNS)}
+    assert rows["all simulated, none left out"][2:5] == [1, 1, 100.0]
+    ratio = scores.COLUMNS.index("after / least")
+    assert rows["joint, one, 2x"][ratio] == pytest.approx(2.0)
+
+
 def test_halves_agree_by_names_and_by_sizes() -> None:
     """The Jaccard index of {A, B} and {B, C} is a third."""
     assert scores.jaccard(("A", "B"), ("B", "C")) == pytest.approx(1.0 / 3.0)

@@ -26,6 +26,7 @@ class JointSpring(JointEffect):
     joint: str = joint_name()
     stiffness: float = amplitude("N m/rad", -2000.0, 2000.0, "k, of the spring")
 
+    is_filtered = True
     noun = "a spring"
     experiment = (
         "this joint slowly over its whole range, both ways, in two poses of the joints "

@@ -28,6 +28,7 @@ class ArmResidualModel(ArmTorqueEffect):
     is_physical: ClassVar[bool] = False
     inputs: ClassVar[tuple[str, ...]] = ("q", "v", "vd", "load")
 
+    is_filtered = True
     noun = "a learned model of the torques"
     experiment = "what shows an effect of which this is the trace"
 

@@ -21,6 +21,7 @@ class RotorInertia(JointEffect):
     joint: str = joint_name()
     inertia: float = amplitude("kg m^2", 0.0, 50.0, "reflected to the joint")
 
+    is_filtered = True
     noun = "inertia of the rotor"
     experiment = "fast reversals of this joint alone, the others at rest"
 

@@ -22,6 +22,7 @@ class TorqueGain(JointEffect):
     share: float = amplitude("1", -0.9, 0.9, "relative error of the torque")
 
     moves_the_arm = False
+    is_filtered = True
     noun = "a gain error of the torque"
     experiment = "the same motion with two known payloads"
 

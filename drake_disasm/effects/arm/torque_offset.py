@@ -22,6 +22,7 @@ class TorqueOffset(JointEffect):
     joint: str = joint_name()
     size: float = amplitude("N m", -200.0, 200.0, "the offset")
 
+    is_filtered = True
     noun = "an offset of the torque"
     experiment = "rests of this joint in several poses, each reached from both sides"
 

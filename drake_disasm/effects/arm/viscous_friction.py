@@ -21,6 +21,7 @@ class JointViscousFriction(JointEffect):
     joint: str = joint_name()
     coefficient: float = amplitude("N m s/rad", 0.0, 500.0, "viscous coefficient")
 
+    is_filtered = True
     noun = "viscous friction"
     experiment = "this joint at three or more constant speeds, both ways"
 
