@@ -250,9 +250,7 @@ class NormalEquations:
         is_there = self.is_new(np.arange(size))
         others = np.where(is_there, total - diagonal + _RIDGE * total, np.inf)
         x = (right - self.total[:size, -1]) / np.maximum(others, 1e-300)
-        return np.asarray(
-            self.losses[:, None] + 2.0 * x * right + x**2 * diagonal
-        )
+        return np.asarray(self.losses[:, None] + 2.0 * x * right + x**2 * diagonal)
 
     def folds(self, count: int) -> "NormalEquations":
         """Returns the same with blocks added up to so many contiguous folds."""

@@ -81,9 +81,7 @@ def _excess(r: Array, measured: Measurements, settings: SelectionSettings) -> st
     return f"{size:.2g} times its noise, of unknown origin"
 
 
-def _outlying(
-    r: Array, measured: Measurements, least: float
-) -> str:
+def _outlying(r: Array, measured: Measurements, least: float) -> str:
     """Returns which rows of a residual (n,) are beyond what its tail has elsewhere.
 
     Of heavy-tailed noise no row is outlying.
@@ -103,9 +101,7 @@ def _outlying(
     return f"{what}{where} (row {numbers})"
 
 
-def _line(
-    r: Array, measured: Measurements, least: float
-) -> str:
+def _line(r: Array, measured: Measurements, least: float) -> str:
     """Returns the frequency at which a residual (n,) is periodic, in words.
 
     The episodes' periodograms are averaged; a line is a frequency that stands out of

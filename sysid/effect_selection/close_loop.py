@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.progress import Progress, ignore_progress
+from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.effects import Effect, Imprecision, registered_effects
 from drake_disasm.scenario import Scenario
 from sysid.data_checks.constancy import dead_channels
+from sysid.data_checks.contradictions import contradicting_rows
 from sysid.data_checks.finding import refuse
+from sysid.effect_selection.bookkeeping import best_hypothesis
 from sysid.effect_selection.candidates import Candidate, candidates
 from sysid.effect_selection.command_scatter import (
     CommandScatter,
@@ -33,8 +35,10 @@ from sysid.effect_selection.verdict_sentence import (
 from sysid.effect_selection.verdict_text import verdict_text
 from sysid.identification.split import train_and_test
 from sysid.models.base import LogModel
+from sysid.models.bookkeeping import Bookkeeping
 from sysid.workers import Workers
 
+_MOST_REWRITES = 3  # ways in which a log may have been written wrongly
 _PROVISIONAL = (
     "provisional: the time was over{untested}; the same command without a budget, or "
     "with another, goes on from here"
@@ -167,17 +171,44 @@ def close_loop(
     )
     delta = model.default_huber_delta if huber_delta is None else huber_delta
     workers = workers or Workers()
-    fitter = Fitter.of(model.of_episodes(train), workers, delta, settings, folder)
-    base = fitter.base
-    refuse_few_rows(base)
-    refuse(dead_channels(base))
-    applicable = _applicable(base, library)
-    found = search(fitter, applicable, progress or ignore_progress, deadline)
+    progress = progress or ignore_progress
+    written: list[Bookkeeping[LogModel]] = []
+    while True:
+        fitter = Fitter.of(model.of_episodes(train), workers, delta, settings, folder)
+        base = fitter.base
+        refuse_few_rows(base)
+        refuse(dead_channels(base))
+        applicable = _applicable(base, library)
+        found = search(fitter, applicable, progress, deadline)
+        better = _better_written(model, fitter, found, train, len(written), deadline)
+        if better is None:
+            break
+        progress(ProgressUpdate("selecting effects", message=better.what))
+        written.append(better)
+        model = better.model
     held_out = _with_noise_of(base, model.of_episodes(test)) if test else None
     errors = held_out_errors(found.first, found.last, held_out)
-    scatter = fit_command_scatter(fitter, found.last) if Imprecision in library else None
-    verdict = judge(found, errors, scatter, held_out)
+    scatter = (
+        fit_command_scatter(fitter, found.last) if Imprecision in library else None
+    )
+    misfits = [f"{each.what} ({each.remedy})" for each in contradicting_rows(base)]
+    verdict = judge(found, errors, scatter, held_out, misfits, written)
     return ClosedLoop(verdict, errors, found, scatter)
+
+
+def _better_written(
+    model: LogModel,
+    fitter: Fitter,
+    found: SearchResult,
+    train: Sequence[int],
+    known: int,
+    deadline: float,
+) -> Bookkeeping[LogModel] | None:
+    """Returns how a log was written, if that explains it better than effects do."""
+    if known >= _MOST_REWRITES or time.monotonic() > deadline:
+        return None
+    hypotheses = model.bookkeeping()
+    return best_hypothesis(fitter, found, hypotheses, lambda m: m.of_episodes(train))
 
 
 def _applicable(

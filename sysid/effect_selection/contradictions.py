@@ -61,7 +61,9 @@ def _difference(
     """Returns what differs in an episode and how much that explains; else None."""
     whole = account.grams.weighted(account.weights)
     own = np.setdiff1d(account.columns, np.concatenate([[], *account.owners.values()]))
-    sets = [(t.candidates[0].text, t.columns) for t in account.terms if len(t.names) == 1]
+    sets = [
+        (t.candidates[0].text, t.columns) for t in account.terms if len(t.names) == 1
+    ]
     sets += [*account.owners.items(), (_OWN, own.astype(np.int64))]
     passed = []
     for text, columns in sets:
@@ -92,9 +94,7 @@ def _with_own(
     blocks[~acts, k : 2 * k] = 0.0
     blocks[~acts, :, k : 2 * k] = 0.0
     power = np.einsum("bii->i", blocks)[:-1]
-    return NormalEquations(
-        blocks, small.rows, small.episode, np.zeros(2 * k), power
-    )
+    return NormalEquations(blocks, small.rows, small.episode, np.zeros(2 * k), power)
 
 
 def _gain(both: NormalEquations, k: int, folds: int) -> tuple[float, float]:

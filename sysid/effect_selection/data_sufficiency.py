@@ -3,8 +3,8 @@
 from drake_disasm.common.errors import DisasmError
 from sysid.models.base import LogModel
 
-_LEAST_ROWS = 10  # fewer make no blocks
-_PER_PARAMETER = 2  # rows, so that half of them can be held out
+_LEAST_ROWS = 6  # poses, as the guide asks for of readings at rest
+_PER_PARAMETER = 2  # readings, so that half of them can be held out
 
 
 def refuse_few_rows(model: LogModel) -> None:
@@ -15,7 +15,7 @@ def refuse_few_rows(model: LogModel) -> None:
     """
     rows, channels = model.measurements.values.shape
     count = len(model.parameters)
-    needed = max(_LEAST_ROWS, _PER_PARAMETER * count)
+    needed = max(_LEAST_ROWS, -(-_PER_PARAMETER * count // channels))
     if rows < needed:
         raise DisasmError(
             f"the log is too short to decide: {rows} rows of {channels} channels, for "

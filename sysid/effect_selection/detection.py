@@ -84,5 +84,7 @@ def _limits(account: LinearAccount, term: Term) -> list[DetectionLimit]:
         amplitude = float(least * slope[i]) if share <= 1.0 else None
         field = account.field(column)
         unit = parameters[i].unit
-        found.append(DetectionLimit(candidate.name, field, amplitude, unit, share, shape))
+        found.append(
+            DetectionLimit(candidate.name, field, amplitude, unit, share, shape)
+        )
     return found

@@ -16,9 +16,9 @@ from sysid.effect_selection.detection import (
 from sysid.effect_selection.experiments import revealing_kind
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
 from sysid.effect_selection.linear_account import LinearAccount
 from sysid.effect_selection.linear_system import linear_system
+from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
 from sysid.models.base import LogModel
 from sysid.parameters import Scaling
 from sysid.workers import Workers

@@ -7,7 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sysid.effect_selection.block_grams import Array, BlockGrams, Columns, NormalEquations
+from sysid.effect_selection.block_grams import (
+    Array,
+    BlockGrams,
+    Columns,
+    NormalEquations,
+)
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.forward_selection import (
     Gain,

@@ -116,7 +116,12 @@ def linear_system(
     blocks = blocks_of(measured.episode, settings.blocks)
     columns = [linear.jacobian, curves]
     grams = BlockGrams.of(
-        columns, linear.residual, linear.weights, blocks, measured.episode, side,
+        columns,
+        linear.residual,
+        linear.weights,
+        blocks,
+        measured.episode,
+        side,
         pooled=fit.noise_is_stated,
     )
     own_columns = _distinct(tested, groups, linear.jacobian)

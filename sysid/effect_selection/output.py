@@ -73,6 +73,7 @@ def _verdict(found: Verdict) -> dict[str, Any]:
         "would_not_have_been_found": found.undetectable,
         "correlated_channels": list(found.correlated),
         "misfits": list(found.misfits),
+        "written": [dataclasses.asdict(each) for each in found.written],
         "left_over": [dataclasses.asdict(each) for each in found.left_over],
         "residual_model": _residual_model(found.residual_model),
     }

@@ -115,9 +115,9 @@ class RefitSelection:
         self._report(f"fitting {len(gains)} candidates to a few rows")
         sets = [gain.term.candidates for gain in gains]
         _, fits = prescreening_fits(self.fitter, fit, sets, self.deadline)
-        pairs = sorted(
-            zip(gains, fits, strict=False), key=lambda pair: pair[1].loss
-        )[: self._settings.trials]
+        pairs = sorted(zip(gains, fits, strict=False), key=lambda pair: pair[1].loss)[
+            : self._settings.trials
+        ]
         self._starts = {gain.term.names: found for gain, found in pairs}
         return [gain for gain, _ in pairs]
 

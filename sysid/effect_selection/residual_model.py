@@ -145,9 +145,7 @@ class _Rows:
         inputs = model.residual_inputs(fit.theta)
         return cls(model, inputs, missing, model.measurements.episode)
 
-    def learned(
-        self, channel: int, name: str
-    ) -> BoostedTrees:
+    def learned(self, channel: int, name: str) -> BoostedTrees:
         """Returns what a channel's rows teach."""
         return _taught(self.inputs[name], self.missing[:, channel])
 
@@ -156,9 +154,7 @@ class _Rows:
         missing = self.missing[:, channel]
         return self._error(channel, missing - learned(self.inputs[name]))
 
-    def cross_error(
-        self, channel: int, name: str
-    ) -> ChannelError:
+    def cross_error(self, channel: int, name: str) -> ChannelError:
         """Returns a channel's error where each fold is predicted by all others."""
         folds = contiguous_blocks(self.blocks, FOLDS)
         inputs, missing = self.inputs[name], self.missing[:, channel]

@@ -12,9 +12,7 @@ _TURNS = 0.05  # of a joint's travel: by less it does not turn back
 _POSITION = "position"  # the covariate of a joint's own motion
 
 
-def joints_of_one_stroke(
-    model: LogModel, joints: Collection[str]
-) -> tuple[str, ...]:
+def joints_of_one_stroke(model: LogModel, joints: Collection[str]) -> tuple[str, ...]:
     """Returns those of some joints that move one way, or there and back, an episode.
 
     Args:

@@ -26,6 +26,7 @@ from sysid.effect_selection.search import SearchResult
 from sysid.effect_selection.strokes import joints_of_one_stroke
 from sysid.effect_selection.whiteness import correlated_channels
 from sysid.models.base import LogModel
+from sysid.models.bookkeeping import Bookkeeping
 from sysid.parameters import Scaling
 
 _SCATTER = Imprecision.__name__
@@ -77,6 +78,21 @@ class Tie:
 
 
 @dataclass(frozen=True)
+class Written:
+    """How a log seems to have been written, in place of what it says.
+
+    Attributes:
+        name: short: `GravityDirection`, `TorqueSign.joint_3`.
+        what: a clause.
+        remedy: what to do with the log, or with the map of import-log.
+    """
+
+    name: str
+    what: str
+    remedy: str
+
+
+@dataclass(frozen=True)
 class Verdict:
     """What a log shows of its model.
 
@@ -99,6 +115,8 @@ class Verdict:
         residual_model: learned in their place; not physical. None if it gains little.
         single_strokes: joints of ambiguous effects that make a single stroke.
         misfits: rows that contradict the kind of log, in words.
+        written: how the log seems to have been written, in place of what it says; all
+            else is of the log put right.
         is_provisional: whether the time was over before the search was.
     """
 
@@ -117,6 +135,7 @@ class Verdict:
     residual_model: ResidualModel | None = None
     single_strokes: tuple[str, ...] = ()
     misfits: tuple[str, ...] = ()
+    written: tuple[Written, ...] = ()
     is_provisional: bool = False
 
     @property
@@ -162,6 +181,7 @@ def judge(
     scatter: CommandScatter | None = None,
     held_out: LogModel | None = None,
     misfits: Sequence[str] = (),
+    written: Sequence[Bookkeeping[LogModel]] = (),
 ) -> Verdict:
     """Returns the verdict on a search.
 
@@ -171,6 +191,7 @@ def judge(
         scatter: how the arm scatters about its commands, if it does.
         held_out: model of the held-out episodes; None if there are none.
         misfits: rows that contradict the kind of log, in words.
+        written: how the log seems to have been written, in place of what it says.
     """
     last = found.last
     white = scatter.left_of(last) if scatter else last
@@ -193,6 +214,7 @@ def judge(
         tuple(left),
         fit_residual_model(last, left, held_out),
         misfits=tuple(misfits),
+        written=tuple(Written(w.name, w.what, w.remedy) for w in written),
         is_provisional=not found.is_complete,
     )
     ending, strokes = _ending(verdict, last), _single_strokes(verdict, last)
@@ -202,7 +224,9 @@ def judge(
 def _ordered(placed: Sequence[Standing]) -> tuple[Standing, ...]:
     """Returns standings, confirmed ones first."""
     order = ("confirmed", "ambiguous", "suggested")
-    return tuple(sorted(placed, key=lambda each: (order.index(each.status), -each.gain)))
+    return tuple(
+        sorted(placed, key=lambda each: (order.index(each.status), -each.gain))
+    )
 
 
 def _ending(found: Verdict, last: Fit) -> Ending:

@@ -5,6 +5,7 @@ them the held-out error falls from 6.7 % to 2.1 % of the torque. Suggested, not
 confirmed: elasticity of a gear at joint_2.
 """
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -50,6 +51,18 @@ def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
         verdict: of a search.
         errors: on rows that were not fitted.
     """
+    if verdict.written:
+        rest = dataclasses.replace(verdict, written=())
+        each = "; ".join(f"{w.what} ({w.remedy})" for w in verdict.written)
+        return f"The log is not what it says: {each}. Put right: " + verdict_sentence(
+            rest, errors
+        )
+    if verdict.misfits:
+        rest = dataclasses.replace(verdict, misfits=())
+        each = "; ".join(verdict.misfits)
+        return f"Rows are not what the kind of the log says: {each}. As it is: " + (
+            verdict_sentence(rest, errors)
+        )
     if verdict.ending == "none":
         return f"{_nothing(verdict, errors)}."
     if verdict.ending == "too short":
@@ -77,7 +90,10 @@ def _unexplained(verdict: Verdict, errors: HeldOut, left: str) -> str:
             f"The model lacks something that no effect {tried} explains{why}; "
             f"{_size_of_error(errors)} is left."
         )
-    effects, improved = effects_in_words(verdict.suggested), improvement_in_words(errors)
+    effects, improved = (
+        effects_in_words(verdict.suggested),
+        improvement_in_words(errors),
+    )
     them = "it" if len(verdict.suggested) == 1 else "them"
     reasons = dict.fromkeys(x.reason for x in verdict.standings if x.reason)
     return (
@@ -214,7 +230,6 @@ def left_in_words(verdict: Verdict) -> str:
         excess,
         _findings(verdict.findings),
         _left_over(verdict.left_over),
-        enumeration(verdict.misfits),
         _large_error(verdict),
     )
     return enumeration([clause for clause in clauses if clause])

@@ -61,7 +61,9 @@ def _missing_line(verdict: Verdict, most: int) -> str:
     if not (verdict.confirmed or verdict.ambiguous):
         nearest = f". Suggested: {effects}{status}" if effects else ""
         return f"No effect is confirmed: {left or 'see the report'}{nearest}"
-    return f"missing: {effects}{status}" + (f". Left unexplained: {left}" if left else "")
+    return f"missing: {effects}{status}" + (
+        f". Left unexplained: {left}" if left else ""
+    )
 
 
 def _status_text(verdict: Verdict) -> str:
@@ -114,8 +116,7 @@ def _left_text(verdict: Verdict) -> str:
         other = f"the residual is {verdict.excess:.2g} times the noise"
     learned = "; ".join(each.text for each in verdict.left_over)
     findings = findings_text(verdict.findings)
-    more = "; ".join(verdict.misfits)
-    parts = (verdict.dependence, other, findings, learned, more)
+    parts = (verdict.dependence, other, findings, learned)
     return "; ".join(part for part in parts if part)
 
 
@@ -124,7 +125,9 @@ def _limits_text(verdict: Verdict) -> str:
     kinds, hidden = by_kind([x.effect for x in verdict.limits]), verdict.undetectable
     if not kinds:
         return "the residual is consistent with noise"
-    text = f"{len(kinds) - len(hidden)} of {len(kinds)} kinds of effects would have been "
+    text = (
+        f"{len(kinds) - len(hidden)} of {len(kinds)} kinds of effects would have been "
+    )
     text += "found (from which amplitude on: result.json)"
     return text + (f", not {', '.join(hidden)}" if hidden else "")
 

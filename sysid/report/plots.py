@@ -169,9 +169,7 @@ def dependence_plot(
     )
 
 
-def candidate_plot(
-    begin: Sequence[Gain], end: Sequence[Gain], least: float
-) -> Plot:
+def candidate_plot(begin: Sequence[Gain], end: Sequence[Gain], least: float) -> Plot:
     """Returns what each candidate would explain, without and with the effects.
 
     Args:

@@ -1,0 +1,59 @@
+"""Whether a log was written otherwise than it says: a sign, an order, a frame.
+
+Such hypotheses compete with effects. One is taken that explains more by itself than the
+best effect does, or lowers the held-out error with all effects in; the selection then
+starts anew from the log as it should have been written.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+from sysid.effect_selection.fit import Fit
+from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.search import SearchResult
+from sysid.models.base import LogModel
+from sysid.models.bookkeeping import Bookkeeping
+
+
+def best_hypothesis(
+    fitter: Fitter,
+    found: SearchResult,
+    hypotheses: Sequence[Bookkeeping[LogModel]],
+    rows: Callable[[LogModel], LogModel],
+) -> Bookkeeping[LogModel] | None:
+    """Returns the hypothesis that explains a log better than effects do; None if none.
+
+    Args:
+        fitter: of the log as it was written.
+        found: effects that it seems to need.
+        hypotheses: on how it was written.
+        rows: returns a model of the rows that are fitted.
+    """
+    least = fitter.settings.min_gain
+    best_effect = max((gain.share for gain in found.begin), default=0.0)
+    gains = {}
+    for number, each in enumerate(hypotheses):
+        own = _fitter_of(fitter, rows(each.model))
+        alone = own.fit(())
+        gain = _gain(found.first, alone)
+        if gain < max(least, best_effect):
+            gain = _gain(found.last, own.fit(found.last.effects, alone))
+        if gain >= least:
+            gains[number] = gain
+    if not gains:
+        return None
+    return hypotheses[max(gains, key=lambda number: gains[number])]
+
+
+def _fitter_of(fitter: Fitter, model: LogModel) -> Fitter:
+    """Returns a fitter of another model of the same rows, in the same units."""
+    noise = fitter.base.measurements.noise
+    origin = fitter.base.measurements.channels[0].origin
+    same = model.with_measurements(model.measurements.with_noise(noise, origin))
+    return dataclasses.replace(fitter, base=same)
+
+
+def _gain(before: Fit, after: Fit) -> float:
+    """Returns the share of the held-out loss that one fit takes away of another's."""
+    left = after.held_out_losses.sum() / max(before.held_out_losses.sum(), 1e-300)
+    return float(1.0 - left)
