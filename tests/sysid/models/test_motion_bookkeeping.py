@@ -198,6 +198,7 @@ def test_steps_of_an_order(order, sign, steps):
     assert all(abs(near.steps - steps) <= 2 for near in found.near())
 
 
+@pytest.mark.slow
 def test_a_real_drive_is_written_right_but_for_its_clocks(tmp_path):
     urdf = write_slide(tmp_path / "emps.urdf")
     [way] = model(read_log(write_emps(2, tmp_path / "log", urdf))).bookkeeping()
