@@ -3,9 +3,10 @@
     python benchmarks/twin_against_cell.py --scenario removal --steps 800
 
 The cell is recorded under `admittance` with exploration. Each of its steps is then
-predicted by the twin that follows from the same scenario, from the measured state. The
-residuals are in units of the sensor's noise, and of what the twin states of itself: the
-noise and the error that it is known to make of forces.
+predicted by the twin that follows from the same scenario, from the measured state, and
+from how far the twin has the grip give at the end of the step before. The residuals
+are in units of the sensor's noise, and of what the twin states of itself: the noise and
+the error that it is known to make of forces.
 """
 
 import argparse
@@ -68,7 +69,7 @@ def errors(
             simulation = TaskSimulation(scenario, station, policy)
             with ProgressBar("step") as progress:
                 record_transitions(log, simulation, steps, progress=progress)
-        model = TwinModel([read_log(log)], scenario, ())
+        model = TwinModel([read_log(log)], scenario, ()).begun(nominal_values(()))
     measured = model.measurements
     predicted = model.predict(nominal_values(()), slice(0, measured.rows))
     return predicted - measured.values, measured

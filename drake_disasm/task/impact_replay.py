@@ -102,10 +102,9 @@ class _EvenReplay:
         self._batches = {
             h: _SteppedBatch.of(scenarios, h) for h in {coarse_step or fine, fine}
         }
-        is_coarse = coarse and 0.0 < 2.0 * coarse_step < self._period
-        self._time_steps = _time_steps(
-            self._period, fine, coarse_step if is_coarse else fine
-        )
+        is_coarse = coarse and 0.0 < 4.0 * coarse_step < self._period
+        middle = coarse_step if is_coarse else fine
+        self._time_steps = _time_steps(self._period, fine, middle)
         self._zero(coarse_step or fine)
 
     def ends(self, steps: Sequence[Steps]) -> list[Ends]:
@@ -245,8 +244,9 @@ def _coarse_step(scenario: Scenario) -> float:
 def _time_steps(period: float, fine: float, coarse: float) -> list[float]:
     """Returns the time steps of a period [s]: coarse ones between fine ones.
 
-    Forces jump as a step of the task begins, and its end is read: there a coarse step
-    is made in fine ones.
+    Forces jump as a step of the task begins, where a coarse step may take a wrong root
+    of the contact's equations; and its end is read. There two coarse steps each are
+    made in fine ones.
     """
-    ends = [fine] * round(coarse / fine)
-    return [*ends, *[coarse] * (round(period / coarse) - 2), *ends]
+    ends = [fine] * round(2.0 * coarse / fine)
+    return [*ends, *[coarse] * max(0, round(period / coarse) - 4), *ends]

@@ -58,13 +58,15 @@ def gravity_in(
     columns, rest = _weights(motion, arm_under, size)
     by_written = columns @ (written[:, None] / size)
     scale = np.where(tau.std(axis=0) > 0.0, tau.std(axis=0), 1.0)
-    if not np.abs(by_written).max() > _ROUNDED * scale.max():
+    if not tau.any() or np.abs(by_written).max() <= _ROUNDED * scale.max():
         return None
     fits = _Fits(tau, friction_columns(motion.v), scale)
     share, error = fits.shares(columns, rest)
     length = float(np.linalg.norm(share))
     if length + STANDARD_ERRORS * error < 0.5:
         return GravityEstimate(np.zeros(3))
+    if length <= STANDARD_ERRORS * error:
+        return None
     tilt = _MOST_TILT + STANDARD_ERRORS * error / length
     losses = fits.losses(columns, rest)
     # What pulls up is not the gravity that is written.

@@ -13,6 +13,7 @@ from sysid.models.sensor_reading import at_bolt
 from sysid.models.transitions import Transitions
 
 _SURE = 3.0  # standard deviations: by chance one in four hundred
+_BY_CHANCE = 22.5  # of the squares of six standard normal variables: once in a thousand
 #: Standard deviation of a standard normal variable once it is shrunk: of (m - 1 / m)^2
 #: where |m| > 1, the mean is 4 (phi(1) - Q(1)).
 _OF_NOISE = 0.577
@@ -73,18 +74,22 @@ class GripObserver:
     ) -> Transitions:
         """Returns all transitions, some of which begin where the step before led.
 
-        Steps that the model does not lead anywhere are left as they are.
+        Others are left as they are: after a step of which the model has no balance, or
+        says less of the wrench than that it stays as it was.
 
         Args:
             whole: all transitions.
             ends: (n,) numbers of those that begin where the others end.
             led: where the n steps before them lead.
-            read: (n, 12) states that were measured there, without effects.
+            read: (steps, 12) states that were measured as all steps begin, without
+                effects.
         """
-        is_known = np.isfinite(led.give).all(axis=1)
-        ends, read = ends[is_known], read[is_known]
-        give, states = led.give[is_known], led.states[is_known]
-        missed = read[:, 6:] - states[:, 6:]
+        change = (read[ends] - read[ends - 1])[:, 6:]
+        missed = (read[ends] - led.states)[:, 6:]
+        excess = np.sum((missed / self.noise) ** 2 - (change / self.noise) ** 2, axis=1)
+        is_known = excess < _BY_CHANCE  # and a number
+        ends, missed, give = ends[is_known], missed[is_known], led.give[is_known]
+        read = read[ends]
         believed = shrunk(missed, self.noise)
         elastic = self.grip.carried(give, self.weight)
         elastic += self.grip.after_growth(self._on_bolt(read, believed))

@@ -205,6 +205,8 @@ class JointMotionModel(LogModel):
         if rates:
             return rates
         fits = TorqueFits(self._motion, self.measurements.values)
+        if not fits.are_known:
+            return []
         columns = list(self._wrong_columns(fits))
         # Gravity is known by columns that are in their places.
         turned = [] if columns else list(self._turned(fits))
@@ -344,7 +346,7 @@ class JointMotionModel(LogModel):
         yield Bookkeeping(name, what, remedy, model, 2 * int(gravity.any())), lost
 
     def _arm_under(self, gravity: Array) -> ArmDynamics:
-        return ArmDynamics(self._urdf, self.joints, gravity)
+        return ArmDynamics(self._urdf, self.joints, tuple(gravity.tolist()))
 
     def _rewritten(
         self,

@@ -17,6 +17,7 @@ from scipy.optimize import linear_sum_assignment
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.channel_grams import (
     FAR_BETTER,
+    MOST_BLOCKS,
     ChannelGrams,
     Estimate,
     is_lower,
@@ -54,6 +55,13 @@ class TorqueFits:
         self._thin = motion.rows(self._taken)
         self._scale = _positive(tau[self._taken].std(axis=0))
         self._friction = friction_columns(self._thin.v)
+
+    @property
+    def are_known(self) -> bool:
+        """Whether each block has as many torques as the fits have coefficients."""
+        rows, joints, bodies = self._thin.Y.shape
+        coefficients = bodies + joints * self._friction.shape[2]
+        return bool(rows >= MOST_BLOCKS * coefficients / joints)
 
     def signed_order(self) -> SignedOrder:
         """Returns the order and signs of torques that explain them far better.
@@ -202,9 +210,9 @@ class TorqueFits:
         to be there without each joint, too: what single joints do is another matter.
         """
         count = round(_LATEST / _STEP)
-        coarse = _STEP * np.arange(-count, count + 1)
+        coarse: Array = _STEP * np.arange(-count, count + 1)
         near = coarse[int(np.argmin(_log_sum(self._delayed(coarse))))]
-        fine = near + _STEP * np.arange(-_FINE, _FINE + 1) / _FINE
+        fine: Array = near + _STEP * np.arange(-_FINE, _FINE + 1) / _FINE
         curve, written = self._delayed(fine), self._delayed(np.zeros(1))[0]
         late = _least_at(fine, curve)
         joints = range(curve.shape[2] if curve.shape[2] > 1 else 0)

@@ -56,7 +56,7 @@ def rate_factors(
 
 def _products(time: Array, values: Array, rates: Array) -> Array:
     """Returns the sums (2, joints) of integral times value, and of value squared."""
-    integral = cumulative_trapezoid(rates, time, axis=0, initial=0.0)
+    integral = cumulative_trapezoid(rates, time, axis=0, initial=0)
     line = np.column_stack([np.ones(len(time)), time - time[0]])
     both = np.hstack([integral, values])
     left = both - line @ np.linalg.lstsq(line, both, rcond=None)[0]

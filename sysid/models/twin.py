@@ -43,7 +43,7 @@ _CHUNK = 32  # transitions: a tenth of a second of work
 _IMPACT_CHUNK = 512  # large enough for arrays, small enough to share
 _IMPACT_BATCH = 4096  # with more an array operation hardly gets faster
 _N_PER_MM = 1e-3  # of N/m
-_PASSES = 2  # the second where the first has changed much
+_PASSES = 4  # but the first of those steps alone whose begin has surely changed
 _KEPT = 64  # steps of that many parameter sets
 _FAILURES = (RuntimeError, DisasmError, ValueError)  # of a simulation
 _T = TypeVar("_T")
@@ -299,7 +299,7 @@ class TwinModel(ScenarioModel):
             if not len(ends):
                 break
             led = model.replace(_whole=known, _displacement=None)._ends(theta, ends - 1)
-            before, known = known, observer.corrected(known, ends, led, read[ends])
+            before, known = known, observer.corrected(known, ends, led, read)
             ends = ends[observer.changed(known, before)[ends - 1]]
         change = observer.change(known.select(rows), self._transitions)
         is_new = not self._whole.seen.any()

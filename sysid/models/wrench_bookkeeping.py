@@ -24,6 +24,7 @@ from sysid.models.channel_grams import (
     jackknife_error,
 )
 
+_TURNED = 1e-4  # rad^2, mean square about the axis that is turned about the least
 _EQUAL = 0.9  # of the least loss: permutations that leave less than it / this tie
 _FEWEST = 4  # readings: fewer always agree with some frame
 _FORCE, _TORQUE = slice(0, 3), slice(3, 6)
@@ -81,13 +82,19 @@ class Readings:
         return found
 
     def weight(self) -> tuple[Array, float]:
-        """Returns the weight (3,) in W [N] of whatever direction, and its error."""
+        """Returns the weight (3,) in W [N] of whatever direction, and its error.
+
+        The error is infinite where orientations do not tell a weight from a bias.
+        """
         R_SW = np.swapaxes(self.R_WS, 1, 2)
+        turned = (R_SW - R_SW.mean(axis=0)).reshape(-1, 3)
+        least = float(np.linalg.eigvalsh(turned.T @ turned)[0])
+        is_told = least > _TURNED * len(R_SW)
         columns = np.concatenate([R_SW, np.tile(np.eye(3), (len(R_SW), 1, 1))], axis=2)
         grams = ChannelGrams.of(columns, self.wrench[:, _FORCE, None])
         without = grams.shared_by_block(np.ones((3, 1)), self.scale[_FORCE])[:, :3]
-        error = jackknife_error(without) if len(without) > 1 else np.inf
-        return without.mean(axis=0), error
+        known = is_told and len(without) > 1
+        return without.mean(axis=0), jackknife_error(without) if known else np.inf
 
 
 @dataclass(frozen=True)
@@ -188,7 +195,9 @@ def _gravity(readings: Readings) -> Iterator[Way]:
     weight, error = readings.weight()
     length = float(np.linalg.norm(weight))
     angle = angle_between(weight, readings.g_W)
-    if not angle > most_of(BaseTilt, "rx") + STANDARD_ERRORS * error / length:
+    if length <= STANDARD_ERRORS * error:
+        return
+    if angle <= most_of(BaseTilt, "rx") + STANDARD_ERRORS * error / length:
         return
     down = weight / length
     g = float(np.linalg.norm(readings.g_W))
@@ -247,7 +256,7 @@ def _axes(readings: Readings) -> Iterator[Way]:
             right[:, part] = turned[:, part] @ P.T
             names = WRENCH[part]
             texts += [
-                signed_text(names, P, i)
+                signed_text(names, P, int(i))
                 for i in np.flatnonzero((np.eye(3) != P).any(axis=1))
             ]
         if texts:

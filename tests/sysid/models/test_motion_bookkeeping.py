@@ -157,6 +157,18 @@ def test_ways_are_those_of_the_rows_that_a_model_has(right):
     assert np.abs(error).max() < 1e-2
 
 
+@pytest.mark.parametrize("rows", [1, 2, 5, 30])
+def test_few_rows_tell_nothing(rows, right):
+    few = model(damaged(right, scaled(-1.0, "tau"))).of_rows(np.arange(800) < rows)
+    assert few.bookkeeping() == []
+
+
+@pytest.mark.parametrize("columns", ["tau", "q.1 v.1 vd.1", "q v vd"])
+def test_columns_of_zeros_are_no_other_way(columns, right):
+    log = damaged(right, scaled(0.0, *columns.split()))
+    assert model(log).bookkeeping() == []
+
+
 def test_a_frozen_parameter_stays_frozen(right):
     log = damaged(right, scaled(2.0, "v.0"))
     name = model(log).parameters[0].name
@@ -186,6 +198,7 @@ def test_steps_of_an_order(order, sign, steps):
     assert all(abs(near.steps - steps) <= 2 for near in found.near())
 
 
+@pytest.mark.slow
 def test_a_real_drive_is_written_right_but_for_its_clocks(tmp_path):
     urdf = write_slide(tmp_path / "emps.urdf")
     [way] = model(read_log(write_emps(2, tmp_path / "log", urdf))).bookkeeping()

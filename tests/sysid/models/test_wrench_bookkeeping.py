@@ -162,6 +162,17 @@ def test_a_weight_that_is_taken_away_has_no_parameters(tmp_path):
     assert 0.7 < rms(way.model) < 1.3
 
 
+@pytest.mark.parametrize("rows", [1, 2, 4, 6])
+def test_few_readings_tell_nothing(rows, tmp_path):
+    turned = Rotation.from_rotvec([0.0, 0.1, 0.0])
+    assert ways(write(tmp_path, turned, rows=rows)) == []
+
+
+def test_one_orientation_tells_no_weight_from_a_bias(tmp_path):
+    log = write(tmp_path, mass=0.0, rows=100, read_as=lambda q: 0.0 * q + q[:1])
+    assert ways(log) == []
+
+
 @pytest.mark.parametrize("rows", [7, 100])
 def test_a_real_sensor_is_written_right(rows, tmp_path):
     assert ways(read_log(write_static(rows, tmp_path / "log"))) == []
