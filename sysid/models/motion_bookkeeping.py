@@ -210,7 +210,7 @@ class TorqueFits:
         to be there without each joint, too: what single joints do is another matter.
         """
         count = round(_LATEST / _STEP)
-        coarse: Array = _STEP * np.arange(-count, count + 1)
+        coarse = np.linspace(-_LATEST, _LATEST, 2 * count + 1)
         near = coarse[int(np.argmin(_log_sum(self._delayed(coarse))))]
         fine: Array = near + _STEP * np.arange(-_FINE, _FINE + 1) / _FINE
         curve, written = self._delayed(fine), self._delayed(np.zeros(1))[0]
