@@ -217,18 +217,61 @@ def _forward(
         gains = ranked(equations, open_terms, settings)
         if not gains or gains[0].share < settings.min_gain:
             return
-        step = step_of(gains, settings)
+        step = step_of(gains, settings, equations)
         yield step
         have.update(step.chosen.term.names)
         equations = equations.projected(step.chosen.term.columns)
 
 
-def step_of(gains: Sequence[Gain], settings: SelectionSettings) -> Step:
-    """Returns the simplest of the best, and its rivals."""
+def step_of(
+    gains: Sequence[Gain],
+    settings: SelectionSettings,
+    equations: NormalEquations | None = None,
+) -> Step:
+    """Returns the simplest of the best, and its rivals.
+
+    Args:
+        gains: the best first.
+        settings: thresholds.
+        equations: by folds, in which an effect can do with fewer columns; None where a
+            fit has left those out that it can do without.
+    """
     best = gains[0]
     as_good = [gain for gain in gains if gain.is_about_as_good_as(best, settings)]
+    if equations is not None:
+        as_good = [thinned(equations, gain, settings) for gain in as_good]
     chosen = min(as_good, key=lambda gain: (len(gain.term.columns), -gain.share))
     return Step(chosen, rivals_of(chosen, gains, settings))
+
+
+def thinned(
+    equations: NormalEquations, gain: Gain, settings: SelectionSettings
+) -> Gain:
+    """Returns the gain of an effect with as few columns as are about as good as all.
+
+    Columns are added one by one, the best first: those of an effect may depend on each
+    other, as moments and forces of one payload do. Kinds at all joints stay whole.
+
+    Args:
+        equations: by folds.
+        gain: of the effect with all its columns.
+        settings: thresholds.
+    """
+    columns = gain.term.columns
+    if len(columns) < 2 or len(gain.term.candidates) > 1:
+        return gain
+    before, total = equations.losses, max(float(equations.losses.sum()), 1e-300)
+    kept = np.array([], dtype=np.int64)
+    while len(kept) < len(columns):
+        rest = np.setdiff1d(columns, kept)
+        sets = [np.append(kept, column) for column in rest]
+        losses = [equations.held_out(each) for each in sets]
+        number = int(np.argmin([each.sum() for each in losses]))
+        kept, gains = sets[number], (before - losses[number]) / total
+        found = Gain(gain.term.of_columns(kept), float(gains.sum()), gains)
+        if found.is_about_as_good_as(gain, settings):
+            return found
+    return gain
 
 
 def rivals_of(
@@ -266,7 +309,7 @@ def _exchanged(
         if not gains or gains[0].share < settings.min_gain:
             steps[number] = Step(Gain(_nothing(), 0.0, np.zeros(1)), ())
             continue
-        best = step_of(gains, settings)
+        best = step_of(gains, settings, left)
         if own and own[0].is_about_as_good_as(best.chosen, settings):
             best = Step(own[0], rivals_of(own[0], gains, settings))
         steps[number] = best
