@@ -38,6 +38,7 @@ from sysid.models.base import LogModel
 from sysid.models.bookkeeping import Bookkeeping
 from sysid.workers import Workers
 
+_SEARCHED = 0.85  # of the time: the rest is for errors and the verdict
 _MOST_REWRITES = 3  # ways in which a log may have been written wrongly
 _PROVISIONAL = (
     "provisional: the time was over{untested}; the same command without a budget, or "
@@ -156,15 +157,16 @@ def close_loop(
         workers: evaluate; this process if left out.
         progress: gets a line after each step; may raise to stop.
         folder: of a cache of fits: the same call, stopped and made again, resumes.
-        time_budget: after which the search ends with what it has [s]; a fit that runs
-            is finished, candidates whose turn has not come are not tested, and the
-            errors on held-out rows are still found.
+        time_budget: after which the verdict is there, with what has been found [s];
+            candidates whose turn has not come are not tested. The fit without effects
+            and the errors on held-out rows take what they take.
 
     Raises:
         DisasmError: the log is too short to decide anything, or no effect of the
             library can act on the model.
     """
-    deadline = time.monotonic() + time_budget
+    # What is said in the end takes about a tenth of a search's time.
+    deadline = time.monotonic() + _SEARCHED * time_budget
     library = registered_effects() if library is None else library
     train, test = train_and_test(
         model.measurements.names, train, test, model.held_out_share
@@ -175,6 +177,7 @@ def close_loop(
     written: list[Bookkeeping[LogModel]] = []
     while True:
         fitter = Fitter.of(model.of_episodes(train), workers, delta, settings, folder)
+        fitter = dataclasses.replace(fitter, deadline=deadline)
         base = fitter.base
         refuse_few_rows(base)
         refuse(dead_channels(base))

@@ -6,7 +6,9 @@ that it depends on.
 """
 
 import hashlib
+import math
 import pickle
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,8 +19,19 @@ from sysid.identification.linearisation import Linearisation
 _ARRAYS = ("u", "residual", "jacobian", "weights")
 
 
+class _UnfinishedError(Exception):
+    """A fit that ended because its time was over."""
+
+    def __init__(self, fit: Linearisation) -> None:
+        super().__init__()
+        self.fit = fit
+
+
 def cached_fit(
-    folder: Path | None, depends_on: Any, find: Callable[[], Linearisation]
+    folder: Path | None,
+    depends_on: Any,
+    find: Callable[[], Linearisation],
+    deadline: float = math.inf,
 ) -> Linearisation:
     """Returns a fit from the cache, or computes and caches it.
 
@@ -26,11 +39,23 @@ def cached_fit(
         folder: of the cache; None for no cache.
         depends_on: everything that the fit depends on.
         find: computes the fit.
+        deadline: by `time.monotonic` [s]: what is found later may not have come to an
+            end, and is not cached.
     """
     if folder is None:
         return find()
     key = hashlib.sha256(pickle.dumps(depends_on)).hexdigest()
-    kept = FinishedWork(folder).arrays(key, lambda: _arrays(find()))
+
+    def _whole() -> Arrays:
+        found = find()
+        if time.monotonic() > deadline:
+            raise _UnfinishedError(found)
+        return _arrays(found)
+
+    try:
+        kept = FinishedWork(folder).arrays(key, _whole)
+    except _UnfinishedError as unfinished:
+        return unfinished.fit
     arrays = {name: kept[name] for name in _ARRAYS}
     return Linearisation(**arrays, huber_delta=float(kept["huber_delta"]))
 

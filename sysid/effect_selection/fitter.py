@@ -1,6 +1,7 @@
 """Fits a model with chosen effects."""
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,6 +36,7 @@ class Fitter:
         settings: how far a fit goes.
         folder: where fits are kept, for a search that is stopped; None keeps none.
         noise_is_stated: whether the channels' noise is known, else estimated.
+        deadline: by `time.monotonic` [s], after which a fit goes no further.
         exact: whether derivatives are the model's own, else those of its surrogate.
     """
 
@@ -45,6 +47,7 @@ class Fitter:
     folder: Path | None = None
     noise_is_stated: bool = True
     exact: bool = False
+    deadline: float = math.inf
 
     @classmethod
     def of(
@@ -207,8 +210,15 @@ class Fitter:
             None if model.affine else self.folder,
             (model, self.huber_delta, self.exact, u, known, iterations, progress),
             lambda: gauss_newton(
-                objective, u, iterations, start=known, central=False, min_gain=progress
+                objective,
+                u,
+                iterations,
+                start=known,
+                central=False,
+                min_gain=progress,
+                deadline=self.deadline,
             ),
+            self.deadline,
         )
 
 

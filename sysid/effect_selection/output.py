@@ -72,6 +72,7 @@ def _verdict(found: Verdict) -> dict[str, Any]:
         "would_have_been_found": [dataclasses.asdict(each) for each in found.limits],
         "would_not_have_been_found": found.undetectable,
         "correlated_channels": list(found.correlated),
+        "invalid": found.invalid,
         "misfits": list(found.misfits),
         "written": [dataclasses.asdict(each) for each in found.written],
         "left_over": [dataclasses.asdict(each) for each in found.left_over],

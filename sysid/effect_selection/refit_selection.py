@@ -20,6 +20,7 @@ from sysid.effect_selection.exceeds_noise import exceeds_noise_p
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.forward_selection import Gain, Step, Term, ranked, step_of
+from sysid.effect_selection.linear_account import LinearAccount
 from sysid.effect_selection.linear_system import LinearSystem, linear_system
 from sysid.effect_selection.prescreen import prescreening_fits
 from sysid.effect_selection.settings import SelectionSettings
@@ -36,7 +37,9 @@ class RefitSelection:
         progress: gets a line after each step.
         deadline: when to stop, by `time.monotonic` [s].
         steps: what was added.
+        begin: what each candidate would gain without effects, the best first.
         is_complete: whether it ended by itself, not because its time was over.
+        invalid: why the model does not hold for the log, in words; empty if it does.
     """
 
     fitter: Fitter
@@ -44,7 +47,9 @@ class RefitSelection:
     progress: Progress = ignore_progress
     deadline: float = math.inf
     steps: list[Step] = field(default_factory=list)
+    begin: tuple[Gain, ...] = ()
     is_complete: bool = True
+    invalid: str = ""
 
     def run(self, fit: Fit) -> Fit:
         """Returns the fit with effects that lower the held-out loss.
@@ -55,6 +60,8 @@ class RefitSelection:
         for _ in range(self._settings.max_steps):
             if fit.is_at_noise and not fit.states_model_error:
                 return fit
+            if fit.effects and self._is_invalid(fit):
+                return fit
             found = self._next(fit)
             if time.monotonic() > self.deadline:
                 self.is_complete = False
@@ -64,6 +71,12 @@ class RefitSelection:
             fit = self._without_needless(found)
         return fit
 
+    def _is_invalid(self, fit: Fit) -> bool:
+        """Returns whether the model does not say what would be explained further."""
+        found = fit.model.validity(fit.theta)
+        self.invalid = "" if found is None or found.holds else str(found)
+        return bool(self.invalid)
+
     @property
     def _settings(self) -> SelectionSettings:
         return self.fitter.settings
@@ -72,6 +85,8 @@ class RefitSelection:
         """Returns the fit with one more effect; None if none is confirmed."""
         self._report(f"comparing {len(self.library)} candidates")
         system = linear_system(self.fitter, fit, self.library, self.deadline)
+        if not fit.effects:
+            self.begin = tuple(LinearAccount.of_fit(system, fit).gains())
         trials = self._trials(fit, system)
         fits = self._fitted(fit, system, trials)
         gains = {}

@@ -42,6 +42,7 @@ class SearchResult:
         standings: of the effects.
         untested: candidates, as text, for which the time was not enough.
         is_complete: whether it ended by itself, not because its time was over.
+        invalid: why the model does not hold for the log, in words; empty if it does.
     """
 
     first: Fit
@@ -52,6 +53,7 @@ class SearchResult:
     standings: tuple[Standing, ...]
     untested: tuple[str, ...]
     is_complete: bool
+    invalid: str = ""
 
 
 def search(
@@ -144,32 +146,31 @@ def _refit_search(
     selection = RefitSelection(few, library, progress, deadline)
     reached = selection.run(start)
     first, last = start, reached
-    if few is not fitter:
+    if few is not fitter and time.monotonic() < deadline:
         _say(progress, "fitting all rows")
         exact = fitter.with_exact_derivatives() if fitter.base.costly else fitter
         first, last = exact.fit(()), exact.fit(reached.effects, reached)
+    is_complete = selection.is_complete and time.monotonic() < deadline
     _say(progress, f"comparing {len(library)} candidates with the effects")
-    begin_system = linear_system(few, start, library, deadline)
     system = linear_system(few, reached, library, deadline)
     account = LinearAccount.of_fit(system, reached)
-    recordings = len(fitter.base.measurements.names)
     placed = standings(
         account,
         votes_of_gains(account),
         _rivals(selection.steps),
         reached.effects,
-        recordings,
+        len(fitter.base.measurements.names),
     )
-    begin = LinearAccount.of_fit(begin_system, start).gains()
     return SearchResult(
         first,
         last,
-        tuple(begin),
+        selection.begin,
         account,
         tuple(selection.steps),
         placed,
         system.untested,
-        selection.is_complete and time.monotonic() < deadline,
+        is_complete,
+        selection.invalid,
     )
 
 

@@ -117,6 +117,7 @@ class Verdict:
         misfits: rows that contradict the kind of log, in words.
         written: how the log seems to have been written, in place of what it says; all
             else is of the log put right.
+        invalid: why the model does not hold for the log, in words; empty if it does.
         is_provisional: whether the time was over before the search was.
     """
 
@@ -136,6 +137,7 @@ class Verdict:
     single_strokes: tuple[str, ...] = ()
     misfits: tuple[str, ...] = ()
     written: tuple[Written, ...] = ()
+    invalid: str = ""
     is_provisional: bool = False
 
     @property
@@ -215,6 +217,7 @@ def judge(
         fit_residual_model(last, left, held_out),
         misfits=tuple(misfits),
         written=tuple(Written(w.name, w.what, w.remedy) for w in written),
+        invalid=found.invalid,
         is_provisional=not found.is_complete,
     )
     ending, strokes = _ending(verdict, last), _single_strokes(verdict, last)
@@ -238,6 +241,7 @@ def _ending(found: Verdict, last: Fit) -> Ending:
         or found.findings
         or found.left_over
         or found.misfits
+        or found.invalid
         or is_large
     )
     if found.confirmed or found.ambiguous:

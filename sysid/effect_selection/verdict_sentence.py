@@ -230,6 +230,9 @@ def left_in_words(verdict: Verdict) -> str:
         excess,
         _findings(verdict.findings),
         _left_over(verdict.left_over),
+        f"the model does not hold for this log: {verdict.invalid}"
+        if verdict.invalid
+        else "",
         _large_error(verdict),
     )
     return enumeration([clause for clause in clauses if clause])

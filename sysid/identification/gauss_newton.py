@@ -1,5 +1,7 @@
 """Gauss-Newton within the box, damped as by Levenberg and Marquardt."""
 
+import math
+import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -32,6 +34,7 @@ def gauss_newton(
     start: Linearisation | None = None,
     central: bool = True,
     min_gain: float = MIN_GAIN,
+    deadline: float = math.inf,
 ) -> Linearisation:
     """Returns the linearisation at the point to which Gauss-Newton steps lead from u.
 
@@ -51,9 +54,12 @@ def gauss_newton(
             damping is tried only where the full step does not help.
         min_gain: share of the objective that an iteration has to gain for another one
             to follow.
+        deadline: by `time.monotonic` [s], after which no iteration is begun.
     """
     linearisation = linearise(objective, u, central=central) if start is None else start
     for _ in range(iterations if len(u) else 0):
+        if time.monotonic() > deadline:
+            break
         value = objective.value(linearisation.residual)
         if callback:
             callback(value)

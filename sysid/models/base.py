@@ -22,6 +22,7 @@ from sysid.models.effects import (
     within_travel,
 )
 from sysid.models.measurements import Measurements
+from sysid.models.validity import Validity
 from sysid.parameters import Parameter, by_name, by_path
 
 Array = NDArray[np.float64]
@@ -208,6 +209,14 @@ class LogModel(abc.ABC):
         return self.replace(
             _effects=tuple(effects), parameters=(*self.parameters, *added)
         )
+
+    def validity(self, theta: Array) -> Validity | None:
+        """Returns whether the stated error holds for the log; None: not known.
+
+        Args:
+            theta: (p,) values of `parameters`.
+        """
+        return None
 
     # Which parameters vary.
 
