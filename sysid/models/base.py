@@ -22,6 +22,7 @@ from sysid.models.effects import (
     within_travel,
 )
 from sysid.models.measurements import Measurements
+from sysid.models.validity import Validity
 from sysid.parameters import Parameter, by_name, by_path
 
 Array = NDArray[np.float64]
@@ -362,6 +363,10 @@ class LogModel(abc.ABC):
         Its derivatives are those of `begun` along the parameters.
         """
         return self
+
+    def validity(self, theta: Array) -> Validity | None:
+        """Returns whether the stated error holds at parameters (p,); None: unknown."""
+        return None
 
     def displaced(self, displacement: Array, push: Array) -> Self:
         """Returns the same model with each step displaced from its command.
