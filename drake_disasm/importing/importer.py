@@ -202,13 +202,16 @@ def low_pass_of(header: LogHeader) -> LowPass | None:
 
     None if its provenance states none.
     """
+    cutoff: Any
+    every: Any
     done: Any = header.provenance
     for key in ("import", "processing"):
         done = done.get(key) if isinstance(done, Mapping) else None
     if not isinstance(done, Mapping) or done.get("filter") != _FILTER:
         return None
     cutoff, every = done.get("cutoff_Hz"), done.get("decimation")
-    if type(cutoff) not in (int, float) or type(every) is not int or not header.period:
+    is_number = isinstance(cutoff, int | float) and isinstance(every, int)
+    if not is_number or not header.period:
         return None
     is_possible = every > 0 and 0.0 < cutoff < 0.5 * every / header.period
     return LowPass(float(cutoff), header.period / every) if is_possible else None

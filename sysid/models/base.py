@@ -372,6 +372,10 @@ class LogModel(abc.ABC):
         """
         return self
 
+    def validity(self, theta: Array) -> Validity | None:
+        """Returns whether the stated error holds at parameters (p,); None: unknown."""
+        return None
+
     def displaced(self, displacement: Array, push: Array) -> Self:
         """Returns the same model with each step displaced from its command.
 

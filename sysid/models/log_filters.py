@@ -94,12 +94,14 @@ class FilteredTorques:
         ends = np.flatnonzero(np.diff(motion.episode)) + 1
         self._ends: NDArray[np.int64] = ends
         points = [each.points for each in filters]
-        counts = np.diff([0, *ends, len(motion.time)]) * points
+        rows = np.diff(np.array([0, *ends, len(motion.time)]))
+        counts: NDArray[np.int64] = rows * np.array(points)
         self._point_ends = np.cumsum(counts)[:-1]
-        self._motion = [self._between(each) for each in (motion.q, motion.v, motion.vd)]
+        q, v, vd = (self._between(each) for each in (motion.q, motion.v, motion.vd))
+        self._motion = q, v, vd
         episode = np.repeat(np.arange(len(filters)), counts)
-        self._paths = PathMemory(motion.joints, episode, self._motion[0])
-        self._load = np.full_like(motion.q, np.nan), self._motion[0]
+        self._paths = PathMemory(motion.joints, episode, q)
+        self._load = np.full_like(motion.q, np.nan), q
 
     def __call__(self, load: Array, effects: Sequence[ArmEffect]) -> Array:
         """Returns the filtered sum of what effects add to the load, (n, joints).

@@ -251,7 +251,7 @@ class TwinModel(ScenarioModel):
         return self.replace(_whole=whole, _transitions=own)
 
     def validity(self, theta: Array) -> Validity | None:
-        """Returns how far predictions depend on how the grip gives as steps begin.
+        """See LogModel: how far predictions depend on how the grip gives.
 
         What the sensor's noise leaves unknown of that is put to one side or the other
         at random. None for a model that does not know it: of whole episodes, or with

@@ -9,8 +9,10 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
 
-from sysid.effect_selection.prewhitening import ArFilter
+from sysid.identification.whiteness import autocorrelation
 from sysid.models.base import LogModel
 from sysid.parameters import nominal_values
 
@@ -70,25 +72,29 @@ def sieve(residual: Array) -> Noise:
     The residual's innovations are drawn with replacement, row by row, so that channels
     stay correlated, and go through the model that whitened it (Bühlmann 1997).
     """
-    filters = [ArFilter.of([r], _SIEVE_ORDER) for r in residual.T]
-    scale = np.sqrt([f.variances[-1] / f.variances[0] for f in filters])
-    whitened = [f(r) for f, r in zip(filters, residual.T, strict=True)]
-    innovations = np.column_stack(whitened) * scale
-    begin = max(f.order for f in filters)
+    order = min(_SIEVE_ORDER, len(residual) // 2)
+    filters = [_whitening_filter(r, order) for r in residual.T]
+    pairs = zip(filters, residual.T, strict=True)
+    innovations = np.column_stack([lfilter(a, 1.0, r)[order:] for a, r in pairs])
     power = np.sqrt(np.mean(residual**2, axis=0))
 
     def _draw(random: np.random.Generator, predicted: Array) -> Array:
         rows = len(predicted) + _FORGETS
-        drawn = innovations[random.integers(begin, len(residual), rows)]
-        noise = np.zeros_like(drawn)
-        for column, own in enumerate(filters):
-            past = own.predictors[-1][1:]
-            for row in range(len(past), rows):
-                known = noise[row - len(past) : row, column][::-1]
-                noise[row, column] = drawn[row, column] - past @ known
-        return noise[_FORGETS:] / np.maximum(power, 1e-300)
+        drawn = innovations[random.integers(0, len(innovations), rows)]
+        pairs = zip(filters, drawn.T, strict=True)
+        noise = np.column_stack([lfilter([1.0], a, e) for a, e in pairs])
+        return np.asarray(noise[_FORGETS:] / np.maximum(power, 1e-300))
 
     return _draw
+
+
+def _whitening_filter(residual: Array, order: int) -> Array:
+    """Returns weights (order + 1,) of a row and its past that make a residual white.
+
+    By the Yule-Walker equations, whose model is stable.
+    """
+    rho = np.append(1.0, autocorrelation(residual, order))
+    return np.append(1.0, -solve_toeplitz(rho[:-1], rho[1:]))
 
 
 def null_log(

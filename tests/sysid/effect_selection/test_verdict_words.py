@@ -1,20 +1,20 @@
 """What a verdict states in words: names, numbers, the ending and what to record."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
 
-from drake_disasm.effects import registered_effects
+from drake_disasm.effects import ArmEffect, registered_effects
 from sysid.effect_selection.channel_checks import ChannelFinding
 from sysid.effect_selection.contradictions import Contradiction
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effects_in_words, in_words
 from sysid.effect_selection.experiments import separating
 from sysid.effect_selection.left_over import LeftOver
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.effect_selection.strokes import joints_of_one_stroke
-from sysid.effect_selection.verdict import ParameterValue, Tie, Undecided
+from sysid.effect_selection.verdict import ParameterValue, Tie, Written
 from sysid.effect_selection.verdict_sentence import (
     improvement_in_words,
     indistinguishable_text,
@@ -44,40 +44,57 @@ def _joints(kind, count):
     return tuple(f"{kind}.j{i}" for i in range(count))
 
 
-def _verdict(*arguments, **more):
-    """Returns a verdict, with fields that `made_verdict` has no argument for."""
-    later = {k: more.pop(k) for k in ("left_over", "undecided") if k in more}
-    return dataclasses.replace(made_verdict(*arguments, **more), **later)
-
-
 @pytest.mark.parametrize(
     ("verdict", "stated"),
     [
-        (_verdict("none", limits=_LIMITS), ["residual is noise", "1 of 2"]),
+        (made_verdict("none", limits=_LIMITS), ["residual is noise", "1 of 2"]),
         (
-            _verdict("explained", _joints("JointCoulombFriction", 6)),
+            made_verdict("too short", limits=_LIMITS),
+            ["too short", "1 of 2", effects_in_words(("GrooveBend",))],
+        ),
+        (
+            made_verdict("explained", _joints("JointCoulombFriction", 6)),
             ["dry friction at six joints", "10 %", "1 %"],
         ),
-        (_verdict("partly", _LAG, findings=_TWO), ["not all", "fx and fy"]),
-        (_verdict("unexplained", findings=[_SINE]), ["fx is periodic at 1.3 Hz"]),
-        (_verdict("partly", _LAG, left_over=_LEFT), ["40 %", "fx", "velocity"]),
+        (made_verdict("partly", _LAG, findings=_TWO), ["not all", "fx and fy"]),
+        (made_verdict("unexplained", findings=(_SINE,)), ["fx is periodic at 1.3 Hz"]),
+        (made_verdict("partly", _LAG, left_over=_LEFT), ["40 %", "fx", "velocity"]),
         (
-            _verdict("partly", _LAG, undecided=[Undecided("TorqueRipple", 0.36)]),
-            ["36 %", "torque ripple", "too short"],
+            made_verdict("unexplained", _LAG, excess=3.14),
+            ["no effect is confirmed", "3.1 times", "slow filter", "2 of 4 parts"],
         ),
-        (_verdict("unexplained", _LAG, excess=3.14), ["3.1 times", "slow filter"]),
-        (_verdict("unexplained", dependence="fx depends on time"), ["on time"]),
+        (made_verdict("unexplained", dependence="fx depends on time"), ["on time"]),
+        (made_verdict("unexplained", correlated=("fx",)), ["of fx is correlated"]),
+        (made_verdict("partly", _LAG, relative_error=0.49), ["49 % of what was"]),
         (
-            _verdict("unexplained", excess=3.14, against=_AGAINST),
+            made_verdict("unexplained", excess=3.14, contradictions=_AGAINST),
             ["a contradicts b", "an offset of the sensor"],
+        ),
+        (
+            made_verdict("explained", _LAG, misfits=("moving rows (drop)",)),
+            ["moving rows (drop)", "slow filter"],
+        ),
+        (
+            made_verdict("none", written=(Written("Sign", "j1 turned", "flip it"),)),
+            ["j1 turned (flip it)", "residual is noise"],
         ),
     ],
 )
 def test_a_sentence_states_names_numbers_and_the_ending(verdict, stated):
     sentence = verdict_sentence(verdict, ERRORS)
-    assert sentence.count(".") == 1 + sentence.count("1.3") + sentence.count("3.1")
     for words in stated:
         assert words in sentence
+
+
+def test_confirmed_names_come_before_what_is_suggested():
+    found = made_verdict("partly", ("SensorLag", "SensorBias"))
+    lag, bias = found.standings
+    bias = dataclasses.replace(bias, status="suggested", reason="2 of 4 parts ask")
+    found = dataclasses.replace(found, standings=(lag, bias))
+    assert (found.confirmed, found.suggested) == (("SensorLag",), ("SensorBias",))
+    sentence = verdict_sentence(found, ERRORS)
+    assert sentence.index("slow filter") < sentence.index("Suggested")
+    assert sentence.index("Suggested") < sentence.index("offset")
 
 
 def test_a_sentence_of_none_owns_that_the_model_states_an_error_of_its_own():
@@ -88,7 +105,7 @@ def test_a_sentence_of_none_owns_that_the_model_states_an_error_of_its_own():
 
 def _text(*arguments, **more):
     """Returns what is missing, the parameters and the error, each a line."""
-    lines = verdict_text(_verdict(*arguments, **more), ERRORS, most=3).split("\n")
+    lines = verdict_text(made_verdict(*arguments, **more), ERRORS, most=3).split("\n")
     return [line for line in lines[1:] if not line.startswith("that is: ")]
 
 
@@ -96,7 +113,7 @@ def test_the_text_begins_with_the_sentence_and_ends_with_the_errors():
     found = made_verdict("explained", _joints("JointCoulombFriction", 3))
     sentence, missing, meaning, *_, errors = verdict_text(found, ERRORS, 3).split("\n")
     assert sentence == verdict_sentence(found, ERRORS)
-    assert missing == "missing: JointCoulombFriction of 3 joints"
+    assert missing == "missing: JointCoulombFriction of 3 joints (3 confirmed)"
     assert meaning.startswith("that is: JointCoulombFriction: ")
     assert errors.endswith("1 -> 0.1 N; 10 -> 1 % of the readings")
 
@@ -109,11 +126,16 @@ def test_the_text_begins_with_the_sentence_and_ends_with_the_errors():
             ("explained", _LAG),
             {"dependence": "fx depends on time"},
             "missing: Sen",
-            "e",
+            "time",
         ),
-        (("partly", _LAG), {"findings": _TWO}, "missing: SensorLag.", "(row 4, 5)"),
-        (("unexplained", _LAG), {"excess": 3.14}, "No library", "Nearest: SensorLag"),
-        (("unexplained",), {"against": _AGAINST, "excess": 2.0}, "No", "(SensorBias)"),
+        (("partly", _LAG), {"findings": _TWO}, "missing: SensorLag", "(row 4, 5)"),
+        (("unexplained", _LAG), {"excess": 3.14}, "No effect", "(1 suggested)"),
+        (
+            ("unexplained",),
+            {"contradictions": _AGAINST, "excess": 2.0},
+            "No",
+            "(SensorBias)",
+        ),
         (
             (
                 "explained",
@@ -122,7 +144,7 @@ def test_the_text_begins_with_the_sentence_and_ends_with_the_errors():
             ),
             {},
             "missing: Friction.j1 (or E0 or E1 or E2 or 2 more)",
-            "record: rests",
+            "record: rests (1 ambiguous)",
         ),
     ],
 )
@@ -198,13 +220,13 @@ class Sliding(LogModel):
 def test_strokes_are_counted_by_reversals_and_episodes(position, is_single):
     t = np.linspace(0.0, 2.0 * np.pi, 200)
     model = Sliding(np.tile(position(t) + 1e-3 * np.sin(300.0 * t), 2))
-    assert joints_of_one_stroke(model, {"rack"}, DEFAULT_SETTINGS) == ()
+    assert joints_of_one_stroke(model, {"rack"}) == ()
     model.measurements = dataclasses.replace(
         model.measurements, episode=np.repeat([0, 1], 200), names=("first", "second")
     )
-    found = joints_of_one_stroke(model, {"rack"}, DEFAULT_SETTINGS)
+    found = joints_of_one_stroke(model, {"rack"})
     assert found == (("rack",) if is_single else ())
-    assert joints_of_one_stroke(model, {"another"}, DEFAULT_SETTINGS) == ()
+    assert joints_of_one_stroke(model, {"another"}) == ()
 
 
 @pytest.mark.parametrize(
@@ -239,8 +261,8 @@ def test_errors_that_fall_and_rise_are_said_in_their_units(
 
 
 def test_a_log_of_the_task_is_not_told_to_record_readings_at_rest():
-    for one in registered_effects():
-        for other in registered_effects():
-            told = separating(one.__name__, other.__name__, at_task=True)
-            assert "readings" not in told and "known weight" not in told
+    of_task = [e for e in registered_effects() if not issubclass(e, ArmEffect)]
+    for one, other in itertools.product(of_task, of_task):
+        told = separating(one.__name__, other.__name__, at_task=True)
+        assert "readings" not in told and "known weight" not in told
     assert "readings" in separating("SensorBias", "GrooveFriction")

@@ -3,6 +3,7 @@
 import numpy as np
 
 from sysid.effect_selection.held_out import HeldOut
+from sysid.effect_selection.replication import Standing
 from sysid.effect_selection.verdict import Verdict
 from sysid.models import Channel
 
@@ -17,28 +18,17 @@ ERRORS = HeldOut(
 )
 
 
-def made_verdict(
-    ending,
-    names=(),
-    ties=(),
-    values=(),
-    dependence="",
-    against=(),
-    excess=0.0,
-    findings=(),
-    limits=(),
-) -> Verdict:
-    """Returns a verdict whose effects gain half each, without ties unless given."""
-    return Verdict(
-        ending,
-        names,
-        tuple(0.5 for _ in names),
-        ties or tuple(() for _ in names),
-        values,
-        dependence,
-        1.0,
-        against,
-        excess,
-        findings,
-        limits,
-    )
+def made_verdict(ending, names=(), ties=(), values=(), **more) -> Verdict:
+    """Returns a verdict whose effects gain half each, without ties unless given.
+
+    Those with ties are ambiguous, others are confirmed; of what is unexplained all are
+    suggested.
+    """
+    ties = ties or tuple(() for _ in names)
+    placed = []
+    for name, own in zip(names, ties, strict=True):
+        status, votes, reason = "ambiguous" if own else "confirmed", 4, ""
+        if ending == "unexplained":
+            status, votes, reason = "suggested", 2, "2 of 4 parts of the log ask for it"
+        placed.append(Standing(name, status, 0.5, votes, 4, (), reason))
+    return Verdict(ending, tuple(placed), ties, tuple(values), **more)

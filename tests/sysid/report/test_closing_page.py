@@ -52,9 +52,10 @@ def test_an_error_that_the_model_states_of_itself_has_a_column(found):
 
 
 def test_what_is_at_its_bound_and_what_is_not_explained_is_marked(found):
+    verdict = dataclasses.replace(found.verdict, ending="explained")
+    found = dataclasses.replace(found, verdict=verdict)
     page = own_part(closing_page(found, {}))
     assert "at its bound" not in page and 'class="box warn"' not in page
-    verdict = found.verdict
     values = tuple(dataclasses.replace(v, is_at_bound=True) for v in verdict.values)
     other = dataclasses.replace(verdict, values=values, ending="partly")
     page = closing_page(dataclasses.replace(found, verdict=other), {})

@@ -18,8 +18,8 @@ from sysid.data_checks.check import check_data
 from sysid.effect_selection.candidates import candidates, extended
 from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.fitter import Fitter
+from sysid.effect_selection.linear_system import linear_system
 from sysid.effect_selection.settings import DEFAULT_SETTINGS
-from sysid.effect_selection.survey import survey_candidates
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.response.model import JointResponseModel, _assumption
@@ -159,7 +159,7 @@ def test_no_candidate_fails_where_its_derivative_is_taken(log):
     model = JointResponseModel([log])
     fitter = Fitter.of(model, Workers(), model.default_huber_delta, DEFAULT_SETTINGS)
     fit = fitter.fit(())
-    found = survey_candidates(fitter, fit, candidates(model)).linearised
+    found = linear_system(fitter, fit, candidates(model))
     size = np.abs(found.linearisation.jacobian).max()
     # A failure counts as a million times the noise, over a step of a ten-thousandth.
     assert size < 1e8

@@ -1,0 +1,88 @@
+"""Linear systems of made-up columns, of effects in name only."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from drake_disasm.effects import JointCoulombFriction, SensorDrift
+from sysid.effect_selection.block_grams import BlockGrams, blocks_of
+from sysid.effect_selection.candidates import Candidate
+from sysid.effect_selection.forward_selection import Selection, Term, select
+from sysid.effect_selection.linear_account import LinearAccount
+from sysid.effect_selection.linear_system import LinearSystem
+from sysid.effect_selection.replication import (
+    Standing,
+    standings,
+    votes_of_selections,
+)
+from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.parameters import Parameter
+
+
+def of_joint(joint: str) -> Candidate:
+    """Returns an effect that has nothing to do with time."""
+    return Candidate.of(JointCoulombFriction(joint=joint))
+
+
+def of_time() -> Candidate:
+    """Returns an effect of time alone, by the name of SensorDrift."""
+    return Candidate.of(SensorDrift())
+
+
+def linear_system(
+    columns: Mapping[Candidate, np.ndarray],
+    residual: np.ndarray,
+    *,
+    episode: np.ndarray | None = None,
+    sides: Sequence[float] = (),
+    noise_is_stated: bool = False,
+) -> LinearSystem:
+    """Returns the system of candidates' columns beside a base of an offset.
+
+    Args:
+        columns: (rows, k) of each candidate.
+        residual: (rows,).
+        episode: (rows,) number of each row's episode; one if left out.
+        sides: of each column, the base first; none if left out.
+        noise_is_stated: whether residuals are in units of their noise.
+    """
+    rows = len(residual)
+    each = [np.ones((rows, 1)), *columns.values()]
+    ends = np.cumsum([own.shape[1] for own in each])
+    episode = np.zeros(rows, dtype=np.int64) if episode is None else episode
+    grams = BlockGrams.of(
+        [own[:, None, :] for own in each],
+        residual[:, None],
+        np.ones((rows, 1)),
+        blocks_of(episode, DEFAULT_SETTINGS.blocks),
+        episode,
+        np.array(sides) if len(sides) else np.zeros(ends[-1]),
+    )
+    terms = tuple(
+        Term((candidate,), np.arange(begin, end), np.zeros(end - begin, dtype=np.int64))
+        for candidate, begin, end in zip(columns, ends[:-1], ends[1:], strict=True)
+    )
+    parameters = tuple(
+        Parameter(f"x.{i}", 0.0, -5.0, 5.0, "N") for i in range(ends[-1])
+    )
+    return LinearSystem(
+        grams, np.arange(1), terms, (), (0,), noise_is_stated, parameters, None, (),
+        DEFAULT_SETTINGS,
+    )  # fmt: skip
+
+
+def selected(system: LinearSystem) -> Selection:
+    """Returns the effects that lower the held-out loss."""
+    return select(
+        system.grams, system.own, system.terms, system.settings, system.weights
+    )
+
+
+def placed(system: LinearSystem, recordings: int = 1) -> dict[str, Standing]:
+    """Returns where each effect of the selection stands, by its name."""
+    found = selected(system)
+    votes, _ = votes_of_selections(system, lambda done, count: None, np.inf)
+    effects = [candidate for term in found.terms for candidate in term.candidates]
+    account = LinearAccount.of_selection(system, found)
+    each = standings(account, votes, {}, effects, recordings)
+    return {standing.name: standing for standing in each}
