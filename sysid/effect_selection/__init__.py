@@ -4,7 +4,7 @@
 rows that were not fitted, and adds those that are confirmed. From the top:
 
     close_loop                              the library call and its result
-    search, refit_selection, prescreen      which effects: by the linear account, by fits
+    search, refit_selection, prescreen      which effects: by linear accounts, by fits
     forward_selection                       the rule: loss, ambiguity, stopping
     replication                             confirmed, ambiguous or suggested
     linear_system, linear_account           a fit linearised with all candidates

@@ -25,6 +25,7 @@ from sysid.effect_selection.data_sufficiency import refuse_few_rows
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.held_out import HeldOut, held_out_errors
+from sysid.effect_selection.residual_model import fit_residual_model
 from sysid.effect_selection.search import SearchResult, search
 from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
 from sysid.effect_selection.verdict import Verdict, judge
@@ -138,6 +139,7 @@ def close_loop(
     progress: Progress | None = None,
     folder: Path | None = None,
     time_budget: float = math.inf,
+    learn_residual: bool = False,
 ) -> ClosedLoop:
     """Finds what a model lacks to explain its log.
 
@@ -160,6 +162,8 @@ def close_loop(
         time_budget: after which the verdict is there, with what has been found [s];
             candidates whose turn has not come are not tested. The fit without effects
             and the errors on held-out rows take what they take.
+        learn_residual: whether a model of what the effects leave is learned, which
+            lowers the error and explains nothing.
 
     Raises:
         DisasmError: the log is too short to decide anything, or no effect of the
@@ -191,11 +195,14 @@ def close_loop(
         model = better.model
     held_out = _with_noise_of(base, model.of_episodes(test)) if test else None
     errors = held_out_errors(found.first, found.last, held_out)
-    scatter = (
-        fit_command_scatter(fitter, found.last) if Imprecision in library else None
-    )
+    is_late = time.monotonic() > deadline
+    may_scatter = Imprecision in library and not is_late
+    scatter = fit_command_scatter(fitter, found.last) if may_scatter else None
     misfits = [f"{each.what} ({each.remedy})" for each in contradicting_rows(base)]
-    verdict = judge(found, errors, scatter, held_out, misfits, written)
+    verdict = judge(found, errors, scatter, misfits, written)
+    if learn_residual and not is_late:
+        learned = fit_residual_model(found.last, verdict.left_over, held_out)
+        verdict = dataclasses.replace(verdict, residual_model=learned)
     return ClosedLoop(verdict, errors, found, scatter)
 
 

@@ -36,8 +36,8 @@ class DetectionLimit:
 def detection_limits(account: LinearAccount) -> list[DetectionLimit]:
     """Returns the limit of each amplitude of each effect, shape by shape.
 
-    An effect is found if it takes away `min_gain` of the loss, and if its coefficient is
-    significant when a part of the log is left out.
+    An effect is found if it takes away `min_gain` of the loss, and if its coefficient
+    is significant when a part of the log is left out.
     """
     return [
         limit

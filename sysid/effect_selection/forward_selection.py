@@ -1,8 +1,8 @@
 """Forward selection of effects: one loss, one rule for ties, one for stopping.
 
-The loss is that of contiguous blocks of rows, each predicted with coefficients that were
-fitted to the others. In each step the candidate that lowers it most is added; of those
-that are about as good, the one with the fewest coefficients.
+The loss is that of contiguous blocks of rows, each predicted with coefficients that
+were fitted to the others. In each step the candidate that lowers it most is added; of
+those that are about as good, the one with the fewest coefficients.
 """
 
 import itertools

@@ -24,7 +24,7 @@ from sysid.objective import pseudo_residual
 
 Array = NDArray[np.float64]
 
-_ROWS = 1500  # more are thinned out evenly: a channel then takes half a second
+_ROWS = 1000  # more are thinned out evenly: a channel then takes a third of a second
 _LAGS = (1, 4, 16)  # rows back in time, at which quantities are seen, too
 _ALPHA = 0.001  # of one channel: there are up to a dozen
 _IMPORTANCE = 0.25  # of what the most important quantity is worth, to be listed

@@ -81,7 +81,7 @@ class LinearSystem:
         return found
 
     def candidates_of(self, term: Term) -> list[Candidate]:
-        """Returns a term's effects with those amplitudes free that it has columns of."""
+        """Returns a term's effects with those amplitudes that it has columns of."""
         fields: list[list[str]] = [[] for _ in term.candidates]
         for number, column in zip(term.owners, term.columns, strict=True):
             fields[number].append(field_of(self.parameters[column]))

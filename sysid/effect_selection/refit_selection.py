@@ -1,9 +1,9 @@
 """Selection where the model is not linear in its effects: fits decide.
 
 The linear account at the present fit ranks the candidates; the best are fitted, and the
-fits are compared by the same loss and the same rules as terms of a linear model. Contact
-makes a derivative at null mean little far from the data: there every effect is fitted
-to a few rows.
+fits are compared by the same loss and the same rules as terms of a linear model.
+Contact makes a derivative at null mean little far from the data: there every effect is
+fitted to a few rows.
 """
 
 import dataclasses

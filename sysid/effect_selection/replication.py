@@ -1,8 +1,8 @@
 """Whether parts of a log that had no say in choosing an effect ask for it, too.
 
-Each part of the log is left out in turn. *Confirmed* is an effect that the others select
-without it, and of the same sign in each part; *ambiguous* one for which they select it
-or a rival; *suggested* what lowers the error and is neither.
+Each part of the log is left out in turn. *Confirmed* is an effect that the others
+select without it, and of the same sign in each part; *ambiguous* one for which they
+select it or a rival; *suggested* what lowers the error and is neither.
 """
 
 import time

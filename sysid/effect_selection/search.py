@@ -79,14 +79,18 @@ def _linear_search(
     _say(progress, "fitting the model without effects")
     first = fitter.fit(())
     _say(progress, f"comparing {len(library)} candidates")
-    system = linear_system(fitter, first, library, deadline)
+    begin = time.monotonic()
+    half = begin + 0.5 * (deadline - begin)  # the rest is for what is made of them
+    system = linear_system(fitter, first, library, half)
+    begin = time.monotonic()
     found = _selection(system)
+    took = time.monotonic() - begin
     _say(progress, f"{len(found.names)} effects lower the held-out error")
 
     def _told(done: int, count: int) -> None:
         _say(progress, f"selecting without part {done} of {count} of the log")
 
-    votes, is_complete = votes_of_selections(system, _told, deadline)
+    votes, is_complete = votes_of_selections(system, _told, deadline - took)
     effects = tuple(_candidates(system, found))
     _say(progress, "fitting the model with the effects")
     last = fitter.fit(effects, first) if effects else first
@@ -94,13 +98,13 @@ def _linear_search(
     recordings = len(fitter.base.measurements.names)
     rivals = _rivals(found.steps)
     placed = standings(account, votes, rivals, effects, recordings)
-    begin = ranked(
+    gains = ranked(
         system.equations(_first_weights(system)), system.terms, system.settings
     )
     return SearchResult(
         first,
         last,
-        tuple(begin),
+        tuple(gains),
         account,
         found.steps,
         placed,

@@ -21,7 +21,7 @@ from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.left_over import LeftOver, left_over
 from sysid.effect_selection.replication import Standing
-from sysid.effect_selection.residual_model import ResidualModel, fit_residual_model
+from sysid.effect_selection.residual_model import ResidualModel
 from sysid.effect_selection.search import SearchResult
 from sysid.effect_selection.strokes import joints_of_one_stroke
 from sysid.effect_selection.whiteness import correlated_channels
@@ -181,7 +181,6 @@ def judge(
     found: SearchResult,
     errors: HeldOut,
     scatter: CommandScatter | None = None,
-    held_out: LogModel | None = None,
     misfits: Sequence[str] = (),
     written: Sequence[Bookkeeping[LogModel]] = (),
 ) -> Verdict:
@@ -191,13 +190,12 @@ def judge(
         found: by it.
         errors: on rows that were not fitted.
         scatter: how the arm scatters about its commands, if it does.
-        held_out: model of the held-out episodes; None if there are none.
         misfits: rows that contradict the kind of log, in words.
         written: how the log seems to have been written, in place of what it says.
     """
     last = found.last
     white = scatter.left_of(last) if scatter else last
-    left = left_over(white)
+    left = left_over(white) if found.is_complete else []
     placed = _ordered(found.standings) + _of_scatter(scatter)
     names = last.model.measurements.names
     dependence = _dependence(found, last)
@@ -214,7 +212,6 @@ def judge(
         tuple(channel_findings(white)),
         tuple(detection_limits(found.account)),
         tuple(left),
-        fit_residual_model(last, left, held_out),
         misfits=tuple(misfits),
         written=tuple(Written(w.name, w.what, w.remedy) for w in written),
         invalid=found.invalid,

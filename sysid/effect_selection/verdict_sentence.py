@@ -78,7 +78,8 @@ def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
         them = "these and what is suggested"
     rest = f", but not all is explained: {left}" if left else ""
     improved = improvement_in_words(errors)
-    return f"The model lacks {effects_in_words(named)}; with {them} {improved}{rest}.{more}"
+    lacks = f"The model lacks {effects_in_words(named)}"
+    return f"{lacks}; with {them} {improved}{rest}.{more}"
 
 
 def _unexplained(verdict: Verdict, errors: HeldOut, left: str) -> str:
@@ -112,8 +113,8 @@ def _too_short(verdict: Verdict) -> str:
     record = [text for text in dict.fromkeys(hidden.values()) if text][:_SHOWN]
     return (
         f"This log is too short to decide: nothing is missing that it shows, and "
-        f"{len(hidden)} of {len(kinds)} kinds of effects would not have been found, such "
-        f"as {enumeration(shown)}{more}; record: {'; '.join(record)}."
+        f"{len(hidden)} of {len(kinds)} kinds of effects would not have been found, "
+        f"such as {enumeration(shown)}{more}; record: {'; '.join(record)}."
     )
 
 
@@ -129,8 +130,8 @@ def _nothing(verdict: Verdict, errors: HeldOut) -> str:
     if not kinds:
         return text
     return (
-        f"{text}, in which {seen} of {len(kinds)} kinds of effects would have been found "
-        "if they were large enough"
+        f"{text}, in which {seen} of {len(kinds)} kinds of effects would have been "
+        "found if they were large enough"
     )
 
 

@@ -53,6 +53,12 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         help="end the search after so many minutes, with a provisional verdict, that "
         "the same command goes on from (default: none)",
     )
+    add(
+        "--residual-model",
+        action="store_true",
+        help="learn what the effects leave, too: it lowers the error within the range "
+        "of the log, and explains nothing",
+    )
     common.add_import_argument(parser)
     common.add_executor_arguments(parser)
     add("--out", required=True, type=Path, metavar="DIR", help="a folder")
@@ -118,6 +124,7 @@ def main(arguments: Sequence[str]) -> int:
             progress=progress,
             folder=fits,
             time_budget=60.0 * args.time_budget,
+            learn_residual=args.residual_model,
         )
     _write(args.out, closed, findings, origin)
     if not closed.is_provisional:
