@@ -2,6 +2,7 @@
 
 import argparse
 import dataclasses
+import itertools
 import json
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -14,6 +15,8 @@ from drake_disasm.common import options
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder
 from drake_disasm.learning.statistics import wilson_interval
+from sysid.effect_selection.verdict import Verdict
+from sysid.validation.blind_tests import named_with_ties
 
 #: What was said of a log: its ending, the names, and whatever else.
 Answer = dict[str, Any]
@@ -45,6 +48,32 @@ class Count:
         said = ", ".join(f"{n} {ending}" for ending, n in endings.most_common())
         interval = f"{100 * low:.1f} to {100 * high:.1f}"
         return [self.logs, self.what, self.right, len(self.answers), interval, said]
+
+
+def of_verdict(found: Verdict) -> Answer:
+    """Returns a verdict's ending, and where its effects stand.
+
+    `names` are confirmed or ambiguous, `ties` are the rivals of each; `suggested` ones
+    are neither.
+    """
+    names, ties = named_with_ties(found)
+    return {
+        "ending": found.ending,
+        "names": list(names),
+        "ties": [list(own) for own in ties],
+        "suggested": list(found.suggested),
+    }
+
+
+def no_verdict(ending: str, text: str = "") -> Answer:
+    """Returns the answer to a log that has no verdict, with the reason."""
+    return {"ending": ending, "names": [], "ties": [], "suggested": [], "text": text}
+
+
+def said(found: Answer) -> set[str]:
+    """Returns the names in an answer and in its ambiguous sets, one by one."""
+    texts = [*found["names"], *itertools.chain(*found["ties"])]
+    return {name for text in texts for name in text.split(" and ")}
 
 
 def add_arguments(parser: argparse.ArgumentParser, logs: int, out: str) -> None:

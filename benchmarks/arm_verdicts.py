@@ -9,13 +9,21 @@ have.
 """
 
 import dataclasses
-import itertools
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from answers import Answer, Count, add_arguments, complete, report
+from answers import (
+    Answer,
+    Count,
+    add_arguments,
+    complete,
+    no_verdict,
+    of_verdict,
+    report,
+    said,
+)
 from null_alarms import arm_log, drawn, fitted, noise_of
 
 from drake_disasm.common import options, program
@@ -199,7 +207,7 @@ def answer(
     """
     hidden = draw(*real, number, level)
     if hidden is None:
-        return {"kinds": [], "ending": "not visible", "names": [], "ties": []}
+        return {"kinds": []} | no_verdict("not visible")
     measured = drawn(hidden.model, hidden.theta, noise, _SEED + number)
     besides = [Candidate.of(effect).name for effect in real[0].effects]
     put_in = {
@@ -210,21 +218,8 @@ def answer(
     try:
         closed = close_loop(model.with_measurements(measured))
     except DisasmError as error:
-        refused = {"ending": "refused", "names": [], "ties": [], "text": str(error)}
-        return put_in | refused
-    found = closed.verdict
-    return put_in | {
-        "ending": found.ending,
-        "names": list(found.names),
-        "ties": [[tie.name for tie in ties] for ties in found.ties],
-        "text": closed.text,
-    }
-
-
-def said(found: Answer) -> set[str]:
-    """Returns the names in an answer and its ties, of groups of joints one by one."""
-    texts = [*found["names"], *itertools.chain(*found["ties"])]
-    return {name for text in texts for name in text.split(" and ")}
+        return put_in | no_verdict("refused", str(error))
+    return put_in | of_verdict(closed.verdict) | {"text": closed.text}
 
 
 def _counts(name: str, answers: list[Answer]) -> list[Count]:
@@ -235,9 +230,9 @@ def _counts(name: str, answers: list[Answer]) -> list[Count]:
     as_many = [len(a["names"]) == len(a["kinds"]) for a in shown]
     alone = list(map(all, zip(named, as_many, strict=True)))
     rows = (
-        ("name the case's effect, or have it in a reported tie", own),
-        ("name all that is there, or have it in ties", named),
-        ("the same, and name nothing else", alone),
+        ("the case's effect is confirmed, or in an ambiguous set", own),
+        ("so is all that is there", named),
+        ("the same, and nothing else is named", alone),
     )
     return [Count(name, what, sum(right), shown) for what, right in rows]
 

@@ -167,7 +167,8 @@ def main(arguments: Sequence[str]) -> int:
     bag, own, shift = verdicts(parser.parse_args(arguments).out)
     print(f"shift of the sensor's clock: {1e3 * shift:.1f} ms")
     for name, verdict in (("bag", bag), ("log", own)):
-        print(f"{name}: {verdict.ending}: {', '.join(verdict.names)}")
+        each = ", ".join(f"{s.name} ({s.status})" for s in verdict.standings)
+        print(f"{name}: {verdict.ending}: {each}")
     return 0
 
 

@@ -6,14 +6,23 @@ ten times as large as the first null log would show with 80 % probability.
 """
 
 import copy
-import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from answers import Answer, Count, add_arguments, complete, read_answers, report
+from answers import (
+    Answer,
+    Count,
+    add_arguments,
+    complete,
+    no_verdict,
+    of_verdict,
+    read_answers,
+    report,
+    said,
+)
 
 from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
@@ -73,13 +82,10 @@ def answer(log: Log, scenario: Scenario, time_budget: float = math.inf) -> Answe
     try:
         closed = close_loop(model, time_budget=time_budget)
     except DisasmError as error:
-        return {"ending": "refused", "names": [], "ties": [], "text": str(error)}
+        return no_verdict("refused", str(error))
     found = closed.verdict
     residual = closed.last.linearisation.residual
-    return {
-        "ending": found.ending,
-        "names": list(found.names),
-        "ties": [[tie.name for tie in ties] for ties in found.ties],
+    return of_verdict(found) | {
         "provisional": closed.is_provisional,
         "text": closed.text,
         "rms": np.sqrt(np.mean(residual**2, axis=0)).round(2).tolist(),
@@ -101,7 +107,7 @@ def _case(
     try:
         log = record(out / f"{kind}_{number}", real, seed)
     except RuntimeError as error:
-        return {"ending": "not recorded", "names": [], "ties": [], "text": str(error)}
+        return no_verdict("not recorded", str(error))
     return {"hidden": hidden, "kind": name} | answer(log, scenario, time_budget)
 
 
@@ -116,14 +122,15 @@ def _limits(path: Path) -> list[list[Any]]:
 def _counts(kind: str, answers: list[Answer]) -> list[Count]:
     """Returns alarms of null logs, or effects named."""
     if kind != "effect":
+        what = "an effect is confirmed or ambiguous (false alarm)"
         alarms = sum(bool(a["names"]) for a in answers)
-        return [Count(kind, "name an effect (false alarm)", alarms, answers)]
+        return [Count(kind, what, alarms, answers)]
     first = [a["names"][:1] == [a["kind"]] for a in answers]
-    named = [a["kind"] in {*a["names"], *itertools.chain(*a["ties"])} for a in answers]
+    named = [a["kind"] in said(a) for a in answers]
     explained = [a["ending"] == "explained" for a in answers]
     rows = (
-        ("named first", first),
-        ("named, or in a reported tie", named),
+        ("the effect is first", first),
+        ("the effect is confirmed, or in an ambiguous set", named),
         ("the same, and explained", map(all, zip(named, explained, strict=True))),
     )
     return [Count(kind, what, sum(right), answers) for what, right in rows]

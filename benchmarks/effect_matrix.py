@@ -116,9 +116,9 @@ def counted(found: Mapping[str, Sequence[Answer]]) -> list[tuple[Cell, ...]]:
         groups.append((f"one effect, {level:g} times the noise", "named first", own))
     for name in ("pairs", "triples"):
         tied = [a.in_tie for a in found[name]]
-        groups.append((name, "all named or tied", tied))
+        groups.append((name, "all confirmed or in an ambiguous set", tied))
     for rho in CORRELATIONS:
-        own = [a.ending != "none" for a in nulls if a.case.correlation == rho]
+        own = [bool(a.names) for a in nulls if a.case.correlation == rho]
         groups.append((f"no effect, noise correlated by {rho:g}", "false alarms", own))
     open_ = [a.ending != "explained" for a in found["left_out"]]
     groups.append(("an effect that the library lacks", "not explained", open_))

@@ -12,7 +12,15 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from answers import Answer, Count, add_arguments, complete, report
+from answers import (
+    Answer,
+    Count,
+    add_arguments,
+    complete,
+    no_verdict,
+    of_verdict,
+    report,
+)
 from real_data import write_arm, write_motion, write_static
 
 from drake_disasm.common import program
@@ -111,13 +119,8 @@ def answer(model: LogModel, noise: null_logs.Noise, seed: int) -> Answer:
     try:
         found = close_loop(model.with_measurements(measured)).verdict
     except DisasmError as error:
-        return {"seed": seed, "ending": "refused", "names": [], "text": str(error)}
-    return {
-        "seed": seed,
-        "ending": found.ending,
-        "names": list(found.names),
-        "text": found.dependence,
-    }
+        return {"seed": seed} | no_verdict("refused", str(error))
+    return {"seed": seed} | of_verdict(found) | {"text": found.dependence}
 
 
 def _model(logs: list[Path]) -> LogModel:
@@ -138,9 +141,12 @@ def main(arguments: Sequence[str]) -> int:
     for name, noise in noises.items():
         path = args.out / f"{args.model}_{name}.jsonl"
         found = complete(path, args.logs, partial(answer, model, noise))
-        named = sum(bool(each["names"]) for each in found)
-        what = "name an effect (false alarm)"
-        counts.append(Count(f"{args.model}, {name}", what, named, found))
+        for key, what in (
+            ("names", "an effect is confirmed or ambiguous (false alarm)"),
+            ("suggested", "an effect is suggested"),
+        ):
+            number = sum(bool(each[key]) for each in found)
+            counts.append(Count(f"{args.model}, {name}", what, number, found))
     report(counts, "Logs with nothing missing", _PROGRAM, arguments, args.results)
     return 0
 

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from answers import Answer, complete
+from answers import Answer, complete, of_verdict
 from results import add_results_argument, write_result
 
 from drake_disasm.common import program
@@ -46,7 +46,7 @@ _EXAMPLES = """examples:
   python benchmarks/seven_joints.py --only payload tilt
 """
 _TITLE = "Verdicts on an arm of seven joints, by its positions"
-_COLUMNS = ("hidden effect", "ending", "verdict", "time [s]")
+_COLUMNS = ("hidden effect", "ending", "effects", "time [s]")
 
 
 def goals(time: np.ndarray, random: np.random.Generator) -> np.ndarray:
@@ -105,10 +105,17 @@ def verdict(name: str, folder: Path) -> Answer:
     log = write_log(folder, *effects, seed=seed)
     begin = clock.perf_counter()
     closed = close_loop(JointResponseModel([log]))
-    found = closed.verdict
     took = round(clock.perf_counter() - begin)
-    names = ", ".join(found.names) or "-"
-    return {"ending": found.ending, "names": names, "text": closed.text, "s": took}
+    return of_verdict(closed.verdict) | {"text": closed.text, "s": took}
+
+
+def _in_words(found: Answer) -> str:
+    """Returns effects, with those that are ambiguous with them, and suggested ones."""
+    pairs = zip(found["names"], found["ties"], strict=True)
+    named = [" or ".join([name, *ties]) for name, ties in pairs]
+    if found["suggested"]:
+        named.append(f"suggested: {', '.join(found['suggested'])}")
+    return "; ".join(named) or "-"
 
 
 def _numbered(name: str, folder: Path, _: int) -> Answer:
@@ -134,7 +141,7 @@ def main(arguments: Sequence[str]) -> int:
         log, kept = args.out / name, args.out / f"{name}.jsonl"
         [found] = complete(kept, 1, partial(_numbered, name, log))
         print(f"{name}: {found['s']} s\n{found['text']}\n", flush=True)
-        rows.append([name, found["ending"], found["names"], found["s"]])
+        rows.append([name, found["ending"], _in_words(found), found["s"]])
     write_result(args.results, _TITLE, _COLUMNS, rows, _PROGRAM, arguments)
     return 0
 

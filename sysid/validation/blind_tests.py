@@ -23,6 +23,7 @@ from drake_disasm.effects import (
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.close_loop import close_loop
+from sysid.effect_selection.verdict import Verdict
 from sysid.models.twin import TwinModel
 from sysid.objective import pseudo_residual, rms
 from sysid.validation.random_effects import random_effect
@@ -62,11 +63,11 @@ class Answer:
     Attributes:
         case: that was run.
         drawn: the effects that were put in, as text.
-        ending: "none", "explained" or "unexplained"; "refused" for a log that is
-            judged too short.
-        names: found, the most important first.
-        ties: of each.
+        ending: of the verdict.
+        names: confirmed or in an ambiguous set, the most important first.
+        ties: the others of each one's set.
         before, after: error on held-out episodes, in units of the noise.
+        suggested: names of effects that lower the error and are not confirmed.
     """
 
     case: Case
@@ -76,6 +77,7 @@ class Answer:
     ties: tuple[tuple[str, ...], ...]
     before: float
     after: float
+    suggested: tuple[str, ...] = ()
 
     @property
     def named_first(self) -> bool:
@@ -85,7 +87,7 @@ class Answer:
 
     @property
     def in_tie(self) -> bool:
-        """Whether each effect is named, or tied with one that is."""
+        """Whether each effect is confirmed, or in a reported ambiguous set."""
         said = set(self.names) | {name for tie in self.ties for name in tie}
         return set(self.case.effects) <= said
 
@@ -132,14 +134,29 @@ def run_case(case: Case) -> Answer:
         library = [e for e in registered_effects() if e.__name__ not in case.left_out]
         closed = close_loop(model, library=library)
     found, errors = closed.verdict, closed.errors
+    names, ties = named_with_ties(found)
     return Answer(
         case,
         tuple(repr(effect) for effect in effects),
         found.ending,
-        found.names,
-        tuple(tuple(tie.name for tie in ties) for ties in found.ties),
+        names,
+        ties,
         errors.in_noise(errors.before),
         errors.in_noise(errors.after),
+        found.suggested,
+    )
+
+
+def named_with_ties(
+    found: Verdict,
+) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+    """Returns the effects that are confirmed or ambiguous, and the rivals of each."""
+    named = {*found.confirmed, *found.ambiguous}
+    pairs = zip(found.names, found.ties, strict=True)
+    kept = [(name, ties) for name, ties in pairs if name in named]
+    return (
+        tuple(name for name, _ in kept),
+        tuple(tuple(tie.name for tie in ties) for _, ties in kept),
     )
 
 
@@ -192,6 +209,7 @@ def _answer_of(entry: dict[str, Any]) -> Answer:
             "drawn": tuple(entry["drawn"]),
             "names": tuple(entry["names"]),
             "ties": tuple(tuple(tie) for tie in entry["ties"]),
+            "suggested": tuple(entry["suggested"]),
         }
     )
 
