@@ -68,9 +68,9 @@ def _limits(account: LinearAccount, term: Term) -> list[DetectionLimit]:
     at, slope = scaling.to_unit(nominal), scaling.slope(nominal)
     shape = ", ".join(f"{k}={v:g}" for k, v in candidate.shape.items())
     nu = equations.degrees_of_freedom
-    needed = t_distribution.isf(0.5 * settings.alpha, nu)
-    needed += norm.ppf(settings.detection_power)
     enlarged = np.sqrt(settings.parts / (settings.parts - 1.0))
+    above = enlarged * norm.ppf(settings.detection_power)
+    needed = above + enlarged * t_distribution.isf(0.5 * settings.alpha, nu)
     loss = float(equations.losses.sum())
     found = []
     for i, column in enumerate(term.columns):
@@ -79,7 +79,7 @@ def _limits(account: LinearAccount, term: Term) -> list[DetectionLimit]:
         if equations.is_new(np.array([column]))[0] and power > 0.0:
             error = np.sqrt(equations.score_variance(column)) / power
             of_use = np.sqrt(settings.min_gain / (1 - settings.min_gain) * loss / power)
-            least = max(needed * enlarged * error, of_use)
+            least = max(needed * error, of_use + above * error)
         share = float(least / max(at[i], 1.0 - at[i]))
         amplitude = float(least * slope[i]) if share <= 1.0 else None
         field = account.field(column)

@@ -18,19 +18,18 @@ from sysid.effect_selection.replication import (
 from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.parameters import Parameter
 
+TIME = "time"  # a joint's name that stands for SensorDrift
+
 
 def of_joint(joint: str) -> Candidate:
-    """Returns an effect that has nothing to do with time."""
+    """Returns an effect at a joint; of TIME, one of time alone."""
+    if joint == TIME:
+        return Candidate.of(SensorDrift())
     return Candidate.of(JointCoulombFriction(joint=joint))
 
 
-def of_time() -> Candidate:
-    """Returns an effect of time alone, by the name of SensorDrift."""
-    return Candidate.of(SensorDrift())
-
-
 def linear_system(
-    columns: Mapping[Candidate, np.ndarray],
+    columns: Mapping[str, np.ndarray],
     residual: np.ndarray,
     *,
     episode: np.ndarray | None = None,
@@ -40,7 +39,7 @@ def linear_system(
     """Returns the system of candidates' columns beside a base of an offset.
 
     Args:
-        columns: (rows, k) of each candidate.
+        columns: (rows, k) of each candidate, by its joint.
         residual: (rows,).
         episode: (rows,) number of each row's episode; one if left out.
         sides: of each column, the base first; none if left out.
@@ -59,8 +58,8 @@ def linear_system(
         np.array(sides) if len(sides) else np.zeros(ends[-1]),
     )
     terms = tuple(
-        Term((candidate,), np.arange(begin, end), np.zeros(end - begin, dtype=np.int64))
-        for candidate, begin, end in zip(columns, ends[:-1], ends[1:], strict=True)
+        Term((of_joint(joint),), np.arange(begin, end), np.zeros(end - begin, np.int64))
+        for joint, begin, end in zip(columns, ends[:-1], ends[1:], strict=True)
     )
     parameters = tuple(
         Parameter(f"x.{i}", 0.0, -5.0, 5.0, "N") for i in range(ends[-1])

@@ -1,86 +1,63 @@
 """Limits of detection: effects as large as they say are found, most of the time."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
-from drake_disasm.effects import registered_effects
-from sysid.effect_selection.candidates import candidates
-from sysid.effect_selection.data_sufficiency import refuse_short_logs
-from sysid.effect_selection.detection import detection_limits
-from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.settings import SelectionSettings
-from sysid.effect_selection.survey import survey_candidates
-from sysid.models.from_logs import ModelChoice, model_of
-from sysid.workers import Workers
-from tests.refusals import refused
-from tests.sysid.effect_selection import blind
+from sysid.effect_selection.detection import (
+    DetectionLimit,
+    detection_limits,
+    is_detectable,
+)
+from sysid.effect_selection.linear_account import LinearAccount
+from tests.sysid.effect_selection.made import linear_system, selected
 
-_SETTINGS = SelectionSettings()
-_LOGS = 20
+_ROWS, _NAME = 480, "JointCoulombFriction.j"
+_RANGE = 10.0  # N, of the parameters: columns are by shares of it
 
 
-@pytest.fixture(scope="module")
-def model(tmp_path_factory):
-    """A hundred simulated readings of a sensor at rest, with nothing missing."""
-    log = blind.static_log(tmp_path_factory.mktemp("null"), [], 0.0, 5)
-    found = model_of([log], ModelChoice())
-    noise = np.array([blind.FORCE_NOISE] * 3 + [blind.TORQUE_NOISE] * 3)
-    return found.with_measurements(found.measurements.with_noise(noise, "stated"))
+def _drawn(seed, amplitude=0.0, noise=1.0):
+    """Returns a system with so much of an effect [N], beside nine others."""
+    random = np.random.default_rng(seed)
+    columns = {f"k{i}": random.standard_normal((_ROWS, 1)) for i in range(9)}
+    columns = {"j": 3.0 * random.standard_normal((_ROWS, 1)), **columns}
+    effect = amplitude / _RANGE * columns["j"][:, 0]
+    return linear_system(columns, noise * random.standard_normal(_ROWS) - effect)
 
 
-def _survey(model):
-    fitter = Fitter(model, Workers(), np.inf, _SETTINGS)
-    fit = fitter.fit(())
-    return fit, survey_candidates(fitter, fit, candidates(model, registered_effects()))
+def _limits(system):
+    account = LinearAccount.of_selection(system, selected(system))
+    return {limit.effect: limit for limit in detection_limits(account)}
 
 
-@pytest.mark.slow
-def test_four_of_five_are_found_at_the_limit(model):
-    fit, survey = _survey(model)
-    limits = {(x.effect, x.field): x for x in detection_limits(survey.linearised)}
-    limit = limits["SensorCrossTalk", "fy_fx"]
-    change = limit.amplitude * model.predictions(fit.theta)[:, 0]
-    clean = model.predictions(fit.theta)
-    found = []
-    for seed in range(_LOGS):
-        noise = np.random.default_rng(seed).standard_normal(clean.shape)
-        values = clean + noise * model.measurements.noise
-        values[:, 1] += change
-        drawn = model.with_measurements(model.measurements.with_values(values))
-        _, survey = _survey(drawn)
-        found.append(
-            any("SensorCrossTalk" in e.name for e in survey.effects if e.accepted)
+@pytest.mark.parametrize(("times", "least", "most"), [(1, 0.5, 0.97), (2, 1.0, 1.0)])
+def test_most_are_found_at_the_limit_and_all_at_twice_the_limit(times, least, most):
+    limit = times * np.mean([_limits(_drawn(s))[_NAME].amplitude for s in range(5)])
+    found = [_NAME in selected(_drawn(seed, limit)).names for seed in range(100, 150)]
+    assert least <= np.mean(found) <= most
+
+
+def test_limits_are_in_proportion_to_the_noise_and_none_beyond_the_bounds():
+    quiet, loud = (_limits(_drawn(0, noise=noise))[_NAME] for noise in (0.1, 0.4))
+    assert loud.amplitude == pytest.approx(4.0 * quiet.amplitude, rel=1e-6)
+    assert quiet.unit == "N" and quiet.share == pytest.approx(quiet.amplitude / 5.0)
+    deaf = _limits(_drawn(0, noise=30.0))[_NAME]
+    assert deaf.amplitude is None and deaf.share > 1.0
+
+
+def test_what_looks_like_the_model_itself_is_not_detectable():
+    random = np.random.default_rng(0)
+    columns = {"j": np.full((_ROWS, 1), 2.0)}  # as the base has, an offset
+    limit = _limits(linear_system(columns, random.standard_normal(_ROWS)))[_NAME]
+    assert limit.amplitude is None and np.isinf(limit.share)
+
+
+@pytest.mark.parametrize(("seen", "shows"), [(1, False), (2, False), (3, True)])
+def test_a_kind_is_detectable_if_most_of_its_shapes_are(seen, shows):
+    limits = [
+        DetectionLimit(
+            "GroovePatch", field, 0.1 if i < seen else None, "1", 1.0, f"{i}"
         )
-    assert np.mean(found) >= 0.5  # of 20 at 0.8: less in one of 300 times
-    assert limit.unit == "1" and 1e-4 < limit.amplitude < 0.1
-
-
-def test_more_noise_takes_larger_effects(model):
-    _, survey = _survey(model)
-    louder = model.measurements.values.copy()
-    random = np.random.default_rng(1)
-    louder += 3.0 * model.measurements.noise * random.standard_normal(louder.shape)
-    _, other = _survey(model.with_measurements(model.measurements.with_values(louder)))
-    quiet, loud = (
-        {(x.effect, x.field): x.share for x in detection_limits(s.linearised)}
-        for s in (survey, other)
-    )
-    one_sided = ("SensorSaturation", "share")  # whichever side noise has pushed it to
-    assert np.isfinite([quiet[one_sided], loud[one_sided]]).all()
-    shapes = {x.effect: x.shape for x in detection_limits(survey.linearised)}
-    assert shapes["SensorWarmUp"].startswith("time_constant=")
-    assert shapes["SensorGain"] == ""
-    both = [key for key in quiet if np.isfinite(quiet[key])]
-    ratio = np.median([loud[key] / quiet[key] for key in both])
-    assert 2.0 < ratio < 5.0  # the noise is sqrt(1 + 9) times as large
-
-
-def test_a_log_that_can_show_nothing_is_refused(model):
-    fit, survey = _survey(model)
-    limits = detection_limits(survey.linearised)
-    refuse_short_logs(fit, limits)
-    beyond = [dataclasses.replace(x, amplitude=None, share=1.5) for x in limits]
-    with refused("no effect", "125 rows more"):
-        refuse_short_logs(fit, beyond)
+        for i in range(4)
+        for field in ("size", "width")
+    ]
+    assert is_detectable(limits, "GroovePatch") == shows
