@@ -210,14 +210,6 @@ class LogModel(abc.ABC):
             _effects=tuple(effects), parameters=(*self.parameters, *added)
         )
 
-    def validity(self, theta: Array) -> Validity | None:
-        """Returns whether the stated error holds for the log; None: not known.
-
-        Args:
-            theta: (p,) values of `parameters`.
-        """
-        return None
-
     # Which parameters vary.
 
     def freeze(self, values: Mapping[str, float]) -> Self:
