@@ -33,13 +33,13 @@ class BlockGrams:
         grams: (B, C, P + 1, P + 1), the residual last.
         rows: (B,) of each block.
         episode: (B,) number of the episode that each block is of.
-        side: (P,) 1 or -1 where a column's coefficient can go up or down only, else 0.
+        bounds: (P, 2) of each column's coefficient.
     """
 
     grams: Array
     rows: NDArray[np.int64]
     episode: NDArray[np.int64]
-    side: Array
+    bounds: Array
 
     @classmethod
     def of(
@@ -49,7 +49,7 @@ class BlockGrams:
         weights: Array,
         blocks: NDArray[np.int64],
         episode: NDArray[np.int64],
-        side: Array,
+        bounds: Array,
         pooled: bool = False,
     ) -> "BlockGrams":
         """Returns the Gram matrices of some rows.
@@ -60,7 +60,7 @@ class BlockGrams:
             weights: (rows, channels) of rows in the loss.
             blocks: (rows,) number of each row's block, from 0, in order.
             episode: (rows,) number of each row's episode.
-            side: (P,) see the class.
+            bounds: (P, 2) see the class.
             pooled: whether channels are added up, since their weights are known.
         """
         root = np.sqrt(weights)
@@ -77,7 +77,7 @@ class BlockGrams:
             own = own.reshape(-1, 1, size) if pooled else own
             for c in range(channels):
                 grams[b, c] = own[:, c].T @ own[:, c]
-        return cls(grams, np.diff([*starts, len(blocks)]), episode[starts], side)
+        return cls(grams, np.diff([*starts, len(blocks)]), episode[starts], bounds)
 
     def __add__(self, other: "BlockGrams") -> "BlockGrams":
         """Returns the blocks of two logs of the same columns."""
@@ -86,7 +86,7 @@ class BlockGrams:
             np.concatenate([self.grams, other.grams]),
             np.concatenate([self.rows, other.rows]),
             np.concatenate([self.episode, episode]),
-            self.side,
+            self.bounds,
         )
 
     def shifted(self, change: Array) -> "BlockGrams":
@@ -114,7 +114,7 @@ class BlockGrams:
         """Returns the same of some columns."""
         kept = np.append(columns, -1)
         grams = self.grams[:, :, kept][:, :, :, kept]
-        return dataclasses.replace(self, grams=grams, side=self.side[columns])
+        return dataclasses.replace(self, grams=grams, bounds=self.bounds[columns])
 
     def channel_powers(self, columns: Columns) -> Array:
         """Returns the mean square (channels,) that columns leave of each channel."""
@@ -129,7 +129,9 @@ class BlockGrams:
         blocks = sum(w * self.grams[:, c] for c, w in enumerate(weights))
         power = np.einsum("bii->i", blocks)
         size = len(power) - 1
-        return NormalEquations(blocks, self.rows, self.episode, self.side, power[:size])
+        return NormalEquations(
+            blocks, self.rows, self.episode, self.bounds, power[:size]
+        )
 
 
 @dataclass(frozen=True)
@@ -139,14 +141,14 @@ class NormalEquations:
     Attributes:
         blocks: (B, P + 1, P + 1), the residual last; zero where columns were projected
             out.
-        rows, episode, side: see BlockGrams.
+        rows, episode, bounds: see BlockGrams.
         power: (P,) of each column before any was projected out.
     """
 
     blocks: Array
     rows: NDArray[np.int64]
     episode: NDArray[np.int64]
-    side: Array
+    bounds: Array
     power: Array
 
     @functools.cached_property
@@ -186,7 +188,7 @@ class NormalEquations:
         return dataclasses.replace(
             self,
             blocks=self.blocks[:, kept][:, :, kept],
-            side=self.side[columns],
+            bounds=self.bounds[columns],
             power=self.power[columns],
         )
 
@@ -221,10 +223,11 @@ class NormalEquations:
         return -solve(total[np.ix_(columns, columns)], total[columns, -1])
 
     def feasible(self, columns: Columns) -> Columns:
-        """Returns the columns that are new, and whose coefficients have their signs."""
+        """Returns the columns that are new, and whose coefficients are in bounds."""
         kept = columns[self.is_new(columns)]
-        while len(kept) and self.side[kept].any():
-            wrong = self.side[kept] * self.solution(kept) < 0.0
+        while len(kept):
+            x, (low, high) = self.solution(kept), self.bounds[kept].T
+            wrong = (x < low) | (x > high)
             if not wrong.any():
                 break
             kept = kept[~wrong]

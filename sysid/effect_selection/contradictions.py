@@ -94,7 +94,9 @@ def _with_own(
     blocks[~acts, k : 2 * k] = 0.0
     blocks[~acts, :, k : 2 * k] = 0.0
     power = np.einsum("bii->i", blocks)[:-1]
-    return NormalEquations(blocks, small.rows, small.episode, np.zeros(2 * k), power)
+    return NormalEquations(
+        blocks, small.rows, small.episode, np.zeros((2 * k, 2)), power
+    )
 
 
 def _gain(both: NormalEquations, k: int, folds: int) -> tuple[float, float]:

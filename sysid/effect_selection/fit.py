@@ -106,7 +106,7 @@ class Fit:
             linear.weights,
             self.blocks,
             episode,
-            np.zeros(len(linear.u)),
+            np.zeros((len(linear.u), 2)),
             pooled=True,
         )
         return grams.weighted(np.ones(1))

@@ -211,15 +211,14 @@ def _forward(
     equations: NormalEquations, terms: Sequence[Term], settings: SelectionSettings
 ) -> Iterator[Step]:
     """Yields what is added, step by step."""
-    have: set[str] = set()
-    for _ in range(settings.max_steps):
-        open_terms = [term for term in terms if not have.issuperset(term.names)]
-        gains = ranked(equations, open_terms, settings)
+    steps: list[Step] = []
+    while len(steps) < settings.max_steps:
+        gains = ranked(equations, _others(terms, steps), settings)
         if not gains or gains[0].share < settings.min_gain:
             return
         step = step_of(gains, settings, equations)
         yield step
-        have.update(step.chosen.term.names)
+        steps.append(step)
         equations = equations.projected(step.chosen.term.columns)
 
 
@@ -240,6 +239,8 @@ def step_of(
     as_good = [gain for gain in gains if gain.is_about_as_good_as(best, settings)]
     if equations is not None:
         as_good = [thinned(equations, gain, settings) for gain in as_good]
+        best = max(as_good, key=lambda gain: gain.share)
+        as_good = [gain for gain in as_good if gain.is_about_as_good_as(best, settings)]
     chosen = min(as_good, key=lambda gain: (len(gain.term.columns), -gain.share))
     return Step(chosen, rivals_of(chosen, gains, settings))
 
@@ -247,10 +248,11 @@ def step_of(
 def thinned(
     equations: NormalEquations, gain: Gain, settings: SelectionSettings
 ) -> Gain:
-    """Returns the gain of an effect with as few columns as are about as good as all.
+    """Returns the gain of an effect with those columns that lower the loss.
 
-    Columns are added one by one, the best first: those of an effect may depend on each
-    other, as moments and forces of one payload do. Kinds at all joints stay whole.
+    Columns are added one by one, the best first, as effects are: those of an effect may
+    depend on each other, as moments and forces of one payload do. Kinds at all joints
+    stay whole.
 
     Args:
         equations: by folds.
@@ -260,18 +262,19 @@ def thinned(
     columns = gain.term.columns
     if len(columns) < 2 or len(gain.term.candidates) > 1:
         return gain
-    before, total = equations.losses, max(float(equations.losses.sum()), 1e-300)
-    kept = np.array([], dtype=np.int64)
+    before = equations.losses
+    kept, least = np.array([], dtype=np.int64), before
     while len(kept) < len(columns):
         rest = np.setdiff1d(columns, kept)
         sets = [np.append(kept, column) for column in rest]
         losses = [equations.held_out(each) for each in sets]
         number = int(np.argmin([each.sum() for each in losses]))
-        kept, gains = sets[number], (before - losses[number]) / total
-        found = Gain(gain.term.of_columns(kept), float(gains.sum()), gains)
-        if found.is_about_as_good_as(gain, settings):
-            return found
-    return gain
+        enough = (1.0 - settings.min_gain) * least.sum()
+        if len(kept) and losses[number].sum() > enough:
+            break
+        kept, least = sets[number], losses[number]
+    gains = (before - least) / max(float(before.sum()), 1e-300)
+    return Gain(gain.term.of_columns(kept), float(gains.sum()), gains)
 
 
 def rivals_of(
@@ -326,9 +329,26 @@ def _columns_of(steps: Sequence[Step]) -> Columns:
 
 
 def _others(terms: Sequence[Term], steps: Sequence[Step]) -> list[Term]:
-    """Returns terms that have an effect which no step has added."""
-    have = {name for step in steps for name in step.chosen.term.names}
-    return [term for term in terms if not have.issuperset(term.names)]
+    """Returns terms without columns that steps have added.
+
+    And without other shapes of effects that they have added.
+    """
+    chosen = {
+        candidate.name: candidate.text
+        for step in steps
+        for candidate in step.chosen.term.candidates
+    }
+    if not chosen:
+        return list(terms)
+    added, found = _columns_of(steps), []
+    for term in terms:
+        texts = [chosen.get(c.name, c.text) == c.text for c in term.candidates]
+        is_open = np.array(texts)[term.owners] & ~np.isin(term.columns, added)
+        if is_open.all():
+            found.append(term)
+        elif is_open.any():
+            found.append(term.of_columns(term.columns[is_open]))
+    return found
 
 
 def ranked(

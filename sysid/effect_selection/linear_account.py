@@ -69,7 +69,7 @@ class LinearAccount:
         Of the residual with its effects at null, as where they are selected.
         """
         owners = {effect.name: fit.columns_of(effect) for effect in fit.effects}
-        change = np.zeros(len(system.grams.side))
+        change = np.zeros(len(system.grams.bounds))
         for columns in owners.values():
             change[columns] = (fit.null - fit.linearisation.u)[columns]
         system = dataclasses.replace(system, grams=system.grams.shifted(change))

@@ -112,7 +112,8 @@ def linear_system(
     settings, measured = fitter.settings, model.measurements
     curves, dependences = dependence_curves(model)
     begin = len(model.parameters)
-    side = np.concatenate([_side(linear.u), np.zeros(curves.shape[2])])
+    free = np.tile([-np.inf, np.inf], (curves.shape[2], 1))
+    bounds = np.concatenate([_bounds(linear.u), free])
     blocks = blocks_of(measured.episode, settings.blocks)
     columns = [linear.jacobian, curves]
     grams = BlockGrams.of(
@@ -121,7 +122,7 @@ def linear_system(
         linear.weights,
         blocks,
         measured.episode,
-        side,
+        bounds,
         pooled=fit.noise_is_stated,
     )
     own_columns = _distinct(tested, groups, linear.jacobian)
@@ -156,9 +157,9 @@ def _linearised(
     return model, groups, found
 
 
-def _side(u: Array) -> Array:
-    """Returns 1 or -1 for parameters (p,) that can go up or down only, else 0."""
-    return (u < _AT_BOUND).astype(float) - (u > 1.0 - _AT_BOUND)
+def _bounds(u: Array) -> Array:
+    """Returns how far parameters (p,) of the unit box may go down and up (p, 2)."""
+    return np.column_stack([-u - _AT_BOUND, 1.0 - u + _AT_BOUND])
 
 
 def _distinct(

@@ -136,7 +136,9 @@ def _candidates(system: LinearSystem, found: Selection) -> list[Candidate]:
     each = [c for term in found.terms for c in system.candidates_of(term)]
     merged: dict[str, Candidate] = {}
     for candidate in each:
-        merged.setdefault(candidate.name, candidate)
+        known = merged.setdefault(candidate.name, candidate)
+        fields = dict.fromkeys((*known.fields, *candidate.fields))
+        merged[candidate.name] = known.only(tuple(fields))
     return list(merged.values())
 
 
@@ -185,8 +187,9 @@ def _rivals(steps: Sequence[Step]) -> Mapping[str, tuple[tuple[str, ...], ...]]:
         for name in step.chosen.term.names:
             joint = name.partition(".")[2]
             own = [_at_joint(gain.term.names, joint) for gain in step.rivals]
+            known = found.get(name, ())
             unique = dict.fromkeys(names for names in own if name not in names)
-            found[name] = tuple(unique)
+            found[name] = known or tuple(unique)
     return found
 
 
