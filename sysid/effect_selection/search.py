@@ -4,6 +4,8 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from drake_disasm.common.progress import Progress, ProgressUpdate
 from sysid.effect_selection.block_grams import Array
 from sysid.effect_selection.candidates import Candidate
@@ -75,7 +77,11 @@ def search(
 def _linear_search(
     fitter: Fitter, library: Sequence[Candidate], progress: Progress, deadline: float
 ) -> SearchResult:
-    """Returns what the linear account of all rows selects: it is exact here."""
+    """Returns what the linear account of all rows selects.
+
+    It is exact but for shapes and for effects that are not linear themselves, as a mass
+    and its place are. The fit tells, in which nothing has to stand for these.
+    """
     _say(progress, "fitting the model without effects")
     first = fitter.fit(())
     _say(progress, f"comparing {len(library)} candidates")
@@ -93,11 +99,18 @@ def _linear_search(
     votes, is_complete = votes_of_selections(system, _told, deadline - took)
     effects = tuple(_candidates(system, found))
     _say(progress, "fitting the model with the effects")
-    last = fitter.fit(effects, first) if effects else first
+    last = _needed(fitter, first, fitter.fit(effects, first)) if effects else first
     account = LinearAccount.of_selection(system, found)
+    if not _is_exact(account, first, last):
+        _say(progress, f"comparing {len(library)} candidates with the effects")
+        account = LinearAccount.of_fit(
+            linear_system(fitter, last, library, deadline), last
+        )
     recordings = len(fitter.base.measurements.names)
-    rivals = _rivals(found.steps)
-    placed = standings(account, votes, rivals, effects, recordings)
+    kept = {effect.name for effect in last.effects}
+    steps = tuple(s for s in found.steps if kept.intersection(s.chosen.term.names))
+    rivals = _rivals(steps)
+    placed = standings(account, votes, rivals, last.effects, recordings)
     gains = ranked(
         system.equations(_first_weights(system)), system.terms, system.settings
     )
@@ -106,11 +119,31 @@ def _linear_search(
         last,
         tuple(gains),
         account,
-        found.steps,
+        steps,
         placed,
         system.untested,
         is_complete and not system.untested,
     )
+
+
+def _needed(fitter: Fitter, first: Fit, last: Fit) -> Fit:
+    """Returns the fit without effects that gain too little once all are fitted."""
+    while last.effects:
+        gains = last.effect_gains
+        worst = min(gains, key=lambda name: gains[name])
+        if gains[worst] >= fitter.settings.min_gain:
+            break
+        rest = tuple(each for each in last.effects if each.name != worst)
+        last = fitter.fit(rest, last) if rest else first
+    return last
+
+
+def _is_exact(account: LinearAccount, first: Fit, last: Fit) -> bool:
+    """Returns whether a fit leaves what the linear account says, but for `min_gain`."""
+    squares = first.linearisation.weights * last.linearisation.residual**2
+    fitted = float(np.sum(account.weights * squares.sum(axis=0)))
+    linear = float(account.equations.losses.sum())
+    return abs(fitted - linear) <= account.settings.min_gain * linear
 
 
 def _selection(system: LinearSystem) -> Selection:

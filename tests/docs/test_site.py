@@ -52,7 +52,7 @@ def test_quantities_become_a_table() -> None:
     assert docstrings.field_table(int) == []
     text = "\n".join(docstrings.field_table(SelectionSettings))
     names = [field.name for field in dataclasses.fields(SelectionSettings)]
-    assert all(f"``{name}``" in text for name in names) and "binomial" in text
+    assert all(f"``{name}``" in text for name in names) and "judge" in text
 
 
 def test_absolute_values_are_text_apart_from_literals() -> None:

@@ -13,20 +13,14 @@ from drake_disasm.effects import (
     JointCoulombFriction,
     JointCoupling,
     JointDelay,
-    JointViscousFriction,
     TorqueRipple,
 )
 from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario
-from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.close_loop import close_loop
-from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
-from sysid.identification.noise import with_estimated_noise
 from sysid.models.effects import at_null
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.regressor import ArmDynamics
-from sysid.workers import Workers
 from tests.sysid.models.arm import (
     JOINTS,
     smooth_motion,
@@ -141,26 +135,3 @@ def test_closing_the_loop_names_them(effects, expected, urdf, tmp_path):
     values = {v.name.rpartition(".")[2]: v.value for v in found.verdict.values}
     if hasattr(effects[0], "delay"):
         assert values["delay"] == pytest.approx(effects[0].delay, rel=0.1)
-
-
-@pytest.mark.parametrize(
-    ("there", "is_misshapen"),
-    [
-        (JointViscousFriction("elbow", 0.3), True),
-        (JointCoulombFriction("elbow", 1.0), False),
-    ],
-    ids=["viscous", "dry"],
-)
-def test_a_shape_that_would_go_past_its_bound_is_the_wrong_effect(
-    there, is_misshapen, urdf, tmp_path
-):
-    """Dry friction can be made as wide as viscous friction, were it not for a bound."""
-    model = JointMotionModel([_log(tmp_path, urdf, [there])])
-    base = with_estimated_noise(model, Workers(), np.inf)
-    fitter = Fitter(base, Workers(), np.inf, DEFAULT_SETTINGS)
-    (dry,) = (
-        c
-        for c in candidates(base, [JointCoulombFriction])
-        if c.effect.joint == "elbow" and c.effect.creep == 0.08
-    )
-    assert fitter.fit((dry,)).is_misshapen([dry.name]) is is_misshapen
