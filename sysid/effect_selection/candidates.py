@@ -57,11 +57,6 @@ class Candidate:
         }
 
 
-def is_joint_group(effects: Sequence[Candidate]) -> bool:
-    """Returns whether effects are one kind at several joints: more than a pair."""
-    return len(effects) > 2
-
-
 def joint_groups(library: Sequence[Candidate]) -> list[tuple[Candidate, ...]]:
     """Returns the same kind of effect at all joints at once, kind by kind.
 

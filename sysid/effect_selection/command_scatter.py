@@ -313,8 +313,9 @@ def _generalises(likelihood: _Likelihood, blocks: NDArray[np.int64]) -> bool:
         std = likelihood.select(~own).best()
         before, after = (likelihood.select(own).rows(s)[0] for s in (np.zeros(3), std))
         np.add.at(gains, blocks[own], before - after)
-    p = wilcoxon(gains, alternative="greater").pvalue if gains.any() else 1.0
-    return p < _ALPHA
+    if not gains.any():
+        return False
+    return float(wilcoxon(gains, alternative="greater").pvalue) < _ALPHA
 
 
 def _is_dependent(fit: Fit, displaced: Array) -> bool:

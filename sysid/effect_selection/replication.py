@@ -111,7 +111,7 @@ def votes_of_selections(
     """
     grams, settings = system.grams, system.settings
     part = part_numbers(grams.weighted(np.ones(grams.grams.shape[1])), settings.parts)
-    found = []
+    found: list[frozenset[str]] = []
     for number in range(int(part.max()) + 1):
         if time.monotonic() > deadline:
             return found, False

@@ -76,10 +76,10 @@ def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
     if verdict.suggested:
         more = f" Suggested, not confirmed: {effects_in_words(verdict.suggested)}."
         them = "these and what is suggested"
-    rest = f", but not all is explained: {left}" if left else ""
+    but = f", but not all is explained: {left}" if left else ""
     improved = improvement_in_words(errors)
     lacks = f"The model lacks {effects_in_words(named)}"
-    return f"{lacks}; with {them} {improved}{rest}.{more}"
+    return f"{lacks}; with {them} {improved}{but}.{more}"
 
 
 def _unexplained(verdict: Verdict, errors: HeldOut, left: str) -> str:
