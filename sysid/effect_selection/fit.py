@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -173,15 +173,24 @@ class Fit:
 
     @property
     def effect_gains(self) -> dict[str, float]:
-        """What each effect gains, by its name, as a share of the loss without.
+        """What each effect gains, by its name, see `gains_of`."""
+        return self.gains_of(self.effects)
 
-        Of blocks that are not fitted; all other parameters are fitted again.
+    def gains_of(self, effects: Sequence[Candidate]) -> dict[str, float]:
+        """Returns what each of some of its effects gains, the others left out.
+
+        As a share of the loss without it, of blocks that are not fitted; all other
+        parameters are fitted again, one Gauss-Newton step away.
         """
+        gone = [self.columns_of(each) for each in self.effects if each not in effects]
+        absent = np.concatenate([np.array([], np.int64), *gone])
+        present = np.setdiff1d(np.arange(len(self.theta)), absent)
         found = {}
-        for effect in self.effects:
+        for effect in effects:
             columns = self.columns_of(effect)
-            rest = np.setdiff1d(np.arange(len(self.theta)), columns)
-            without = self._at_null(columns).projected(rest).folds(self.settings.folds)
+            rest = np.setdiff1d(present, columns)
+            equations = self._at_null(np.append(columns, absent))
+            without = equations.projected(rest).folds(self.settings.folds)
             left = without.held_out(columns).sum() / max(without.losses.sum(), 1e-300)
             found[effect.name] = float(1.0 - left)
         return found

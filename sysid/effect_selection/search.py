@@ -128,14 +128,16 @@ def _linear_search(
 
 def _needed(fitter: Fitter, first: Fit, last: Fit) -> Fit:
     """Returns the fit without effects that gain too little once all are fitted."""
-    while last.effects:
-        gains = last.effect_gains
+    kept = last.effects
+    while kept:
+        gains = last.gains_of(kept)
         worst = min(gains, key=lambda name: gains[name])
         if gains[worst] >= fitter.settings.min_gain:
             break
-        rest = tuple(each for each in last.effects if each.name != worst)
-        last = fitter.fit(rest, last) if rest else first
-    return last
+        kept = tuple(each for each in kept if each.name != worst)
+    if not kept:
+        return first
+    return last if kept == last.effects else fitter.fit(kept, last)
 
 
 def _is_exact(account: LinearAccount, first: Fit, last: Fit) -> bool:

@@ -12,6 +12,7 @@ from sysid.identification.linearisation import (
     Linearisation,
     fitting_steps,
     linearise,
+    linearise_again,
 )
 from sysid.objective import Objective
 
@@ -67,9 +68,13 @@ def gauss_newton(
         reached = objective.value(residual)
         if reached >= value:
             break
-        linearisation = linearise(
-            objective, point, fitting_steps(linearisation), central, residual
-        )
+        steps = fitting_steps(linearisation)
+        if central:
+            linearisation = linearise(objective, point, steps)
+        else:
+            linearisation = linearise_again(
+                linearisation, objective, point, steps, residual
+            )
         if reached > (1.0 - min_gain) * value:
             break
     return linearisation

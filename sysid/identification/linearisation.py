@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.deadline import parts_until
+from sysid.models.effects import field_of
 from sysid.objective import Objective, huber_weights
 from sysid.parameters import Parameter
 
@@ -19,6 +20,7 @@ _LEAST_STEP = 1e-6
 #: For a parameter that hardly matters: over less, the solver's own noise shows.
 WIDE_STEP = 0.03
 _NOTICEABLE = 3.0  # standard deviations that a step should move the residuals by
+_SAME = 1e-6  # of a derivative: rounding of differences
 _BETWEEN_LOOKS = 8  # evaluations, or as many as a model takes together
 
 
@@ -96,6 +98,40 @@ def linearise(
     jacobian = np.moveaxis(difference / way[:, None, None], 0, -1)
     weights = huber_weights(found[0], objective.huber_delta)
     return Linearisation(u, found[0], jacobian, weights, objective.huber_delta)
+
+
+def linearise_again(
+    before: Linearisation,
+    objective: Objective,
+    u: Array,
+    steps: Array,
+    residual: Array,
+) -> Linearisation:
+    """Returns the linearisation at another point (p,), by one-sided differences.
+
+    Of an affine model, derivatives by its own parameters are the same everywhere,
+    unless an effect shifts them: the first tells.
+
+    Args:
+        before: at a point before.
+        objective: whose residuals.
+        u: the point.
+        steps: (p,) of the differences, in the unit box.
+        residual: (rows, channels) there.
+    """
+    start = _at(objective, u, residual)
+    own = sum(not field_of(p) for p in objective.model.parameters)
+    if not objective.model.affine or own < 2:
+        return extend(start, objective, u, steps)
+    way = -steps[0] if u[0] > 0.5 else steps[0]
+    there = objective.scaling.from_unit(u + way * (np.arange(len(u)) == 0))
+    first = (objective.residuals(there)[0] - residual) / way
+    known = before.jacobian[..., :own]
+    change = np.abs(first - known[..., 0]).max()
+    if change > _SAME * np.abs(known[..., 0]).max():
+        return extend(start, objective, u, steps)
+    start = dataclasses.replace(start, u=u[:own], jacobian=known)
+    return extend(start, objective, u, steps[own:])
 
 
 def extend(
