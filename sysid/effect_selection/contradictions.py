@@ -97,8 +97,8 @@ def _with_own(
     blocks[~acts, copies] = 0.0
     blocks[~acts, :, copies] = 0.0
     power = np.einsum("bii->i", blocks)[:-1]
-    side = np.zeros(shared + k)
-    return NormalEquations(blocks, small.rows, small.episode, side, power)
+    bounds = np.zeros((shared + k, 2))  # nothing is asked that needs them
+    return NormalEquations(blocks, small.rows, small.episode, bounds, power)
 
 
 def _gain(both: NormalEquations, k: int, folds: int) -> tuple[float, float]:
