@@ -18,7 +18,6 @@ from drake_disasm.effects import (
 )
 from drake_disasm.logs import read_log
 from sysid.effect_selection.close_loop import close_loop
-from sysid.effect_selection.experiments import separating
 from sysid.effect_selection.output import to_mapping
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.effect_selection.verdict import judge
@@ -151,11 +150,3 @@ def test_a_log_that_is_too_short_is_refused_with_what_it_needs(tmp_path):
     model = model_of([log], ModelChoice()).of_rows(np.arange(100) < 4)
     with refused("too short", "2 rows more"):
         close_loop(model)
-
-
-def test_ties_name_the_experiment_that_separates():
-    drifts = separating("SensorWarmUp", "SensorDrift")
-    assert drifts == separating("SensorDrift", "SensorWarmUp") and "rest" in drifts
-    joints = separating("JointCoulombFriction.j1", "JointLoadFriction.j1")
-    assert "payload" in joints
-    assert separating("Unheard", "Of")
