@@ -69,8 +69,8 @@ def _difference(
     for text, columns in sets:
         if not len(columns):
             continue
-        base = np.union1d(account.columns, columns)
-        both = _with_own(whole.projected(np.setdiff1d(base, columns)), columns, number)
+        base = np.setdiff1d(account.columns, columns)
+        both = _with_own(whole, base, columns, number)
         gain, p = _gain(both, len(columns), account.settings.folds)
         if gain >= account.settings.min_gain and p * len(sets) * tests < 0.05:
             passed.append((text, gain, len(columns)))
@@ -83,26 +83,29 @@ def _difference(
 
 
 def _with_own(
-    equations: NormalEquations, columns: Columns, number: int
+    equations: NormalEquations, base: Columns, columns: Columns, number: int
 ) -> NormalEquations:
-    """Returns equations of columns, and of a copy of them that acts in one episode."""
-    small = equations.of_columns(columns)
-    k = len(columns)
-    order = np.concatenate([np.arange(k), np.arange(k), [k]])
+    """Returns equations of base, columns, and copies of these that act in an episode.
+
+    The copies come last.
+    """
+    small = equations.of_columns(np.append(base, columns))
+    shared, k = len(base) + len(columns), len(columns)
+    order = np.concatenate([np.arange(shared), np.arange(len(base), shared + 1)])
     blocks = small.blocks[:, order][:, :, order]
-    acts = small.episode == number
-    blocks[~acts, k : 2 * k] = 0.0
-    blocks[~acts, :, k : 2 * k] = 0.0
+    acts, copies = small.episode == number, slice(shared, shared + k)
+    blocks[~acts, copies] = 0.0
+    blocks[~acts, :, copies] = 0.0
     power = np.einsum("bii->i", blocks)[:-1]
-    return NormalEquations(
-        blocks, small.rows, small.episode, np.zeros((2 * k, 2)), power
-    )
+    bounds = np.zeros((shared + k, 2))  # nothing is asked that needs them
+    return NormalEquations(blocks, small.rows, small.episode, bounds, power)
 
 
 def _gain(both: NormalEquations, k: int, folds: int) -> tuple[float, float]:
-    """Returns what the copies gain beside common columns, and its p-value."""
-    left = both.projected(np.arange(k))
-    copies: NDArray[np.int64] = np.arange(k, 2 * k)
+    """Returns what the last k columns gain beside all others, and its p-value."""
+    shared = len(both.power) - k
+    left = both.projected(np.arange(shared))
+    copies: NDArray[np.int64] = np.arange(shared, shared + k)
     copies = copies[left.is_new(copies)]
     if not len(copies):
         return 0.0, 1.0

@@ -131,8 +131,11 @@ class Fit:
 
     @property
     def held_out_losses(self) -> Array:
-        """Loss of each fold (F,) with all parameters fitted to the others."""
-        numbers = np.arange(len(self.theta))
+        """Loss of each fold (F,) with all parameters fitted to the others.
+
+        But those that a bound holds: past it the model does not go.
+        """
+        numbers = np.flatnonzero(~self.is_at_bound)
         return self.equations.folds(self.settings.folds).held_out(numbers)
 
     @property

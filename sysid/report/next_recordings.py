@@ -59,12 +59,11 @@ def recordings(verdict: Verdict, at_task: bool) -> list[Recording]:
         for kind, rivals in indistinguishable(verdict).items()
         for text in rivals.experiments
     ]
-    if verdict.ending == "unexplained":
-        found += [
-            Recording(f"whether it is {in_words(name)} at all", text)
-            for name in dict.fromkeys(n.partition(".")[0] for n in verdict.names)
-            if (text := revealing_kind(name, at_task))
-        ]
+    found += [
+        Recording(f"whether it is {in_words(name)} at all", text)
+        for name in dict.fromkeys(n.partition(".")[0] for n in verdict.suggested)
+        if (text := revealing_kind(name, at_task))
+    ]
     found += [
         Recording(f"{in_words(kind)}, which this log could not have shown", text)
         for kind in verdict.undetectable

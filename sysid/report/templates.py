@@ -30,6 +30,10 @@ def _brief(value: float) -> str:
     return f"{value:.2g}"
 
 
+def _times(value: float) -> str:
+    return f"{value:.2f}" if value < 100.0 else f"{value:.0f}"
+
+
 def interval(ends: Sequence[float]) -> str:
     """Returns an interval in as many digits as tell its ends apart, at least two."""
     low, high = ends
@@ -56,6 +60,7 @@ def _figure(drawn: Plot) -> str:
 _ENVIRONMENT.filters["number"] = _number
 _ENVIRONMENT.filters["short"] = _short
 _ENVIRONMENT.filters["brief"] = _brief
+_ENVIRONMENT.filters["times"] = _times
 _ENVIRONMENT.filters["interval"] = interval
 _ENVIRONMENT.filters["figure"] = _figure
 _ENVIRONMENT.globals["plotly_script"] = get_plotlyjs

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drake_disasm.effects import CommandGain, SensorDrift
+from drake_disasm.effects import CommandGain, SensorMounting
 from drake_disasm.logs import Log, LogWriter, read_log
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
@@ -26,14 +26,16 @@ def run(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_tool_writes_a_scenario_and_a_report(tmp_path):
-    log = static_log(tmp_path, [SensorDrift], 5.0, seed=2).folder
+    log = static_log(tmp_path, [SensorMounting], 5.0, seed=2).folder
     out = tmp_path / "out"
     result = run("--log", log, "--out", out, "--workers", "1")
     assert result.returncode == 0, result.stderr
-    assert "missing: SensorDrift" in result.stdout
+    assert "missing: SensorMounting" in result.stdout
     scenario = load_scenario(str(out / "scenario.yaml"))
-    assert any(isinstance(effect, SensorDrift) for effect in scenario.effects)
-    assert json.loads((out / "result.json").read_text())["ending"] == "explained"
+    assert any(isinstance(effect, SensorMounting) for effect in scenario.effects)
+    mapping = json.loads((out / "result.json").read_text())
+    assert mapping["ending"] == "explained"
+    assert mapping["effects"] == mapping["confirmed"] + mapping["ambiguous"]
     assert "Measured against predicted" in own_part((out / "report.html").read_text())
 
 

@@ -135,9 +135,11 @@ def _limit_words(row: LimitRow) -> str:
     """Returns the least size of one amplitude; over joints the range of it."""
     assert row.least and row.greatest
     low, high = row.least, row.greatest
-    size = f"{low[0]:.3g}"
-    if high[0] != low[0]:
-        size += f" ({low[1]}) to {high[0]:.3g} ({high[1]})"
-    hidden = f"; not at {', '.join(row.hidden)}" if any(row.hidden) else ""
+    ends = [low] if high[0] == low[0] else [low, high]
+    is_of_joints = any(joint for _, joint in ends) and len(ends) > 1
+    at = [f" ({joint})" if is_of_joints else "" for _, joint in ends]
+    size = " to ".join(f"{e[0]:.3g}{a}" for e, a in zip(ends, at, strict=True))
+    joints = dict.fromkeys(joint for joint in row.hidden if joint)
+    hidden = f"; not at {', '.join(joints)}" if joints else ""
     shapes = f" ({'; '.join(row.shapes)})" if row.shapes else ""
     return f"{row.kind}.{row.field}: {size} {row.unit}{shapes}{hidden}"

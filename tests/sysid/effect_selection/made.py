@@ -18,6 +18,7 @@ from sysid.effect_selection.replication import (
 from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.parameters import Parameter
 
+FREE = (-np.inf, np.inf)  # bounds of a coefficient
 TIME = "time"  # a joint's name that stands for SensorDrift
 
 
@@ -33,7 +34,7 @@ def linear_system(
     residual: np.ndarray,
     *,
     episode: np.ndarray | None = None,
-    sides: Sequence[float] = (),
+    bounds: Sequence[tuple[float, float]] = (),
     noise_is_stated: bool = False,
 ) -> LinearSystem:
     """Returns the system of candidates' columns beside a base of an offset.
@@ -42,7 +43,7 @@ def linear_system(
         columns: (rows, k) of each candidate, by its joint.
         residual: (rows,).
         episode: (rows,) number of each row's episode; one if left out.
-        sides: of each column, the base first; none if left out.
+        bounds: of each column's coefficient, the base first; none if left out.
         noise_is_stated: whether residuals are in units of their noise.
     """
     rows = len(residual)
@@ -55,7 +56,7 @@ def linear_system(
         np.ones((rows, 1)),
         blocks_of(episode, DEFAULT_SETTINGS.blocks),
         episode,
-        np.array(sides) if len(sides) else np.zeros(ends[-1]),
+        np.array(bounds or [FREE] * ends[-1]),
     )
     terms = tuple(
         Term((of_joint(joint),), np.arange(begin, end), np.zeros(end - begin, np.int64))

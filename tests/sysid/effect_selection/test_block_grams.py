@@ -33,7 +33,7 @@ class _Data:
             self.weights[rows],
             self.blocks[rows],
             self.episode[rows],
-            np.zeros(_P),
+            np.tile([-np.inf, np.inf], (_P, 1)),
         )
 
     def equations(self):
@@ -121,11 +121,12 @@ def test_what_is_left_of_each_channel(data):
     np.testing.assert_allclose(found, np.mean(left**2, axis=0), rtol=1e-6)
 
 
-def test_coefficients_keep_to_their_side(data):
-    grams = data.grams()
-    sides = np.sign(data.equations().solution(np.arange(_P)))
-    for side, expected in ((sides, [0, 1, 2, 3, 4]), (-sides, [])):
-        own = BlockGrams(grams.grams, grams.rows, grams.episode, side)
+def test_columns_whose_coefficients_would_leave_their_bounds_are_left_out(data):
+    grams, x = data.grams(), data.equations().solution(np.arange(_P))
+    bounds = np.tile([-np.inf, np.inf], (_P, 1))
+    for most, expected in ((2.0, [0, 1, 2, 3, 4]), (0.5, [0, 1, 2, 4])):
+        bounds[3] = sorted([0.0, most * x[3]])
+        own = BlockGrams(grams.grams, grams.rows, grams.episode, bounds)
         found = own.weighted(data.of_channels).feasible(np.arange(_P))
         assert found.tolist() == expected
 
@@ -150,7 +151,7 @@ def _regressions(rho, count, rows=480):
     weights = np.ones((rows, 1))
     for r in noise:
         grams = BlockGrams.of(
-            [A[:, None, :]], r[:, None], weights, blocks, one, np.zeros(3)
+            [A[:, None, :]], r[:, None], weights, blocks, one, np.zeros((3, 2))
         )
         yield A, r, grams.weighted(np.ones(1))
 

@@ -9,7 +9,7 @@ from sysid.effect_selection.block_grams import BlockGrams, blocks_of
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.forward_selection import Term, select, wald_p
 from sysid.effect_selection.settings import DEFAULT_SETTINGS
-from tests.sysid.effect_selection.made import linear_system, of_joint, selected
+from tests.sysid.effect_selection.made import FREE, linear_system, of_joint, selected
 
 _ROWS = 480
 
@@ -70,12 +70,16 @@ def test_an_effect_enters_with_as_few_amplitudes_as_are_about_as_good():
     assert term.columns.tolist() == [1 + 8 + 1]
 
 
-@pytest.mark.parametrize(("side", "shows"), [(1.0, True), (-1.0, False), (0.0, True)])
-def test_an_amplitude_keeps_to_its_side(side, shows):
+@pytest.mark.parametrize(
+    ("bounds", "shows"), [(FREE, True), ((0.0, 9.0), True), ((-9.0, 0.0), False)]
+)
+def test_an_amplitude_keeps_to_its_bounds(bounds, shows):
     random = np.random.default_rng(3)
     columns = _columns(random, 1)
     r = random.standard_normal(_ROWS) - 2.0 * columns["j0"][:, 0]
-    assert bool(selected(linear_system(columns, r, sides=[0.0, side])).names) == shows
+    assert (
+        bool(selected(linear_system(columns, r, bounds=[FREE, bounds])).names) == shows
+    )
 
 
 def test_a_stand_in_for_two_effects_gives_way_to_them():
@@ -107,7 +111,12 @@ def test_a_kind_at_all_joints_enters_at_once_and_without_those_that_lack_it():
     r = A[:, 0] @ [0, 0, 0, 0, 0, 1.0, -1.0, 0.0, 1.0] + random.standard_normal(_ROWS)
     one = np.zeros(_ROWS, np.int64)
     grams = BlockGrams.of(
-        [A], r[:, None], np.ones((_ROWS, 1)), blocks_of(one, 48), one, np.zeros(9)
+        [A],
+        r[:, None],
+        np.ones((_ROWS, 1)),
+        blocks_of(one, 48),
+        one,
+        np.array([FREE] * 9),
     )
     found = select(grams, np.arange(1), terms, DEFAULT_SETTINGS)
     assert set(found.names) == {f"JointViscousFriction.j{i}" for i in (0, 1, 3)}
@@ -126,7 +135,7 @@ def test_channels_count_by_what_is_left_of_them():
         np.ones((_ROWS, 2)),
         blocks_of(one, 48),
         one,
-        np.zeros(2),
+        np.array([FREE] * 2),
     )
     terms = [
         Term((of_joint(f"j{i}"),), np.array([i]), np.zeros(1, np.int64)) for i in (0, 1)

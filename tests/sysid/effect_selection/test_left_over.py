@@ -55,7 +55,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def found(folder: Path) -> ClosedLoop:
     model = _model(folder, hidden=0.2)
-    return close_loop(model, train=[0], test=[1], library=_LIBRARY)
+    return close_loop(model, train=[0], test=[1], library=_LIBRARY, learn_residual=True)
 
 
 def test_what_is_left_is_said_with_its_channel_and_what_it_depends_on(found):

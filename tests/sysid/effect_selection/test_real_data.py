@@ -35,7 +35,7 @@ def _closed(folders, train, test) -> ClosedLoop:
 
 def test_a_real_force_sensor_drifts_and_stops(tmp_path):
     found = _closed([write_static(100, tmp_path / "log")], [0], [])
-    assert found.verdict.names[0] == "SensorDrift"
+    assert "SensorDrift" in found.verdict.names
     values = {value.name: value for value in found.verdict.values}
     assert values["SensorDrift.fz"].interval[1] < 0.0
     assert 45.0 < values["SensorDrift.duration"].value < 65.0

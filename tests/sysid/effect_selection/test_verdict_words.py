@@ -24,66 +24,46 @@ from sysid.effect_selection.verdict_text import verdict_text
 from sysid.models import Channel, LogModel, Measurements
 from tests.sysid.effect_selection.verdicts import ERRORS, made_verdict
 
-_LAG = ("SensorLag",)
+_LAG, _FRICTION = ("SensorLag",), tuple(f"JointCoulombFriction.j{i}" for i in range(3))
 _AGAINST = (Contradiction(("a", "b"), "SensorBias", 0.5),)
-_TWO = tuple(ChannelFinding(c, "2 outlying rows (row 4, 5)") for c in ("fx", "fy"))
-_SINE = ChannelFinding("fx", "periodic at 1.3 Hz (90 %)", "is periodic at 1.3 Hz")
+_SINE = (ChannelFinding("fx", "periodic at 1.3 Hz (90 %)", "is periodic at 1.3 Hz"),)
 _LEFT = (LeftOver("fx", 0.4, 0.1, "N", ("velocity", "time")),)
 _LIMITS = (
     DetectionLimit("SensorLag", "fx", 0.01, "s", 0.1),
-    DetectionLimit("SensorLag", "fy", None, "s", 1.2),
     DetectionLimit("GrooveBend", "k", None, "1/m", 3.0),
 )
-_VALUE = ParameterValue("GrooveFriction.mu", 0.2, "1", (0.1, 0.3), 0.0)
-_SHAPE = ParameterValue("SensorLag.tau", 0.5, "s", (0.4, 0.6), None)
-_MAYBE_NULL = ParameterValue("SensorLag.size", 0.1, "N", (-0.1, 0.3), 0.0)
-_AT_BOUND = ParameterValue("SensorLag.share", 1.0, "1", (0.9, 1.0), 0.0, True)
-
-
-def _joints(kind, count):
-    return tuple(f"{kind}.j{i}" for i in range(count))
+_SIGN = (Written("TorqueSign", "j1 has the other sign", "flip it"),)
 
 
 @pytest.mark.parametrize(
-    ("verdict", "stated"),
+    ("ending", "names", "more", "stated"),
     [
-        (made_verdict("none", limits=_LIMITS), ["residual is noise", "1 of 2"]),
+        ("none", (), {"limits": _LIMITS}, ["residual is noise", "1 of 2"]),
+        ("too short", (), {"limits": _LIMITS}, ["too short", "bent groove"]),
+        ("explained", _FRICTION, {}, ["dry friction at three joints", "10 %", "1 %"]),
+        ("partly", _LAG, {"left_over": _LEFT}, ["not all", "40 %", "velocity"]),
+        ("partly", _LAG, {"relative_error": 0.49}, ["49 % of what was measured"]),
         (
-            made_verdict("too short", limits=_LIMITS),
-            ["too short", "1 of 2", effects_in_words(("GrooveBend",))],
+            "unexplained",
+            _LAG,
+            {"excess": 3.14},
+            ["no effect is confirmed", "3.1 times"],
         ),
+        ("unexplained", (), {"findings": _SINE}, ["fx is periodic at 1.3 Hz"]),
+        ("unexplained", (), {"correlated": ("fx",)}, ["of fx is correlated"]),
         (
-            made_verdict("explained", _joints("JointCoulombFriction", 6)),
-            ["dry friction at six joints", "10 %", "1 %"],
+            "unexplained",
+            (),
+            {"contradictions": _AGAINST},
+            ["a contradicts b", "offset"],
         ),
-        (made_verdict("partly", _LAG, findings=_TWO), ["not all", "fx and fy"]),
-        (made_verdict("unexplained", findings=(_SINE,)), ["fx is periodic at 1.3 Hz"]),
-        (made_verdict("partly", _LAG, left_over=_LEFT), ["40 %", "fx", "velocity"]),
-        (
-            made_verdict("unexplained", _LAG, excess=3.14),
-            ["no effect is confirmed", "3.1 times", "slow filter", "2 of 4 parts"],
-        ),
-        (made_verdict("unexplained", dependence="fx depends on time"), ["on time"]),
-        (made_verdict("unexplained", correlated=("fx",)), ["of fx is correlated"]),
-        (made_verdict("partly", _LAG, relative_error=0.49), ["49 % of what was"]),
-        (
-            made_verdict("unexplained", excess=3.14, contradictions=_AGAINST),
-            ["a contradicts b", "an offset of the sensor"],
-        ),
-        (
-            made_verdict("explained", _LAG, misfits=("moving rows (drop)",)),
-            ["moving rows (drop)", "slow filter"],
-        ),
-        (
-            made_verdict("none", written=(Written("Sign", "j1 turned", "flip it"),)),
-            ["j1 turned (flip it)", "residual is noise"],
-        ),
+        ("explained", _LAG, {"misfits": ("moving (drop)",)}, ["moving (drop)", "slow"]),
+        ("none", (), {"written": _SIGN}, ["other sign (flip it)", "is noise"]),
     ],
 )
-def test_a_sentence_states_names_numbers_and_the_ending(verdict, stated):
-    sentence = verdict_sentence(verdict, ERRORS)
-    for words in stated:
-        assert words in sentence
+def test_a_sentence_states_names_numbers_and_the_ending(ending, names, more, stated):
+    sentence = verdict_sentence(made_verdict(ending, names, **more), ERRORS)
+    assert all(words in sentence for words in stated), sentence
 
 
 def test_confirmed_names_come_before_what_is_suggested():
@@ -97,75 +77,28 @@ def test_confirmed_names_come_before_what_is_suggested():
     assert sentence.index("Suggested") < sentence.index("offset")
 
 
-def test_a_sentence_of_none_owns_that_the_model_states_an_error_of_its_own():
+def test_none_owns_that_the_model_states_an_error_of_its_own():
     errors = dataclasses.replace(ERRORS, model_error=np.ones_like(ERRORS.measured))
     assert "its own error" in verdict_sentence(made_verdict("none"), errors)
     assert "its own error" not in verdict_sentence(made_verdict("none"), ERRORS)
 
 
-def _text(*arguments, **more):
-    """Returns what is missing, the parameters and the error, each a line."""
-    lines = verdict_text(made_verdict(*arguments, **more), ERRORS, most=3).split("\n")
-    return [line for line in lines[1:] if not line.startswith("that is: ")]
-
-
-def test_the_text_begins_with_the_sentence_and_ends_with_the_errors():
-    found = made_verdict("explained", _joints("JointCoulombFriction", 3))
-    sentence, missing, meaning, *_, errors = verdict_text(found, ERRORS, 3).split("\n")
+def test_the_text_has_names_rivals_intervals_and_errors():
+    ties = (tuple(Tie(f"E{i}.j0", "rests") for i in range(5)),)
+    sizes = [(0.2, (0.1, 0.3)), (0.1, (-0.1, 0.3))]
+    values = tuple(
+        ParameterValue(f"{_FRICTION[0]}.x{i}", value, "N m", interval, 0.0, i == 0)
+        for i, (value, interval) in enumerate(sizes)
+    )
+    found = made_verdict("explained", _FRICTION[:1], ties, values)
+    sentence, missing, *_, parameters, errors = verdict_text(found, ERRORS, 3).split(
+        "\n"
+    )
     assert sentence == verdict_sentence(found, ERRORS)
-    assert missing == "missing: JointCoulombFriction of 3 joints (3 confirmed)"
-    assert meaning.startswith("that is: JointCoulombFriction: ")
+    assert "E0 or E1 or E2 or 2 more" in missing and "rests" in missing
+    assert "x0 = 0.2 N m (0.1 to 0.3, at its bound)" in parameters
+    assert "x1" not in parameters  # its interval holds null
     assert errors.endswith("1 -> 0.1 N; 10 -> 1 % of the readings")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "more", "begin", "end"),
-    [
-        (("none",), {"limits": _LIMITS}, "missing: none", "not GrooveBend"),
-        (
-            ("explained", _LAG),
-            {"dependence": "fx depends on time"},
-            "missing: Sen",
-            "time",
-        ),
-        (("partly", _LAG), {"findings": _TWO}, "missing: SensorLag", "(row 4, 5)"),
-        (("unexplained", _LAG), {"excess": 3.14}, "No effect", "(1 suggested)"),
-        (
-            ("unexplained",),
-            {"contradictions": _AGAINST, "excess": 2.0},
-            "No",
-            "(SensorBias)",
-        ),
-        (
-            (
-                "explained",
-                ("Friction.j1",),
-                (tuple(Tie(f"E{i}.j1", "rests") for i in range(5)),),
-            ),
-            {},
-            "missing: Friction.j1 (or E0 or E1 or E2 or 2 more)",
-            "record: rests (1 ambiguous)",
-        ),
-    ],
-)
-def test_the_text_names_what_is_missing_and_what_is_left(arguments, more, begin, end):
-    missing, *_ = _text(*arguments, **more)
-    assert missing.startswith(begin) and missing.endswith(end)
-
-
-@pytest.mark.parametrize(
-    ("names", "value", "shown"),
-    [
-        (("GrooveFriction",), _VALUE, "GrooveFriction.mu = 0.2 (0.1 to 0.3)"),
-        (_LAG, _SHAPE, "SensorLag.tau = 0.5 s"),
-        ((*_LAG, "A", "B", "C"), _SHAPE, "parameters: none"),  # of few effects alone
-        (_LAG, _MAYBE_NULL, "parameters: none"),
-        (_LAG, _AT_BOUND, "1 (0.9 to 1, at its bound)"),
-    ],
-)
-def test_the_text_lists_parameters_with_their_intervals(names, value, shown):
-    _, values, _ = _text("explained", names, values=(value,))
-    assert shown in values
 
 
 def test_effects_have_words_of_their_own_and_a_few_joints_are_named():
@@ -177,11 +110,10 @@ def test_effects_have_words_of_their_own_and_a_few_joints_are_named():
 
 
 def test_what_a_log_cannot_tell_apart_is_said_once_for_all_joints():
-    names = _joints("JointCoulombFriction", 3)
     ties = tuple(
-        (Tie(name.replace("Coulomb", "Load"), "two payloads"),) for name in names
+        (Tie(n.replace("Coulomb", "Load"), "two payloads"),) for n in _FRICTION
     )
-    found = made_verdict("explained", names, ties)
+    found = made_verdict("explained", _FRICTION, ties)
     text = indistinguishable_text(found)
     assert text.count("friction in proportion to the load") == 1
     assert text.endswith("record: two payloads.") and "stroke" not in text
@@ -229,21 +161,14 @@ def test_strokes_are_counted_by_reversals_and_episodes(position, is_single):
     assert joints_of_one_stroke(model, {"another"}) == ()
 
 
+_FORCE, _WAY = Channel("fx", "N", 0.1), Channel("w", "rad", 6e-5)
+
+
 @pytest.mark.parametrize(
     ("channels", "before", "after", "words"),
     [
-        (
-            (Channel("fx", "N"), Channel("x", "m"), Channel("tx", "N m")),
-            [2.0, 1e-6, 0.5],
-            [0.1, 1e-5, 0.499],
-            ["falls from 2 to 0.1 N", "rises from 1 to 10 μm"],
-        ),
-        (
-            (Channel("fx", "N", 0.1), Channel("w", "rad", 6e-5)),
-            [0.109, 5.6e-5],
-            [0.109, 9e-6],  # below its noise
-            ["falls from 56 to 9 μrad"],
-        ),
+        ((_FORCE, Channel("x", "m")), [2.0, 1e-6], [0.1, 1e-5], ["from 1 to 10 μm"]),
+        ((_FORCE, _WAY), [0.109, 5.6e-5], [0.109, 9e-6], ["falls from 56 to 9 μrad"]),
     ],
 )
 def test_errors_that_fall_and_rise_are_said_in_their_units(
@@ -266,3 +191,7 @@ def test_a_log_of_the_task_is_not_told_to_record_readings_at_rest():
         told = separating(one.__name__, other.__name__, at_task=True)
         assert "readings" not in told and "known weight" not in told
     assert "readings" in separating("SensorBias", "GrooveFriction")
+    drifts = separating("SensorWarmUp", "SensorDrift")
+    assert drifts == separating("SensorDrift", "SensorWarmUp") and "rest" in drifts
+    joints = separating("JointCoulombFriction.j1", "JointLoadFriction.j1")
+    assert "payload" in joints and separating("Unheard", "Of")

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from damaged_logs import damaged, late, scaled, swapped
 
+from drake_disasm.effects import JointCoulombFriction, JointViscousFriction
 from drake_disasm.logs import Log, read_log
+from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.regressor import ArmDynamics
@@ -72,6 +74,19 @@ def test_columns_of_torques_are_put_right(name, damage, words, right):
     assert way.name == name and words in way.what and way.remedy
     expected = model(right).measurements.values
     np.testing.assert_allclose(way.model.measurements.values, expected, rtol=1e-9)
+
+
+def test_closing_the_loop_takes_a_sign_for_the_log_s_and_names_what_is_besides(right):
+    library = [JointCoulombFriction, JointViscousFriction]
+    turned = model(damaged(right, scaled(-1.0, "tau.1")))
+    verdict = close_loop(turned, library=library).verdict
+    assert [each.name for each in verdict.written] == ["TorqueSign.elbow"]
+    rightly = close_loop(model(right), library=library).verdict
+    assert not rightly.written and set(verdict.names) == set(rightly.names)
+    assert {name.partition(".")[0] for name in rightly.names} == {
+        "JointCoulombFriction",
+        "JointViscousFriction",
+    }
 
 
 @pytest.mark.parametrize(
