@@ -17,6 +17,9 @@ from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.models.base import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 
+#: Effects that the package takes for a way in which the log was written.
+_EFFECTS = {"CommonDelay": "ArmDelay"}
+
 
 def select(case: Case) -> Answer:
     """Returns what closing the loop says of a case."""
@@ -58,9 +61,9 @@ def closed(case: Case, **arguments: Any) -> Answer:
         other = _model(case.held_out)
         before, after = (_error(other, fit) for fit in (found.first, found.last))
     return Answer(
-        verdict.ending,
-        getattr(verdict, "confirmed", verdict.names),
-        getattr(verdict, "suggested", ()),
+        "explained" if verdict.written and verdict.ending == "none" else verdict.ending,
+        (*(_EFFECTS.get(w.name, w.name) for w in verdict.written), *verdict.confirmed),
+        verdict.suggested,
         {
             name: tuple(part for tie in ties for part in tie.name.split(" and "))
             for name, ties in zip(verdict.names, verdict.ties, strict=True)

@@ -239,9 +239,7 @@ class NormalEquations:
             return self.losses
         kept = np.append(columns, -1)
         own = self.blocks[:, kept][:, :, kept]
-        others = own.sum(axis=0) - own
-        x = np.ones((len(own), len(kept)))
-        x[:, :-1] = -solve(others[:, :-1, :-1], others[:, :-1, -1])
+        x = self._of_others(own)
         return np.asarray(np.einsum("bi,bij,bj->b", x, own, x))
 
     def held_out_each(self) -> Array:
@@ -270,15 +268,26 @@ class NormalEquations:
 
         H^-1 V H^-1 with the blocks' scores projected on `cosines`: right for residuals
         that are correlated, as long as they are not slower than the slowest of them
-        (equal-weighted cosine estimator: Lazarus, Lewis, Stock and Watson 2018).
+        (equal-weighted cosine estimator: Lazarus, Lewis, Stock and Watson 2018). Each
+        block's score is that of a fit to all others, since a fit takes up a part of
+        the noise of a block (the jackknife, CR3: Bell and McCaffrey 2002).
         """
-        total = self.total
-        H = total[np.ix_(columns, columns)]
-        x = np.append(self.solution(columns), 1.0)
-        scores = self.blocks[:, columns][:, :, np.append(columns, -1)] @ x
+        kept = np.append(columns, -1)
+        own = self.blocks[:, kept][:, :, kept]
+        x = self._of_others(own)
+        scores = np.einsum("bij,bj->bi", own[:, :-1], x)
         waves = cosines(len(scores), self.degrees_of_freedom)
+        H = self.total[np.ix_(columns, columns)]
         along = solve(H, (waves @ scores).T)
         return np.asarray(along @ along.T / len(waves))
+
+    @staticmethod
+    def _of_others(own: Array) -> Array:
+        """Returns coefficients (B, k + 1), the last 1, fitted to all other blocks."""
+        others = own.sum(axis=0) - own
+        x = np.ones(own.shape[:2])
+        x[:, :-1] = -solve(others[:, :-1, :-1], others[:, :-1, -1])
+        return x
 
     @property
     def degrees_of_freedom(self) -> int:
