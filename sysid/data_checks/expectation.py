@@ -175,7 +175,7 @@ def _spread_rows(
     margin = settings.most_shift
     inside = (place >= margin) & (place < length[episode] - margin)
     rows = np.flatnonzero(inside)
-    if len(rows) < len(episode) // 2:
+    if 2 * len(rows) < len(episode):
         rows = np.arange(len(episode))
     return rows[:: -(-len(rows) // settings.most_rows)]
 

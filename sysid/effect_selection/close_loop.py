@@ -21,7 +21,7 @@ from sysid.effect_selection.command_scatter import (
     CommandScatter,
     fit_command_scatter,
 )
-from sysid.effect_selection.data_sufficiency import refuse_few_rows
+from sysid.effect_selection.data_sufficiency import refuse_few_rows, refuse_rest
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.held_out import HeldOut, held_out_errors
@@ -184,6 +184,7 @@ def close_loop(
         fitter = dataclasses.replace(fitter, deadline=deadline)
         base = fitter.base
         refuse_few_rows(base)
+        refuse_rest(base)
         refuse(dead_channels(base))
         applicable = _applicable(base, library)
         found = search(fitter, applicable, progress, deadline)

@@ -1,4 +1,4 @@
-"""Whether a log is long enough to decide anything."""
+"""Whether a log is long enough, and moves, to decide anything."""
 
 from drake_disasm.common.errors import DisasmError
 from sysid.models.base import LogModel
@@ -20,4 +20,19 @@ def refuse_few_rows(model: LogModel) -> None:
         raise DisasmError(
             f"the log is too short to decide: {rows} rows of {channels} channels, for "
             f"a model of {count} parameters; record at least {needed - rows} rows more"
+        )
+
+
+def refuse_rest(model: LogModel) -> None:
+    """Refuses logs of joints none of which moves.
+
+    Raises:
+        DisasmError: no joint does; names the first.
+    """
+    travel = model.travel
+    if travel and not any(travel.values()):
+        joint = next(iter(travel))
+        raise DisasmError(
+            f"{joint}: does not move in any row, nor does another joint; record a "
+            "motion, or map the columns of its positions"
         )
