@@ -42,8 +42,8 @@ from sysid.workers import Workers
 _SEARCHED = 0.85  # of the time: the rest is for errors and the verdict
 _MOST_REWRITES = 3  # ways in which a log may have been written wrongly
 _PROVISIONAL = (
-    "provisional: the time was over{untested}; the same command without a budget, or "
-    "with another, goes on from here"
+    "provisional: the time was over while {phase}{untested}; the same command without "
+    "a budget, or with another, goes on from here"
 )
 
 
@@ -99,8 +99,9 @@ class ClosedLoop:
         if not self.is_provisional:
             return text
         count = len(self.search.untested)
-        untested = f" before {count} candidate effects were tested" if count else ""
-        return f"{_PROVISIONAL.format(untested=untested)}\n{text}"
+        untested = f", {count} of them not yet" if count else ""
+        said = _PROVISIONAL.format(phase=self.search.phase, untested=untested)
+        return f"{said}\n{text}"
 
     @property
     def scenario(self) -> Scenario | None:

@@ -57,6 +57,17 @@ class SearchResult:
     is_complete: bool
     invalid: str = ""
 
+    @property
+    def phase(self) -> str:
+        """What was being done when the time was over; empty if it was not."""
+        if self.is_complete:
+            return ""
+        if self.untested:
+            return "candidates were compared"
+        if self.first.model.affine:
+            return "parts of the log were left out in turn"
+        return "effects were fitted"
+
 
 def search(
     fitter: Fitter, library: Sequence[Candidate], progress: Progress, deadline: float
