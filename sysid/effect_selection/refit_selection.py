@@ -9,7 +9,7 @@ fitted to a few rows.
 import dataclasses
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,6 +25,9 @@ from sysid.effect_selection.linear_system import LinearSystem, linear_system
 from sysid.effect_selection.prescreen import prescreening_fits
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.workers import Workers
+
+_Names = tuple[str, ...]
+_Gained = tuple[Gain, Fit]
 
 
 @dataclass
@@ -87,13 +90,11 @@ class RefitSelection:
         system = linear_system(self.fitter, fit, self.library, self.deadline)
         if not fit.effects:
             self.begin = tuple(LinearAccount.of_fit(system, fit).gains())
-        trials = self._trials(fit, system)
-        fits = self._fitted(fit, system, trials)
-        gains = {}
-        for trial, found in zip(trials, fits, strict=False):
-            gain = self._gain(fit, found, trial)
-            if gain is not None:
-                gains[gain.term.names] = (gain, found)
+        gains = self._gained(fit, system, self._trials(fit, system))
+        if not self._reaches_noise(fit, gains):
+            known = {*gains, *self._tried}
+            others = [g for g in self._best_shapes(system) if g.term.names not in known]
+            gains |= self._gained(fit, system, self._prescreened(fit, others))
         if not gains:
             return None
         order = sorted((gain for gain, _ in gains.values()), key=lambda g: -g.share)
@@ -105,25 +106,50 @@ class RefitSelection:
         self._report(f"{step.chosen.text}: objective {found.objective:.4g}")
         return found
 
-    def _trials(self, fit: Fit, system: LinearSystem) -> list[Gain]:
-        """Returns what is fitted: each effect in its best shape, the best first."""
+    def _reaches_noise(self, fit: Fit, gains: Mapping[_Names, _Gained]) -> bool:
+        """Returns whether an effect explains all, or nothing says that it should.
+
+        What explains a part may stand for another effect, which is not linear at null.
+        """
+        is_over = time.monotonic() > self.deadline
+        if not fit.noise_is_stated or fit.states_model_error or is_over:
+            return True
+        return any(found.is_at_noise for _, found in gains.values())
+
+    def _gained(
+        self, fit: Fit, system: LinearSystem, trials: Sequence[Gain]
+    ) -> dict[_Names, _Gained]:
+        """Returns what fits of trials gain, those that are more than noise."""
+        self._tried = {trial.term.names for trial in trials}
+        found = {}
+        for trial, after in zip(
+            trials, self._fitted(fit, system, trials), strict=False
+        ):
+            gain = self._gain(fit, after, trial)
+            if gain is not None:
+                found[gain.term.names] = (gain, after)
+        return found
+
+    def _best_shapes(self, system: LinearSystem) -> list[Gain]:
+        """Returns each effect in the shape that gains most by the linear account.
+
+        Those that gain nothing by it come last.
+        """
         equations = system.equations(np.ones(system.grams.grams.shape[1]))
         gains = ranked(equations, system.terms, self._settings)
-        best: dict[tuple[str, ...], Gain] = {}
-        for gain in gains:
+        nothing = [Gain(term, 0.0, np.zeros(1)) for term in system.terms]
+        best: dict[_Names, Gain] = {}
+        for gain in [*gains, *nothing]:
             best.setdefault(gain.term.names, gain)
-        is_far = fit.noise_is_stated and (
-            fit.objective > self._settings.max_linear_objective
-        )
-        if is_far:
-            known = {gain.term.names for gain in best.values()}
-            rest = [t for t in system.terms if t.names not in known]
-            unknown = [Gain(term, 0.0, np.zeros(1)) for term in rest]
-            best |= {gain.term.names: gain for gain in unknown[::-1]}
-            return self._prescreened(fit, list(best.values()))
-        least = 0.5 * self._settings.min_gain
-        promising = [gain for gain in best.values() if gain.share >= least]
-        return promising[: self._settings.trials]
+        return list(best.values())
+
+    def _trials(self, fit: Fit, system: LinearSystem) -> list[Gain]:
+        """Returns what is fitted: each effect in its best shape, the best first."""
+        best, limits = self._best_shapes(system), self._settings
+        if fit.noise_is_stated and fit.objective > limits.max_linear_objective:
+            return self._prescreened(fit, best)
+        least = 0.5 * limits.min_gain
+        return [gain for gain in best if gain.share >= least][: limits.trials]
 
     def _prescreened(self, fit: Fit, gains: Sequence[Gain]) -> list[Gain]:
         """Returns the effects that explain most by fits to a few rows."""
@@ -202,7 +228,8 @@ class RefitSelection:
     def _report(self, text: str) -> None:
         self.progress(ProgressUpdate("selecting effects", message=text))
 
-    _starts: dict[tuple[str, ...], Fit] = field(default_factory=dict)
+    _starts: dict[_Names, Fit] = field(default_factory=dict)
+    _tried: set[_Names] = field(default_factory=set)
 
 
 @dataclass(frozen=True)
