@@ -75,7 +75,7 @@ def sieve(residual: Array) -> Noise:
     order = min(_SIEVE_ORDER, len(residual) // 2)
     filters = [_whitening_filter(r, order) for r in residual.T]
     pairs = zip(filters, residual.T, strict=True)
-    innovations = np.column_stack([lfilter(a, 1.0, r)[order:] for a, r in pairs])
+    innovations = np.column_stack([lfilter(a, [1.0], r)[order:] for a, r in pairs])
     power = np.sqrt(np.mean(residual**2, axis=0))
 
     def _draw(random: np.random.Generator, predicted: Array) -> Array:
