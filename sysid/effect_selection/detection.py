@@ -39,11 +39,15 @@ def detection_limits(account: LinearAccount) -> list[DetectionLimit]:
     An effect is found if it takes away `min_gain` of the loss, and if its coefficient
     is significant when a part of the log is left out.
     """
-    return [
+    shown = [
         limit
         for term in account.terms
         if len(term.candidates) == 1
         for limit in _limits(account, term)
+    ]
+    return shown + [
+        DetectionLimit(each.name, each.fields[0], None, "1", np.inf)
+        for each in account.unseen
     ]
 
 
@@ -74,9 +78,11 @@ def _limits(account: LinearAccount, term: Term) -> list[DetectionLimit]:
     loss = float(equations.losses.sum())
     found = []
     for i, column in enumerate(term.columns):
+        if not equations.is_new(np.array([column]))[0]:
+            continue  # the model's own parameters, or its effects, can do the same
         power = float(equations.total[column, column])
         least = np.inf
-        if equations.is_new(np.array([column]))[0] and power > 0.0:
+        if power > 0.0:
             error = np.sqrt(equations.score_variance(column)) / power
             of_use = np.sqrt(settings.min_gain / (1 - settings.min_gain) * loss / power)
             least = max(needed * error, of_use + above * error)

@@ -13,6 +13,7 @@ from sysid.effect_selection.block_grams import (
     Columns,
     NormalEquations,
 )
+from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.forward_selection import (
     Gain,
@@ -43,6 +44,7 @@ class LinearAccount:
         parameters: as the columns are; curves have none.
         noise_is_stated: whether residuals are in units of a noise that is known.
         settings: thresholds.
+        unseen: candidates that no row depends on.
     """
 
     grams: BlockGrams
@@ -54,6 +56,7 @@ class LinearAccount:
     parameters: tuple[Parameter, ...]
     noise_is_stated: bool
     settings: SelectionSettings
+    unseen: tuple[Candidate, ...] = ()
 
     @classmethod
     def of_selection(cls, system: LinearSystem, found: Selection) -> "LinearAccount":
@@ -97,6 +100,7 @@ class LinearAccount:
             system.parameters,
             system.noise_is_stated,
             system.settings,
+            system.unseen,
         )
 
     @functools.cached_property

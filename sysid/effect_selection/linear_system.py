@@ -45,6 +45,7 @@ class LinearSystem:
             affine, so that they need no such.
         untested: candidates, as text, for which the time was not enough.
         settings: thresholds.
+        unseen: candidates that no row depends on, in whatever shape.
     """
 
     grams: BlockGrams
@@ -57,6 +58,7 @@ class LinearSystem:
     linearisation: Linearisation | None
     untested: tuple[str, ...]
     settings: SelectionSettings
+    unseen: tuple[Candidate, ...] = ()
 
     @property
     def weights(self) -> Array | None:
@@ -138,7 +140,18 @@ def linear_system(
         None if model.affine else linear,
         tuple(candidate.text for candidate in rest[len(tested) :]),
         settings,
+        tuple(_unseen(tested, own_columns)),
     )
+
+
+def _unseen(
+    library: Sequence[Candidate], columns: Sequence[Columns]
+) -> list[Candidate]:
+    """Returns a candidate of each effect none of whose shapes has columns."""
+    pairs = list(zip(library, columns, strict=True))
+    seen = {candidate.name for candidate, own in pairs if len(own)}
+    hidden = {c.name: c for c, _ in pairs if c.name not in seen and c.fields}
+    return list(hidden.values())
 
 
 def _linearised(

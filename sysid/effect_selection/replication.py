@@ -1,7 +1,7 @@
 """Whether parts of a log that had no say in choosing an effect ask for it, too.
 
 Each part of the log is left out in turn. *Confirmed* is an effect that the others
-select without it, and of the same sign in each part; *ambiguous* one for which they
+select without it, and of a compatible size in each part; *ambiguous* one for which they
 select it or a rival; *suggested* what lowers the error and is neither.
 """
 
@@ -76,8 +76,8 @@ def standings(
             reason = "noise that is slow looks like it; a second session would tell"
         elif asked < account.settings.parts - account.settings.missing_votes:
             reason = f"{asked} of {account.settings.parts} parts of the log ask for it"
-        elif not _is_of_one_sign(parts, columns):
-            reason = "its sign differs between parts of the log"
+        elif _contradicting_parts(parts, columns) > account.settings.missing_votes:
+            reason = "its size differs between parts of the log"
         status: Status = "suggested" if reason else "confirmed"
         if own and not reason:
             status = "ambiguous"
@@ -149,22 +149,20 @@ def _gain(folds: NormalEquations, columns: Columns) -> float:
     return float(1.0 - without.held_out(columns).sum() / total)
 
 
-def _is_of_one_sign(parts: NormalEquations, columns: Columns) -> bool:
-    """Returns whether each part by itself wants coefficients of the same direction.
+def _contradicting_parts(parts: NormalEquations, columns: Columns) -> int:
+    """Returns how many parts are predicted worse with what all others say.
 
-    A part in which the effect hardly shows is not asked.
+    That is so if a part by itself says less than half of it, or the opposite. A part in
+    which the effect hardly shows is not asked.
     """
     rest = np.setdiff1d(np.arange(len(parts.power)), columns)
     without = parts.projected(rest)
-    x, total = without.solution(columns), without.total
-    information = float(x @ total[np.ix_(columns, columns)] @ x)
-    for block in without.blocks:
-        own = float(x @ block[np.ix_(columns, columns)] @ x)
-        if own * len(without.blocks) < _INFORMED * information:
-            continue
-        if float(x @ block[columns, -1]) > 0.0:  # the loss would rise along x
-            return False
-    return True
+    x = without.solution(columns)
+    inner = without.blocks[:, columns][:, :, columns]
+    information = np.einsum("i,bij,j->b", x, inner, x)
+    is_informed = information >= _INFORMED * information.mean()
+    is_worse = without.held_out(columns) > without.losses
+    return int(np.sum(is_informed & is_worse))
 
 
 def _slow_names(

@@ -76,7 +76,7 @@ class SelectionSettings:
     missing_votes: int = _setting(
         1,
         "parts",
-        "without which a confirmed effect may be not selected: what shows in one "
+        "that may disagree with the others on a confirmed effect: what shows in one "
         "quarter only can't be selected by the others",
         _ABLATION,
     )

@@ -241,9 +241,10 @@ def _ending(found: Verdict, last: Fit) -> Ending:
         or found.invalid
         or is_large
     )
+    left = left or bool(found.suggested or found.dependence)
     if found.confirmed or found.ambiguous:
-        return "partly" if left or found.suggested else "explained"
-    if left or found.suggested or found.dependence:
+        return "partly" if left else "explained"
+    if left:
         return "unexplained"
     if found.correlated and not last.noise_is_stated:
         return "unexplained"
