@@ -76,7 +76,7 @@ def standings(
             reason = "noise that is slow looks like it; a second session would tell"
         elif asked < account.settings.parts - account.settings.missing_votes:
             reason = f"{asked} of {account.settings.parts} parts of the log ask for it"
-        elif _contradicting_parts(parts, columns) > account.settings.missing_votes:
+        elif not _is_compatible(parts, columns, account.settings.missing_votes):
             reason = "its size differs between parts of the log"
         status: Status = "suggested" if reason else "confirmed"
         if own and not reason:
@@ -149,20 +149,26 @@ def _gain(folds: NormalEquations, columns: Columns) -> float:
     return float(1.0 - without.held_out(columns).sum() / total)
 
 
-def _contradicting_parts(parts: NormalEquations, columns: Columns) -> int:
-    """Returns how many parts are predicted worse with what all others say.
+def _is_compatible(parts: NormalEquations, columns: Columns, most: int) -> bool:
+    """Returns whether parts by themselves ask for coefficients of a compatible size.
 
-    That is so if a part by itself says less than half of it, or the opposite. A part in
-    which the effect hardly shows is not asked.
+    That is for at least half of what all ask for together, along the same direction, of
+    which a part is then predicted better than without. So many parts may ask for less,
+    none for the opposite. A part in which the effect hardly shows is not asked.
+
+    Args:
+        parts: equations of the effects.
+        columns: of the effect.
+        most: parts that may ask for less.
     """
     rest = np.setdiff1d(np.arange(len(parts.power)), columns)
     without = parts.projected(rest)
     x = without.solution(columns)
     inner = without.blocks[:, columns][:, :, columns]
     information = np.einsum("i,bij,j->b", x, inner, x)
-    is_informed = information >= _INFORMED * information.mean()
-    is_worse = without.held_out(columns) > without.losses
-    return int(np.sum(is_informed & is_worse))
+    informed = information >= _INFORMED * information.mean()
+    share = -(without.blocks[informed][:, columns, -1] @ x) / information[informed]
+    return bool((share >= 0.0).all() and np.sum(share < 0.5) <= most)
 
 
 def _slow_names(
