@@ -47,7 +47,7 @@ class SelectionSettings:
         _ABLATION,
     )
     max_steps: int = _setting(
-        20, "effects", "a guard: `min_gain` ends the selection before", _ABLATION
+        20, "effects", "a guard: `min_gain` ends the selection before"
     )
 
     # Which effects can't be told apart.
@@ -106,21 +106,18 @@ class SelectionSettings:
         8,
         "effects",
         "that gain most by the linear account are fitted, and the fits compared",
-        _ABLATION,
     )
     search_rows: int = _setting(
         250,
         "rows",
         "a hundred evaluations of a model that takes seconds for all rows then take "
         "minutes; so do hundreds of fits far from the data",
-        _ABLATION,
     )
     max_linear_objective: float = _setting(
         5.0,
         "objective",
         "beyond five times the noise the linear account is not asked: the bolt is "
         "inside the model's wall, and the derivative is the wall's stiffness",
-        _ABLATION,
     )
     prescreen_rows: int = _setting(
         120, "rows", "there is one such fit for each effect, so it must be cheap"
@@ -137,20 +134,17 @@ class SelectionSettings:
         1.0,
         "objective",
         "a residual as large as the noise: nothing is left to fit",
-        _ABLATION,
     )
     max_objective_at_noise: float = _setting(
         1.2,
         "objective",
         "beyond it there is more than noise, where channels state their noise",
-        _ABLATION,
     )
     model_error_reach: float = _setting(
         1.0,
         "standard deviations",
         "by which the model itself may be off in all rows at once, in the direction of "
         "an effect: what is less is none of a log that states such an error",
-        _ABLATION,
     )
 
     # Whether nothing is missing.
@@ -161,7 +155,6 @@ class SelectionSettings:
         0.9,
         "share of the kinds of effects",
         "that a log must be able to show for a verdict of nothing missing",
-        _ABLATION,
     )
     max_relative_error: float = _setting(
         0.25,
@@ -174,7 +167,6 @@ class SelectionSettings:
         0.1,
         "of a channel's mean squared residual",
         "what a flexible learner explains of rows that it did not see",
-        _ABLATION,
     )
     max_listed: int = _setting(
         3, "items", "of anything in the text of a verdict, which has three lines"

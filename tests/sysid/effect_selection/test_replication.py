@@ -48,7 +48,7 @@ def test_what_can_show_in_one_quarter_only_is_confirmed_where_the_others_are_sil
 def test_what_changes_its_sign_is_not_confirmed():
     found = _placed(np.array([3.0, 3.0, 3.0, -1.5])[_QUARTER])
     assert found[_NAME].status == "suggested"
-    assert found[_NAME].reason == "its sign differs between parts of the log"
+    assert found[_NAME].reason == "its size differs between parts of the log"
 
 
 @pytest.mark.parametrize(
