@@ -57,7 +57,7 @@ def closed(case: Case, **arguments: Any) -> Answer:
     found = close_loop(_model(case.logs), library=library, **arguments)
     verdict, errors = found.verdict, found.errors
     before, after = errors.relative(errors.before), errors.relative(errors.after)
-    if case.held_out:
+    if case.held_out and not verdict.written:  # else it was written otherwise, too
         other = _model(case.held_out)
         before, after = (_error(other, fit) for fit in (found.first, found.last))
     return Answer(
