@@ -136,7 +136,7 @@ def test_ctrl_c_leaves_a_state_that_resumes_to_the_same_result(
         ((), "--parameters"),
         (  # nobody got as far as the end of the groove
             ("--parameters", "contact.friction", "lock.travel", "--workers", "1"),
-            "lock.travel: this log does not determine",
+            "lock.travel: has no effect on this log's channels",
         ),
     ],
 )

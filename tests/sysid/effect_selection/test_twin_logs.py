@@ -98,7 +98,7 @@ def test_candidates_that_the_time_was_not_enough_for_are_counted(tmp_path):
     assert time.monotonic() - begin < 30.0  # of the machine's noise; 3 s alone
     count = len(found.search.untested)
     assert 0 < count < len(candidates(model, registered_effects()))
-    assert f"{count} candidate effects" in found.text
+    assert f"{count} of them not yet" in found.text
     assert "tried so far" in found.sentence
     assert to_mapping(found)["untested"] == list(found.search.untested)
     assert f"{count} candidate effects" in closing_page(found, {})

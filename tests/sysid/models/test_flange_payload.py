@@ -59,9 +59,10 @@ def test_closing_the_loop_finds_it_beside_the_arm_of_the_urdf(log: Log) -> None:
     np.testing.assert_allclose(effect.first_moment, MASS * COM, atol=0.01)
 
 
-def test_a_payload_is_not_missing_if_the_last_link_is_free(log: Log) -> None:
-    """Nor could it be seen: a link's own inertia takes it up."""
+def test_a_payload_is_not_asked_for_if_the_last_link_is_free(log: Log) -> None:
+    """A link's own inertia takes it up: the model lacks nothing."""
     model = model_of([log], ModelChoice())
     assert isinstance(model, JointMotionModel)
     verdict = close_loop(model).verdict
-    assert not verdict.names and "FlangePayload" in verdict.undetectable
+    assert not verdict.names and verdict.ending == "none"
+    assert not any(limit.effect == "FlangePayload" for limit in verdict.limits)
