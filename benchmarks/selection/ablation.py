@@ -30,7 +30,7 @@ from drake_disasm.common.program import ProgressBar, argument_parser, run
 from drake_disasm.common.progress import ProgressUpdate
 from selection.answer import Answer, Case
 from selection.cases import case_of, chosen
-from selection.judge import asked
+from selection.judge import add_folder_arguments, asked
 from selection.scores import Judged
 
 _PROGRAM = "benchmarks/selection/ablation.py"
@@ -122,15 +122,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         help="only the first N of them (default: 20)",
     )  # fmt: skip
     add("--settings", nargs="+", metavar="NAME", help="only these (default: all)")
-    add(
-        "--out", type=Path, default=Path("out/judge"), metavar="FOLDER",
-        help="keeps answers; a run that was stopped goes on from there "
-        "(default: out/judge)",
-    )  # fmt: skip
-    add(
-        "--logs", type=Path, default=None, metavar="FOLDER",
-        help="keeps the logs of cases (default: cases in the folder of --out)",
-    )  # fmt: skip
+    add_folder_arguments(add)
     add_results_argument(parser)
     return parser.parse_args(arguments)
 

@@ -37,7 +37,7 @@ import importlib
 import shutil
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -81,6 +81,16 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         "--limit", type=options.positive, metavar="N",
         help="only the first N of the cases, in an order that mixes all kinds",
     )  # fmt: skip
+    add_folder_arguments(add)
+    add("--fresh", action="store_true", help="forget the selectors' kept answers")
+    add("--list", action="store_true", help="print the names of the cases, and end")
+    add("--each", action="store_true", help="print a line for each case, too")
+    add_results_argument(parser)
+    return parser.parse_args(arguments)
+
+
+def add_folder_arguments(add: Callable[..., object]) -> None:
+    """Adds the folders of answers and of cases' logs to a program's arguments."""
     add(
         "--out", type=Path, default=Path("out/judge"), metavar="FOLDER",
         help="keeps answers; a run that was stopped goes on from there "
@@ -90,11 +100,6 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         "--logs", type=Path, default=None, metavar="FOLDER",
         help="keeps the logs of cases (default: cases in the folder of --out)",
     )  # fmt: skip
-    add("--fresh", action="store_true", help="forget the selectors' kept answers")
-    add("--list", action="store_true", help="print the names of the cases, and end")
-    add("--each", action="store_true", help="print a line for each case, too")
-    add_results_argument(parser)
-    return parser.parse_args(arguments)
 
 
 def main(arguments: Sequence[str]) -> int:

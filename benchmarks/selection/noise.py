@@ -5,10 +5,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from real_data import data_folder
-from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
 from drake_disasm.common.errors import DisasmError
+from sysid.validation.null_logs import autoregressive, heavy_tailed, sieve, white
 
 Array = NDArray[np.float64]
 
@@ -16,8 +15,7 @@ Array = NDArray[np.float64]
 UNMODELLED = "unmodelled"
 NOISES = ("white", "ar0.9", "ar0.98", "t3", "residual")
 
-_FORGETS = 1000  # rows, after which a process knows nothing of its first row
-_SIEVE_ORDER = 30  # of the autoregression that stands for a real residual
+_KINDS = {"white": white, "t3": heavy_tailed}
 _EVERY = 2  # rows of a recording at 200 Hz, for a log at 100 Hz
 
 
@@ -34,46 +32,15 @@ def drawn_noise(
     Raises:
         DisasmError: the kind is unknown, or the real residual's data are missing.
     """
-    if kind == "white":
-        return random.standard_normal((rows, channels))
-    if kind == "t3":
-        return random.standard_t(3, (rows, channels)) / np.sqrt(3.0)
     if kind == "residual":
-        return _sieve(random, rows, channels)
-    if kind.startswith("ar"):
-        rho = float(kind.removeprefix("ar"))
-        size = (rows + _FORGETS, channels)
-        white = np.sqrt(1.0 - rho**2) * random.standard_normal(size)
-        return np.asarray(lfilter([1.0], [1.0, -rho], white, axis=0)[_FORGETS:])
-    raise DisasmError(f"noise '{kind}': unknown; take one of {', '.join(NOISES)}")
-
-
-def _sieve(random: np.random.Generator, rows: int, channels: int) -> Array:
-    """Returns noise like the residual of a real arm: an autoregressive sieve.
-
-    Innovations are drawn with replacement row by row, so that channels stay
-    correlated, and go through the model that whitened them (Bühlmann 1997).
-    """
-    residual = _real_residual()[:, np.arange(channels) % 7]
-    models = [_autoregression(column) for column in residual.T]
-    white = np.column_stack(
-        [
-            lfilter(a, [1.0], column)
-            for a, column in zip(models, residual.T, strict=True)
-        ]
-    )[_SIEVE_ORDER:]
-    drawn = white[random.integers(0, len(white), rows + _FORGETS)]
-    noise = np.column_stack(
-        [lfilter([1.0], a, column) for a, column in zip(models, drawn.T, strict=True)]
-    )[_FORGETS:]
-    return np.asarray(noise / np.sqrt(np.mean(residual**2, axis=0)))
-
-
-def _autoregression(series: Array) -> Array:
-    """Returns the whitening polynomial [1, -a_1, ...], by Yule and Walker."""
-    covariance = np.correlate(series, series, "full")[len(series) - 1 :]
-    lags = covariance[: _SIEVE_ORDER + 1] / len(series)
-    return np.append(1.0, -solve_toeplitz(lags[:-1], lags[1:]))
+        noise = sieve(_real_residual()[:, np.arange(channels) % 7])
+    elif kind in _KINDS:
+        noise = _KINDS[kind]
+    elif kind.startswith("ar"):
+        noise = autoregressive(float(kind.removeprefix("ar")))
+    else:
+        raise DisasmError(f"noise '{kind}': unknown; take one of {', '.join(NOISES)}")
+    return noise(random, np.zeros((rows, channels)))
 
 
 def _real_residual() -> Array:

@@ -242,6 +242,11 @@ class NormalEquations:
         x = self._of_others(own)
         return np.asarray(np.einsum("bi,bij,bj->b", x, own, x))
 
+    def held_out_gain(self, columns: Columns) -> float:
+        """Returns the share of the loss that columns take away, see `held_out`."""
+        total = max(float(self.losses.sum()), 1e-300)
+        return float(1.0 - self.held_out(columns).sum() / total)
+
     def held_out_each(self) -> Array:
         """Returns the same (B, P) of each column by itself."""
         size = self.blocks.shape[1] - 1

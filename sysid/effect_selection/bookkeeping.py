@@ -5,12 +5,12 @@ best effect does, or lowers the held-out error with all effects in; the selectio
 starts anew from the log as it should have been written.
 """
 
-import dataclasses
 from collections.abc import Callable, Sequence
 
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.search import SearchResult
+from sysid.identification.noise import with_noise_of
 from sysid.models.base import LogModel
 from sysid.models.bookkeeping import Bookkeeping
 
@@ -33,7 +33,7 @@ def best_hypothesis(
     best_effect = max((gain.share for gain in found.begin), default=0.0)
     gains = {}
     for number, each in enumerate(hypotheses):
-        own = _fitter_of(fitter, rows(each.model))
+        own = fitter.with_base(with_noise_of(fitter.base, rows(each.model)))
         alone = own.fit(())
         gain = _gain(found.first, alone)
         if gain < max(least, best_effect):
@@ -43,14 +43,6 @@ def best_hypothesis(
     if not gains:
         return None
     return hypotheses[max(gains, key=lambda number: gains[number])]
-
-
-def _fitter_of(fitter: Fitter, model: LogModel) -> Fitter:
-    """Returns a fitter of another model of the same rows, in the same units."""
-    noise = fitter.base.measurements.noise
-    origin = fitter.base.measurements.channels[0].origin
-    same = model.with_measurements(model.measurements.with_noise(noise, origin))
-    return dataclasses.replace(fitter, base=same)
 
 
 def _gain(before: Fit, after: Fit) -> float:

@@ -34,6 +34,7 @@ from sysid.effect_selection.verdict_sentence import (
     verdict_sentence,
 )
 from sysid.effect_selection.verdict_text import verdict_text
+from sysid.identification.noise import with_noise_of
 from sysid.identification.split import train_and_test
 from sysid.models.base import LogModel
 from sysid.models.bookkeeping import Bookkeeping
@@ -195,7 +196,7 @@ def close_loop(
         progress(ProgressUpdate("selecting effects", message=better.what))
         written.append(better)
         model = better.model
-    held_out = _with_noise_of(base, model.of_episodes(test)) if test else None
+    held_out = with_noise_of(base, model.of_episodes(test)) if test else None
     errors = held_out_errors(found.first, found.last, held_out)
     is_late = time.monotonic() > deadline
     may_scatter = Imprecision in library and not is_late
@@ -238,10 +239,3 @@ def _applicable(
             "classes of effects that its predict applies in effect_types"
         )
     return found
-
-
-def _with_noise_of(base: LogModel, held_out: LogModel) -> LogModel:
-    """Returns held-out rows with the noise as estimated on the training rows."""
-    noise = base.measurements.noise
-    origin = base.measurements.channels[0].origin
-    return held_out.with_measurements(held_out.measurements.with_noise(noise, origin))

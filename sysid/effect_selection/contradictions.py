@@ -1,5 +1,6 @@
 """Finds episodes that contradict each other: no common effect explains both."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,38 +47,60 @@ def contradictions(
     if not 1 < len(names) <= _MOST or blocks_each < 2 or is_noise:
         return ()
     numbers = range(len(names)) if len(names) > 2 else [1]
+    whole, sets = account.grams.weighted(account.weights), _sets(account)
     found = []
     for number in numbers:
-        best = _difference(account, number, len(numbers))
+        best = _difference(account, whole, sets, number, len(numbers))
         if best:
             which = (names[number],) if len(names) > 2 else names
             found.append(Contradiction(which, *best))
     return tuple(sorted(found, key=lambda each: -each.gain))
 
 
-def _difference(
-    account: LinearAccount, number: int, tests: int
-) -> tuple[str, float] | None:
-    """Returns what differs in an episode and how much that explains; else None."""
-    whole = account.grams.weighted(account.weights)
-    own = np.setdiff1d(account.columns, np.concatenate([[], *account.owners.values()]))
+def _sets(account: LinearAccount) -> list[tuple[str, Columns]]:
+    """Returns what may differ in an episode, in words, with its columns."""
+    empty = np.array([], dtype=np.int64)
+    effects = np.concatenate([empty, *account.owners.values()])
+    own = np.setdiff1d(account.columns, effects)
     sets = [
-        (t.candidates[0].text, t.columns) for t in account.terms if len(t.names) == 1
+        *(
+            (t.candidates[0].text, t.columns)
+            for t in account.terms
+            if len(t.names) == 1
+        ),
+        *account.owners.items(),
+        (_OWN, own),
     ]
-    sets += [*account.owners.items(), (_OWN, own.astype(np.int64))]
-    passed = []
+    return [(text, columns) for text, columns in sets if len(columns)]
+
+
+def _difference(
+    account: LinearAccount,
+    whole: NormalEquations,
+    sets: Sequence[tuple[str, Columns]],
+    number: int,
+    episodes: int,
+) -> tuple[str, float] | None:
+    """Returns what differs in an episode and how much that explains; else None.
+
+    Args:
+        account: see `contradictions`.
+        whole: its normal equations.
+        sets: what may differ.
+        number: of the episode.
+        episodes: how many are asked.
+    """
+    limits, passed, tests = account.settings, [], episodes * len(sets)
     for text, columns in sets:
-        if not len(columns):
-            continue
         base = np.setdiff1d(account.columns, columns)
         both = _with_own(whole, base, columns, number)
-        gain, p = _gain(both, len(columns), account.settings.folds)
-        if gain >= account.settings.min_gain and p * len(sets) * tests < 0.05:
+        gain, p = _gain(both, len(columns), limits.folds)
+        if gain >= limits.min_gain and p * tests < limits.alpha:
             passed.append((text, gain, len(columns)))
     if not passed:
         return None
-    most = max(gain for _, gain, _ in passed)
-    good = [each for each in passed if each[1] >= 0.9 * most]
+    enough = (1.0 - limits.ambiguity_margin) * max(gain for _, gain, _ in passed)
+    good = [each for each in passed if each[1] >= enough]
     text, gain, _ = min(good, key=lambda each: each[2])
     return text, gain
 
@@ -109,7 +132,6 @@ def _gain(both: NormalEquations, k: int, folds: int) -> tuple[float, float]:
     copies = copies[left.is_new(copies)]
     if not len(copies):
         return 0.0, 1.0
-    parts = left.folds(folds)
-    gain = 1.0 - parts.held_out(copies).sum() / max(parts.losses.sum(), 1e-300)
     x, C = left.solution(copies), left.covariance(copies)
-    return float(gain), wald_p(x, C, left.degrees_of_freedom)
+    p = wald_p(x, C, left.degrees_of_freedom)
+    return left.folds(folds).held_out_gain(copies), p

@@ -1,11 +1,13 @@
 """What a log could have shown: the smallest effects that would have been found."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as t_distribution
 
+from sysid.effect_selection.experiments import revealing_kind
 from sysid.effect_selection.forward_selection import Term
 from sysid.effect_selection.linear_account import LinearAccount
 from sysid.parameters import Scaling, nominal_values
@@ -51,7 +53,14 @@ def detection_limits(account: LinearAccount) -> list[DetectionLimit]:
     ]
 
 
-def is_detectable(limits: list[DetectionLimit], kind: str) -> bool:
+def undetectable(limits: Sequence[DetectionLimit]) -> dict[str, str]:
+    """Returns the kinds of effects that a log could not have shown, and what would."""
+    kinds = dict.fromkeys(x.effect.partition(".")[0] for x in limits)
+    hidden = [kind for kind in kinds if not is_detectable(limits, kind)]
+    return {kind: revealing_kind(kind) for kind in hidden}
+
+
+def is_detectable(limits: Sequence[DetectionLimit], kind: str) -> bool:
     """Returns whether a kind of effect would have been found in most of its shapes.
 
     A patch that shows at one place only is not detectable wherever it may be.

@@ -11,9 +11,8 @@ from sysid.effect_selection.data_sufficiency import refuse_few_rows
 from sysid.effect_selection.detection import (
     DetectionLimit,
     detection_limits,
-    is_detectable,
+    undetectable,
 )
-from sysid.effect_selection.experiments import revealing_kind
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.linear_account import LinearAccount
@@ -63,10 +62,7 @@ class Excitation:
 
         By the kind's name, with the recording that shows it.
         """
-        limits = list(self.limits)
-        kinds = dict.fromkeys(kind_of(limit.effect) for limit in limits)
-        hidden = [kind for kind in kinds if not is_detectable(limits, kind)]
-        return {kind: revealing_kind(kind) for kind in hidden}
+        return undetectable(self.limits)
 
     def to_mapping(self) -> dict[str, Any]:
         """Returns it as plain data."""

@@ -194,8 +194,7 @@ class Fit:
             rest = np.setdiff1d(present, columns)
             equations = self._at_null(np.append(columns, absent))
             without = equations.projected(rest).folds(self.settings.folds)
-            left = without.held_out(columns).sum() / max(without.losses.sum(), 1e-300)
-            found[effect.name] = float(1.0 - left)
+            found[effect.name] = without.held_out_gain(columns)
         return found
 
     def _at_null(self, columns: NDArray[np.int64]) -> NormalEquations:

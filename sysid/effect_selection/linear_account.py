@@ -24,9 +24,10 @@ from sysid.effect_selection.forward_selection import (
     ranked,
     wald_p,
 )
-from sysid.effect_selection.linear_system import LinearSystem, field_of
+from sysid.effect_selection.linear_system import LinearSystem
 from sysid.effect_selection.residual_curves import Dependence
 from sysid.effect_selection.settings import SelectionSettings
+from sysid.models.effects import field_of
 from sysid.parameters import Parameter
 
 
@@ -134,13 +135,13 @@ class LinearAccount:
         """Returns curves with their gain and family-wise p-value, the best first."""
         equations = self.equations
         folds = equations.folds(self.settings.folds)
-        nu, total = equations.degrees_of_freedom, max(folds.losses.sum(), 1e-300)
+        nu = equations.degrees_of_freedom
         found = []
         for curve, columns in self.dependences:
             columns = folds.feasible(columns)
             if not len(columns):
                 continue
-            gain = float(1.0 - folds.held_out(columns).sum() / total)
+            gain = folds.held_out_gain(columns)
             x, C = equations.solution(columns), equations.covariance(columns)
             p = min(1.0, wald_p(x, C, nu) * len(self.dependences))
             found.append((curve, gain, p))

@@ -21,6 +21,7 @@ from sysid.effect_selection.residual_curves import Dependence, dependence_curves
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.identification.linearisation import Linearisation, extend
 from sysid.models.base import LogModel
+from sysid.models.effects import field_of
 from sysid.parameters import Parameter, nominal_values
 
 Array = NDArray[np.float64]
@@ -89,11 +90,6 @@ class LinearSystem:
             fields[number].append(field_of(self.parameters[column]))
         pairs = zip(term.candidates, fields, strict=True)
         return [candidate.only(own) for candidate, own in pairs]
-
-
-def field_of(parameter: Parameter) -> str:
-    """Returns the last part of a parameter's name."""
-    return parameter.name.rpartition(".")[2]
 
 
 def linear_system(

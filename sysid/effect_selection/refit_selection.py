@@ -90,10 +90,12 @@ class RefitSelection:
         system = linear_system(self.fitter, fit, self.library, self.deadline)
         if not fit.effects:
             self.begin = tuple(LinearAccount.of_fit(system, fit).gains())
-        gains = self._gained(fit, system, self._trials(fit, system))
+        best = self._best_shapes(system)
+        trials = self._trials(fit, best)
+        gains = self._gained(fit, system, trials)
         if not self._reaches_noise(fit, gains):
-            known = {*gains, *self._tried}
-            others = [g for g in self._best_shapes(system) if g.term.names not in known]
+            known = {*gains, *(trial.term.names for trial in trials)}
+            others = [gain for gain in best if gain.term.names not in known]
             gains |= self._gained(fit, system, self._prescreened(fit, others))
         if not gains:
             return None
@@ -120,12 +122,9 @@ class RefitSelection:
         self, fit: Fit, system: LinearSystem, trials: Sequence[Gain]
     ) -> dict[_Names, _Gained]:
         """Returns what fits of trials gain, those that are more than noise."""
-        self._tried = {trial.term.names for trial in trials}
         found = {}
-        for trial, after in zip(
-            trials, self._fitted(fit, system, trials), strict=False
-        ):
-            gain = self._gain(fit, after, trial)
+        for after in self._fitted(fit, system, trials):
+            gain = self._gain(fit, after)
             if gain is not None:
                 found[gain.term.names] = (gain, after)
         return found
@@ -143,9 +142,9 @@ class RefitSelection:
             best.setdefault(gain.term.names, gain)
         return list(best.values())
 
-    def _trials(self, fit: Fit, system: LinearSystem) -> list[Gain]:
-        """Returns what is fitted: each effect in its best shape, the best first."""
-        best, limits = self._best_shapes(system), self._settings
+    def _trials(self, fit: Fit, best: Sequence[Gain]) -> list[Gain]:
+        """Returns what is fitted of effects in their best shapes, the best first."""
+        limits = self._settings
         if fit.noise_is_stated and fit.objective > limits.max_linear_objective:
             return self._prescreened(fit, best)
         least = 0.5 * limits.min_gain
@@ -186,14 +185,13 @@ class RefitSelection:
             found = list(workers.map(_TrialFit.run, [job.alone for job in jobs]))
         return found
 
-    def _gain(self, before: Fit, after: Fit, trial: Gain) -> Gain | None:
+    def _gain(self, before: Fit, after: Fit) -> Gain | None:
         """Returns what a fit gains in blocks that it was not fitted to.
 
         None if no amplitude is left, or noise and the model's own error can explain it.
         """
         added = after.effects[len(before.effects) :]
-        names = {candidate.name for candidate in added}
-        if not names:
+        if not added:
             return None
         count = sum(len(candidate.fields) for candidate in added)
         if after.noise_is_stated:
@@ -229,7 +227,6 @@ class RefitSelection:
         self.progress(ProgressUpdate("selecting effects", message=text))
 
     _starts: dict[_Names, Fit] = field(default_factory=dict)
-    _tried: set[_Names] = field(default_factory=set)
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def standings(
         recordings: number of recordings that the log is of.
     """
     equations, owners = account.equations_of_effects()
-    parts = equations.merged(part_numbers(equations, account.settings.parts))
+    parts = equations.merged(part_numbers(equations.episode, account.settings.parts))
     folds = equations.folds(account.settings.folds)
     slow = _slow_names(effects, account.noise_is_stated, recordings)
     found = []
@@ -87,14 +87,17 @@ def standings(
     return tuple(sorted(found, key=lambda each: -each.gain))
 
 
-def part_numbers(equations: NormalEquations, count: int) -> NDArray[np.int64]:
-    """Returns the part (B,) of each block: contiguous, of whole episodes if it can."""
-    episodes = np.unique(equations.episode)
+def part_numbers(episode: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Returns the part (B,) of each block: contiguous, of whole episodes if it can.
+
+    Args:
+        episode: (B,) number of each block's.
+        count: of parts.
+    """
+    episodes, number = np.unique(episode, return_inverse=True)
     if len(episodes) >= count:
-        return fold_numbers(len(episodes), count)[
-            np.searchsorted(episodes, equations.episode)
-        ]
-    return fold_numbers(len(equations.rows), count)
+        return fold_numbers(len(episodes), count)[number]
+    return fold_numbers(len(episode), count)
 
 
 def votes_of_selections(
@@ -110,7 +113,7 @@ def votes_of_selections(
         deadline: by `time.monotonic` [s], after which none is begun.
     """
     grams, settings = system.grams, system.settings
-    part = part_numbers(grams.weighted(np.ones(grams.grams.shape[1])), settings.parts)
+    part = part_numbers(grams.episode, settings.parts)
     found: list[frozenset[str]] = []
     for number in range(int(part.max()) + 1):
         if time.monotonic() > deadline:
@@ -131,7 +134,7 @@ def votes_of_gains(account: LinearAccount) -> list[frozenset[str]]:
     of the others if they would miss it.
     """
     equations, owners = account.equations_of_effects()
-    part = part_numbers(equations, account.settings.parts)
+    part = part_numbers(equations.episode, account.settings.parts)
     found = []
     for number in range(int(part.max(initial=-1)) + 1):
         folds = equations.select(part != number).folds(account.settings.folds)
@@ -144,9 +147,7 @@ def votes_of_gains(account: LinearAccount) -> list[frozenset[str]]:
 def _gain(folds: NormalEquations, columns: Columns) -> float:
     """Returns the share of the loss without columns that they take away."""
     rest = np.setdiff1d(np.arange(len(folds.power)), columns)
-    without = folds.projected(rest)
-    total = max(float(without.losses.sum()), 1e-300)
-    return float(1.0 - without.held_out(columns).sum() / total)
+    return folds.projected(rest).held_out_gain(columns)
 
 
 def _is_compatible(parts: NormalEquations, columns: Columns, most: int) -> bool:

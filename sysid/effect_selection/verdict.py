@@ -14,9 +14,9 @@ from sysid.effect_selection.contradictions import Contradiction, contradictions
 from sysid.effect_selection.detection import (
     DetectionLimit,
     detection_limits,
-    is_detectable,
+    undetectable,
 )
-from sysid.effect_selection.experiments import revealing_kind, separating
+from sysid.effect_selection.experiments import separating
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.left_over import LeftOver, left_over
@@ -168,10 +168,7 @@ class Verdict:
     @property
     def undetectable(self) -> dict[str, str]:
         """Kinds of effects that the log could not have shown, and what would."""
-        limits = list(self.limits)
-        kinds = dict.fromkeys(x.effect.partition(".")[0] for x in limits)
-        hidden = [kind for kind in kinds if not is_detectable(limits, kind)]
-        return {kind: revealing_kind(kind) for kind in hidden}
+        return undetectable(self.limits)
 
     def _of_status(self, status: str) -> tuple[str, ...]:
         return tuple(each.name for each in self.standings if each.status == status)
@@ -239,9 +236,10 @@ def _ending(found: Verdict, last: Fit) -> Ending:
         or found.left_over
         or found.misfits
         or found.invalid
+        or found.suggested
+        or found.dependence
         or is_large
     )
-    left = left or bool(found.suggested or found.dependence)
     if found.confirmed or found.ambiguous:
         return "partly" if left else "explained"
     if left:

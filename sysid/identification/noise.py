@@ -39,6 +39,17 @@ def with_estimated_noise(
     return model.with_measurements(measured.with_noise(estimated, "first fit"))
 
 
+def with_noise_of(base: LogModel, model: LogModel) -> LogModel:
+    """Returns a model of the same channels with the noise of another.
+
+    Args:
+        base: whose noise is known, or was estimated.
+        model: of other rows, or of the same ones written otherwise.
+    """
+    known, origin = base.measurements.noise, base.measurements.channels[0].origin
+    return model.with_measurements(model.measurements.with_noise(known, origin))
+
+
 def _pooled(residual: Array, groups: Sequence[str]) -> Array:
     """Returns the rms (channels,) over all channels of the same group."""
     square = np.mean(residual**2, axis=0)

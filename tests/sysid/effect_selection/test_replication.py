@@ -70,7 +70,7 @@ def test_parts_are_of_whole_episodes_where_there_are_enough(episodes):
     episode = np.repeat(np.arange(episodes), 240 // episodes)
     system = linear_system({"j": np.ones((240, 1))}, np.ones(240), episode=episode)
     equations = system.equations(np.ones(1))
-    parts = part_numbers(equations, 4)
+    parts = part_numbers(equations.episode, 4)
     assert set(np.diff(parts)) <= {0, 1} and parts[-1] == 3
     if episodes > 1:
         of = [set(parts[equations.episode == number]) for number in range(episodes)]
