@@ -120,7 +120,7 @@ def answer(model: LogModel, noise: null_logs.Noise, seed: int) -> Answer:
         found = close_loop(model.with_measurements(measured)).verdict
     except DisasmError as error:
         return {"seed": seed} | no_verdict("refused", str(error))
-    return {"seed": seed} | of_verdict(found) | {"text": found.dependence}
+    return {"seed": seed} | of_verdict(found)
 
 
 def _model(logs: list[Path]) -> LogModel:

@@ -262,29 +262,32 @@ class NormalEquations:
         """Returns the same with blocks added up to so many contiguous folds."""
         return self.merged(fold_numbers(len(self.rows), count))
 
-    def score_variance(self, column: int) -> float:
-        """Returns the variance of a column's score, if its coefficient is zero."""
-        scores = self.blocks[:, column, -1]
-        waves = cosines(len(scores), self.degrees_of_freedom)
-        return float(np.mean((waves @ scores) ** 2))
-
     def covariance(self, columns: Columns) -> Array:
         """Returns the covariance (k, k) of all columns' coefficients, fitted together.
 
-        H^-1 V H^-1 with the blocks' scores projected on `cosines`: right for residuals
-        that are correlated, as long as they are not slower than the slowest of them
-        (equal-weighted cosine estimator: Lazarus, Lewis, Stock and Watson 2018). Each
-        block's score is that of a fit to all others, since a fit takes up a part of
-        the noise of a block (the jackknife, CR3: Bell and McCaffrey 2002).
+        The jackknife: each block is left out in turn, and all coefficients are fitted
+        to the others (Efron and Stein 1981). Right for residuals that are correlated,
+        as long as a block is longer than that lasts, and for coefficients that take up
+        noise; Student's t has `degrees_of_freedom`.
         """
         kept = np.append(columns, -1)
-        own = self.blocks[:, kept][:, :, kept]
-        x = self._of_others(own)
-        scores = np.einsum("bij,bj->bi", own[:, :-1], x)
-        waves = cosines(len(scores), self.degrees_of_freedom)
-        H = self.total[np.ix_(columns, columns)]
-        along = solve(H, (waves @ scores).T)
-        return np.asarray(along @ along.T / len(waves))
+        x = self._of_others(self.blocks[:, kept][:, :, kept])[:, :-1]
+        away = x - x.mean(axis=0)
+        return np.asarray((1.0 - 1.0 / len(x)) * away.T @ away)
+
+    def errors_beside(self, base: Columns) -> Array:
+        """Returns the standard error (P,) of each column, fitted with a base alone.
+
+        See `covariance`; of a column that others do not span.
+        """
+        base = base[self.is_new(base)]
+        others = self.total - self.blocks
+        along, right = others[:, base], others[:, base][:, :, base]
+        K = solve(right, along) if len(base) else along
+        left = others - np.swapaxes(K, 1, 2) @ along
+        power = np.maximum(np.einsum("bii->bi", left)[:, :-1], 1e-300)
+        x = -left[:, :-1, -1] / power
+        return np.sqrt((len(x) - 1.0) * x.var(axis=0))
 
     @staticmethod
     def _of_others(own: Array) -> Array:
@@ -296,9 +299,8 @@ class NormalEquations:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Number of cosines that a covariance is made of."""
-        rows, blocks = int(self.rows.sum()), len(self.rows)
-        return int(np.clip(0.41 * rows ** (2.0 / 3.0), 1, max(1, blocks // 2)))
+        """Of a covariance: one less than there are blocks."""
+        return max(1, len(self.rows) - 1)
 
 
 def blocks_of(episode: NDArray[np.int64], count: int) -> NDArray[np.int64]:
@@ -315,12 +317,6 @@ def blocks_of(episode: NDArray[np.int64], count: int) -> NDArray[np.int64]:
 def fold_numbers(blocks: int, count: int) -> NDArray[np.int64]:
     """Returns the fold (blocks,) of each block: contiguous runs of blocks."""
     return np.asarray(np.arange(blocks) * min(count, blocks) // blocks)
-
-
-def cosines(count: int, number: int) -> Array:
-    """Returns the slowest cosines (number, count) but the constant one."""
-    at = (np.arange(count) + 0.5) / count
-    return np.sqrt(2.0) * np.cos(np.pi * np.outer(np.arange(1, number + 1), at))
 
 
 def solve(A: Array, b: Array) -> Array:

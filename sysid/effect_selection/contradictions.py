@@ -43,11 +43,11 @@ def contradictions(
         names: of the episodes.
         is_noise: whether channels whose noise is known leave nothing to explain.
     """
-    blocks_each = len(account.grams.rows) // max(1, len(names))
+    blocks_each = len(account.system.grams.rows) // max(1, len(names))
     if not 1 < len(names) <= _MOST or blocks_each < 2 or is_noise:
         return ()
     numbers = range(len(names)) if len(names) > 2 else [1]
-    whole, sets = account.grams.weighted(account.weights), _sets(account)
+    whole, sets = account.whole, _sets(account)
     found = []
     for number in numbers:
         best = _difference(account, whole, sets, number, len(numbers))

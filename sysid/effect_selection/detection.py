@@ -7,9 +7,11 @@ import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as t_distribution
 
+from sysid.effect_selection.block_grams import Array
 from sysid.effect_selection.experiments import revealing_kind
 from sysid.effect_selection.forward_selection import Term
 from sysid.effect_selection.linear_account import LinearAccount
+from sysid.models.effects import field_of
 from sysid.parameters import Scaling, nominal_values
 
 
@@ -39,17 +41,18 @@ def detection_limits(account: LinearAccount) -> list[DetectionLimit]:
     """Returns the limit of each amplitude of each effect, shape by shape.
 
     An effect is found if it takes away `min_gain` of the loss, and if its coefficient
-    is significant when a part of the log is left out.
+    is significant beside the model's own.
     """
+    errors = account.whole.folds(account.settings.folds).errors_beside(account.columns)
     shown = [
         limit
         for term in account.terms
         if len(term.candidates) == 1
-        for limit in _limits(account, term)
+        for limit in _limits(account, term, errors)
     ]
     return shown + [
         DetectionLimit(each.name, each.fields[0], None, "1", np.inf)
-        for each in account.unseen
+        for each in account.system.unseen
     ]
 
 
@@ -73,17 +76,22 @@ def is_detectable(limits: Sequence[DetectionLimit], kind: str) -> bool:
     return 2 * sum(shapes.values()) > len(shapes)
 
 
-def _limits(account: LinearAccount, term: Term) -> list[DetectionLimit]:
+def _limits(account: LinearAccount, term: Term, errors: Array) -> list[DetectionLimit]:
+    """Returns the limit of each amplitude of a term with one effect.
+
+    Args:
+        account: of the model.
+        term: that it has not.
+        errors: standard error of each column of the account.
+    """
     (candidate,) = term.candidates
     equations, settings = account.equations, account.settings
-    parameters = [account.parameters[column] for column in term.columns]
+    parameters = [account.system.parameters[column] for column in term.columns]
     scaling, nominal = Scaling(tuple(parameters)), nominal_values(tuple(parameters))
     at, slope = scaling.to_unit(nominal), scaling.slope(nominal)
     shape = ", ".join(f"{k}={v:g}" for k, v in candidate.shape.items())
-    nu = equations.degrees_of_freedom
-    enlarged = np.sqrt(settings.parts / (settings.parts - 1.0))
-    above = enlarged * norm.ppf(settings.detection_power)
-    needed = above + enlarged * t_distribution.isf(0.5 * settings.alpha, nu)
+    above = float(norm.ppf(settings.detection_power))
+    needed = above + t_distribution.isf(0.5 * settings.alpha, settings.folds - 1)
     loss = float(equations.losses.sum())
     found = []
     for i, column in enumerate(term.columns):
@@ -92,12 +100,11 @@ def _limits(account: LinearAccount, term: Term) -> list[DetectionLimit]:
         power = float(equations.total[column, column])
         least = np.inf
         if power > 0.0:
-            error = np.sqrt(equations.score_variance(column)) / power
             of_use = np.sqrt(settings.min_gain / (1 - settings.min_gain) * loss / power)
-            least = max(needed * error, of_use + above * error)
+            least = max(needed * errors[column], of_use + above * errors[column])
         share = float(least / max(at[i], 1.0 - at[i]))
         amplitude = float(least * slope[i]) if share <= 1.0 else None
-        field = account.field(column)
+        field = field_of(account.system.parameters[column])
         unit = parameters[i].unit
         found.append(
             DetectionLimit(candidate.name, field, amplitude, unit, share, shape)

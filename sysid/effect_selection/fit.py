@@ -112,22 +112,17 @@ class Fit:
         return grams.weighted(np.ones(1))
 
     @property
-    def standard_errors(self) -> Array:
-        """Standard error (p,) of each parameter in the unit box, see `covariance`."""
-        numbers = np.arange(len(self.theta))
-        if not len(numbers):
-            return np.zeros(0)
-        diagonal = np.diagonal(self.equations.covariance(numbers))
-        return np.sqrt(np.maximum(diagonal, 0.0))
-
-    @property
     def half_intervals(self) -> Array:
         """Half the 95 % interval (p,) of each parameter in the unit box.
 
-        Student's t, with as many degrees of freedom as the covariance has cosines.
+        By Student's t and the jackknife over folds, see `NormalEquations.covariance`.
         """
-        nu = self.equations.degrees_of_freedom
-        return np.asarray(t_distribution.ppf(0.975, nu) * self.standard_errors)
+        if not len(self.theta):
+            return np.zeros(0)
+        folds = self.equations.folds(self.settings.folds)
+        variance = np.diagonal(folds.covariance(np.arange(len(self.theta))))
+        half = t_distribution.ppf(0.975, folds.degrees_of_freedom)
+        return np.asarray(half * np.sqrt(variance))
 
     @property
     def held_out_losses(self) -> Array:

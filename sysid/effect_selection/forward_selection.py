@@ -6,12 +6,11 @@ those that are about as good, the one with the fewest coefficients.
 """
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as f_distribution
 from scipy.stats import t as t_distribution
 
 from sysid.effect_selection.block_grams import (
@@ -389,19 +388,14 @@ def significant_columns(
         settings: thresholds.
     """
     owners = owned_columns(terms)
-    empty = np.array([], dtype=np.int64)
-    columns = np.concatenate([empty, *owners.values()])
-    small = equations.of_columns(np.append(base, columns))
-    small = small.projected(np.arange(len(base)))
-    at = {int(c): len(base) + i for i, c in enumerate(columns)}
+    folds = equations.folds(settings.folds)
     while owners:
-        local = {n: np.array([at[int(c)] for c in own]) for n, own in owners.items()}
-        p = p_values(small, local)
+        p = p_values(folds, base, owners)
         worst = max(p, key=lambda name: p[name])
         if p[worst] < settings.alpha:
             break
         del owners[worst]
-    return np.sort(np.concatenate([empty, *owners.values()]))
+    return np.sort(np.concatenate([np.array([], np.int64), *owners.values()]))
 
 
 def owned_columns(terms: Sequence[Term]) -> dict[str, Columns]:
@@ -415,31 +409,31 @@ def owned_columns(terms: Sequence[Term]) -> dict[str, Columns]:
 
 
 def p_values(
-    equations: NormalEquations, owners: dict[str, Columns]
+    equations: NormalEquations, base: Columns, owners: Mapping[str, Columns]
 ) -> dict[str, float]:
     """Returns the p-value of each effect's coefficients, all fitted together.
 
-    A Wald test whose covariance allows for correlation, see `covariance`: F with k and
-    nu - k + 1 degrees of freedom.
+    Args:
+        equations: by folds, nothing projected out.
+        base: columns of the model without effects, which are fitted, too.
+        owners: columns of each effect, by its name.
     """
-    columns = np.concatenate(list(owners.values()))
+    columns = np.concatenate([base, *owners.values()])
     small = equations.of_columns(columns)
     numbers = np.arange(len(columns))
     x, C = small.solution(numbers), small.covariance(numbers)
-    nu = equations.degrees_of_freedom
-    found, at = {}, 0
+    found, at = {}, len(base)
     for name, own in owners.items():
         part = slice(at, at := at + len(own))
-        found[name] = wald_p(x[part], C[part, part], nu)
+        found[name] = wald_p(x[part], C[part, part], small.degrees_of_freedom)
     return found
 
 
 def wald_p(x: Array, C: Array, nu: int) -> float:
-    """Returns the p-value that coefficients (k,) with a covariance (k, k) are zero."""
-    k = len(x)
-    least = nu - k + 1
-    if least < 1:  # more coefficients than cosines: each by itself, Bonferroni
-        each = np.abs(x) / np.sqrt(np.maximum(np.diagonal(C), 1e-300))
-        return float(min(1.0, k * 2.0 * t_distribution.sf(each.max(), nu)))
-    statistic = float(x @ np.linalg.pinv(C, hermitian=True) @ x)
-    return float(f_distribution.sf(statistic * least / (nu * k), k, least))
+    """Returns the p-value that coefficients (k,) with a covariance (k, k) are zero.
+
+    The largest of their t-statistics, with nu degrees of freedom, and Bonferroni's
+    correction: a covariance of a few folds has no inverse for many coefficients.
+    """
+    t = np.abs(x) / np.sqrt(np.maximum(np.diagonal(C), 1e-300))
+    return float(min(1.0, len(x) * 2.0 * t_distribution.sf(t.max(), nu)))

@@ -16,8 +16,7 @@ from sysid.effect_selection.block_grams import (
 from sysid.effect_selection.candidates import Candidate, extended, joint_groups
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.forward_selection import Term
-from sysid.effect_selection.residual_curves import Dependence, dependence_curves
+from sysid.effect_selection.forward_selection import Term, channel_weights
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.identification.linearisation import Linearisation, extend
 from sysid.models.base import LogModel
@@ -31,13 +30,12 @@ _AT_BOUND = 1e-9  # of a parameter's range: rounding of a point on the bound
 
 @dataclass(frozen=True)
 class LinearSystem:
-    """Gram matrices of a fit's parameters, of candidates, and of dependence curves.
+    """Gram matrices of a fit's parameters and of candidates.
 
     Attributes:
         grams: by blocks; of one channel if the noise of all is stated.
         own: columns of the fit's parameters.
         terms: what may be added.
-        dependences: curves of covariates, with their columns.
         labels: for each channel of the Gram matrices; those of one label have one
             unknown noise.
         noise_is_stated: whether channels keep their weights.
@@ -52,7 +50,6 @@ class LinearSystem:
     grams: BlockGrams
     own: Columns
     terms: tuple[Term, ...]
-    dependences: tuple[tuple[Dependence, Columns], ...]
     labels: tuple[int, ...]
     noise_is_stated: bool
     parameters: tuple[Parameter, ...]
@@ -68,9 +65,16 @@ class LinearSystem:
             return None
         return np.ones(self.grams.grams.shape[1])
 
-    def equations(self, weights: Array) -> NormalEquations:
+    @property
+    def first_weights(self) -> Array:
+        """Weights of channels by what is left of each without candidates."""
+        if self.weights is not None:
+            return self.weights
+        return channel_weights(self.grams, self.own, self.labels)
+
+    def equations(self) -> NormalEquations:
         """Returns the normal equations with the fit's parameters projected out."""
-        return self.grams.weighted(weights).projected(self.own)
+        return self.grams.weighted(self.first_weights).projected(self.own)
 
     def derivatives(self, term: Term) -> dict[str, Array]:
         """Returns the derivatives (rows, channels) by a term's amplitudes, by name."""
@@ -107,20 +111,14 @@ def linear_system(
     rest = [candidate for candidate in library if candidate.name not in names]
     model, groups, linear = _linearised(fitter, fit, rest, deadline)
     tested = rest[: len(groups)]
-    settings, measured = fitter.settings, model.measurements
-    curves, dependences = dependence_curves(model)
-    begin = len(model.parameters)
-    free = np.tile([-np.inf, np.inf], (curves.shape[2], 1))
-    bounds = np.concatenate([_bounds(linear.u), free])
-    blocks = blocks_of(measured.episode, settings.blocks)
-    columns = [linear.jacobian, curves]
+    measured = model.measurements
     grams = BlockGrams.of(
-        columns,
+        [linear.jacobian],
         linear.residual,
         linear.weights,
-        blocks,
+        blocks_of(measured.episode, fitter.settings.blocks),
         measured.episode,
-        bounds,
+        _bounds(linear.u),
         pooled=fit.noise_is_stated,
     )
     own_columns = _distinct(tested, groups, linear.jacobian)
@@ -129,13 +127,12 @@ def linear_system(
         grams,
         np.arange(len(fit.theta)),
         tuple(_terms(tested, own_columns)),
-        tuple((d, begin + np.array(d.columns, np.int64)) for d in dependences),
         tuple(labels.index(label) for label in model.noise_groups),
         fit.noise_is_stated,
         model.parameters,
         None if model.affine else linear,
         tuple(candidate.text for candidate in rest[len(tested) :]),
-        settings,
+        fitter.settings,
         tuple(_unseen(tested, own_columns)),
     )
 

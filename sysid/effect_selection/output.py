@@ -67,7 +67,6 @@ def _verdict(found: Verdict) -> dict[str, Any]:
             }
             for value in found.values
         },
-        "dependence_left": found.dependence,
         "left_in_channels": [dataclasses.asdict(each) for each in found.findings],
         "would_have_been_found": [dataclasses.asdict(each) for each in found.limits],
         "would_not_have_been_found": found.undetectable,

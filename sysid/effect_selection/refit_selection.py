@@ -134,8 +134,7 @@ class RefitSelection:
 
         Those that gain nothing by it come last.
         """
-        equations = system.equations(np.ones(system.grams.grams.shape[1]))
-        gains = ranked(equations, system.terms, self._settings)
+        gains = ranked(system.equations(), system.terms, self._settings)
         nothing = [Gain(term, 0.0, np.zeros(1)) for term in system.terms]
         best: dict[_Names, Gain] = {}
         for gain in [*gains, *nothing]:

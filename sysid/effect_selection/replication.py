@@ -1,8 +1,9 @@
-"""Whether parts of a log that had no say in choosing an effect ask for it, too.
+"""Whether stretches of the log that had no say in choosing an effect ask for it, too.
 
 Each part of the log is left out in turn. *Confirmed* is an effect that the others
-select without it, and of a compatible size in each part; *ambiguous* one for which they
-select it or a rival; *suggested* what lowers the error and is neither.
+select, but for one part, which may be the only one in which it shows, and whose size
+agrees from one stretch to the next; *ambiguous* one for which they select it or a
+rival; *suggested* what lowers the error and is neither.
 """
 
 import time
@@ -12,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import false_discovery_control
 
 from sysid.effect_selection.block_grams import Columns, NormalEquations, fold_numbers
 from sysid.effect_selection.candidates import Candidate
@@ -20,8 +22,6 @@ from sysid.effect_selection.linear_account import LinearAccount
 from sysid.effect_selection.linear_system import LinearSystem
 
 Status = Literal["confirmed", "ambiguous", "suggested"]
-
-_INFORMED = 0.25  # of a part's fair share of what all say of an effect
 
 
 @dataclass(frozen=True)
@@ -63,10 +63,11 @@ def standings(
         effects: of the model.
         recordings: number of recordings that the log is of.
     """
+    settings = account.settings
     equations, owners = account.equations_of_effects()
-    parts = equations.merged(part_numbers(equations.episode, account.settings.parts))
-    folds = equations.folds(account.settings.folds)
-    slow = _slow_names(effects, account.noise_is_stated, recordings)
+    folds = equations.folds(settings.folds)
+    by_chance = _adjusted(account)
+    slow = _slow_names(effects, account.system.noise_is_stated, recordings)
     found = []
     for name, columns in owners.items():
         own = rivals.get(name, ())
@@ -74,17 +75,27 @@ def standings(
         reason = ""
         if name in slow:
             reason = "noise that is slow looks like it; a second session would tell"
-        elif asked < account.settings.parts - account.settings.missing_votes:
-            reason = f"{asked} of {account.settings.parts} parts of the log ask for it"
-        elif not _is_compatible(parts, columns, account.settings.missing_votes):
-            reason = "its size differs between parts of the log"
-        status: Status = "suggested" if reason else "confirmed"
-        if own and not reason:
-            status = "ambiguous"
+        elif asked < settings.parts - 1:
+            reason = f"{asked} of {settings.parts} parts of the log ask for it"
+        elif by_chance[name] >= settings.alpha:
+            reason = "its size differs from one stretch of the log to the next"
+        status: Status = "suggested" if reason else "ambiguous" if own else "confirmed"
         gain = _gain(folds, columns)
-        parts_count = account.settings.parts
-        found.append(Standing(name, status, gain, asked, parts_count, own, reason))
+        found.append(Standing(name, status, gain, asked, settings.parts, own, reason))
     return tuple(sorted(found, key=lambda each: -each.gain))
+
+
+def _adjusted(account: LinearAccount) -> dict[str, float]:
+    """Returns each effect's p-value, adjusted for all that might have been selected.
+
+    So that of the effects below a level no larger share is there by chance (Benjamini
+    and Hochberg 1995).
+    """
+    p = account.p_values
+    names = {name for term in account.system.terms for name in term.names}
+    others = np.ones(len(names.difference(p)))
+    adjusted = false_discovery_control(np.append(list(p.values()), others))
+    return dict(zip(p, adjusted.tolist(), strict=False))
 
 
 def part_numbers(episode: NDArray[np.int64], count: int) -> NDArray[np.int64]:
@@ -148,28 +159,6 @@ def _gain(folds: NormalEquations, columns: Columns) -> float:
     """Returns the share of the loss without columns that they take away."""
     rest = np.setdiff1d(np.arange(len(folds.power)), columns)
     return folds.projected(rest).held_out_gain(columns)
-
-
-def _is_compatible(parts: NormalEquations, columns: Columns, most: int) -> bool:
-    """Returns whether parts by themselves ask for coefficients of a compatible size.
-
-    That is for at least half of what all ask for together, along the same direction, of
-    which a part is then predicted better than without. So many parts may ask for less,
-    none for the opposite. A part in which the effect hardly shows is not asked.
-
-    Args:
-        parts: equations of the effects.
-        columns: of the effect.
-        most: parts that may ask for less.
-    """
-    rest = np.setdiff1d(np.arange(len(parts.power)), columns)
-    without = parts.projected(rest)
-    x = without.solution(columns)
-    inner = without.blocks[:, columns][:, :, columns]
-    information = np.einsum("i,bij,j->b", x, inner, x)
-    informed = information >= _INFORMED * information.mean()
-    share = -(without.blocks[informed][:, columns, -1] @ x) / information[informed]
-    return bool((share >= 0.0).all() and np.sum(share < 0.5) <= most)
 
 
 def _slow_names(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from drake_disasm.common.progress import Progress, ProgressUpdate
-from sysid.effect_selection.block_grams import Array
 from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.fitter import Fitter
@@ -15,7 +14,6 @@ from sysid.effect_selection.forward_selection import (
     Gain,
     Selection,
     Step,
-    channel_weights,
     ranked,
     select,
 )
@@ -122,9 +120,7 @@ def _linear_search(
     steps = tuple(s for s in found.steps if kept.intersection(s.chosen.term.names))
     rivals = _rivals(steps)
     placed = standings(account, votes, rivals, last.effects, recordings)
-    gains = ranked(
-        system.equations(_first_weights(system)), system.terms, system.settings
-    )
+    gains = ranked(system.equations(), system.terms, system.settings)
     return SearchResult(
         first,
         last,
@@ -168,13 +164,6 @@ def _selection(system: LinearSystem) -> Selection:
         system.weights,
         system.labels,
     )
-
-
-def _first_weights(system: LinearSystem) -> Array:
-    """Returns the weights of channels by what is left of each without effects."""
-    if system.weights is not None:
-        return system.weights
-    return channel_weights(system.grams, system.own, system.labels)
 
 
 def _candidates(system: LinearSystem, found: Selection) -> list[Candidate]:

@@ -30,17 +30,24 @@ class SelectionSettings:
         _ABLATION,
     )
     alpha: float = _setting(
-        0.05, "1", "level of each test and of an interval; the usual 5 %", _ABLATION
+        0.05,
+        "1",
+        "level of each test, and share of the confirmed effects that may be there by "
+        "chance; the usual 5 %",
+        _ABLATION,
     )
     blocks: int = _setting(
         48,
         "blocks of rows",
-        "contiguous; half as many cosines estimate a covariance, so that a t-test is "
-        "close to a normal one",
+        "contiguous; folds and parts are made of them",
         _ABLATION,
     )
     folds: int = _setting(
-        8, "folds", "contiguous, each predicted by a fit to the others", _ABLATION
+        8,
+        "folds",
+        "contiguous, each predicted by a fit to the others, and left out by the "
+        "jackknife: longer than noise stays correlated",
+        _ABLATION,
     )
     reweightings: int = _setting(
         2,
@@ -73,17 +80,10 @@ class SelectionSettings:
     parts: int = _setting(
         4,
         "parts of the log",
-        "each is left out in turn: the others select, and it has to agree",
+        "each is left out in turn, and the others have to select an effect, but for "
+        "one part, which may be the only one in which it shows",
         _ABLATION,
     )
-    missing_votes: int = _setting(
-        1,
-        "parts",
-        "that may disagree with the others on a confirmed effect: what shows in one "
-        "quarter only can't be selected by the others",
-        _ABLATION,
-    )
-
     # How a model with effects is fitted.
     fit_iterations: int = _setting(
         8, "iterations", "a guard: `fit_min_progress` usually ends a fit before"

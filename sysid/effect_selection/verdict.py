@@ -102,7 +102,6 @@ class Verdict:
             then those that are ambiguous, then those that are suggested.
         ties: for each, effects that are ambiguous with it.
         values: of their parameters.
-        dependence: the strongest that is left, in words; empty if none is.
         contradictions: episodes that no common effect explains.
         excess: objective that is left, in units of the noise, if it is more than noise;
             else 0.
@@ -125,7 +124,6 @@ class Verdict:
     standings: tuple[Standing, ...]
     ties: tuple[tuple[Tie, ...], ...]
     values: tuple[ParameterValue, ...]
-    dependence: str = ""
     contradictions: tuple[Contradiction, ...] = ()
     excess: float = 0.0
     correlated: tuple[str, ...] = ()
@@ -195,13 +193,11 @@ def judge(
     left = left_over(white) if found.is_complete else []
     placed = _ordered(found.standings) + _of_scatter(scatter)
     names = last.model.measurements.names
-    dependence = _dependence(found, last)
     verdict = Verdict(
         "none",
         placed,
         tuple(_ties(each, last.model.has_commands) for each in placed),
         parameter_values(last, len(found.first.theta)) + _scatter_values(scatter),
-        dependence,
         contradictions(found.account, names, last.is_at_noise),
         _excess(last, scatter),
         correlated_channels(white),
@@ -237,7 +233,6 @@ def _ending(found: Verdict, last: Fit) -> Ending:
         or found.misfits
         or found.invalid
         or found.suggested
-        or found.dependence
         or is_large
     )
     if found.confirmed or found.ambiguous:
@@ -256,18 +251,6 @@ def _single_strokes(found: Verdict, last: Fit) -> tuple[str, ...]:
     pairs = zip(found.names, found.ties, strict=True)
     tied = {name.partition(".")[2] for name, ties in pairs if ties}
     return joints_of_one_stroke(last.model, tied)
-
-
-def _dependence(found: SearchResult, last: Fit) -> str:
-    """Returns the strongest dependence that is left, in words; empty for none."""
-    measured = last.model.measurements
-    names = [channel.name for channel in measured.channels]
-    for curve, gain, p in found.account.dependence_left():
-        least = last.noticeable(names.index(curve.channel)) ** 2 * measured.rows
-        is_large = gain >= last.settings.min_gain and gain * last.loss >= least
-        if is_large and p < last.settings.alpha:
-            return curve.text
-    return ""
 
 
 def _of_scatter(scatter: CommandScatter | None) -> tuple[Standing, ...]:

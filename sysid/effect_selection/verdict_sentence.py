@@ -226,7 +226,6 @@ def left_in_words(verdict: Verdict) -> str:
         excess = f"the residual is {verdict.excess:.2g} times the noise"
     clauses = (
         _correlated(verdict),
-        verdict.dependence,
         against,
         excess,
         _findings(verdict.findings),

@@ -116,7 +116,7 @@ def _left_text(verdict: Verdict) -> str:
         other = f"the residual is {verdict.excess:.2g} times the noise"
     learned = "; ".join(each.text for each in verdict.left_over)
     findings = findings_text(verdict.findings)
-    parts = (verdict.dependence, other, findings, learned)
+    parts = (other, findings, learned)
     return "; ".join(part for part in parts if part)
 
 

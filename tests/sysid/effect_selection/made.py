@@ -66,7 +66,7 @@ def linear_system(
         Parameter(f"x.{i}", 0.0, -5.0, 5.0, "N") for i in range(ends[-1])
     )
     return LinearSystem(
-        grams, np.arange(1), terms, (), (0,), noise_is_stated, parameters, None, (),
+        grams, np.arange(1), terms, (0,), noise_is_stated, parameters, None, (),
         DEFAULT_SETTINGS,
     )  # fmt: skip
 

@@ -159,7 +159,8 @@ def _regressions(rho, count, rows=480):
 @pytest.mark.parametrize("rho", [0.0, 0.6])
 def test_intervals_cover_the_truth_in_white_and_in_slow_noise(rho):
     columns, count, covered = np.arange(3), 200, np.zeros(3)
-    for _, _, equations in _regressions(rho, count):
+    for _, _, blocks in _regressions(rho, count):
+        equations = blocks.folds(8)
         error = np.sqrt(np.diagonal(equations.covariance(columns)))
         half = t_distribution.ppf(0.975, equations.degrees_of_freedom) * error
         covered += np.abs(equations.solution(columns)) <= half

@@ -150,11 +150,11 @@ def test_channels_count_by_what_is_left_of_them():
 
 @pytest.mark.parametrize("size", [1, 3, 30])
 def test_p_values_are_uniform_where_nothing_is_to_be_found(size):
-    """Of 30 coefficients and 24 cosines, each by itself: at most as many."""
-    random, nu, p = np.random.default_rng(7), 24, []
+    """Of several coefficients, the largest with Bonferroni: at most as many."""
+    random, nu, p = np.random.default_rng(7), 7, []
     for _ in range(400):
         x = random.standard_normal(size)
         scores = random.standard_normal((size, nu))
         p.append(wald_p(x, scores @ scores.T / nu, nu))
     share = np.mean(np.array(p) < 0.1)
-    assert (0.06 if size < nu else 0.0) <= share <= 0.14
+    assert (0.06 if size == 1 else 0.0) <= share <= 0.14

@@ -48,7 +48,6 @@ def test_what_can_show_in_one_quarter_only_is_confirmed_where_the_others_are_sil
 def test_what_changes_its_sign_is_not_confirmed():
     found = _placed(np.array([3.0, 3.0, 3.0, -1.5])[_QUARTER])
     assert found[_NAME].status == "suggested"
-    assert found[_NAME].reason == "its size differs between parts of the log"
 
 
 @pytest.mark.parametrize(
@@ -69,7 +68,7 @@ def test_slow_noise_looks_like_an_effect_of_time(recordings, is_stated, status):
 def test_parts_are_of_whole_episodes_where_there_are_enough(episodes):
     episode = np.repeat(np.arange(episodes), 240 // episodes)
     system = linear_system({"j": np.ones((240, 1))}, np.ones(240), episode=episode)
-    equations = system.equations(np.ones(1))
+    equations = system.equations()
     parts = part_numbers(equations.episode, 4)
     assert set(np.diff(parts)) <= {0, 1} and parts[-1] == 3
     if episodes > 1:
