@@ -1,12 +1,14 @@
 """Simulated recordings of arms: a Fourier motion and torques with hidden effects."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.importing.importer import processing_origin
 from drake_disasm.importing.processing import Processing, process
 from drake_disasm.importing.recording import Recording
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
@@ -93,10 +95,11 @@ def write_arm_case(plan: Plan, folder: Path) -> Case:
         noise = _noise(plan, motion, random) * truth.noise * _as_filtered(plan.cutoff)
         tau = truth.on(model) + noise
         logs.append(folder / name)
+        origin: dict[str, Any] = {}
         if plan.cutoff:
-            _, noise = _imported(motion, noise, plan.cutoff)
-            motion, tau = _imported(motion, tau, plan.cutoff)
-        _write(logs[-1], urdf, motion, tau)
+            _, noise, _ = _imported(motion, noise, plan.cutoff)
+            motion, tau, origin = _imported(motion, tau, plan.cutoff)
+        _write(logs[-1], urdf, motion, tau, origin)
     return Case(
         plan.name,
         (str(logs[0]),),
@@ -184,19 +187,32 @@ def _as_filtered(cutoff: float | None) -> float:
     return 1.0 if cutoff is None else float(np.sqrt(0.5 / (cutoff * PERIOD)))
 
 
-def _imported(motion: Motion, tau: Array, cutoff: float) -> tuple[Motion, Array]:
-    """Returns a recording of positions and torques, as the importer makes it."""
+def _imported(
+    motion: Motion, tau: Array, cutoff: float
+) -> tuple[Motion, Array, dict[str, Any]]:
+    """Returns a recording of positions and torques, as the importer makes it.
+
+    And its provenance, which says how it was filtered.
+    """
     q = np.round(motion.q / _QUANTUM) * _QUANTUM
     recorded = Recording("run", motion.time, {"q": q, "tau": tau})
-    [part], _ = process([recorded], Processing(cutoff))
+    [part], done = process([recorded], Processing(cutoff))
     columns = part.columns
     time = columns["time"] - columns["time"][0]
-    return Motion(time, columns["q"], columns["v"], columns["vd"]), columns["tau"]
+    origin = {"import": {"processing": processing_origin(done)}}
+    found = Motion(time, columns["q"], columns["v"], columns["vd"])
+    return found, columns["tau"], origin
 
 
-def _write(folder: Path, urdf: Path, motion: Motion, tau: Array) -> None:
+def _write(
+    folder: Path,
+    urdf: Path,
+    motion: Motion,
+    tau: Array,
+    origin: Mapping[str, Any] | None = None,
+) -> None:
     joints = joint_names(motion.q.shape[1])
-    origin = {"source": "benchmarks/selection/judge.py"}
+    origin = {"source": "benchmarks/selection/judge.py", **(origin or {})}
     header = LogHeader("joint_motion", "excite", origin, joints=joints, urdf=str(urdf))
     table = {
         "time": motion.time,

@@ -171,7 +171,7 @@ def origin(
     if shifts:
         found["shifts"] = {n: _finite(values) for n, values in shifts.items()}
     if imported.done:
-        found["processing"] = _processing(imported.done)
+        found["processing"] = processing_origin(imported.done)
     return found
 
 
@@ -182,7 +182,8 @@ def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _processing(done: Done) -> dict[str, Any]:
+def processing_origin(done: Done) -> dict[str, Any]:
+    """Returns what was done to make rows, as plain data; see `low_pass_of`."""
     filtered = math.isfinite(done.cutoff)
     return {
         "filter": _FILTER if filtered else "none",
