@@ -213,7 +213,9 @@ def _write(
 ) -> None:
     joints = joint_names(motion.q.shape[1])
     origin = {"source": "benchmarks/selection/judge.py", **(origin or {})}
-    header = LogHeader("joint_motion", "excite", origin, joints=joints, urdf=str(urdf))
+    header = LogHeader(
+        "joint_motion", "excite", origin, joints=joints, urdf=str(urdf), period=PERIOD
+    )
     table = {
         "time": motion.time,
         "q": motion.q,
