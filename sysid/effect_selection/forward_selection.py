@@ -302,24 +302,20 @@ def _exchanged(
     What was added while others were missing may have stood for those in part: it goes
     if it gains too little beside them, and gives way to what gains more.
     """
+    kept: list[Step] = []
     for number, step in enumerate(steps):
-        others = [s for i, s in enumerate(steps) if i != number]
+        others = kept + steps[number + 1 :]
         left = equations.projected(_columns_of(others))
         gains = ranked(left, _others(terms, others), settings)
         own = ranked(left, [step.chosen.term], settings)
         gains = sorted([*own, *gains], key=lambda gain: -gain.share)
         if not gains or gains[0].share < settings.min_gain:
-            steps[number] = Step(Gain(_nothing(), 0.0, np.zeros(1)), ())
             continue
         best = step_of(gains, settings, left)
         if own and own[0].is_about_as_good_as(best.chosen, settings):
             best = Step(own[0], rivals_of(own[0], gains, settings))
-        steps[number] = best
-    return [step for step in steps if len(step.chosen.term.columns)]
-
-
-def _nothing() -> Term:
-    return Term((), np.array([], np.int64), np.array([], np.int64))
+        kept.append(best)
+    return kept
 
 
 def _columns_of(steps: Sequence[Step]) -> Columns:
