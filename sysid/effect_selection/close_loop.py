@@ -40,7 +40,7 @@ from sysid.models.base import LogModel
 from sysid.models.bookkeeping import Bookkeeping
 from sysid.workers import Workers
 
-_SEARCHED = 0.85  # of the time: the rest is for errors and the verdict
+_SEARCHED = 0.75  # of the time: the rest is for errors and the verdict
 _MOST_REWRITES = 3  # ways in which a log may have been written wrongly
 _PROVISIONAL = (
     "provisional: the time was over while {phase}{untested}; the same command without "
@@ -171,7 +171,6 @@ def close_loop(
         DisasmError: the log is too short to decide anything, or no effect of the
             library can act on the model.
     """
-    # What is said in the end takes about a tenth of a search's time.
     deadline = time.monotonic() + _SEARCHED * time_budget
     library = registered_effects() if library is None else library
     train, test = train_and_test(
