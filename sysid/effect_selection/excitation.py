@@ -30,7 +30,7 @@ class ParameterExcitation:
     Attributes:
         name, unit: of it.
         value: fitted, without any effect.
-        spread: half its 95 % interval, by the block bootstrap.
+        spread: half its 95 % interval, by the jackknife.
     """
 
     name: str
@@ -71,11 +71,6 @@ class Excitation:
             "would_have_been_found": [dataclasses.asdict(x) for x in self.limits],
             "would_not_have_been_found": self.hidden,
         }
-
-
-def kind_of(effect: str) -> str:
-    """Returns the class of an effect, without its joint."""
-    return effect.partition(".")[0]
 
 
 def excitation_of(
