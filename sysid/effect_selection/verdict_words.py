@@ -37,7 +37,7 @@ class KindLine:
     Attributes:
         names: of the effects.
         status: see `Standing`.
-        values: of their parameters whose intervals exclude null.
+        values: of their parameters; those that exclude null, if an amplitude does.
         rivals: kinds, or several joined by "and", that explain about as much.
         experiments: that would separate them.
         reasons: why they are not confirmed.
@@ -96,17 +96,16 @@ def kind_lines(verdict: Verdict) -> list[KindLine]:
     lines = []
     for (status, _), numbers in groups.items():
         names = tuple(verdict.names[number] for number in numbers)
-        values = tuple(
-            value
-            for name in names
-            for value in verdict.values
-            if value.name.rpartition(".")[0] == name and value.excludes_null
-        )
+        values: list[ParameterValue] = []
+        for name in names:
+            own = [v for v in verdict.values if v.name.rpartition(".")[0] == name]
+            is_clear = any(v.excludes_null for v in own if v.null is not None)
+            values += [v for v in own if v.excludes_null or not is_clear]
         ties = [tie for number in numbers for tie in verdict.ties[number]]
         rivals = _once([_kinds(tie.name) for tie in ties])
         tests = _once([test for tie in ties for test in tie.experiment.split("; ")])
         reasons = _once([verdict.standings[number].reason for number in numbers])
-        lines.append(KindLine(names, status, values, rivals, tests, reasons))
+        lines.append(KindLine(names, status, tuple(values), rivals, tests, reasons))
     return lines
 
 

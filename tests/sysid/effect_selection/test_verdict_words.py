@@ -115,6 +115,8 @@ def test_a_line_has_intervals_and_rivals():
     found = made_verdict("explained", _FRICTION[:1], ties, values)
     (line,) = kind_lines(found)
     assert line.title == _FRICTION[0] and line.values == values[:1]  # one holds null
+    (alone,) = kind_lines(made_verdict("explained", _FRICTION[:1], ties, values[1:]))
+    assert alone.values == values[1:]  # it has no other
     assert "x0 = 0.2 N m (0.1 to 0.3, at its bound)" in line.details
     assert "E0, E1, E2 or 2 more" in line.details
     *_, record, errors = verdict_text(found, ERRORS).split("\n")
