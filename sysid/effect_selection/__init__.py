@@ -11,7 +11,7 @@ rows that were not fitted, and adds those that are confirmed. From the top:
     block_grams                             sufficient statistics of blocks of rows
     fitter, fit, fit_cache                  a model with chosen effects, fitted
     detection, whiteness, contradictions    what the log could show, and what is left
-    verdict, verdict_sentence, output       what is said in the end
+    verdict, verdict_words, output          what is said in the end
 """
 
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop

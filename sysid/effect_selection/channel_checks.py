@@ -41,13 +41,10 @@ class ChannelFinding:
     Attributes:
         channel: its name.
         text: what it is, in words.
-        clause: the same behind the channel's name in a sentence; empty: that something
-            is left is all there is to say.
     """
 
     channel: str
     text: str
-    clause: str = ""
 
 
 def channel_findings(fit: Fit) -> list[ChannelFinding]:
@@ -60,10 +57,8 @@ def channel_findings(fit: Fit) -> list[ChannelFinding]:
         rows = _outlying(r, measured, max(_NEAR_ROW, least) if least else 0.0)
         line = _line(r, measured, least)
         excess = _excess(r, measured, fit.settings) if fit.noise_is_stated else ""
-        for text, verb in ((rows, "has"), (line, "is"), (excess, "")):
-            clause = f"{verb} {text.partition(' (')[0]}" if verb else ""
-            if text:
-                found.append(ChannelFinding(channel.name, text, clause))
+        texts = (text for text in (rows, line, excess) if text)
+        found += [ChannelFinding(channel.name, text) for text in texts]
     return found
 
 
@@ -165,11 +160,3 @@ def _periodogram(part: Array, longest: int) -> Array:
 def _windowed(part: Array) -> Array:
     window = np.hanning(len(part) + 2)[1:-1]
     return np.asarray((part - part.mean()) * window / np.linalg.norm(window))
-
-
-def findings_text(found: Sequence[ChannelFinding]) -> str:
-    """Returns findings in words, channels with the same one together."""
-    channels: dict[str, list[str]] = {}
-    for each in found:
-        channels.setdefault(each.text, []).append(each.channel)
-    return "; ".join(f"{', '.join(names)}: {text}" for text, names in channels.items())

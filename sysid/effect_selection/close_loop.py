@@ -29,11 +29,11 @@ from sysid.effect_selection.residual_model import fit_residual_model
 from sysid.effect_selection.search import SearchResult, search
 from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
 from sysid.effect_selection.verdict import Verdict, judge
-from sysid.effect_selection.verdict_sentence import (
-    indistinguishable_text,
+from sysid.effect_selection.verdict_words import (
+    not_told_apart,
     verdict_sentence,
+    verdict_text,
 )
-from sysid.effect_selection.verdict_text import verdict_text
 from sysid.identification.noise import with_noise_of
 from sysid.identification.split import train_and_test
 from sysid.models.base import LogModel
@@ -87,16 +87,15 @@ class ClosedLoop:
     @property
     def not_told_apart(self) -> str:
         """What the log can't tell apart, in plain English; empty for nothing."""
-        return indistinguishable_text(self.verdict)
+        return not_told_apart(self.verdict)
 
     @property
     def text(self) -> str:
-        """The verdict in lines: a sentence, what is missing, its parameters, errors.
+        """The verdict in lines: sentences, effects, what to record, errors.
 
         A provisional one says so in a line before them.
         """
-        most = self.last.settings.max_listed
-        text = verdict_text(self.verdict, self.errors, most)
+        text = verdict_text(self.verdict, self.errors)
         if not self.is_provisional:
             return text
         count = len(self.search.untested)

@@ -5,10 +5,6 @@ from collections.abc import Sequence
 from drake_disasm.effects import Effect, registered_effects
 from drake_disasm.effects.base import name_in_words
 
-_NUMBERS = (
-    *("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"),
-    *("ten", "eleven", "twelve"),
-)
 _SHOWN = 2  # joints that a sentence names; more are counted
 
 
@@ -20,9 +16,16 @@ def effect_class(name: str) -> type[Effect] | None:
 
 
 def in_words(name: str) -> str:
-    """Returns what a sentence calls an effect, whatever its joint: "dry friction"."""
-    known = effect_class(name)
-    return known.in_words() if known else name_in_words(name.partition(".")[0])
+    """Returns what a sentence calls an effect, whatever its joint: "dry friction".
+
+    Or several effects that are joined by "and".
+    """
+    kinds = [part.partition(".")[0] for part in name.split(" and ")]
+    classes = [effect_class(kind) for kind in kinds]
+    return " and ".join(
+        known.in_words() if known else name_in_words(kind)
+        for kind, known in zip(kinds, classes, strict=True)
+    )
 
 
 def by_kind(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
@@ -38,12 +41,12 @@ def by_kind(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
 
 
 def effects_in_words(names: Sequence[str]) -> str:
-    """Returns effects in words: "dry friction at six joints and rotor inertia"."""
-    phrases, is_counted = [], False
+    """Returns effects in words: "dry friction at 6 joints and rotor inertia"."""
+    phrases = []
     for kind, joints in by_kind(names).items():
-        where = _place(joints, is_counted)
+        is_many = len(joints) > _SHOWN
+        where = f"{len(joints)} joints" if is_many else enumeration(joints)
         phrases.append(f"{in_words(kind)}{f' at {where}' if where else ''}")
-        is_counted = is_counted or len(joints) > _SHOWN
     return enumeration(phrases)
 
 
@@ -52,15 +55,3 @@ def enumeration(parts: Sequence[str], word: str = "and") -> str:
     if len(parts) < 2:
         return "".join(parts)
     return f"{', '.join(parts[:-1])} {word} {parts[-1]}"
-
-
-def number_in_words(number: int) -> str:
-    """Returns a number as a word, if it is a small one."""
-    return _NUMBERS[number] if number < len(_NUMBERS) else str(number)
-
-
-def _place(joints: Sequence[str], is_counted: bool) -> str:
-    """Returns where effects of one kind act; "four" after "six joints"."""
-    if len(joints) <= _SHOWN:
-        return enumeration(joints)
-    return number_in_words(len(joints)) + ("" if is_counted else " joints")

@@ -1,6 +1,5 @@
 """Which experiment would separate effects that a log can't distinguish."""
 
-from drake_disasm.effects import Effect
 from sysid.effect_selection.effect_names import effect_class
 
 _DEFAULT = "a recording with only one of them at work"
@@ -16,25 +15,15 @@ def separating(one: str, other: str, at_task: bool = False) -> str:
             several joined by "and".
         at_task: whether it is to be recorded in steps of the task, not at rest.
     """
-    first, second = _classes(one), _classes(other)
-    is_rest = at_task and any(effect.task_experiment for effect in first + second)
-    if len(first) == len(second) == 1 and not is_rest:
-        (a,), (b,) = first, second
-        for effect, rival in ((a, b), (b, a)):
+    first, second = one.split(" and "), other.split(" and ")
+    known = [effect for effect in map(effect_class, first + second) if effect]
+    is_rest = at_task and any(effect.task_experiment for effect in known)
+    if len(first) == len(second) == 1 and len(known) == 2 and not is_rest:
+        for effect, rival in (known, known[::-1]):
             if experiment := effect.experiments_against.get(rival.__name__):
                 return experiment
-    shown = [revealing(effect, at_task) for effect in first + second]
+    shown = [revealing_kind(effect.__name__, at_task) for effect in known]
     return "; ".join(dict.fromkeys(filter(None, shown))) or _DEFAULT
-
-
-def revealing(effect: type[Effect], at_task: bool = False) -> str:
-    """Returns the recording that shows an effect apart from others, in words.
-
-    Args:
-        effect: its class.
-        at_task: whether it is to be recorded in steps of the task, not at rest.
-    """
-    return (at_task and effect.task_experiment) or effect.experiment
 
 
 def revealing_kind(kind: str, at_task: bool = False) -> str:
@@ -42,13 +31,7 @@ def revealing_kind(kind: str, at_task: bool = False) -> str:
 
     Args:
         kind: name of its class.
-        at_task: as of `revealing`.
+        at_task: whether it is to be recorded in steps of the task, not at rest.
     """
     known = effect_class(kind)
-    return revealing(known, at_task) if known else ""
-
-
-def _classes(name: str) -> list[type[Effect]]:
-    """Returns the classes of effects that a name speaks of, as far as known."""
-    found = [effect_class(part) for part in name.split(" and ")]
-    return [each for each in found if each]
+    return ((at_task and known.task_experiment) or known.experiment) if known else ""

@@ -70,15 +70,6 @@ class LeftOver:
     unit: str
     depends_on: tuple[str, ...]
 
-    @property
-    def text(self) -> str:
-        """What is left in words."""
-        return (
-            f"{self.channel}: {100 * self.share:.0f} % of what is left "
-            f"({self.size:.2g} {self.unit}) can be predicted from "
-            f"{' and '.join(self.depends_on)}"
-        )
-
 
 @dataclass(frozen=True)
 class _Inputs:

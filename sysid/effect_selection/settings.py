@@ -171,9 +171,6 @@ class SelectionSettings:
         "of a channel's mean squared residual",
         "what a flexible learner explains of rows that it did not see",
     )
-    max_listed: int = _setting(
-        3, "items", "of anything in the text of a verdict, which has three lines"
-    )
 
 
 #: The defaults.

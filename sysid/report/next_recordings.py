@@ -6,7 +6,7 @@ from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effect_class, enumeration, in_words
 from sysid.effect_selection.experiments import revealing_kind
 from sysid.effect_selection.verdict import Verdict
-from sysid.effect_selection.verdict_sentence import in_all_words, indistinguishable
+from sysid.effect_selection.verdict_words import kind_lines
 
 
 @dataclass(frozen=True)
@@ -54,22 +54,21 @@ def recordings(verdict: Verdict, at_task: bool) -> list[Recording]:
         verdict: of a search.
         at_task: whether its log is of steps of the task.
     """
-    found = [
-        Recording(f"whether it is {in_words(kind)} or {_any_of(rivals.kinds)}", text)
-        for kind, rivals in indistinguishable(verdict).items()
-        for text in rivals.experiments
-    ]
-    found += [
-        Recording(f"whether it is {in_words(name)} at all", text)
-        for name in dict.fromkeys(n.partition(".")[0] for n in verdict.suggested)
-        if (text := revealing_kind(name, at_task))
-    ]
+    lines, found = kind_lines(verdict), []
+    for each in (line for line in lines if line.rivals):
+        names = [in_words(name) for name in (each.names[0], *each.rivals)]
+        purpose = f"whether it is {enumeration(names, 'or')}"
+        found += [Recording(purpose, text) for text in each.experiments]
+    for each in (line for line in lines if line.status == "suggested"):
+        if text := revealing_kind(each.names[0], at_task):
+            purpose = f"whether it is {in_words(each.names[0])} at all"
+            found.append(Recording(purpose, text))
     found += [
         Recording(f"{in_words(kind)}, which this log could not have shown", text)
         for kind in verdict.undetectable
         if (text := revealing_kind(kind, at_task))
     ]
-    return found
+    return list(dict.fromkeys(found))
 
 
 def limit_rows(limits: tuple[DetectionLimit, ...]) -> list[LimitRow]:
@@ -104,7 +103,3 @@ def _limit_row(kind: str, field: str, limits: list[DetectionLimit]) -> LimitRow:
         tuple(hidden),
         tuple(shapes),
     )
-
-
-def _any_of(names: tuple[str, ...]) -> str:
-    return enumeration([in_all_words(name) for name in names], "or")

@@ -5,10 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sysid.effect_selection.channel_checks import (
-    channel_findings,
-    findings_text,
-)
+from sysid.effect_selection.channel_checks import channel_findings
 from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.settings import SelectionSettings
 from sysid.models.base import LogModel
@@ -59,7 +56,7 @@ def _found(residual, noise_is_stated=True, model_error=0.0):
     fitter = Fitter(
         model, Workers(), np.inf, _SETTINGS, noise_is_stated=noise_is_stated
     )
-    return findings_text(channel_findings(fitter.fit(())))
+    return [(each.channel, each.text) for each in channel_findings(fitter.fit(()))]
 
 
 def _time():
@@ -69,10 +66,11 @@ def _time():
 def test_a_sine_is_found_with_its_frequency():
     residual = _white()
     residual[:, 1] += 3.0 * np.sin(2 * np.pi * 1.3 * _time())
-    text = _found(residual)
-    assert "fy: periodic at 1.3 Hz" in text  # of frequencies 0.17 Hz apart
-    assert "fy: 2.3 times its noise" in text and "fx" not in text
-    assert _found(residual, noise_is_stated=False).startswith("fy: periodic at 1.3 Hz")
+    (line, text), (excess, size) = _found(residual)
+    assert (line, excess) == ("fy", "fy")
+    assert text.startswith("periodic at 1.3 Hz")  # of frequencies 0.17 Hz apart
+    assert size.startswith("2.3 times")
+    assert _found(residual, noise_is_stated=False) == [(line, text)]
 
 
 def test_a_model_that_states_its_own_error_may_be_off_by_as_much_in_a_pattern():
@@ -85,7 +83,8 @@ def test_a_model_that_states_its_own_error_may_be_off_by_as_much_in_a_pattern():
 def test_outlying_rows_are_counted_and_placed():
     residual = _white()
     residual[[130, 131, 150], 1] += 30.0
-    assert "fy: 3 outlying rows in episode_2 (row 130, 131, 150)" in _found(residual)
+    text = "3 outlying rows in episode_2 (row 130, 131, 150)"
+    assert ("fy", text) in _found(residual)
 
 
 @pytest.mark.parametrize(
@@ -94,11 +93,11 @@ def test_outlying_rows_are_counted_and_placed():
 def test_noise_alone_shows_nothing(noise):
     shape = np.ones((_EPISODES * _ROWS, 2))
     drawn = [noise(np.random.default_rng(seed), shape) for seed in range(30)]
-    texts = [_found(residual) for residual in drawn]
-    assert sum(bool(text) for text in texts) <= 1, texts
+    found = [_found(residual) for residual in drawn]
+    assert sum(bool(each) for each in found) <= 1, found
 
 
 def test_more_than_the_stated_noise_is_said_only_of_its_channel():
     residual = _white()
     residual[:, 0] *= 2.0
-    assert _found(residual) == "fx: 1.9 times its noise, of unknown origin"
+    assert _found(residual) == [("fx", "1.9 times its noise, of unknown origin")]

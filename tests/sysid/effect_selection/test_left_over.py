@@ -64,7 +64,7 @@ def test_what_is_left_is_said_with_its_channel_and_what_it_depends_on(found):
     assert left.depends_on[0] == "velocity"
     assert 0.05 < left.size < 0.2 and left.unit == "N m"
     assert found.verdict.ending in ("partly", "unexplained")
-    assert "of what is left" in found.text
+    assert "elbow depends on velocity" in found.text
 
 
 def test_a_residual_model_halves_the_error_of_a_run_it_never_saw(found, tmp_path):

@@ -22,7 +22,7 @@ from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.output import to_mapping
 from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.effect_selection.verdict import judge
-from sysid.effect_selection.verdict_sentence import verdict_sentence
+from sysid.effect_selection.verdict_words import verdict_sentence
 from sysid.models import Channel, LogModel, Measurements
 from sysid.parameters import Parameter
 from sysid.report import closing_page
@@ -118,7 +118,7 @@ def test_a_large_error_is_no_noise_whatever_else_passed():
     verdict = judge(found.search, errors)
     assert verdict.ending == "unexplained"
     assert verdict.relative_error == pytest.approx(0.4)
-    assert "40 % of what was measured" in verdict_sentence(verdict, errors)
+    assert "40 % of the torque, which is large" in verdict_sentence(verdict, errors)
 
 
 def test_a_model_on_which_no_effect_can_act_is_refused(pendulum):

@@ -15,18 +15,19 @@ from sysid.effect_selection.experiments import separating
 from sysid.effect_selection.left_over import LeftOver
 from sysid.effect_selection.strokes import joints_of_one_stroke
 from sysid.effect_selection.verdict import ParameterValue, Tie, Written
-from sysid.effect_selection.verdict_sentence import (
-    improvement_in_words,
-    indistinguishable_text,
+from sysid.effect_selection.verdict_words import (
+    error_in_words,
+    kind_lines,
+    not_told_apart,
     verdict_sentence,
+    verdict_text,
 )
-from sysid.effect_selection.verdict_text import verdict_text
 from sysid.models import Channel, LogModel, Measurements
 from tests.sysid.effect_selection.verdicts import ERRORS, made_verdict
 
 _LAG, _FRICTION = ("SensorLag",), tuple(f"JointCoulombFriction.j{i}" for i in range(3))
 _AGAINST = (Contradiction(("a", "b"), "SensorBias", 0.5),)
-_SINE = (ChannelFinding("fx", "periodic at 1.3 Hz (90 %)", "is periodic at 1.3 Hz"),)
+_SINE = (ChannelFinding("fx", "periodic at 1.3 Hz (90 %)"),)
 _LEFT = (LeftOver("fx", 0.4, 0.1, "N", ("velocity", "time")),)
 _LIMITS = (
     DetectionLimit("SensorLag", "fx", 0.01, "s", 0.1),
@@ -38,43 +39,51 @@ _SIGN = (Written("TorqueSign", "j1 has the other sign", "flip it"),)
 @pytest.mark.parametrize(
     ("ending", "names", "more", "stated"),
     [
-        ("none", (), {"limits": _LIMITS}, ["residual is noise", "1 of 2"]),
-        ("too short", (), {"limits": _LIMITS}, ["too short", "bent groove"]),
-        ("explained", _FRICTION, {}, ["dry friction at three joints", "10 %", "1 %"]),
-        ("partly", _LAG, {"left_over": _LEFT}, ["not all", "40 %", "velocity"]),
-        ("partly", _LAG, {"relative_error": 0.49}, ["49 % of what was measured"]),
-        (
-            "unexplained",
-            _LAG,
-            {"excess": 3.14},
-            ["no effect is confirmed", "3.1 times"],
-        ),
-        ("unexplained", (), {"findings": _SINE}, ["fx is periodic at 1.3 Hz"]),
-        ("unexplained", (), {"correlated": ("fx",)}, ["of fx is correlated"]),
-        (
-            "unexplained",
-            (),
-            {"contradictions": _AGAINST},
-            ["a contradicts b", "offset"],
-        ),
+        ("none", (), {"limits": _LIMITS}, ["noise", "1 of 2", "GrooveBend"]),
+        ("too short", (), {"limits": _LIMITS}, ["too short", "1 of 2", "GrooveBend"]),
+        ("none", (), {"is_provisional": True}, ["So far"]),
+        ("explained", _FRICTION, {}, [in_words(_FRICTION[0]), "from 10 to 1 %"]),
+        ("partly", _LAG, {"left_over": _LEFT}, ["40 %", "fx", "velocity"]),
+        ("partly", _LAG, {"relative_error": 0.49}, ["large"]),
+        ("partly", _LAG, {"dependence": "fx depends on time"}, ["fx depends on time"]),
+        ("partly", _LAG, {"invalid": "drag is too strong"}, ["drag is too strong"]),
+        ("unexplained", _LAG, {"excess": 3.14}, ["no effect is confirmed", "3.1"]),
+        ("unexplained", (), {"findings": _SINE}, ["fx: periodic at 1.3 Hz"]),
+        ("unexplained", (), {"correlated": ("fx",)}, ["fx is correlated"]),
+        ("unexplained", (), {"contradictions": _AGAINST}, ["a contradicts b"]),
+        ("unexplained", (), {"is_provisional": True}, ["tried so far"]),
         ("explained", _LAG, {"misfits": ("moving (drop)",)}, ["moving (drop)", "slow"]),
-        ("none", (), {"written": _SIGN}, ["other sign (flip it)", "is noise"]),
+        ("none", (), {"written": _SIGN}, ["other sign (flip it)", "noise"]),
     ],
 )
-def test_a_sentence_states_names_numbers_and_the_ending(ending, names, more, stated):
-    sentence = verdict_sentence(made_verdict(ending, names, **more), ERRORS)
-    assert all(words in sentence for words in stated), sentence
+def test_a_text_states_names_numbers_and_the_ending(ending, names, more, stated):
+    text = verdict_text(made_verdict(ending, names, **more), ERRORS)
+    assert all(words in text for words in stated), text
 
 
-def test_confirmed_names_come_before_what_is_suggested():
-    found = made_verdict("partly", ("SensorLag", "SensorBias"))
-    lag, bias = found.standings
-    bias = dataclasses.replace(bias, status="suggested", reason="2 of 4 parts ask")
-    found = dataclasses.replace(found, standings=(lag, bias))
-    assert (found.confirmed, found.suggested) == (("SensorLag",), ("SensorBias",))
-    sentence = verdict_sentence(found, ERRORS)
-    assert sentence.index("slow filter") < sentence.index("Suggested")
-    assert sentence.index("Suggested") < sentence.index("offset")
+def _mixed():
+    """Returns a verdict with an effect of each standing, at several joints."""
+    ties = ((), (Tie("JointLoadFriction.j0 and ArmTilt", "weights; turns"),), ())
+    names = ("SensorLag", "JointCoulombFriction.j0", "SensorBias")
+    found = made_verdict("partly", names, ties, left_over=_LEFT)
+    reason = "2 of 4 parts ask"
+    bias = dataclasses.replace(found.standings[2], status="suggested", reason=reason)
+    return dataclasses.replace(found, standings=(*found.standings[:2], bias))
+
+
+def test_a_sentence_goes_from_what_is_certain_to_what_is_left_and_the_error():
+    names = [in_words(name) for name in _mixed().names]
+    sentence = verdict_sentence(_mixed(), ERRORS)
+    places = [sentence.index(each) for each in (*names, "velocity", "10 to 1 %")]
+    assert places == sorted(places)
+
+
+def test_nothing_is_said_twice():
+    found = dataclasses.replace(_mixed(), relative_error=0.5, contradictions=_AGAINST)
+    lines = verdict_text(found, ERRORS).split("\n")
+    assert lines[0] == verdict_sentence(found, ERRORS)
+    phrases = ("velocity", "a contradicts b", "2 of 4", "weights", "SensorLag", "1 %")
+    assert all("\n".join(lines).count(each) == 1 for each in phrases), lines
 
 
 def test_none_owns_that_the_model_states_an_error_of_its_own():
@@ -83,7 +92,20 @@ def test_none_owns_that_the_model_states_an_error_of_its_own():
     assert "its own error" not in verdict_sentence(made_verdict("none"), ERRORS)
 
 
-def test_the_text_has_names_rivals_intervals_and_errors():
+def test_effects_of_a_kind_and_standing_are_one_line():
+    ties = tuple((Tie(f"E{i}.j0", "rests; turns"),) for i in range(3))
+    found = made_verdict("explained", _FRICTION, ties)
+    reason = "2 of 4 parts ask"
+    last = dataclasses.replace(found.standings[2], status="suggested", reason=reason)
+    found = dataclasses.replace(found, standings=(*found.standings[:2], last))
+    several, one = kind_lines(found)
+    assert (several.names, several.status) == (_FRICTION[:2], "ambiguous")
+    assert (several.rivals, several.experiments) == (("E0", "E1"), ("rests", "turns"))
+    assert (several.reasons, one.reasons) == ((), (reason,))
+    assert (one.names, one.rivals) == (_FRICTION[2:], ("E2",))
+
+
+def test_a_line_has_intervals_and_rivals():
     ties = (tuple(Tie(f"E{i}.j0", "rests") for i in range(5)),)
     sizes = [(0.2, (0.1, 0.3)), (0.1, (-0.1, 0.3))]
     values = tuple(
@@ -91,14 +113,38 @@ def test_the_text_has_names_rivals_intervals_and_errors():
         for i, (value, interval) in enumerate(sizes)
     )
     found = made_verdict("explained", _FRICTION[:1], ties, values)
-    sentence, missing, *_, parameters, errors = verdict_text(found, ERRORS, 3).split(
-        "\n"
-    )
-    assert sentence == verdict_sentence(found, ERRORS)
-    assert "E0 or E1 or E2 or 2 more" in missing and "rests" in missing
-    assert "x0 = 0.2 N m (0.1 to 0.3, at its bound)" in parameters
-    assert "x1" not in parameters  # its interval holds null
-    assert errors.endswith("1 -> 0.1 N; 10 -> 1 % of the readings")
+    (line,) = kind_lines(found)
+    assert line.title == _FRICTION[0] and line.values == values[:1]  # one holds null
+    (alone,) = kind_lines(made_verdict("explained", _FRICTION[:1], ties, values[1:]))
+    assert alone.values == values[1:]  # it has no other
+    assert "x0 = 0.2 N m (0.1 to 0.3, at its bound)" in line.details
+    assert "E0, E1, E2 or 2 more" in line.details
+    *_, record, errors = verdict_text(found, ERRORS).split("\n")
+    assert record.endswith("record: rests")
+    assert errors.endswith("fx 1 -> 0.1 N")
+
+
+def test_values_of_many_joints_say_where_and_leave_shapes_to_the_report():
+    values = [
+        ParameterValue(f"{name}.{field}", 2.0, "N m", (1.0, 3.0), null)
+        for name in _FRICTION
+        for field, null in (("size", 0.0), ("creep", None))
+    ]
+    (many,) = kind_lines(made_verdict("explained", _FRICTION, values=values))
+    assert many.title == "JointCoulombFriction of 3 joints"
+    assert all(f"2 N m (1 to 3) at j{i}" in many.details for i in range(3))
+    assert "creep" not in many.details
+    (one,) = kind_lines(made_verdict("explained", _FRICTION[:1], values=values))
+    assert "creep = 2 N m" in one.details and " at " not in one.details
+
+
+def test_each_set_has_a_recording_that_separates_it():
+    names = ("SensorLag", "SensorBias", "SensorGain", "SensorDrift")
+    ties = tuple((Tie("X", f"first {n}; second {n}"),) for n in names)
+    text = verdict_text(made_verdict("explained", names, ties), ERRORS)
+    assert all(f"first {n}" in text for n in names) and "second" not in text
+    text = verdict_text(made_verdict("explained", names[:1], ties[:1]), ERRORS)
+    assert "first SensorLag; second SensorLag" in text
 
 
 def test_effects_have_words_of_their_own_and_a_few_joints_are_named():
@@ -114,11 +160,11 @@ def test_what_a_log_cannot_tell_apart_is_said_once_for_all_joints():
         (Tie(n.replace("Coulomb", "Load"), "two payloads"),) for n in _FRICTION
     )
     found = made_verdict("explained", _FRICTION, ties)
-    text = indistinguishable_text(found)
+    text = not_told_apart(found)
     assert text.count("friction in proportion to the load") == 1
     assert text.endswith("record: two payloads.") and "stroke" not in text
     found = dataclasses.replace(found, single_strokes=("j0",))
-    assert "j0 makes a single stroke" in indistinguishable_text(found)
+    assert "j0 makes a single stroke" in not_told_apart(found)
 
 
 class Sliding(LogModel):
@@ -181,7 +227,7 @@ def test_errors_that_fall_and_rise_are_said_in_their_units(
         after=np.tile(after, (2, 1)),
         channels=channels,
     )
-    text = improvement_in_words(errors)
+    text = error_in_words(errors)
     assert "%" not in text and all(w in text for w in words)
 
 
