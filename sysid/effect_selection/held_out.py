@@ -174,11 +174,14 @@ def _linearly_predicted(fit: Fit, folds: NDArray[np.int64]) -> Array:
 
 
 def _linear_residual(fit: Fit, folds: NDArray[np.int64]) -> Array:
-    """Returns residuals (rows, channels) of each fold by a fit to the others."""
-    linearisation = fit.linearisation
-    residual = linearisation.residual.copy()
-    root = np.sqrt(linearisation.weights)
-    both = np.concatenate([linearisation.jacobian, residual[..., None]], axis=2)
+    """Returns residuals (rows, channels) of each fold by a fit to the others.
+
+    Parameters that a bound holds stay there: past it the model does not go.
+    """
+    linearisation, free = fit.linearisation, ~fit.is_at_bound
+    residual, u = linearisation.residual.copy(), linearisation.u[free]
+    root, jacobian = np.sqrt(linearisation.weights), linearisation.jacobian[..., free]
+    both = np.concatenate([jacobian, residual[..., None]], axis=2)
     both *= root[..., None]
     rows = [folds == fold for fold in range(int(folds.max()) + 1)]
     # Least squares of all rows are those of each fold's triangular factor.
@@ -187,6 +190,6 @@ def _linear_residual(fit: Fit, folds: NDArray[np.int64]) -> Array:
         others = np.concatenate([*parts[:fold], *parts[fold + 1 :]])
         A, b = others[:, :-1], others[:, -1]
         step = -np.linalg.lstsq(A, b, rcond=_UNDETERMINED)[0]
-        step = np.clip(linearisation.u + step, 0.0, 1.0) - linearisation.u
-        residual[own] += linearisation.jacobian[own] @ step
+        step = np.clip(u + step, 0.0, 1.0) - u
+        residual[own] += jacobian[own] @ step
     return residual

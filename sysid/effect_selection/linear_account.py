@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,11 +40,21 @@ class LinearAccount:
     terms: tuple[Term, ...]
 
     @classmethod
-    def of_selection(cls, system: LinearSystem, found: Selection) -> "LinearAccount":
-        """Returns the account of what was selected by the linear account itself."""
+    def of_selection(
+        cls, system: LinearSystem, found: Selection, kept: Collection[str]
+    ) -> "LinearAccount":
+        """Returns the account of what was selected by the linear account itself.
+
+        Args:
+            system: it was selected from.
+            found: the selection.
+            kept: names of its effects that the model has.
+        """
         owners = owned_columns(found.terms)
+        owners = {name: owners[name] for name in owners if name in kept}
+        columns = np.concatenate([system.own, *owners.values()])
         terms = tuple(t for t in system.terms if not set(t.names) <= set(owners))
-        return cls(system, found.weights, found.columns, owners, terms)
+        return cls(system, found.weights, columns, owners, terms)
 
     @classmethod
     def of_fit(cls, system: LinearSystem, fit: Fit) -> "LinearAccount":

@@ -109,14 +109,14 @@ def _linear_search(
     effects = tuple(_candidates(system, found))
     _say(progress, "fitting the model with the effects")
     last = _needed(fitter, first, fitter.fit(effects, first)) if effects else first
-    account = LinearAccount.of_selection(system, found)
+    kept = {effect.name for effect in last.effects}
+    account = LinearAccount.of_selection(system, found, kept)
     if not _is_exact(account, first, last):
         _say(progress, f"comparing {len(library)} candidates with the effects")
         account = LinearAccount.of_fit(
             linear_system(fitter, last, library, deadline), last
         )
     recordings = len(fitter.base.measurements.names)
-    kept = {effect.name for effect in last.effects}
     steps = tuple(s for s in found.steps if kept.intersection(s.chosen.term.names))
     rivals = _rivals(steps)
     placed = standings(account, votes, rivals, last.effects, recordings)

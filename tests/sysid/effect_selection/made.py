@@ -83,6 +83,6 @@ def placed(system: LinearSystem, recordings: int = 1) -> dict[str, Standing]:
     found = selected(system)
     votes, _ = votes_of_selections(system, lambda done, count: None, np.inf)
     effects = [candidate for term in found.terms for candidate in term.candidates]
-    account = LinearAccount.of_selection(system, found)
+    account = LinearAccount.of_selection(system, found, found.names)
     each = standings(account, votes, {}, effects, recordings)
     return {standing.name: standing for standing in each}

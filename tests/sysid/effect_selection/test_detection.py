@@ -25,7 +25,8 @@ def _drawn(seed, amplitude=0.0, noise=1.0):
 
 
 def _limits(system):
-    account = LinearAccount.of_selection(system, selected(system))
+    found = selected(system)
+    account = LinearAccount.of_selection(system, found, found.names)
     return {limit.effect: limit for limit in detection_limits(account)}
 
 

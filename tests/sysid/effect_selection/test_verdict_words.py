@@ -45,7 +45,6 @@ _SIGN = (Written("TorqueSign", "j1 has the other sign", "flip it"),)
         ("explained", _FRICTION, {}, [in_words(_FRICTION[0]), "from 10 to 1 %"]),
         ("partly", _LAG, {"left_over": _LEFT}, ["40 %", "fx", "velocity"]),
         ("partly", _LAG, {"relative_error": 0.49}, ["large"]),
-        ("partly", _LAG, {"dependence": "fx depends on time"}, ["fx depends on time"]),
         ("partly", _LAG, {"invalid": "drag is too strong"}, ["drag is too strong"]),
         ("unexplained", _LAG, {"excess": 3.14}, ["no effect is confirmed", "3.1"]),
         ("unexplained", (), {"findings": _SINE}, ["fx: periodic at 1.3 Hz"]),
