@@ -133,17 +133,20 @@ def linear_system(
         None if model.affine else linear,
         tuple(candidate.text for candidate in rest[len(tested) :]),
         fitter.settings,
-        tuple(_unseen(tested, own_columns)),
+        tuple(_unseen(tested, groups, own_columns)),
     )
 
 
 def _unseen(
-    library: Sequence[Candidate], columns: Sequence[Columns]
+    library: Sequence[Candidate], groups: Sequence[range], columns: Sequence[Columns]
 ) -> list[Candidate]:
-    """Returns a candidate of each effect none of whose shapes has columns."""
-    pairs = list(zip(library, columns, strict=True))
-    seen = {candidate.name for candidate, own in pairs if len(own)}
-    hidden = {c.name: c for c, _ in pairs if c.name not in seen and c.fields}
+    """Returns a candidate of each effect none of whose shapes has columns.
+
+    But those that are the model's own parameters.
+    """
+    each = list(zip(library, groups, columns, strict=True))
+    seen = {candidate.name for candidate, _, own in each if len(own)}
+    hidden = {c.name: c for c, group, _ in each if len(group) and c.name not in seen}
     return list(hidden.values())
 
 
