@@ -20,6 +20,7 @@ STANDARD_ERRORS = 3.0  # Student's t of eight blocks: one in a hundred by chance
 #: Of the loss of the channels that a sign or an order concerns: a wrong one leaves at
 #: least as much again. Effects that the model lacks change it by less.
 FAR_BETTER = 0.5
+_PARTS = 4  # contiguous ones of a log; all but one have to agree
 _EQUAL = 0.9  # of the least loss: ways that leave less than it / this tie
 _ROUNDED = 1e-9  # of a loss: less is rounding
 _RANK = 1e-10  # of the largest eigenvalue of the columns' scaled products
@@ -216,6 +217,17 @@ def is_lower(losses: Array, than: Array) -> bool:
         return False
     error = float(gain.std(ddof=1)) / np.sqrt(len(gain))
     return float(gain.mean()) > STANDARD_ERRORS * error
+
+
+def is_replicated(losses: Array, than: Array) -> bool:
+    """Returns whether losses by block (blocks,) are lower in all but one of four parts.
+
+    False of fewer blocks than parts.
+    """
+    if len(losses) < _PARTS:
+        return False
+    gain = np.array([part.sum() for part in np.array_split(than - losses, _PARTS)])
+    return bool(np.sum(gain > 0.0) >= _PARTS - 1)
 
 
 def jackknife_error(without: Sequence[float] | Array) -> float:

@@ -55,27 +55,35 @@ def rate_factors(
 
 
 def _products(time: Array, values: Array, rates: Array) -> Array:
-    """Returns the sums (2, joints) of integral times value, and of value squared."""
+    """Returns sums (3, joints) of values squared, times integral, and of integral's."""
     integral = cumulative_trapezoid(rates, time, axis=0, initial=0)
     line = np.column_stack([np.ones(len(time)), time - time[0]])
     both = np.hstack([integral, values])
     left = both - line @ np.linalg.lstsq(line, both, rcond=None)[0]
     integral, values = np.hsplit(left, 2)
-    return np.array([(integral * values).sum(axis=0), (values**2).sum(axis=0)])
+    products = values**2, integral * values, integral**2
+    return np.array([product.sum(axis=0) for product in products])
 
 
 def _ratio(products: Array) -> Estimate:
-    """Returns the ratio of two sums over blocks (blocks, 2), with its error."""
+    """Returns the factor by sums over blocks (blocks, 3), with its error."""
     total = products.sum(axis=0)
     if not total[1]:
         return Estimate(np.nan, np.nan)
-    ratios = [
-        (total - part)[0] / (total - part)[1]
-        for part in products
-        if (total - part)[1] > 0.0
-    ]
+    others = [total - part for part in products]
+    ratios = [_nearest_to_one(other) for other in others if other[1]]
     error = jackknife_error(ratios) if len(ratios) > 1 else np.inf
-    return Estimate(float(total[0] / total[1]), error)
+    return Estimate(_nearest_to_one(total), error)
+
+
+def _nearest_to_one(products: Array) -> float:
+    """Returns the factor nearest to one that noise allows (3,).
+
+    Noise of the values lowers their regression's slope, that of the rates the slope of
+    the other one: the factor is between the two.
+    """
+    slopes = products[1:] / products[:-1]
+    return float(np.clip(1.0, slopes.min(), slopes.max()))
 
 
 def right_rates(

@@ -21,6 +21,7 @@ from sysid.models.channel_grams import (
     ChannelGrams,
     angle_between,
     is_lower,
+    is_replicated,
     jackknife_error,
 )
 
@@ -63,6 +64,13 @@ class Readings:
         """Returns held-out losses (blocks, 6), relative to what readings vary by."""
         grams = ChannelGrams.of(self.columns(), self.wrench[:, :, None])
         return grams.losses(np.ones((6, 1)), self.scale)
+
+    @property
+    def are_explained(self) -> bool:
+        """Whether a weight leaves less than half of what a bias alone leaves."""
+        rest = ChannelGrams.of(self.columns()[..., 4:], self.wrench[:, :, None])
+        alone = rest.losses(np.ones((6, 1)), self.scale)
+        return bool(self.losses().sum() < FAR_BETTER * alone.sum())
 
     @property
     def scale(self) -> Array:
@@ -117,8 +125,7 @@ class Way:
 def has_no_weight(readings: Readings, known: float) -> bool:
     """Returns whether there is no weight in readings.
 
-    Less than half of the weight that is known to hang on the sensor; or, if none is
-    known, less than single readings scatter by.
+    Less than half of the weight that is known to hang on the sensor.
 
     Args:
         readings: at rest.
@@ -127,10 +134,7 @@ def has_no_weight(readings: Readings, known: float) -> bool:
     if len(readings.wrench) < _FEWEST:
         return False
     weight, error = readings.weight()
-    most = float(np.linalg.norm(weight)) + STANDARD_ERRORS * error
-    varied = readings.wrench[:, _FORCE] - readings.wrench[:, _FORCE].mean(axis=0)
-    scatter = float(np.sqrt(np.mean(np.sum(varied**2, axis=1))))
-    return most < (0.5 * known if known else scatter)
+    return float(np.linalg.norm(weight)) + STANDARD_ERRORS * error < 0.5 * known
 
 
 def better_ways(readings: Readings) -> list[tuple[Way, float]]:
@@ -142,7 +146,8 @@ def better_ways(readings: Readings) -> list[tuple[Way, float]]:
     for way in _ways(readings):
         losses = way.readings.losses().sum(axis=1)
         is_far = way.estimated or losses.sum() < FAR_BETTER * written.sum()
-        if is_far and is_lower(losses, written):
+        is_better = is_lower(losses, written) and is_replicated(losses, written)
+        if is_far and is_better and way.readings.are_explained:
             found.append((way, float(losses.sum())))
     return found
 
