@@ -1,26 +1,24 @@
 """Whether real logs that are written wrongly are said to be, and right ones are not.
 
-Windows of real recordings are read as they are, and with one fault put in: `bookkeeping`
-says how each was written. An answer is right if its only hypothesis puts the log right,
-silent if there is none, and wrong if there is any other. A window as it is must have no
-hypothesis, but for one that the recording is known for. Prints how many answers were
-right, silent and wrong, and each wrong one.
+Windows of real recordings are read as they are, and the first of each length with one
+fault put in: `bookkeeping` says how each was written. An answer is right if its only
+hypothesis puts the log right, silent if there is none, and wrong if there is any other.
+A window as it is must have no hypothesis, but for one that the recording is known for.
+Prints each wrong answer, and how many were right, silent and wrong.
 """
 
-import argparse
 import dataclasses
-import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from damaged_logs import Columns, Damage, both, damaged, late, scaled
+from damaged_logs import Columns, Damage, both, damaged, late, reordered, scaled
 from numpy.typing import NDArray
 from real_data import data_folder
-from results import add_results_argument, write_result
+from results import add_results_argument, markdown, write_result
 from scipy.spatial.transform import Rotation
 from selection.real import RECORDED
 
@@ -44,6 +42,8 @@ _KNOWN = {
     "emps_pulses": "CommonDelay",
     _POSES: "GravityDirection",
 }
+_TITLE = "What is said of real logs that are written wrongly, by windows"
+_ANSWERS = ("right", "silent", "wrong")
 _DELAY = 0.03  # s
 _CLOSE = 0.05  # of the rms of what was measured: put right but for rounding
 _LOGS = (*RECORDED, _POSES)
@@ -87,16 +87,6 @@ def _joint_faults(joints: int, period: float) -> Iterator[Fault]:
         yield Fault("all torques reversed", "JointOrder", reordered(backwards))
 
 
-def reordered(order: NDArray[np.int64]) -> Damage:
-    """Returns what puts the columns of torques into another order (joints,)."""
-
-    def _damage(columns: Columns) -> None:
-        taus = [columns[f"tau.{i}"] for i in order]
-        columns.update({f"tau.{i}": tau for i, tau in enumerate(taus)})
-
-    return _damage
-
-
 def _sensor_faults(in_W: bool) -> Iterator[Fault]:
     """Yields faults of readings at rest, of a wrench that is in W or in S."""
     for axis in "xyz":
@@ -115,7 +105,7 @@ def _orientations(columns: Columns) -> Rotation:
 
 
 def _turned(turn: Rotation, in_W: bool) -> Damage:
-    """Returns what writes readings in another world: R_WS, and a wrench that is in W."""
+    """Returns what writes readings in another W: R_WS, and a wrench in W."""
 
     def _damage(columns: Columns) -> None:
         R_WS = turn * _orientations(columns)
@@ -189,7 +179,7 @@ def answer(right: LogModel, fault: Fault, log: Log, known: str) -> tuple[str, st
         known: hypothesis that holds for the log as it is, or "".
     """
     ways = model_of([damaged(log, fault.damage)], ModelChoice()).bookkeeping()
-    said = ", ".join(f"{way.name}: {way.what}" for way in ways)
+    said = _said(ways)
     own = [way for way in ways if _is_put_right(way, right, fault)]
     others = [way for way in ways if way not in own and way.name != known]
     if others:
@@ -220,22 +210,21 @@ def _misfit(model: LogModel) -> NDArray[np.float64]:
 def measured(log: Log, known: str, seconds: Sequence[float]) -> Iterator[list[str]]:
     """Yields [fault, length, answer, what is said] of all windows of a log.
 
-    As they are, all of them; with faults, every other one of the first few: they cost.
+    Without a fault of all of them; with one, of the first of each length.
     """
-    number: Counter[str] = Counter()
+    seen = set[str]()
     for length, part in windows(log, seconds):
         right = model_of([part], ModelChoice())
         ways = [way for way in right.bookkeeping() if way.name != known]
-        said = ", ".join(f"{way.name}: {way.what}" for way in ways)
-        yield ["none", length, "wrong" if ways else "right", said]
-        number[length] += 1
-        if number[length] > _MOST_WINDOWS or known and length != "whole":
-            continue
-        for fault in faults(part) if known != "GravityDirection" else ():
-            yield [fault.kind, length, *answer(right, fault, part, known)]
+        yield ["none", length, "wrong" if ways else "right", _said(ways)]
+        if length not in seen and known != "GravityDirection":
+            for fault in faults(part):
+                yield [fault.kind, length, *answer(right, fault, part, known)]
+        seen.add(length)
 
 
-_MOST_WINDOWS = 1
+def _said(ways: Sequence[Bookkeeping[LogModel]]) -> str:
+    return ", ".join(f"{way.name}: {way.what}" for way in ways)
 
 
 def _written(name: str, folder: Path) -> Log:
@@ -252,23 +241,28 @@ def _written(name: str, folder: Path) -> Log:
 def main(arguments: Sequence[str]) -> int:
     """Prints the table; returns the exit status."""
     parser = program.argument_parser(f"python {_PROGRAM}", __doc__, _EXAMPLES)
-    parser.add_argument("logs", nargs="*", default=list(_LOGS))
-    parser.add_argument("--seconds", type=float, nargs="*", default=[2.0, 5.0])
+    parser.add_argument(
+        "logs", nargs="*", default=list(_LOGS), help=f"of {', '.join(_LOGS)}"
+    )
+    parser.add_argument(
+        "--seconds", type=float, nargs="*", default=[2.0, 5.0], help="of windows [s]"
+    )
     add_results_argument(parser)
     options = parser.parse_args(arguments)
     counts: dict[tuple[str, str], Counter[str]] = {}
     for name in options.logs:
         with tempfile.TemporaryDirectory() as folder:
-            log = _written(name, Path(folder))
-            for kind, length, how, said in measured(
-                log, _KNOWN.get(name, ""), options.seconds
-            ):
+            log, known = _written(name, Path(folder)), _KNOWN.get(name, "")
+            for kind, length, how, said in measured(log, known, options.seconds):
                 counts.setdefault((kind, length), Counter())[how] += 1
                 if how == "wrong":
                     print(f"{name} {length}, {kind}: {said}", flush=True)
-        print(name, "done", flush=True)
-    for (kind, length), of in sorted(counts.items()):
-        print(f"{kind:24} {length:6} {of['right']:4} {of['silent']:4} {of['wrong']:4}")
+    rows = [
+        (*of, *(count[how] for how in _ANSWERS)) for of, count in sorted(counts.items())
+    ]
+    columns = ("fault", "length", *_ANSWERS)
+    print(markdown(columns, rows))
+    write_result(options.results, _TITLE, columns, rows, _PROGRAM, arguments)
     return 0
 
 

@@ -48,8 +48,8 @@ def gravity_in(
     The nominal weights under gravity along each axis of the base are fitted to the
     torques, with the rest of each joint's nominal torque at a positive scale of its
     own, and friction. There is none, if less than half of gravity is in the torques.
-    Torques in another order or of other signs have no common gravity either: whatever is
-    found has to explain more than half of them.
+    Torques in another order or of other signs have no common gravity either: whatever
+    is found has to explain more than half of them.
 
     Args:
         motion: at some rows.

@@ -18,9 +18,12 @@ from sysid.models.channel_grams import (
     MOST_BLOCKS,
     ChannelGrams,
     Estimate,
+    is_beyond_chance,
     is_lower,
     is_replicated,
     jackknife_error,
+    parts_of,
+    runs_of,
 )
 from sysid.models.gravity_estimate import (
     ArmUnder,
@@ -115,25 +118,23 @@ class TorqueFits:
         """Returns by how much all torques are late [s]; None if they are not.
 
         The delay with the least sum of the logarithms of all joints' losses: each
-        joint counts by how sharply its torque tells the delay. At least half of it has
-        to be there without each joint, too: what single joints do is another matter.
+        joint counts by how sharply its torque tells the delay. Most joints and all but
+        one part of the log have to ask for it by themselves, within half of it: what
+        single joints do, or do for a while, is another matter.
         """
         count = round(_LATEST / _STEP)
         coarse = np.linspace(-_LATEST, _LATEST, 2 * count + 1)
-        near = coarse[int(np.argmin(_log_sum(self._delayed(coarse))))]
+        rough = self._delayed(coarse)
+        near = coarse[int(np.argmin(_log_sum(rough)))]
         fine: Array = near + _STEP * np.arange(-_FINE, _FINE + 1) / _FINE
-        curve, written = self._delayed(fine), self._delayed(np.zeros(1))[0]
-        late = _least_at(fine, curve)
-        joints = range(curve.shape[2] if curve.shape[2] > 1 else 0)
-        without = [_least_at(fine, np.delete(curve, i, axis=2)) for i in joints]
-        best = curve[int(np.argmin(_log_sum(curve)))]
-        found = Estimate(late, _delay_error(fine, curve))
-        is_common = all(each / late > 0.5 for each in without) if late else False
-        than_written = _by_block(best, written), np.ones(len(best))
-        is_better = is_lower(*than_written) and is_replicated(*than_written)
+        curve, written = self._delayed(fine), rough[count]
+        found = Estimate(_least_at(fine, curve), _delay_error(fine, curve))
+        best = curve[int(np.argmin(_log_sum(curve)))].mean(axis=0)
+        tried, runs = np.log(len(coarse)), runs_of(self._tau)
+        is_told = is_beyond_chance(best, written.mean(axis=0), runs, tried)
         is_inside = abs(near) < coarse[-1]
-        is_late = is_inside and is_better and found.is_off(0.0)
-        return found if is_late and is_common else None
+        is_late = is_inside and is_told and found.is_off(0.0)
+        return found if is_late and _is_common(found.value, coarse, rough) else None
 
     def gravity(self, arm_under: ArmUnder, written: Array) -> GravityEstimate | None:
         """Returns the gravity that is in the torques, None if it is that written.
@@ -191,9 +192,15 @@ def _log_sum(curve: Array) -> Array:
     return np.asarray(np.log(curve.sum(axis=-2) + 1e-300).sum(axis=-1))
 
 
-def _by_block(losses: Array, than: Array) -> Array:
-    """Returns the geometric mean of joints' ratios of losses, by block (blocks,)."""
-    return np.asarray(np.exp(np.log((losses + 1e-300) / (than + 1e-300)).mean(axis=1)))
+def _is_common(late: float, delays: Array, curve: Array) -> bool:
+    """Returns whether parts of a log, and joints, tell about the same delay [s]."""
+    blocks = range(curve.shape[1])
+    parts = [_least_at(delays, curve[:, own]) for own in parts_of(blocks)]
+    joints = [_least_at(delays, curve[..., [i]]) for i in range(curve.shape[2])]
+    by_part, by_joint = (
+        np.abs(np.array(each) - late) <= 0.5 * abs(late) for each in (parts, joints)
+    )
+    return bool(np.sum(~by_part) <= 1 and by_joint.mean() > 0.5)
 
 
 def _least_at(delays: Array, curve: Array) -> float:

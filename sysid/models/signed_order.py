@@ -120,7 +120,7 @@ class SignedOrder:
             )
 
     def simple(self) -> Iterator[Self]:
-        """Yields those that one slip makes: see `near`; reversed, or columns shifted."""
+        """Yields those that one slip makes: `near`, reversed, columns shifted."""
         yield from self.near()
         order, sign = self.order, self.sign
         yield type(self)(order[::-1], sign[::-1])
