@@ -19,7 +19,6 @@ from sysid.models.channel_grams import (
     ChannelGrams,
     Estimate,
     is_beyond_chance,
-    is_lower,
     is_replicated,
     jackknife_error,
     parts_of,
@@ -103,10 +102,13 @@ class TorqueFits:
                 continue
             by = np.where(np.arange(len(ones)) == i, factor, 1.0)
             one, other = (
-                grams.losses((1.0 / each)[:, None], self._scale / each).sum(axis=1)
+                grams.losses((1.0 / each)[:, None], self._scale / each)
                 for each in (by, ones)
             )
-            if one.sum() < FAR_BETTER * other.sum() and is_lower(one, other):
+            explains = one[:, i].mean() < FAR_BETTER
+            if explains and is_replicated(
+                one.sum(axis=1), FAR_BETTER * other.sum(axis=1)
+            ):
                 found[i] = factor
         return found
 

@@ -74,8 +74,8 @@ class TorqueOrder:
         """Returns the order that explains the torques; as written if none is known.
 
         An order is as likely as exp(-sum(runs / 2 log(loss))). Of those that are about
-        as likely as the likeliest, the simplest is taken: that written, or one slip away
-        from it, or any. None is, if another that is as simple might as well be.
+        as likely as the likeliest, the simplest is taken: that written, or one slip
+        away from it, or any. None is, if another that is as simple might as well be.
         """
         written = SignedOrder.as_written(len(self.runs))
         best = self._likeliest
@@ -84,13 +84,11 @@ class TorqueOrder:
         behind = {each: self._surprise(each) - self._surprise(best) for each in rank}
         lost = {each: self._lost(each).sum() for each in rank}
         least = -math.log(FAR_BETTER) + lost[best]
-        is_open = {
-            each: behind[each] < self._odds or lost[each] < least for each in rank
-        }
+        is_open = {o for o in rank if behind[o] < self._odds or lost[o] < least}
         likely = [each for each in rank if behind[each] < -math.log(BY_CHANCE)]
         found = min(likely, key=lambda each: rank[each])
-        rivals = [each for each in rank if is_open[each] and rank[each] <= rank[found]]
-        if found == written or rivals != [found]:
+        rivals = {each for each in is_open if rank[each] <= rank[found]}
+        if found == written or rivals != {found}:
             return written
         explains = self._lost(found)[found.moved].mean() < math.log(FAR_BETTER)
         by_block = [np.log(self._of(each)).sum(axis=1) for each in (found, written)]
