@@ -18,11 +18,12 @@ import numpy as np
 from damaged_logs import Columns, Damage, both, damaged, late, reordered, scaled
 from numpy.typing import NDArray
 from real_data import data_folder
-from results import add_results_argument, markdown, write_result
+from results import Cell, add_results_argument, markdown, write_result
 from scipy.spatial.transform import Rotation
 from selection.real import RECORDED
 
 from drake_disasm.common import program
+from drake_disasm.effects import ArmDelay
 from drake_disasm.logs import Log, read_log, write_static_wrench
 from drake_disasm.logs.schema import WRENCH
 from sysid.models.base import LogModel
@@ -194,8 +195,8 @@ def _is_put_right(way: Bookkeeping[LogModel], right: LogModel, fault: Fault) -> 
     if fault.name == "WeightRemoved":
         return True
     if fault.name == "CommonDelay":
-        [effect] = way.model.effects
-        return abs(effect.delay - _DELAY) < 0.5 * _DELAY
+        delays = [e.delay for e in way.model.effects if isinstance(e, ArmDelay)]
+        return abs(sum(delays) - _DELAY) < 0.5 * _DELAY
     change = _misfit(way.model) - _misfit(right)
     size = np.sqrt(np.mean(right.measurements.values**2))
     return bool(np.sqrt(np.mean(change**2)) < _CLOSE * size)
@@ -257,7 +258,7 @@ def main(arguments: Sequence[str]) -> int:
                 counts.setdefault((kind, length), Counter())[how] += 1
                 if how == "wrong":
                     print(f"{name} {length}, {kind}: {said}", flush=True)
-    rows = [
+    rows: list[tuple[Cell, ...]] = [
         (*of, *(count[how] for how in _ANSWERS)) for of, count in sorted(counts.items())
     ]
     columns = ("fault", "length", *_ANSWERS)

@@ -122,7 +122,8 @@ class TorqueFits:
         The delay with the least sum of the logarithms of all joints' losses: each
         joint counts by how sharply its torque tells the delay. Most joints and all but
         one part of the log have to ask for it by themselves, within half of it: what
-        single joints do, or do for a while, is another matter.
+        single joints do, or do for a while, is another matter. Each joint's torque has
+        to be explained, or what else is wrong with it would be taken for a delay.
         """
         count = round(_LATEST / _STEP)
         coarse = np.linspace(-_LATEST, _LATEST, 2 * count + 1)
@@ -134,6 +135,7 @@ class TorqueFits:
         best = curve[int(np.argmin(_log_sum(curve)))].mean(axis=0)
         tried, runs = np.log(len(coarse)), runs_of(self._tau)
         is_told = is_beyond_chance(best, written.mean(axis=0), runs, tried)
+        is_told = is_told and best.max() < FAR_BETTER
         is_inside = abs(near) < coarse[-1]
         is_late = is_inside and is_told and found.is_off(0.0)
         return found if is_late and _is_common(found.value, coarse, rough) else None
