@@ -1,7 +1,7 @@
 """Logs that are damaged in one way each."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -68,6 +68,16 @@ def swapped(first: str, second: str, sign: float = 1.0) -> Damage:
 
     def _damage(columns: Columns) -> None:
         columns[first], columns[second] = sign * columns[second], sign * columns[first]
+
+    return _damage
+
+
+def reordered(order: Sequence[int] | np.ndarray) -> Damage:
+    """Returns what puts the torques into another order (joints,) of columns."""
+
+    def _damage(columns: Columns) -> None:
+        taus = [columns[f"tau.{i}"] for i in order]
+        columns.update({f"tau.{i}": tau for i, tau in enumerate(taus)})
 
     return _damage
 

@@ -13,6 +13,7 @@ from sysid.effect_selection.search import SearchResult
 from sysid.identification.noise import with_noise_of
 from sysid.models.base import LogModel
 from sysid.models.bookkeeping import Bookkeeping
+from sysid.models.channel_grams import is_replicated
 
 
 def best_hypothesis(
@@ -46,6 +47,12 @@ def best_hypothesis(
 
 
 def _gain(before: Fit, after: Fit) -> float:
-    """Returns the share of the held-out loss that one fit takes away of another's."""
-    left = after.held_out_losses.sum() / max(before.held_out_losses.sum(), 1e-300)
-    return float(1.0 - left)
+    """Returns the share of the held-out loss that one fit takes away of another's.
+
+    Zero, if more than one part of the log asks for the other: a log is written in one
+    way from end to end.
+    """
+    left, lost = after.held_out_losses, before.held_out_losses
+    if not is_replicated(left, lost):
+        return 0.0
+    return float(1.0 - left.sum() / max(lost.sum(), 1e-300))

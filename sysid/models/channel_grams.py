@@ -20,6 +20,8 @@ STANDARD_ERRORS = 3.0  # Student's t of eight blocks: one in a hundred by chance
 #: Of the loss of the channels that a sign or an order concerns: a wrong one leaves at
 #: least as much again. Effects that the model lacks change it by less.
 FAR_BETTER = 0.5
+BY_CHANCE = 0.01  # how often a way of writing may be taken that is none
+_PARTS = 4  # contiguous ones of a log; all but one have to agree
 _EQUAL = 0.9  # of the least loss: ways that leave less than it / this tie
 _ROUNDED = 1e-9  # of a loss: less is rounding
 _RANK = 1e-10  # of the largest eigenvalue of the columns' scaled products
@@ -216,6 +218,45 @@ def is_lower(losses: Array, than: Array) -> bool:
         return False
     error = float(gain.std(ddof=1)) / np.sqrt(len(gain))
     return float(gain.mean()) > STANDARD_ERRORS * error
+
+
+def runs_of(values: Array) -> Array:
+    """Returns how often each channel (rows, channels) changes sides of its mean.
+
+    Plus one. A log that swings twice says about as much as two numbers, however many
+    rows it has.
+    """
+    above = values > values.mean(axis=0)
+    return 1.0 + np.sum(above[1:] != above[:-1], axis=0)
+
+
+def is_beyond_chance(losses: Array, than: Array, runs: Array, ways: float) -> bool:
+    """Returns whether losses (channels,) are lower than the best of chances makes them.
+
+    The ratio of likelihoods has to exceed how many ways are tried.
+
+    Args:
+        losses, than: of the better way and of the other.
+        runs: (channels,) see `runs_of`.
+        ways: logarithm of how many are tried.
+    """
+    gain = 0.5 * runs @ np.log((than + 1e-300) / (losses + 1e-300))
+    return bool(gain > ways - np.log(BY_CHANCE))
+
+
+def parts_of(blocks: Sequence[int]) -> list[NDArray[np.int64]]:
+    """Returns the numbers of the blocks of each of four contiguous parts of a log."""
+    return np.array_split(np.asarray(blocks), _PARTS)
+
+
+def is_replicated(losses: Array, than: Array) -> bool:
+    """Returns whether losses by block (blocks,) are lower in all but one of four parts.
+
+    False of fewer blocks than parts.
+    """
+    parts = parts_of(range(len(losses)))
+    lower = [bool((than - losses)[part].sum() > 0.0) for part in parts]
+    return lower.count(True) >= _PARTS - 1
 
 
 def jackknife_error(without: Sequence[float] | Array) -> float:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from drake_disasm.effects import ArmTilt
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.channel_grams import (
+    FAR_BETTER,
     STANDARD_ERRORS,
     ChannelGrams,
     angle_between,
@@ -47,6 +48,8 @@ def gravity_in(
     The nominal weights under gravity along each axis of the base are fitted to the
     torques, with the rest of each joint's nominal torque at a positive scale of its
     own, and friction. There is none, if less than half of gravity is in the torques.
+    Torques in another order or of other signs have no common gravity either: whatever
+    is found has to explain more than half of them.
 
     Args:
         motion: at some rows.
@@ -64,7 +67,9 @@ def gravity_in(
     share, error = fits.shares(columns, rest)
     length = float(np.linalg.norm(share))
     if length + STANDARD_ERRORS * error < 0.5:
-        return GravityEstimate(np.zeros(3))
+        is_known = fits.explains(columns[..., :0], rest)
+        is_none = is_known and not fits.has_weight(by_written, rest)
+        return GravityEstimate(np.zeros(3)) if is_none else None
     if length <= STANDARD_ERRORS * error:
         return None
     tilt = _MOST_TILT + STANDARD_ERRORS * error / length
@@ -73,6 +78,8 @@ def gravity_in(
     is_up = fits.shares(by_written, rest)[0][0] < 0.0
     bound = fits.losses(by_written[..., : 0 if is_up else 1], rest)
     if angle_between(share, written) < tilt or not is_lower(losses, bound):
+        return None
+    if not fits.explains(columns, rest):
         return None
     is_opposite = angle_between(share, -written) < tilt
     if is_opposite and not is_lower(losses, fits.losses(columns, -rest)):
@@ -98,6 +105,17 @@ class _Fits:
         """Returns held-out losses (blocks,) of weights (n, joints, k) and the rest."""
         grams, choice = self._grams(weights, rest)
         return np.asarray(grams.losses(choice, self.scale).sum(axis=1))
+
+    def explains(self, weights: Array, rest: Array) -> bool:
+        """Returns whether weights and the rest leave less than half of the torques."""
+        losses = self.losses(weights, rest)
+        return bool(losses.mean() < FAR_BETTER * self.tau.shape[1])
+
+    def has_weight(self, weight: Array, rest: Array) -> bool:
+        """Returns whether weights (n, joints), each of any scale, explain far more."""
+        by_joint = weight * np.eye(self.tau.shape[1])
+        left, lost = (self.losses(w, rest) for w in (by_joint, weight[..., :0]))
+        return bool(left.sum() < FAR_BETTER * lost.sum())
 
     def shares(self, weights: Array, rest: Array) -> tuple[Array, float]:
         """Returns the scales (k,) of weights, and the error of their vector."""

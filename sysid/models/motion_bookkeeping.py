@@ -7,12 +7,10 @@ be explained by friction that drives the joint.
 """
 
 import itertools
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.optimize import linear_sum_assignment
 
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.channel_grams import (
@@ -20,8 +18,11 @@ from sysid.models.channel_grams import (
     MOST_BLOCKS,
     ChannelGrams,
     Estimate,
-    is_lower,
+    is_beyond_chance,
+    is_replicated,
     jackknife_error,
+    parts_of,
+    runs_of,
 )
 from sysid.models.gravity_estimate import (
     ArmUnder,
@@ -30,12 +31,12 @@ from sysid.models.gravity_estimate import (
     gravity_in,
 )
 from sysid.models.signed_order import SignedOrder
+from sysid.models.torque_order import TorqueOrder
 
 Array = NDArray[np.float64]
 
 _MOST_ROWS = 2500  # that are looked at, evenly spread: bodies have some 50 parameters
 _FEW_ROWS = 300  # at which an arm that stands otherwise is evaluated
-_ROUNDED = 1e-12  # of a torque's variance: less is rounding
 _THOUSAND = 1000.0
 _LATEST, _STEP = 0.1, 0.005  # s; delays that are tried, and their spacing
 _FINE = 10  # steps of the second scan in one of the first
@@ -64,24 +65,23 @@ class TorqueFits:
         return bool(rows >= MOST_BLOCKS * coefficients / joints)
 
     def signed_order(self) -> SignedOrder:
-        """Returns the order and signs of torques that explain them far better.
+        """Returns the order and signs of torques that explain them, see TorqueOrder.
 
-        By steps of steepest descent: from the order as written, from its reverse, and
-        from that in which each torque is most like its joint's own.
+        Bodies with free parameters have to agree with the nominal ones: where the base
+        is mounted otherwise, friction tells the sign.
         """
         tau = self._tau[self._taken]
-        joints = tau.shape[1]
-        targets = np.repeat(tau[:, None, :], joints, axis=1)
-        grams = self._grams(targets)
-        written = SignedOrder.as_written(joints)
-        reverse = SignedOrder(written.order[::-1], written.sign)
-        starts = {written, reverse, *self._most_like()}
-        ends = [self._descended(grams, start) for start in starts]
-        best = min(ends, key=lambda end: float(self._loss(grams, end).sum()))
-        needed = self._needed(grams, best)
-        if self._is_refuted(needed) or not needed.steps:
+        nominal = self._thin.Y @ self._thin.nominal
+        found = TorqueOrder.of(nominal, self._friction, tau).found()
+        written = SignedOrder.as_written(tau.shape[1])
+        if found == written:
             return written
-        return needed if self._is_far_better(grams, needed, written) else written
+        grams = self._grams(np.repeat(tau[:, None, :], tau.shape[1], axis=1))
+        losses = [
+            grams.losses(each.matrix, self._scale[list(each.order)]).sum(axis=1)
+            for each in (found, written)
+        ]
+        return found if is_replicated(*losses) else written
 
     def torque_units(self) -> dict[int, float]:
         """Returns joints whose torque has another unit, with the factor to divide by.
@@ -102,10 +102,13 @@ class TorqueFits:
                 continue
             by = np.where(np.arange(len(ones)) == i, factor, 1.0)
             one, other = (
-                grams.losses((1.0 / each)[:, None], self._scale / each).sum(axis=1)
+                grams.losses((1.0 / each)[:, None], self._scale / each)
                 for each in (by, ones)
             )
-            if one.sum() < FAR_BETTER * other.sum() and is_lower(one, other):
+            explains = one[:, i].mean() < FAR_BETTER
+            if explains and is_replicated(
+                one.sum(axis=1), FAR_BETTER * other.sum(axis=1)
+            ):
                 found[i] = factor
         return found
 
@@ -113,117 +116,29 @@ class TorqueFits:
         """Returns what is left of torques that are late [s], to compare ways by."""
         return float(self._delayed(np.array([delay])).sum())
 
-    def _most_like(self) -> tuple[SignedOrder, SignedOrder]:
-        """Returns the order in which torques are best explained one by one.
-
-        By nominal torques and friction: bodies with free parameters explain too much
-        of another joint's. With the signs as they are, and with those of the nominal
-        torques.
-        """
-        left, scale, _ = self._by_nominal
-        joints, columns = linear_sum_assignment(np.log(left + _ROUNDED))
-        signs = np.where(scale[joints, columns] < 0.0, -1.0, 1.0)
-        order = tuple(columns.tolist())
-        same = SignedOrder(order, (1.0,) * len(order))
-        return same, SignedOrder(order, tuple(signs.tolist()))
-
-    def _is_refuted(self, found: SignedOrder) -> bool:
-        """Returns whether most nominal torques speak for the opposite signs.
-
-        Of those joints that an order moves, and whose nominal torque explains the
-        column.
-        """
-        left, scale, without = self._by_nominal
-        at = found.moved, np.array(found.order)[found.moved]
-        explains = left[at] < FAR_BETTER * without[at]
-        votes = np.sign(scale[at]) * np.array(found.sign)[found.moved]
-        return bool(votes[explains].sum() < 0.0)
-
-    @cached_property
-    def _by_nominal(self) -> tuple[Array, Array, Array]:
-        """How each joint's nominal torque and friction explain each column.
-
-        The share of its variance that is left, the scale of the nominal torque, and the
-        share that friction alone leaves; each (joints, columns).
-        """
-        tau = self._tau[self._taken]
-        nominal = self._thin.Y @ self._thin.nominal
-        left, scale, without = np.empty((3, tau.shape[1], tau.shape[1]))
-        for i in range(tau.shape[1]):
-            friction = self._friction[:, i]
-            A = np.column_stack([nominal[:, i], friction])
-            fit = np.linalg.lstsq(A, tau, rcond=None)[0]
-            left[i] = np.mean((tau - A @ fit) ** 2, axis=0) / self._scale**2
-            alone = friction @ np.linalg.lstsq(friction, tau, rcond=None)[0]
-            without[i] = np.mean((tau - alone) ** 2, axis=0) / self._scale**2
-            scale[i] = fit[0]
-        return left, scale, without
-
-    def _loss(self, grams: ChannelGrams, of: SignedOrder) -> Array:
-        """Returns the loss of each joint's torque (joints,)."""
-        return grams.loss(of.matrix, self._scale[list(of.order)])
-
-    def _descended(self, grams: ChannelGrams, order: SignedOrder) -> SignedOrder:
-        """Returns the best order and signs that single steps lead to."""
-        lost = float(self._loss(grams, order).sum())
-        while True:
-            near = {
-                each: float(self._loss(grams, each).sum())
-                for each in order.near()
-                if not self._is_refuted(each)
-            }
-            best = min(near, key=lambda each: near[each], default=order)
-            if near.get(best, lost) >= lost:
-                return order
-            order, lost = best, near[best]
-
-    def _needed(self, grams: ChannelGrams, best: SignedOrder) -> SignedOrder:
-        """Returns what is left of an order when steps are undone that do not matter."""
-        while best.steps:
-            undone = min(
-                best.undone(), key=lambda each: float(self._loss(grams, each).sum())
-            )
-            if self._is_far_better(grams, best, undone):
-                return best
-            best = undone
-        return best
-
-    def _is_far_better(
-        self, grams: ChannelGrams, one: SignedOrder, other: SignedOrder
-    ) -> bool:
-        """Returns whether an order halves the loss of the torques that it moves."""
-        moved = np.flatnonzero((one.matrix != other.matrix).any(axis=1))
-        left, lost = (self._loss(grams, each)[moved].sum() for each in (one, other))
-        if left > FAR_BETTER * lost:
-            return False
-        losses = [
-            grams.losses(each.matrix, self._scale[list(each.order)])[:, moved].sum(1)
-            for each in (one, other)
-        ]
-        return is_lower(*losses)
-
     def common_delay(self) -> Estimate | None:
         """Returns by how much all torques are late [s]; None if they are not.
 
         The delay with the least sum of the logarithms of all joints' losses: each
-        joint counts by how sharply its torque tells the delay. At least half of it has
-        to be there without each joint, too: what single joints do is another matter.
+        joint counts by how sharply its torque tells the delay. Most joints and all but
+        one part of the log have to ask for it by themselves, within half of it: what
+        single joints do, or do for a while, is another matter. Each joint's torque has
+        to be explained, or what else is wrong with it would be taken for a delay.
         """
         count = round(_LATEST / _STEP)
         coarse = np.linspace(-_LATEST, _LATEST, 2 * count + 1)
-        near = coarse[int(np.argmin(_log_sum(self._delayed(coarse))))]
+        rough = self._delayed(coarse)
+        near = coarse[int(np.argmin(_log_sum(rough)))]
         fine: Array = near + _STEP * np.arange(-_FINE, _FINE + 1) / _FINE
-        curve, written = self._delayed(fine), self._delayed(np.zeros(1))[0]
-        late = _least_at(fine, curve)
-        joints = range(curve.shape[2] if curve.shape[2] > 1 else 0)
-        without = [_least_at(fine, np.delete(curve, i, axis=2)) for i in joints]
-        best = curve[int(np.argmin(_log_sum(curve)))]
-        found = Estimate(late, _delay_error(fine, curve))
-        is_common = all(each / late > 0.5 for each in without) if late else False
-        is_better = is_lower(_by_block(best, written), np.ones(len(best)))
+        curve, written = self._delayed(fine), rough[count]
+        found = Estimate(_least_at(fine, curve), _delay_error(fine, curve))
+        best = curve[int(np.argmin(_log_sum(curve)))].mean(axis=0)
+        tried, runs = np.log(len(coarse)), runs_of(self._tau)
+        is_told = is_beyond_chance(best, written.mean(axis=0), runs, tried)
+        is_told = is_told and best.max() < FAR_BETTER
         is_inside = abs(near) < coarse[-1]
-        is_late = is_inside and is_better and found.is_off(0.0)
-        return found if is_late and is_common else None
+        is_late = is_inside and is_told and found.is_off(0.0)
+        return found if is_late and _is_common(found.value, coarse, rough) else None
 
     def gravity(self, arm_under: ArmUnder, written: Array) -> GravityEstimate | None:
         """Returns the gravity that is in the torques, None if it is that written.
@@ -281,9 +196,15 @@ def _log_sum(curve: Array) -> Array:
     return np.asarray(np.log(curve.sum(axis=-2) + 1e-300).sum(axis=-1))
 
 
-def _by_block(losses: Array, than: Array) -> Array:
-    """Returns the geometric mean of joints' ratios of losses, by block (blocks,)."""
-    return np.asarray(np.exp(np.log((losses + 1e-300) / (than + 1e-300)).mean(axis=1)))
+def _is_common(late: float, delays: Array, curve: Array) -> bool:
+    """Returns whether parts of a log, and joints, tell about the same delay [s]."""
+    blocks = range(curve.shape[1])
+    parts = [_least_at(delays, curve[:, own]) for own in parts_of(blocks)]
+    joints = [_least_at(delays, curve[..., [i]]) for i in range(curve.shape[2])]
+    by_part, by_joint = (
+        np.abs(np.array(each) - late) <= 0.5 * abs(late) for each in (parts, joints)
+    )
+    return bool(np.sum(~by_part) <= 1 and by_joint.mean() > 0.5)
 
 
 def _least_at(delays: Array, curve: Array) -> float:

@@ -32,50 +32,60 @@ def rate_factors(
 ) -> list[Estimate]:
     """Returns by what factor each joint's rate is off the derivative of its values.
 
-    From the integral of the rate over whole blocks, less an offset and a slope: a
-    filter that rounds the rate does not matter there. The factor is NaN at a joint that
-    does not move.
+    From the integral of the rate over whole blocks and over whole episodes, less an
+    offset and a slope; the nearer to one counts: a filter rounds what is fast only. The
+    factor is NaN at a joint that does not move.
 
     Args:
         time: (n,) [s].
         episode: (n,) number of each row's episode.
         values, rates: (n, joints).
     """
-    by_block = []
+    by_block, whole = [], []
     for number in np.unique(episode):
         rows = np.flatnonzero(episode == number)
-        for k in range(int(blocks_of(len(rows))[-1]) + 1):
-            own = rows[blocks_of(len(rows)) == k]
+        block = blocks_of(len(rows))
+        for k in range(int(block[-1]) + 1):
+            own = rows[block == k]
             if len(own) > 3:
                 by_block.append(_products(time[own], values[own], rates[own]))
+        whole.append(_products(time[rows], values[rows], rates[rows]))
     if not by_block:
         return [Estimate(np.nan, np.nan)] * values.shape[1]
-    products = np.array(by_block)  # (blocks, 2, joints)
-    return [_ratio(products[:, :, i]) for i in range(values.shape[1])]
+    blocks, total = np.array(by_block), np.sum(whole, axis=0)  # (blocks, 3, joints)
+    return [_ratio(blocks[:, :, i], total[:, i]) for i in range(values.shape[1])]
 
 
 def _products(time: Array, values: Array, rates: Array) -> Array:
-    """Returns the sums (2, joints) of integral times value, and of value squared."""
+    """Returns sums (3, joints) of values squared, times integral, and of integral's."""
     integral = cumulative_trapezoid(rates, time, axis=0, initial=0)
     line = np.column_stack([np.ones(len(time)), time - time[0]])
     both = np.hstack([integral, values])
     left = both - line @ np.linalg.lstsq(line, both, rcond=None)[0]
     integral, values = np.hsplit(left, 2)
-    return np.array([(integral * values).sum(axis=0), (values**2).sum(axis=0)])
+    products = values**2, integral * values, integral**2
+    return np.array([product.sum(axis=0) for product in products])
 
 
-def _ratio(products: Array) -> Estimate:
-    """Returns the ratio of two sums over blocks (blocks, 2), with its error."""
+def _ratio(products: Array, whole: Array) -> Estimate:
+    """Returns the factor with its error, by sums over blocks (blocks, 3) and (3,)."""
     total = products.sum(axis=0)
     if not total[1]:
         return Estimate(np.nan, np.nan)
-    ratios = [
-        (total - part)[0] / (total - part)[1]
-        for part in products
-        if (total - part)[1] > 0.0
-    ]
+    others = [total - part for part in products]
+    ratios = [_nearest_to_one(other) for other in others if other[1]]
     error = jackknife_error(ratios) if len(ratios) > 1 else np.inf
-    return Estimate(float(total[0] / total[1]), error)
+    return Estimate(_nearest_to_one(total, whole), error)
+
+
+def _nearest_to_one(*products: Array) -> float:
+    """Returns the factor nearest to one that noise allows, by sums (3,).
+
+    Noise of the values lowers their regression's slope, that of the rates the slope of
+    the other one: the factor is between the two.
+    """
+    slopes = [each[1:] / each[:-1] for each in products]
+    return float(np.clip(1.0, np.min(slopes), np.max(slopes)))
 
 
 def right_rates(

@@ -119,13 +119,10 @@ class SignedOrder:
                 self.exchanged(i, j) for i, j in itertools.combinations(joints, 2)
             )
 
-    def undone(self) -> Iterator[Self]:
-        """Yields those with fewer steps: one less, or all of one cycle."""
-        yield from (each for each in self.near() if each.steps < self.steps)
-        for cycle, sign in itertools.product(self.cycles, (1.0, -1.0)):
-            order, signs = list(self.order), list(self.sign)
-            for joint in cycle:
-                order[joint], signs[joint] = joint, sign
-            fewer = type(self)(tuple(order), tuple(signs))
-            if fewer.steps < self.steps:
-                yield fewer
+    def simple(self) -> Iterator[Self]:
+        """Yields those that one slip makes: `near`, reversed, columns shifted."""
+        yield from self.near()
+        order, sign = self.order, self.sign
+        yield type(self)(order[::-1], sign[::-1])
+        for by in range(1, len(order)):
+            yield type(self)(order[by:] + order[:by], sign[by:] + sign[:by])

@@ -181,7 +181,7 @@ class StaticWrenchModel(ScenarioModel):
         )
 
     def _without_weight(self, known: float) -> Iterator[Bookkeeping[Self]]:
-        """Yields a wrench without weight, where the model has one [N]."""
+        """Yields a wrench without the weight that is known [N]."""
         carried = [
             p.name
             for p in self.parameters
@@ -189,10 +189,7 @@ class StaticWrenchModel(ScenarioModel):
                 self.scenario.effects[int(p.path.split(".")[1])], PayloadError
             )
         ]
-        if not carried and not known:
-            return
-        what = "the wrench has no weight in it"
-        what += f", of {known:.3g} N on the sensor" if known else ""
+        what = f"the wrench has no weight in it, of {known:.3g} N on the sensor"
         remedy = (
             "record the sensor's raw reading, before the controller takes the weight "
             "of the tool away"

@@ -20,12 +20,15 @@ from sysid.models.channel_grams import (
     Array,
     ChannelGrams,
     angle_between,
-    is_lower,
+    is_beyond_chance,
+    is_replicated,
     jackknife_error,
+    runs_of,
 )
 
 _TURNED = 1e-4  # rad^2, mean square about the axis that is turned about the least
 _EQUAL = 0.9  # of the least loss: permutations that leave less than it / this tie
+_MOST_WAYS = 2.0 * np.log(48.0)  # signed permutations of forces and of torques
 _FEWEST = 4  # readings: fewer always agree with some frame
 _FORCE, _TORQUE = slice(0, 3), slice(3, 6)
 
@@ -63,6 +66,15 @@ class Readings:
         """Returns held-out losses (blocks, 6), relative to what readings vary by."""
         grams = ChannelGrams.of(self.columns(), self.wrench[:, :, None])
         return grams.losses(np.ones((6, 1)), self.scale)
+
+    @property
+    def show_weight(self) -> bool:
+        """Whether one is known, and leaves less than half of what a bias leaves."""
+        weight, error = self.weight()
+        rest = ChannelGrams.of(self.columns()[..., 4:], self.wrench[:, :, None])
+        alone = rest.losses(np.ones((6, 1)), self.scale)
+        explains = self.losses().sum() < FAR_BETTER * alone.sum()
+        return bool(np.linalg.norm(weight) > STANDARD_ERRORS * error and explains)
 
     @property
     def scale(self) -> Array:
@@ -117,8 +129,7 @@ class Way:
 def has_no_weight(readings: Readings, known: float) -> bool:
     """Returns whether there is no weight in readings.
 
-    Less than half of the weight that is known to hang on the sensor; or, if none is
-    known, less than single readings scatter by.
+    Less than half of the weight that is known to hang on the sensor.
 
     Args:
         readings: at rest.
@@ -127,22 +138,21 @@ def has_no_weight(readings: Readings, known: float) -> bool:
     if len(readings.wrench) < _FEWEST:
         return False
     weight, error = readings.weight()
-    most = float(np.linalg.norm(weight)) + STANDARD_ERRORS * error
-    varied = readings.wrench[:, _FORCE] - readings.wrench[:, _FORCE].mean(axis=0)
-    scatter = float(np.sqrt(np.mean(np.sum(varied**2, axis=1))))
-    return most < (0.5 * known if known else scatter)
+    return float(np.linalg.norm(weight)) + STANDARD_ERRORS * error < 0.5 * known
 
 
 def better_ways(readings: Readings) -> list[tuple[Way, float]]:
     """Returns ways to write readings that explain them better, with what they leave."""
     if len(readings.wrench) < _FEWEST:
         return []
-    written = readings.losses().sum(axis=1)
+    runs, written = runs_of(readings.wrench), readings.losses()
     found = []
     for way in _ways(readings):
-        losses = way.readings.losses().sum(axis=1)
-        is_far = way.estimated or losses.sum() < FAR_BETTER * written.sum()
-        if is_far and is_lower(losses, written):
+        losses = way.readings.losses()
+        by_block = losses.sum(axis=1), written.sum(axis=1)
+        by_channel = losses.mean(axis=0), written.mean(axis=0)
+        is_told = is_beyond_chance(*by_channel, runs, _MOST_WAYS)
+        if is_told and is_replicated(*by_block) and way.readings.show_weight:
             found.append((way, float(losses.sum())))
     return found
 

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from damaged_logs import damaged, late, scaled, swapped
+from damaged_logs import damaged, late, reordered, scaled, swapped
 
 from drake_disasm.effects import JointCoulombFriction, JointViscousFriction
 from drake_disasm.logs import Log, read_log
 from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
+from sysid.models.motion_bookkeeping import TorqueFits
 from sysid.models.regressor import ArmDynamics
 from sysid.models.signed_order import SignedOrder
 from sysid.parameters import nominal_values
@@ -229,3 +230,29 @@ def test_a_real_arm_is_written_right(recording, tmp_path):
     assert model(log).bookkeeping() == []
     turned = model(damaged(log, scaled(-1.0, "tau.2")))
     assert [way.name for way in turned.bookkeeping()] == ["TorqueSign.lwr_2_joint"]
+
+
+@pytest.fixture(scope="module")
+def real_arm(tmp_path_factory) -> Log:
+    folder = tmp_path_factory.mktemp("lwr4")
+    return read_log(write_motion(1, folder / "log", write_arm(folder / "arm.urdf")))
+
+
+@pytest.mark.parametrize("order", [(6, 0, 1, 2, 3, 4, 5), (3, 1, 2, 0, 4, 5, 6)])
+def test_columns_of_a_real_arm_are_put_back(order, real_arm):
+    written = model(damaged(real_arm, reordered(np.argsort(order))))
+    assert written.signed_order == SignedOrder(order, (1.0,) * 7)
+
+
+def test_seconds_of_a_real_arm_tell_no_order(real_arm):
+    whole = model(real_arm)
+    time = whole._motion.time
+    for start in range(0, 24, 2):
+        part = whole.of_rows((time >= start) & (time < start + 2))
+        assert part.signed_order == SignedOrder.as_written(7)
+
+
+def test_a_wrong_sign_takes_no_gravity_away(real_arm):
+    written = model(damaged(real_arm, scaled(-1.0, "tau.1")))
+    fits = TorqueFits(written._motion, written.measurements.values)
+    assert fits.gravity(written._arm_under, np.array([0.0, 0.0, -_G])) is None
