@@ -180,15 +180,21 @@ class ChannelGrams:
         if held.any():
             through = A[np.ix_(held, free)] @ inverse
             S = A[np.ix_(held, held)] - through @ A[np.ix_(free, held)]
-            x[held] = _non_negative(S, b[held] - through @ b[free])
+            least = _RANK * float(np.trace(A[np.ix_(held, held)]))
+            x[held] = _non_negative(S, b[held] - through @ b[free], least)
         x[free] = inverse @ (b[free] - A[np.ix_(free, held)] @ x[held])
         return np.asarray(x / self._norm)
 
 
-def _non_negative(S: Array, r: Array) -> Array:
-    """Returns x >= 0 with the least x S x / 2 - r x, of a positive semidefinite S."""
+def _non_negative(S: Array, r: Array, least: float) -> Array:
+    """Returns x >= 0 with the least x S x / 2 - r x, of a positive semidefinite S.
+
+    Directions whose eigenvalue is not above the least are rounding, and not taken.
+    """
     values, vectors = np.linalg.eigh(S)
-    kept = values > _RANK * max(float(values[-1]), 1e-300)
+    kept = values > max(least, 1e-300)
+    if not kept.any():
+        return np.zeros(len(r))
     root = np.sqrt(values[kept])
     x = nnls(root[:, None] * vectors[:, kept].T, (vectors[:, kept].T @ r) / root)[0]
     return np.asarray(x)

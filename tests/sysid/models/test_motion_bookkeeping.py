@@ -256,3 +256,9 @@ def test_a_wrong_sign_takes_no_gravity_away(real_arm):
     written = model(damaged(real_arm, scaled(-1.0, "tau.1")))
     fits = TorqueFits(written._motion, written.measurements.values)
     assert fits.gravity(written._arm_under, np.array([0.0, 0.0, -_G])) is None
+
+
+def test_an_arm_that_stands_still_is_written_no_other_way(right):
+    still = damaged(right, scaled(0.0, "v", "vd"))
+    at_rest = damaged(still, scaled(0.0, "q"))
+    assert model(at_rest).signed_order == SignedOrder.as_written(2)
