@@ -101,7 +101,7 @@ def known(random):
     )
     space.arm[:] = random.uniform(-0.01, 0.01, equations.NORMALS.shape)
     law = np.array(TURNED.law.row)
-    return equations.Known(M + H * np.diag(D), np.zeros(6), H, 0.2, law, space)
+    return equations.Known(M + H * np.diag(D), np.zeros(6), H, 0.2, law, space, False)
 
 
 @pytest.mark.parametrize("seed", range(2))
