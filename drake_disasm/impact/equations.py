@@ -20,7 +20,7 @@ _STICTION = 1e-4  # m/s: creep at which friction is three quarters
 _ITERATIONS = 60
 _SHORTEST = 11  # times that a step is halved before it is given up
 _TOLERANCE = 1e-8  # m/s, of the velocities after the step
-_ROUNDS = 30  # of a step by `_by_rounds`
+_ROUNDS = 100  # of a step by `_by_rounds`
 #: How Newton's method ends: solved; where no step leads to less error; not done.
 _SOLVED, _STUCK, _UNFINISHED = 0, 1, 2
 
@@ -58,7 +58,7 @@ class Workspace(NamedTuple):
         R_GnG, R_GB: (3, 3).
         T, T_inverse: (6, 6), twist = T v of the joints' rates v.
         A, slope, trial_slope: (6, 6), see `Known`, `balance`, `newton`.
-        b, before, twist, W, r, step, there, trial_W, trial: (6,), see there.
+        b, before, twist, W, r, step, there, trial_W, trial, last_W: (6,), see there.
         p_ToBo, p_GBo, one, other: (3,).
         by_twist: (3, 6), see `_push`.
     """
@@ -82,6 +82,7 @@ class Workspace(NamedTuple):
     there: np.ndarray
     trial_W: np.ndarray
     trial: np.ndarray
+    last_W: np.ndarray
     p_ToBo: np.ndarray
     p_GBo: np.ndarray
     one: np.ndarray
@@ -90,7 +91,7 @@ class Workspace(NamedTuple):
 
 
 #: Of the arrays that `arranged` takes.
-SHAPES = ((2, PLACES), (PLACES, 3), (2, 3, 3), (5, 6, 6), (9, 6), (4, 3), (3, 6))
+SHAPES = ((2, PLACES), (PLACES, 3), (2, 3, 3), (5, 6, 6), (10, 6), (4, 3), (3, 6))
 
 
 @compiled
@@ -108,7 +109,7 @@ def arranged(
     return Workspace(
         *(places[0], places[1], arm, rotations[0], rotations[1]),
         *(m[0], m[1], m[2], m[3], m[4]),
-        *(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8]),
+        *(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9]),
         *(p[0], p[1], p[2], p[3], by_twist),
     )
 
@@ -333,35 +334,39 @@ def _solve(known: Known) -> bool:
 def _by_rounds(known: Known) -> bool:
     """Sets twist and wrench W where Newton's method finds no balance; is there one?
 
-    It may stop short where friction is large: the normal forces then depend on the
-    friction that depends on them. Friction of given normal forces is a convex problem,
-    which has one solution. The normal forces that it leads to are those of the next
-    round, in the mean with the last ones. They are bounded, since given forces let
-    friction only brake, so some are their own (Brouwer's fixed point): a balance. If
-    the rounds do not come there, friction lags: it is of the last round's forces.
+    It stops short where friction is large: the normal forces then depend on the
+    friction that depends on them. Friction of given normal forces leaves a convex
+    problem with one solution, where the normal force falls with the way out. It has
+    new normal forces, which in the mean with the given ones are those of the next
+    round. Friction of given forces can only brake, so they are bounded, and some of
+    them are their own (Brouwer's fixed point theorem): a balance. Without one after
+    the last round, friction is of the forces of the round before.
 
     Without a solution for given forces, twist and wrench are left as they are.
     """
     space = known.space
-    twist, wrench, last = space.twist, space.W, space.before
+    twist, wrench, last, last_W = space.twist, space.W, space.before, space.last_W
     lagged = Known(known.A, known.b, known.h, known.friction, known.law, space, True)
     _copy_vector(twist, last)
+    _copy_vector(wrench, last_W)
+    is_solved = False
     for k in range(PLACES):
         space.pressed[k] = 0.0
-    for n in range(_ROUNDS):
+    for _ in range(_ROUNDS):
         if newton(lagged, twist, wrench) != _SOLVED:
-            _copy_vector(last, twist)
-            balance(known if n == 0 else lagged, twist, wrench, space.r, space.slope)
-            return n > 0
+            break
         _copy_vector(twist, last)
+        _copy_vector(wrench, last_W)
         if newton(known, twist, wrench) == _SOLVED:
             return True
-        _copy_vector(last, twist)
         for k in range(PLACES):
-            F, _ = _normal_force_at(known, k, twist, space.one)
-            space.pressed[k] = F if n == 0 else 0.5 * (space.pressed[k] + F)
-    balance(lagged, twist, wrench, space.r, space.slope)
-    return True
+            F, _ = _normal_force_at(known, k, last, space.one)
+            space.pressed[k] = 0.5 * (space.pressed[k] + F) if is_solved else F
+        _copy_vector(last, twist)
+        is_solved = True
+    _copy_vector(last, twist)
+    _copy_vector(last_W, wrench)
+    return is_solved
 
 
 @compiled
