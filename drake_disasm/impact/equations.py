@@ -20,7 +20,7 @@ _STICTION = 1e-4  # m/s: creep at which friction is three quarters
 _ITERATIONS = 60
 _SHORTEST = 11  # times that a step is halved before it is given up
 _TOLERANCE = 1e-8  # m/s, of the velocities after the step
-_ROUNDS = 100  # of a step by `_by_rounds`
+_ROUNDS = 64  # of a step by `_by_rounds`
 #: How Newton's method ends: solved; where no step leads to less error; not done.
 _SOLVED, _STUCK, _UNFINISHED = 0, 1, 2
 
@@ -352,15 +352,17 @@ def _by_rounds(known: Known) -> bool:
     is_solved = False
     for k in range(PLACES):
         space.pressed[k] = 0.0
-    for _ in range(_ROUNDS):
+    for n in range(_ROUNDS):
         if newton(lagged, twist, wrench) != _SOLVED:
             break
         _copy_vector(twist, last)
         _copy_vector(wrench, last_W)
-        if newton(known, twist, wrench) == _SOLVED:
+        is_tried = n & (n + 1) == 0  # as often again as before: most tries are in vain
+        if is_tried and newton(known, twist, wrench) == _SOLVED:
             return True
         for k in range(PLACES):
-            F, _ = _normal_force_at(known, k, last, space.one)
+            rate = _rate_at(k, space.arm[k], last, space.one)
+            F, _, _ = normal_force(space.depth[k] + known.h * rate, rate, known.law)
             space.pressed[k] = 0.5 * (space.pressed[k] + F) if is_solved else F
         _copy_vector(last, twist)
         is_solved = True
@@ -393,14 +395,17 @@ def balance(
         for j in range(6):
             slope[i, j] = 0.0
     for k in range(PLACES):
-        F, dF = _normal_force_at(known, k, twist, velocity)
-        limit, by_rate = known.friction * F, known.friction * dF
-        if known.is_lagged:
-            limit, by_rate = known.friction * space.pressed[k], 0.0
-        if F == 0.0 and limit == 0.0:
+        rate = _rate_at(k, space.arm[k], twist, velocity)
+        after = space.depth[k] + h * rate
+        if after <= 0.0 and not (known.is_lagged and space.pressed[k] > 0.0):
             continue
+        F, by_depth, by_rate = normal_force(after, rate, known.law)
+        dF, mu = h * by_depth + by_rate, known.friction
+        limit, limit_by_rate = mu * F, mu * dF
+        if known.is_lagged:
+            limit, limit_by_rate = mu * space.pressed[k], 0.0
         _push(_AXES[k], _SIDES[k], F, dF, force, space.by_twist)
-        _rub(_AXES[k], _SIDES[k], velocity, limit, by_rate, force, space.by_twist)
+        _rub(_AXES[k], _SIDES[k], velocity, limit, limit_by_rate, force, space.by_twist)
         _add_wrench(space.arm[k], force, space.by_twist, wrench, slope)
     for i in range(6):
         r[i] = -known.b[i] - h * wrench[i]
@@ -410,25 +415,19 @@ def balance(
 
 
 @compiled
-def _normal_force_at(
-    known: Known, k: int, twist: np.ndarray, velocity: np.ndarray
-) -> tuple[float, float]:
-    """Returns a place's normal force F [N], and dF/d(dp/dt) over the step [N s/m].
+def _rate_at(k: int, arm: np.ndarray, twist: np.ndarray, velocity: np.ndarray) -> float:
+    """Returns at what rate a place goes into the groove [m/s].
 
     Args:
-        known: of the step.
         k: number of the place.
+        arm: (3,) from To to it.
         twist: (6,) of the bolt.
-        velocity: (3,) is set, the bolt's at the place.
+        velocity: (3,) is set, the bolt's there.
     """
-    space = known.space
     for i in range(3):
         velocity[i] = twist[i]
-    _add_cross(1.0, twist[3:], space.arm[k], velocity)
-    rate = -_SIDES[k] * velocity[_AXES[k]]
-    after = space.depth[k] + known.h * rate
-    F, by_depth, by_rate = normal_force(after, rate, known.law)
-    return F, known.h * by_depth + by_rate
+    _add_cross(1.0, twist[3:], arm, velocity)
+    return float(-_SIDES[k] * velocity[_AXES[k]])
 
 
 @compiled
