@@ -2,7 +2,9 @@
 
 Records each log (`removal`, `admittance` with 0.15 mm of exploration, 440 transitions)
 and judges it by the twin of the same scenario. Run `null` first: effects are four to
-ten times as large as the first null log would show with 80 % probability.
+ten times as large as the first null log would show with 80 % probability. `strong`
+ones are a drag of 600 N s/m and a patch of friction of 1.0, in turn, in logs of the
+twin itself with IMPACT contact (200 transitions): where its stated error ends.
 """
 
 import copy
@@ -26,7 +28,7 @@ from answers import (
 
 from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import Effect
+from drake_disasm.effects import Effect, GrooveViscousFriction, RustyPatch
 from drake_disasm.logs import Log, read_log
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
@@ -36,27 +38,41 @@ from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.validation.blind_tests import observable_effects
 
-_STEPS, _EPISODES = 440, 20  # recorded at least; seeds from one log to the next
-_SEEDS = {"null": 3000, "effect": 7000}
+_STEPS = {"null": 440, "effect": 440, "strong": 200}  # recorded at least
+_EPISODES = 20  # seeds from one log to the next
+_SEEDS = {"null": 3000, "effect": 7000, "strong": 57000}
 _EXPLORATION = 1.5e-4  # m
 _TIMES = (4.0, 10.0)  # the limit of detection
 _MOST = 0.5  # of the way to an amplitude's bound; beyond it the cell may not start
 _FAR = _MOST / _TIMES[1]
+_DRAG, _PATCH = 600.0, 1.0  # N s/m, 1: strong ones
+_PLACES, _WIDTHS = (0.01, 0.05), (0.004, 0.03)  # m, of strong patches
 _PROGRAM = "benchmarks/cell_verdicts.py"
 _EXAMPLES = """examples:
   python benchmarks/cell_verdicts.py null --logs 50
   python benchmarks/cell_verdicts.py effect --logs 50 --time-budget 30
+  python benchmarks/cell_verdicts.py strong --logs 20 --time-budget 30
 """
 
 
-def record(folder: Path, scenario: Scenario, seed: int) -> Log:
-    """Returns a log of the cell; one that is there already is read."""
+def record(folder: Path, scenario: Scenario, kind: str, seed: int) -> Log:
+    """Returns a log with what is hidden; one that is there already is read."""
     if not (folder / "done").exists():
         policy = Exploring(make_policy("admittance", scenario), _EXPLORATION, seed)
-        simulation = TaskSimulation(scenario, "cell", policy)
-        record_transitions(folder, simulation, _STEPS, seed)
+        station = "twin" if kind == "strong" else "cell"
+        simulation = TaskSimulation(scenario, station, policy)
+        record_transitions(folder, simulation, _STEPS[kind], seed)
         (folder / "done").touch()
     return read_log(folder)
+
+
+def strong(number: int) -> Effect:
+    """Returns the effect of a strong case: a drag or a patch somewhere, in turn."""
+    if number % 2 == 0:
+        return GrooveViscousFriction(_DRAG)
+    random = np.random.default_rng([_SEEDS["strong"], number])
+    width = math.exp(random.uniform(*np.log(_WIDTHS)))
+    return RustyPatch(_PATCH, random.uniform(*_PLACES), width)
 
 
 def draw(number: int, limits: list[list[Any]]) -> Effect:
@@ -100,12 +116,14 @@ def _case(
 ) -> Answer:
     """Returns the answer to a case, within a time [s], with what was put in."""
     real, hidden, name = copy.deepcopy(scenario), "", ""
-    if kind == "effect":
-        effect = draw(number, _limits(out / "null.jsonl"))
+    if kind != "null":
+        is_strong = kind == "strong"
+        limits = [] if is_strong else _limits(out / "null.jsonl")
+        effect = strong(number) if is_strong else draw(number, limits)
         real.effects, hidden, name = [effect], repr(effect), type(effect).__name__
     seed = _SEEDS[kind] + _EPISODES * number
     try:
-        log = record(out / f"{kind}_{number}", real, seed)
+        log = record(out / f"{kind}_{number}", real, kind, seed)
     except RuntimeError as error:
         return no_verdict("not recorded", str(error))
     return {"hidden": hidden, "kind": name} | answer(log, scenario, time_budget)
@@ -121,7 +139,7 @@ def _limits(path: Path) -> list[list[Any]]:
 
 def _counts(kind: str, answers: list[Answer]) -> list[Count]:
     """Returns alarms of null logs, or effects named."""
-    if kind != "effect":
+    if kind == "null":
         what = "an effect is confirmed or ambiguous (false alarm)"
         alarms = sum(bool(a["names"]) for a in answers)
         return [Count(kind, what, alarms, answers)]
@@ -150,6 +168,8 @@ def main(arguments: Sequence[str]) -> int:
     add_arguments(parser, 50, "cell_verdicts")
     args = parser.parse_args(arguments)
     scenario, path = load_scenario("removal"), args.out / f"{args.kind}.jsonl"
+    if args.kind == "strong":
+        scenario.contact.model = "impact"
     seconds = 60.0 * args.time_budget
     answers = complete(
         path,

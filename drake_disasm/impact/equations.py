@@ -20,6 +20,7 @@ _STICTION = 1e-4  # m/s: creep at which friction is three quarters
 _ITERATIONS = 60
 _SHORTEST = 11  # times that a step is halved before it is given up
 _TOLERANCE = 1e-8  # m/s, of the velocities after the step
+_ROUNDS = 64  # of a step by `_by_rounds`
 #: How Newton's method ends: solved; where no step leads to less error; not done.
 _SOLVED, _STUCK, _UNFINISHED = 0, 1, 2
 
@@ -52,16 +53,18 @@ class Workspace(NamedTuple):
     """What a step of one state is computed in; the next one overwrites it.
 
     Attributes:
-        depth, arm: (k,), (k, 3) of the places; arms from To in G.
+        depth, pressed, arm: (k,), (k,), (k, 3) of the places: see `find_places`; normal
+            forces that friction is of, where it is lagged [N]; arms from To in G.
         R_GnG, R_GB: (3, 3).
         T, T_inverse: (6, 6), twist = T v of the joints' rates v.
         A, slope, trial_slope: (6, 6), see `Known`, `balance`, `newton`.
-        b, before, twist, W, r, step, there, trial_W, trial: (6,), see there.
+        b, before, twist, W, r, step, there, trial_W, trial, last_W: (6,), see there.
         p_ToBo, p_GBo, one, other: (3,).
         by_twist: (3, 6), see `_push`.
     """
 
     depth: np.ndarray
+    pressed: np.ndarray
     arm: np.ndarray
     R_GnG: np.ndarray
     R_GB: np.ndarray
@@ -79,6 +82,7 @@ class Workspace(NamedTuple):
     there: np.ndarray
     trial_W: np.ndarray
     trial: np.ndarray
+    last_W: np.ndarray
     p_ToBo: np.ndarray
     p_GBo: np.ndarray
     one: np.ndarray
@@ -87,12 +91,12 @@ class Workspace(NamedTuple):
 
 
 #: Of the arrays that `arranged` takes.
-SHAPES = ((PLACES,), (PLACES, 3), (2, 3, 3), (5, 6, 6), (9, 6), (4, 3), (3, 6))
+SHAPES = ((2, PLACES), (PLACES, 3), (2, 3, 3), (5, 6, 6), (10, 6), (4, 3), (3, 6))
 
 
 @compiled
 def arranged(
-    depth: np.ndarray,
+    places: np.ndarray,
     arm: np.ndarray,
     rotations: np.ndarray,
     maps: np.ndarray,
@@ -103,8 +107,9 @@ def arranged(
     """Returns a workspace in some arrays, of `SHAPES`."""
     m, v, p = maps, vectors, points
     return Workspace(
-        *(depth, arm, rotations[0], rotations[1], m[0], m[1], m[2], m[3], m[4]),
-        *(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8]),
+        *(places[0], places[1], arm, rotations[0], rotations[1]),
+        *(m[0], m[1], m[2], m[3], m[4]),
+        *(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9]),
         *(p[0], p[1], p[2], p[3], by_twist),
     )
 
@@ -112,9 +117,9 @@ def arranged(
 @compiled
 def workspace() -> Workspace:
     """Returns a workspace on the host."""
-    depth, arm, rotations, maps, vectors, points, by_twist = SHAPES
+    places, arm, rotations, maps, vectors, points, by_twist = SHAPES
     return arranged(
-        np.empty(depth),
+        np.empty(places),
         np.empty(arm),
         np.empty(rotations),
         np.empty(maps),
@@ -133,6 +138,8 @@ class Known(NamedTuple):
         friction: Coulomb coefficient.
         law: (4,) of the normal force.
         space: its `depth` and `arm` are of the places before the step, from To in G.
+        is_lagged: whether friction is of the forces `space.pressed`, not of those at
+            the twist.
     """
 
     A: np.ndarray
@@ -141,6 +148,7 @@ class Known(NamedTuple):
     friction: float
     law: np.ndarray
     space: Workspace
+    is_lagged: bool
 
 
 #: q, v, qd, vd (6,) of a state, and E, its inverse and R_GnB (3, 3), see `turning`; of
@@ -193,7 +201,7 @@ def solve_row(
     _set_without_contact(c, h, q[i], v[i], qd[i], vd[i], E[i], space)
     _set_maps(E[i], E_inverse[i], space)
     _to_twists(space)
-    known = Known(space.A, space.b, h, c[_FRICTION], c[_LAW:_LOCK], space)
+    known = Known(space.A, space.b, h, c[_FRICTION], c[_LAW:_LOCK], space, False)
     _apply(space.T, v[i], space.before)
     is_solved[i] = _solve(known)
     _apply(space.T_inverse, space.twist, after[i])
@@ -316,7 +324,51 @@ def _solve(known: Known) -> bool:
     if squared(r) < alone and newton(known, before, wrench) == _SOLVED:
         _copy_vector(before, twist)
         return True
-    return newton(known, twist, wrench) != _UNFINISHED
+    ended = newton(known, twist, wrench)
+    if ended == _SOLVED:
+        return True
+    return _by_rounds(known) or ended == _STUCK
+
+
+@compiled
+def _by_rounds(known: Known) -> bool:
+    """Sets twist and wrench W where Newton's method finds no balance; is there one?
+
+    It stops short where friction is large: the normal forces then depend on the
+    friction that depends on them. Friction of given normal forces leaves a convex
+    problem with one solution, where the normal force falls with the way out. It has
+    new normal forces, which in the mean with the given ones are those of the next
+    round. Friction of given forces can only brake, so they are bounded, and some of
+    them are their own (Brouwer's fixed point theorem): a balance. Without one after
+    the last round, friction is of the forces of the round before.
+
+    Without a solution for given forces, twist and wrench are left as they are.
+    """
+    space = known.space
+    twist, wrench, last, last_W = space.twist, space.W, space.before, space.last_W
+    lagged = Known(known.A, known.b, known.h, known.friction, known.law, space, True)
+    _copy_vector(twist, last)
+    _copy_vector(wrench, last_W)
+    is_solved = False
+    for k in range(PLACES):
+        space.pressed[k] = 0.0
+    for n in range(_ROUNDS):
+        if newton(lagged, twist, wrench) != _SOLVED:
+            break
+        _copy_vector(twist, last)
+        _copy_vector(wrench, last_W)
+        is_tried = n & (n + 1) == 0  # as often again as before: most tries are in vain
+        if is_tried and newton(known, twist, wrench) == _SOLVED:
+            return True
+        for k in range(PLACES):
+            rate = _rate_at(k, space.arm[k], last, space.one)
+            F, _, _ = normal_force(space.depth[k] + known.h * rate, rate, known.law)
+            space.pressed[k] = 0.5 * (space.pressed[k] + F) if is_solved else F
+        _copy_vector(last, twist)
+        is_solved = True
+    _copy_vector(last, twist)
+    _copy_vector(last_W, wrench)
+    return is_solved
 
 
 @compiled
@@ -343,16 +395,17 @@ def balance(
         for j in range(6):
             slope[i, j] = 0.0
     for k in range(PLACES):
-        for i in range(3):
-            velocity[i] = twist[i]
-        _add_cross(1.0, twist[3:], space.arm[k], velocity)
-        rate = -_SIDES[k] * velocity[_AXES[k]]
+        rate = _rate_at(k, space.arm[k], twist, velocity)
         after = space.depth[k] + h * rate
-        if after <= 0.0:
+        if after <= 0.0 and not (known.is_lagged and space.pressed[k] > 0.0):
             continue
         F, by_depth, by_rate = normal_force(after, rate, known.law)
         dF, mu = h * by_depth + by_rate, known.friction
-        _push(_AXES[k], _SIDES[k], velocity, F, dF, mu, force, space.by_twist)
+        limit, limit_by_rate = mu * F, mu * dF
+        if known.is_lagged:
+            limit, limit_by_rate = mu * space.pressed[k], 0.0
+        _push(_AXES[k], _SIDES[k], F, dF, force, space.by_twist)
+        _rub(_AXES[k], _SIDES[k], velocity, limit, limit_by_rate, force, space.by_twist)
         _add_wrench(space.arm[k], force, space.by_twist, wrench, slope)
     for i in range(6):
         r[i] = -known.b[i] - h * wrench[i]
@@ -362,37 +415,69 @@ def balance(
 
 
 @compiled
+def _rate_at(k: int, arm: np.ndarray, twist: np.ndarray, velocity: np.ndarray) -> float:
+    """Returns at what rate a place goes into the groove [m/s].
+
+    Args:
+        k: number of the place.
+        arm: (3,) from To to it.
+        twist: (6,) of the bolt.
+        velocity: (3,) is set, the bolt's there.
+    """
+    for i in range(3):
+        velocity[i] = twist[i]
+    _add_cross(1.0, twist[3:], arm, velocity)
+    return float(-_SIDES[k] * velocity[_AXES[k]])
+
+
+@compiled
 def _push(
+    axis: int, side: float, F: float, dF: float, force: np.ndarray, slope: np.ndarray
+) -> None:
+    """Finds the normal force at a place, and its slope by the place's velocity.
+
+    Args:
+        axis, side: of the normal.
+        F: normal force [N].
+        dF: by which it falls with the velocity along the normal [N s/m].
+        force: (3,) of which [axis] is set.
+        slope: (3, 6), of which [axis, :3] is set.
+    """
+    force[axis] = side * F
+    for j in range(3):
+        slope[axis, j] = 0.0
+    slope[axis, axis] = -dF
+
+
+@compiled
+def _rub(
     axis: int,
     side: float,
     velocity: np.ndarray,
-    F: float,
-    dF: float,
-    mu: float,
+    limit: float,
+    by_rate: float,
     force: np.ndarray,
     slope: np.ndarray,
 ) -> None:
-    """Finds the force at a touching place, and its slope by the place's velocity.
+    """Finds the friction at a place, and its slope by the place's velocity.
 
-    Coulomb friction, regularised: mu F s / sqrt(s^2 + stiction^2) against the slip s.
+    Coulomb's, regularised: limit s / sqrt(s^2 + stiction^2) against the slip s.
 
     Args:
         axis, side: of the normal.
         velocity: (3,) of the bolt there.
-        F: normal force [N].
-        dF: by which it falls with the velocity along the normal [N s/m].
-        mu: coefficient of friction.
-        force: (3,) is set.
-        slope: (3, 6), of which [:, :3] is set.
+        limit: coefficient of friction times normal force [N].
+        by_rate: by which that falls with the velocity along the normal [N s/m].
+        force: (3,) of which all but [axis] is set.
+        slope: (3, 6), of which all but [axis] of [:, :3] is set.
     """
     one, other = (axis + 1) % 3, (axis + 2) % 3
     speed = math.sqrt(velocity[one] ** 2 + velocity[other] ** 2 + _STICTION**2)
-    drag = mu * F / speed
-    force[axis], slope[axis, axis] = side * F, -dF
+    drag = limit / speed
     for i, j in ((one, other), (other, one)):
         along = velocity[i] / speed
         force[i] = -drag * velocity[i]
-        slope[i, axis], slope[axis, i] = side * dF * mu * along, 0.0
+        slope[i, axis] = side * by_rate * along
         slope[i, i] = drag * (along * along - 1.0)
         slope[i, j] = drag * along * velocity[j] / speed
 

@@ -12,7 +12,7 @@ from drake_disasm.common.arrays import Array, namespace
 from drake_disasm.impact.equations import SHAPES, arranged, solve_row
 
 _THREADS = 64  # of a block
-_DEPTH, _ARM, _ROTATIONS, _MAPS, _VECTORS, _POINTS, _BY_TWIST = SHAPES
+_PLACES, _ARM, _ROTATIONS, _MAPS, _VECTORS, _POINTS, _BY_TWIST = SHAPES
 
 
 def solve_rows(
@@ -47,7 +47,7 @@ def kernel(table, h, states, after, wrench, is_solved):  # type: ignore[no-untyp
     """Solves one state in each thread; see `equations.solve_rows`."""
     i = cuda.grid(1)
     space = arranged(
-        cuda.local.array(_DEPTH, np.float64),
+        cuda.local.array(_PLACES, np.float64),
         cuda.local.array(_ARM, np.float64),
         cuda.local.array(_ROTATIONS, np.float64),
         cuda.local.array(_MAPS, np.float64),

@@ -49,7 +49,7 @@ class ChannelFinding:
 
 def channel_findings(fit: Fit) -> list[ChannelFinding]:
     """Returns what is left in each channel of a fit's residual."""
-    measured, residual = fit.model.measurements, fit.linearisation.residual
+    measured, residual = fit.model.measurements, fit.weighed_residual
     found = []
     for number, channel in enumerate(measured.channels):
         r = residual[:, number]

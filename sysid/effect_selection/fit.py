@@ -59,8 +59,10 @@ class Fit:
     @property
     def bounded_residual(self) -> Array:
         """Residuals (rows, channels) whose squares add up to the loss."""
-        linear = self.linearisation
-        return pseudo_residual(linear.residual, linear.huber_delta)
+        return self._bounded(self.linearisation.residual)
+
+    def _bounded(self, residual: Array) -> Array:
+        return pseudo_residual(residual, self.linearisation.huber_delta)
 
     @property
     def states_model_error(self) -> bool:
@@ -83,13 +85,37 @@ class Fit:
     def is_at_noise(self) -> bool:
         """Whether the noise is stated, and the residual of no channel is larger.
 
-        Of a log of the twin, whose poses are exact, half of the channels are silent.
+        Or no larger than it and what the model does not know of how steps begin; that
+        is not asked of a fit that is far off. Of a log of the twin, whose poses are
+        exact, half of the channels are silent.
         """
-        limits = self.settings
-        if not self.noise_is_stated or self.objective > limits.noise_level:
+        if not self.noise_is_stated:
             return False
-        worst = np.sqrt(np.mean(self.bounded_residual**2, axis=0)).max(initial=0.0)
-        return bool(worst <= limits.max_objective_at_noise)
+        if self._is_noise(self.bounded_residual):
+            return True
+        is_far = self.objective > self.settings.max_linear_objective
+        return not is_far and self._is_noise(self._bounded(self.weighed_residual))
+
+    def _is_noise(self, bounded: Array) -> bool:
+        """Returns whether bounded residuals (rows, channels) are no more than noise."""
+        limits, squared = self.settings, bounded**2
+        worst = np.sqrt(np.mean(squared, axis=0)).max(initial=0.0)
+        level = float(np.sqrt(np.mean(squared)))
+        return bool(
+            level <= limits.noise_level and worst <= limits.max_objective_at_noise
+        )
+
+    @functools.cached_property
+    def weighed_residual(self) -> Array:
+        """Residuals (rows, channels) in units of all that is known to be uncertain.
+
+        Of the stated error, and of what predictions depend on that no reading shows,
+        see `LogModel.begin_error`. A fit does not weigh by the latter: whatever makes
+        predictions uncertain would then fit well.
+        """
+        residual = self.linearisation.residual
+        error = self.model.begin_error(self.theta)
+        return residual if error is None else residual / np.hypot(1.0, error)
 
     @property
     def blocks(self) -> NDArray[np.int64]:

@@ -116,7 +116,8 @@ class RefitSelection:
         is_over = time.monotonic() > self.deadline
         if not fit.noise_is_stated or fit.states_model_error or is_over:
             return True
-        return any(found.is_at_noise for _, found in gains.values())
+        fits = sorted((found for _, found in gains.values()), key=lambda f: f.objective)
+        return any(found.is_at_noise for found in fits)
 
     def _gained(
         self, fit: Fit, system: LinearSystem, trials: Sequence[Gain]

@@ -368,6 +368,14 @@ class LogModel(abc.ABC):
         """Returns whether the stated error holds at parameters (p,); None: unknown."""
         return None
 
+    def begin_error(self, theta: Array) -> Array | None:
+        """Returns by how much predictions are off for what no reading shows.
+
+        (rows, channels) standard deviations in units of the stated error, beyond which
+        they come, at parameters (p,); None if that is nothing, or unknown.
+        """
+        return None
+
     def displaced(self, displacement: Array, push: Array) -> Self:
         """Returns the same model with each step displaced from its command.
 

@@ -43,6 +43,7 @@ _CHUNK = 32  # transitions: a tenth of a second of work
 _IMPACT_CHUNK = 512  # large enough for arrays, small enough to share
 _IMPACT_BATCH = 4096  # with more an array operation hardly gets faster
 _N_PER_MM = 1e-3  # of N/m
+_DRAWS = 4  # of where steps begin: a standard deviation is then known to a third
 _PASSES = 4  # but the first of those steps alone whose begin has surely changed
 _KEPT = 64  # steps of that many parameter sets
 _FAILURES = (RuntimeError, DisasmError, ValueError)  # of a simulation
@@ -263,17 +264,44 @@ class TwinModel(ScenarioModel):
         model = self.surrogate().begun(theta)
         if model.rollout or model.costly:
             return None
-        observer, whole = model._observer, model._whole
-        signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(whole.steps), 6))
-        away = observer.uncertain(whole, signs).select(model._transitions.rows)
         try:
-            found = model.predictions(theta)
-            other = model.replace(_transitions=away).predictions(theta)
+            [moved] = model._moved_begins(theta, 1)
         except PredictionError as error:
             return Validity(1.0, np.nan, str(error))
-        spread = np.abs(other - found) / self.measurements.sigma
-        share = float(np.mean(spread.max(axis=1) > 3.0))
+        share = float(np.mean(np.abs(moved).max(axis=1) > 3.0))
         return Validity(share, model._transitions.most_give())
+
+    def begin_error(self, theta: Array) -> Array | None:
+        """See LogModel: of how far the grip gives, see `validity`."""
+        model = self.surrogate().begun(theta)
+        if model.rollout or model.costly:
+            return None
+        try:
+            moved = model._moved_begins(theta, _DRAWS)
+        except PredictionError:
+            return None
+        return np.asarray(np.sqrt(np.mean(moved**2, axis=0)))
+
+    def _moved_begins(self, theta: Array, draws: int) -> Array:
+        """Returns by how much predictions move with where steps begin.
+
+        (draws, rows, channels), in units of their stated errors, where steps begin
+        elsewhere by what the sensor's noise leaves unknown of it, to random sides.
+
+        Args:
+            theta: (p,) values of `parameters`.
+            draws: how often.
+
+        Raises:
+            PredictionError: a simulation failed.
+        """
+        found, rows = self.predictions(theta), self._transitions.rows
+        random, moved = np.random.default_rng(0), []
+        for _ in range(draws):
+            sides = random.choice([-1.0, 1.0], (len(self._whole.steps), 6))
+            away = self._observer.uncertain(self._whole, sides).select(rows)
+            moved.append(self.replace(_transitions=away).predictions(theta) - found)
+        return np.array(moved) / self.measurements.sigma
 
     @property
     def _observer(self) -> GripObserver:

@@ -131,27 +131,18 @@ def test_fixed_scenarios_share_their_starts_beside_randomised_ones(monkeypatch):
         np.testing.assert_allclose(states[:, row], alone[:, 0], atol=1e-9)
 
 
-def test_a_bolt_that_contact_throws_away_ends_its_episode_alone():
-    """Its stiffness grows with the fifth power: no step of time can follow that."""
-    law = ["contact.impact.stiffness=30690", "contact.impact.exponent=4.99"]
-    steep = load_scenario("chapter3", [*IMPACT, *law, "contact.friction=1.6"])
-    usual = load_scenario("chapter3", IMPACT)
-    twin = BatchedTwin([steep] * 200 + [usual], device="numpy")
-    twin.reset(range(201))
+def test_a_bolt_that_is_thrown_away_ends_its_episode_alone():
+    """Contact hardly does it: here the command goes where no arm does."""
+    twin = BatchedTwin(load_scenario("chapter3", IMPACT), 2, device="numpy")
+    twin.reset([0, 1])
     history = BatchHistory(twin)
-    random, bounds = np.random.default_rng(0), np.array([3e-3] * 3 + [1e-2] * 3)
-    thrown, steps = [], 0
-    while not thrown and steps < 20:
-        steps += 1
-        moves = np.zeros((201, 6))
-        moves[:200] = random.uniform(-1.0, 1.0, (200, 6)) * bounds
-        result = twin.step(moves)
-        history.add(result)
-        assert np.abs(result.observation[:, :3]).max() < 1.0
-        assert not result.failure[200]
-        thrown = [row for row, why in enumerate(result.failure) if "thrown" in why]
-    assert thrown and result.reward[thrown[0]] == 0.0
-    recorded = history.episode(thrown[0], steps).columns()
+    twin.episodes.goal[0, 1] = 20.0
+    result = twin.step(np.zeros((2, 6)))
+    history.add(result)
+    assert "thrown" in result.failure[0] and not result.failure[1]
+    assert np.abs(result.observation[:, :3]).max() < 1.0
+    assert result.reward[0] == 0.0
+    recorded = history.episode(0, 1).columns()
     assert np.abs(recorded["X_GB_measured"]).max() < 2.0
 
 

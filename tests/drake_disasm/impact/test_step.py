@@ -40,17 +40,55 @@ def states():
     return q, v, q + away, np.zeros((COUNT, 6))
 
 
-def test_springs_inertia_and_contact_balance_after_the_step():
-    q, v, qd, vd = states()
-    step = impact.ImpactStep.of(TURNED, H, q, v, qd, vd)
+def unbalanced(conditions, h, step, q, v, qd, vd):
+    """Returns contact's forces on the joints (n, 6), and the impulses left over."""
     after, wrench = step.v, step.wrench
-    assert step.is_solved.all()
     E, R = impact.turning(q[:, 3:])
-    t_To = wrench[:, 3:] - np.cross(R @ TURNED.p_BoTo_B, wrench[:, :3])
+    t_To = wrench[:, 3:] - np.cross(R @ conditions.p_BoTo_B, wrench[:, :3])
     pushed = np.hstack([wrench[:, :3], np.einsum("nji,nj->ni", E, t_To)])
-    rest = (after - v) @ M - H * (K * (qd - q - H * after) + D * (vd - after) + pushed)
+    moved = K * (qd - q - h * after) + D * (vd - after) + pushed
+    return pushed, (after - v) @ M - h * moved
+
+
+def test_springs_inertia_and_contact_balance_after_the_step():
+    step = impact.ImpactStep.of(TURNED, H, *states())
+    assert step.is_solved.all()
+    pushed, rest = unbalanced(TURNED, H, step, *states())
     assert np.abs(pushed).max() > 1.0
     np.testing.assert_allclose(rest, 0.0, atol=5e-6)  # 1e-8 m/s, in a stiff wall
+
+
+@pytest.mark.parametrize("friction", [1.2, 2.2])
+@pytest.mark.parametrize("h", [0.005, 0.01])
+def test_they_balance_under_friction_on_which_newtons_method_alone_stops_short(
+    friction, h
+):
+    around = dataclasses.replace(TURNED.around, friction=np.array([friction]))
+    law = impact.ImpactLaw(1000.0, 1.0, 1.0, 0.1)
+    rough = dataclasses.replace(TURNED, law=law, around=around)
+    random = np.random.default_rng(0)
+    q = random.uniform(-1, 1, (200, 6)) * [0, 2e-4, 4e-4, 0.01, 0.02, 0.01]
+    q[:, 0] = random.uniform(0.0, 0.06, len(q))
+    away = random.uniform(-1, 1, q.shape) * [1e-3, 5e-4, 5e-4, 0.01, 0.01, 0.01]
+    state = (q, random.uniform(-1, 1, q.shape) * 0.01, q + away, np.zeros(q.shape))
+    step = impact.ImpactStep.of(rough, h, *state)
+    assert step.is_solved.all()
+    _, rest = unbalanced(rough, h, step, *state)
+    np.testing.assert_allclose(rest, 0.0, atol=2e-4)  # 1e-8 m/s of bolts that stick
+    # Contact takes energy from a bolt or gives back what its springs had: it never
+    # throws it.
+    assert np.abs(step.v[:, :3]).max() < 0.5
+
+
+def test_friction_of_given_normal_forces_only_brakes():
+    random = np.random.default_rng(3)
+    step = known(random)._replace(friction=5.0, is_lagged=True)
+    step.space.pressed[:] = random.uniform(0.0, 100.0, equations.PLACES)
+    step.space.depth[:] = -1.0  # nothing touches
+    wrench, r = np.empty((2, 6))
+    for twist in random.uniform(-1, 1, (20, 6)) * 0.01:
+        equations.balance(step, twist, wrench, r, np.empty((6, 6)))
+        assert wrench @ twist < 0.0
 
 
 def test_without_contact_it_is_the_linear_step():
@@ -101,7 +139,7 @@ def known(random):
     )
     space.arm[:] = random.uniform(-0.01, 0.01, equations.NORMALS.shape)
     law = np.array(TURNED.law.row)
-    return equations.Known(M + H * np.diag(D), np.zeros(6), H, 0.2, law, space)
+    return equations.Known(M + H * np.diag(D), np.zeros(6), H, 0.2, law, space, False)
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -81,3 +81,22 @@ def test_noise_is_reached_channel_by_channel(gain):
         found = dataclasses.replace(fit, linearisation=linear, objective=rms)
         assert found.is_at_noise == is_noise
         assert not dataclasses.replace(found, noise_is_stated=False).is_at_noise
+
+
+def test_noise_is_reached_where_no_reading_shows_how_a_step_begins(gain, monkeypatch):
+    """In the rows that depend on it a residual of that size is none."""
+    fitter, effect = gain
+    fit = fitter.fit((effect,))
+    residual = 0.5 * np.ones_like(fit.linearisation.residual)
+    residual[:20] = 4.0
+    linear = dataclasses.replace(fit.linearisation, residual=residual)
+    found = dataclasses.replace(fit, linearisation=linear, objective=1.5)
+    assert not found.is_at_noise
+    error = np.zeros_like(residual)
+    error[:20] = 5.0
+    monkeypatch.setattr(type(fit.model), "begin_error", lambda *_: error)
+    assert dataclasses.replace(found).is_at_noise
+    monkeypatch.setattr(
+        type(fit.model), "begin_error", lambda *_: np.roll(error, 20, axis=0)
+    )
+    assert not dataclasses.replace(found).is_at_noise

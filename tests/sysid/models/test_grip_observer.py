@@ -131,6 +131,21 @@ def test_where_a_model_leads_nowhere_steps_begin_as_the_wrench_says(dragged):
     assert refused.begun(_NOTHING) is refused
 
 
+def test_what_a_grip_that_gives_leaves_unknown_is_little_and_less_of_a_stiff_one(
+    dragged,
+):
+    log, scenario, _ = dragged
+    model = TwinModel([log], scenario, ())
+    error = model.begin_error(_NOTHING)
+    assert error is not None and error.shape == model.measurements.values.shape
+    assert 0.05 < np.median(error[:, 6:]) < 0.5
+    stiff = dataclasses.replace(scenario.gripper, compliance="rigid")
+    rigid = TwinModel([log], dataclasses.replace(scenario, gripper=stiff), ())
+    held = rigid.begin_error(_NOTHING)
+    assert held is not None and np.median(held[:, 6:]) < 0.1 * np.median(error[:, 6:])
+    assert model.replace(rollout=True).begin_error(_NOTHING) is None
+
+
 def test_a_log_that_the_grip_decides_is_out_of_the_models_range(dragged):
     """Of steps as they are; and of ones that no force balances."""
     log, scenario, _ = dragged
