@@ -38,6 +38,8 @@ FLOORS = {
         {"workers"},
         {"objective"},
         {"identification", "data_checks"},
+        {"fitting"},
+        {"residuals"},
         {"effect_selection"},
         {"validation", "report", "experiment_design", "studies"},
     ),

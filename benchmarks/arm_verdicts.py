@@ -35,10 +35,10 @@ from drake_disasm.effects import (
     shape_parameters,
 )
 from drake_disasm.logs import read_logs
-from sysid.effect_selection.candidates import Candidate, candidates, extended
 from sysid.effect_selection.close_loop import close_loop
-from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.fitting.candidates import Candidate, candidates, extended
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import DEFAULT_SETTINGS
 from sysid.identification.noise import with_estimated_noise
 from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of

@@ -14,7 +14,7 @@ from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
-from sysid.effect_selection.candidates import candidates, extended
+from sysid.fitting.candidates import candidates, extended
 from sysid.identification.linearisation import linearise
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective

@@ -36,11 +36,11 @@ from drake_disasm.effects import (
 )
 from drake_disasm.effects.fields import amplitude, joint_name, shape_parameter
 from drake_disasm.logs import Log, LogHeader, LogWriter, flat_columns, read_log
-from sysid.effect_selection.candidates import Candidate, extended
 from sysid.effect_selection.close_loop import close_loop
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.fitting.candidates import Candidate, extended
+from sysid.fitting.fit import Fit
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import DEFAULT_SETTINGS
 from sysid.models.response.model import JointResponseModel
 from sysid.workers import Workers
 

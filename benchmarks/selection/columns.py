@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from drake_disasm.effects import Effect, registered_effects
 from drake_disasm.logs import read_logs
 from selection.answer import Answer, Case
-from sysid.effect_selection.candidates import (
+from sysid.fitting.candidates import (
     Candidate,
     candidates,
     extended,

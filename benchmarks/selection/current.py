@@ -12,8 +12,8 @@ from drake_disasm.logs import read_logs
 from selection.answer import Answer, Case
 from selection.watched import watched
 from sysid.effect_selection import close_loop
-from sysid.effect_selection.candidates import extended
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.fitting.candidates import extended
+from sysid.fitting.settings import DEFAULT_SETTINGS
 from sysid.models.base import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 

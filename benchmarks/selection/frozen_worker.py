@@ -23,9 +23,9 @@ from drake_disasm.effects import registered_effects  # noqa: E402
 from drake_disasm.logs import read_logs  # noqa: E402
 from selection.answer import FAILED, Answer, Case, refusal  # noqa: E402
 from selection.watched import watched  # noqa: E402
-from sysid.effect_selection.candidates import extended  # noqa: E402
 from sysid.effect_selection.close_loop import close_loop  # noqa: E402
-from sysid.effect_selection.settings import DEFAULT_SETTINGS  # noqa: E402
+from sysid.fitting.candidates import extended  # noqa: E402
+from sysid.fitting.settings import DEFAULT_SETTINGS  # noqa: E402
 from sysid.models.from_logs import ModelChoice, model_of  # noqa: E402
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import registered_effects
-from sysid.effect_selection.candidates import Candidate, candidates, extended
+from sysid.fitting.candidates import Candidate, candidates, extended
 from sysid.models.base import LogModel
 from sysid.parameters import Parameter
 

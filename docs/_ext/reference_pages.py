@@ -25,7 +25,7 @@ from drake_disasm.learning.hyperparameters import Hyperparameters
 from drake_disasm.scenario.schema import Scenario
 from drake_disasm.stations.hardware_config import HardwareConfig
 from sysid.data_checks.settings import DataSettings
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.fitting.settings import SelectionSettings
 
 FOLDER = Path(__file__).parents[1] / "reference"
 

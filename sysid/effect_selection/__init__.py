@@ -8,15 +8,15 @@ rows that were not fitted, and adds those that are confirmed. From the top:
     forward_selection                       the rule: loss, ambiguity, stopping
     replication                             confirmed, ambiguous or suggested
     linear_system, linear_account           a fit linearised with all candidates
-    block_grams                             sufficient statistics of blocks of rows
-    fitter, fit, fit_cache                  a model with chosen effects, fitted
-    detection, whiteness, contradictions    what the log could show, and what is left
+    detection, contradictions               what could have shown; episodes that differ
     verdict, verdict_words, output          what is said in the end
+
+Fits are made in `sysid.fitting`; `sysid.residuals` looks at what they leave.
 """
 
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
-from sysid.effect_selection.settings import SelectionSettings
 from sysid.effect_selection.verdict import ParameterValue, Tie, Verdict
+from sysid.fitting.settings import SelectionSettings
 
 __all__ = [
     "ClosedLoop",

@@ -7,9 +7,9 @@ starts anew from the log as it should have been written.
 
 from collections.abc import Callable, Sequence
 
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.search import SearchResult
+from sysid.fitting.fit import Fit
+from sysid.fitting.fitter import Fitter
 from sysid.identification.noise import with_noise_of
 from sysid.models.base import LogModel
 from sysid.models.bookkeeping import Bookkeeping

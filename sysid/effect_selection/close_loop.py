@@ -16,28 +16,28 @@ from sysid.data_checks.constancy import dead_channels
 from sysid.data_checks.contradictions import contradicting_rows
 from sysid.data_checks.finding import refuse
 from sysid.effect_selection.bookkeeping import best_hypothesis
-from sysid.effect_selection.candidates import Candidate, candidates
-from sysid.effect_selection.command_scatter import (
-    CommandScatter,
-    fit_command_scatter,
-)
 from sysid.effect_selection.data_sufficiency import refuse_few_rows, refuse_rest
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.held_out import HeldOut, held_out_errors
-from sysid.effect_selection.residual_model import fit_residual_model
 from sysid.effect_selection.search import SearchResult, search
-from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
 from sysid.effect_selection.verdict import Verdict, judge
 from sysid.effect_selection.verdict_words import (
     not_told_apart,
     verdict_sentence,
     verdict_text,
 )
+from sysid.fitting.candidates import Candidate, candidates
+from sysid.fitting.fit import Fit
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import DEFAULT_SETTINGS, SelectionSettings
 from sysid.identification.noise import with_noise_of
 from sysid.identification.split import train_and_test
 from sysid.models.base import LogModel
 from sysid.models.bookkeeping import Bookkeeping
+from sysid.residuals.command_scatter import (
+    CommandScatter,
+    fit_command_scatter,
+)
+from sysid.residuals.held_out import HeldOut, held_out_errors
+from sysid.residuals.residual_model import fit_residual_model
 from sysid.workers import Workers
 
 _SEARCHED = 0.75  # of the time: the rest is for errors and the verdict

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.effect_selection.block_grams import Columns, NormalEquations
 from sysid.effect_selection.forward_selection import wald_p
 from sysid.effect_selection.linear_account import LinearAccount
+from sysid.fitting.block_grams import Columns, NormalEquations
 
 _OWN = "the model's own parameters"
 _MOST = 40  # episodes: of more, one by one, the time is not spent

@@ -7,10 +7,10 @@ import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as t_distribution
 
-from sysid.effect_selection.block_grams import Array
 from sysid.effect_selection.experiments import revealing_kind
 from sysid.effect_selection.forward_selection import Term
 from sysid.effect_selection.linear_account import LinearAccount
+from sysid.fitting.block_grams import Array
 from sysid.models.effects import field_of
 from sysid.parameters import Scaling, nominal_values
 

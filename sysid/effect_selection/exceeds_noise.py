@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from sysid.effect_selection.fit import Fit
+from sysid.fitting.fit import Fit
 
 Array = NDArray[np.float64]
 

@@ -6,18 +6,18 @@ from typing import Any
 import numpy as np
 
 from drake_disasm.effects import registered_effects
-from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.data_sufficiency import refuse_few_rows
 from sysid.effect_selection.detection import (
     DetectionLimit,
     detection_limits,
     undetectable,
 )
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.linear_account import LinearAccount
 from sysid.effect_selection.linear_system import linear_system
-from sysid.effect_selection.settings import DEFAULT_SETTINGS, SelectionSettings
+from sysid.fitting.candidates import candidates
+from sysid.fitting.fit import Fit
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import DEFAULT_SETTINGS, SelectionSettings
 from sysid.models.base import LogModel
 from sysid.parameters import Scaling
 from sysid.workers import Workers

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as t_distribution
 
-from sysid.effect_selection.block_grams import (
+from sysid.fitting.block_grams import (
     Array,
     BlockGrams,
     Columns,
     NormalEquations,
 )
-from sysid.effect_selection.candidates import Candidate, kind_text
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.fitting.candidates import Candidate, kind_text
+from sysid.fitting.settings import SelectionSettings
 
 
 @dataclass(frozen=True)

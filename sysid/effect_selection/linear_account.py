@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sysid.effect_selection.block_grams import Array, Columns, NormalEquations
-from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.forward_selection import (
     Gain,
     Selection,
@@ -18,7 +16,9 @@ from sysid.effect_selection.forward_selection import (
     ranked,
 )
 from sysid.effect_selection.linear_system import LinearSystem
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.fitting.block_grams import Array, Columns, NormalEquations
+from sysid.fitting.fit import Fit
+from sysid.fitting.settings import SelectionSettings
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.effect_selection.block_grams import (
+from sysid.effect_selection.forward_selection import Term, channel_weights
+from sysid.fitting.block_grams import (
     BlockGrams,
     Columns,
     NormalEquations,
     blocks_of,
 )
-from sysid.effect_selection.candidates import Candidate, extended, joint_groups
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.forward_selection import Term, channel_weights
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.fitting.candidates import Candidate, extended, joint_groups
+from sysid.fitting.fit import Fit
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import SelectionSettings
 from sysid.identification.linearisation import Linearisation, extend
 from sysid.models.base import LogModel
 from sysid.models.effects import field_of

@@ -4,14 +4,14 @@ import dataclasses
 from typing import Any
 
 from sysid.effect_selection.close_loop import ClosedLoop
-from sysid.effect_selection.fit import Fit
 from sysid.effect_selection.forward_selection import Gain, Step
-from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.replication import Standing
-from sysid.effect_selection.residual_diagnosis import diagnose
-from sysid.effect_selection.residual_model import ResidualModel
 from sysid.effect_selection.verdict import Verdict
+from sysid.fitting.fit import Fit
 from sysid.models.effects import field_of
+from sysid.residuals.held_out import HeldOut
+from sysid.residuals.residual_diagnosis import diagnose
+from sysid.residuals.residual_model import ResidualModel
 
 
 def to_mapping(closed: ClosedLoop) -> dict[str, Any]:

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid.deadline import parts_until
-from sysid.effect_selection.candidates import Candidate, extended
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.fitter import Fitter
+from sysid.fitting.candidates import Candidate, extended
+from sysid.fitting.fit import Fit
+from sysid.fitting.fitter import Fitter
 from sysid.models.base import LogModel
 from sysid.objective import Objective
 from sysid.workers import Workers

@@ -15,15 +15,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
-from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.exceeds_noise import exceeds_noise_p
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.forward_selection import Gain, Step, Term, ranked, step_of
 from sysid.effect_selection.linear_account import LinearAccount
 from sysid.effect_selection.linear_system import LinearSystem, linear_system
 from sysid.effect_selection.prescreen import prescreening_fits
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.fitting.candidates import Candidate
+from sysid.fitting.fit import Fit
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import SelectionSettings
 from sysid.workers import Workers
 
 _Names = tuple[str, ...]

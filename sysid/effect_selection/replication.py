@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import false_discovery_control
 
-from sysid.effect_selection.block_grams import Columns, NormalEquations, fold_numbers
-from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.forward_selection import select
 from sysid.effect_selection.linear_account import LinearAccount
 from sysid.effect_selection.linear_system import LinearSystem
+from sysid.fitting.block_grams import Columns, NormalEquations, fold_numbers
+from sysid.fitting.candidates import Candidate
 
 Status = Literal["confirmed", "ambiguous", "suggested"]
 

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from drake_disasm.common.progress import Progress, ProgressUpdate
-from sysid.effect_selection.candidates import Candidate
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.forward_selection import (
     Gain,
     Selection,
@@ -26,6 +23,9 @@ from sysid.effect_selection.replication import (
     votes_of_gains,
     votes_of_selections,
 )
+from sysid.fitting.candidates import Candidate
+from sysid.fitting.fit import Fit
+from sysid.fitting.fitter import Fitter
 
 _STAGE = "selecting effects"
 

@@ -8,8 +8,6 @@ from typing import Literal
 import numpy as np
 
 from drake_disasm.effects import Imprecision
-from sysid.effect_selection.channel_checks import ChannelFinding, channel_findings
-from sysid.effect_selection.command_scatter import CommandScatter
 from sysid.effect_selection.contradictions import Contradiction, contradictions
 from sysid.effect_selection.detection import (
     DetectionLimit,
@@ -17,17 +15,19 @@ from sysid.effect_selection.detection import (
     undetectable,
 )
 from sysid.effect_selection.experiments import separating
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.held_out import HeldOut
-from sysid.effect_selection.left_over import LeftOver, left_over
 from sysid.effect_selection.replication import Standing
-from sysid.effect_selection.residual_model import ResidualModel
 from sysid.effect_selection.search import SearchResult
 from sysid.effect_selection.strokes import joints_of_one_stroke
-from sysid.effect_selection.whiteness import correlated_channels
+from sysid.fitting.fit import Fit
 from sysid.models.base import LogModel
 from sysid.models.bookkeeping import Bookkeeping
 from sysid.parameters import Scaling
+from sysid.residuals.channel_checks import ChannelFinding, channel_findings
+from sysid.residuals.command_scatter import CommandScatter
+from sysid.residuals.held_out import HeldOut
+from sysid.residuals.left_over import LeftOver, left_over
+from sysid.residuals.residual_model import ResidualModel
+from sysid.residuals.whiteness import correlated_channels
 
 _SCATTER = Imprecision.__name__
 

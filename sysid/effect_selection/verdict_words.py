@@ -21,10 +21,10 @@ from sysid.effect_selection.effect_names import (
     enumeration,
     in_words,
 )
-from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.replication import Status
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.effect_selection.verdict import ParameterValue, Verdict
+from sysid.fitting.settings import DEFAULT_SETTINGS
+from sysid.residuals.held_out import HeldOut
 
 _SHOWN = 3  # items of anything that are listed: a size of output, no threshold
 _QUANTITIES = {"N": "force", "N m": "torque", "m": "position", "rad": "position"}

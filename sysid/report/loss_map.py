@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.effect_selection.held_out import HeldOut
 from sysid.objective import pseudo_residual
+from sysid.residuals.held_out import HeldOut
 
 Array = NDArray[np.float64]
 

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sysid.data_checks import DataFinding
-from sysid.effect_selection.held_out import HeldOut
 from sysid.identification.output import to_mapping
 from sysid.identification.result import Comparison, Identification
 from sysid.report import figures, plots
 from sysid.report.templates import render
+from sysid.residuals.held_out import HeldOut
 
 _DRAWS = 200  # of the bootstrap of an error
 

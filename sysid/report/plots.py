@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from sysid.effect_selection.forward_selection import Gain
-from sysid.effect_selection.held_out import HeldOut
 from sysid.models.measurements import Channel
 from sysid.report.loss_map import LossMap, place
 from sysid.report.thinning import even_rows, extreme_rows
+from sysid.residuals.held_out import HeldOut
 
 Array = NDArray[np.float64]
 

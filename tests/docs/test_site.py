@@ -8,7 +8,7 @@ import types
 import pytest
 
 from drake_disasm.common.quantity import quantity
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.fitting.settings import SelectionSettings
 from tests.docs.pages import ROOT
 
 

@@ -5,8 +5,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from drake_disasm.effects import JointCoulombFriction, SensorDrift
-from sysid.effect_selection.block_grams import BlockGrams, blocks_of
-from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.forward_selection import Selection, Term, select
 from sysid.effect_selection.linear_account import LinearAccount
 from sysid.effect_selection.linear_system import LinearSystem
@@ -15,7 +13,9 @@ from sysid.effect_selection.replication import (
     standings,
     votes_of_selections,
 )
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.fitting.block_grams import BlockGrams, blocks_of
+from sysid.fitting.candidates import Candidate
+from sysid.fitting.settings import DEFAULT_SETTINGS
 from sysid.parameters import Parameter
 
 FREE = (-np.inf, np.inf)  # bounds of a coefficient

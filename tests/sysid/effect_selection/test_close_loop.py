@@ -19,8 +19,8 @@ from drake_disasm.effects import (
 from drake_disasm.logs import read_log
 from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.output import to_mapping
-from sysid.effect_selection.settings import SelectionSettings
 from sysid.effect_selection.verdict import judge
+from sysid.fitting.settings import SelectionSettings
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.twin import TwinModel
 from sysid.report import closing_page

@@ -5,10 +5,10 @@ import pytest
 from scipy.signal import lfilter
 
 from drake_disasm.effects import JointCoulombFriction, JointViscousFriction
-from sysid.effect_selection.block_grams import BlockGrams, blocks_of
-from sysid.effect_selection.candidates import Candidate
 from sysid.effect_selection.forward_selection import Term, select, wald_p
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.fitting.block_grams import BlockGrams, blocks_of
+from sysid.fitting.candidates import Candidate
+from sysid.fitting.settings import DEFAULT_SETTINGS
 from tests.sysid.effect_selection.made import FREE, linear_system, of_joint, selected
 
 _ROWS = 480

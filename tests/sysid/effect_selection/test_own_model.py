@@ -15,14 +15,14 @@ from drake_disasm.effects import (
     SensorBias,
     TorqueOffset,
 )
-from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.exceeds_noise import exceeds_noise_p
-from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.output import to_mapping
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
 from sysid.effect_selection.verdict import judge
 from sysid.effect_selection.verdict_words import verdict_sentence
+from sysid.fitting.candidates import candidates
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import DEFAULT_SETTINGS
 from sysid.models import Channel, LogModel, Measurements
 from sysid.parameters import Parameter
 from sysid.report import closing_page

@@ -21,14 +21,14 @@ from drake_disasm.effects import (
     registered_effects,
 )
 from drake_disasm.logs import read_log
-from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.close_loop import close_loop
-from sysid.effect_selection.command_scatter import _Likelihood, fit_command_scatter
-from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.output import to_mapping
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.fitting.candidates import candidates
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import SelectionSettings
 from sysid.models.twin import TwinModel
 from sysid.report import closing_page
+from sysid.residuals.command_scatter import _Likelihood, fit_command_scatter
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
 from sysid.workers import Workers

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from drake_disasm.effects import ArmEffect, registered_effects
-from sysid.effect_selection.channel_checks import ChannelFinding
 from sysid.effect_selection.contradictions import Contradiction
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effects_in_words, in_words
 from sysid.effect_selection.experiments import separating
-from sysid.effect_selection.left_over import LeftOver
 from sysid.effect_selection.strokes import joints_of_one_stroke
 from sysid.effect_selection.verdict import ParameterValue, Tie, Written
 from sysid.effect_selection.verdict_words import (
@@ -23,6 +21,8 @@ from sysid.effect_selection.verdict_words import (
     verdict_text,
 )
 from sysid.models import Channel, LogModel, Measurements
+from sysid.residuals.channel_checks import ChannelFinding
+from sysid.residuals.left_over import LeftOver
 from tests.sysid.effect_selection.verdicts import ERRORS, made_verdict
 
 _LAG, _FRICTION = ("SensorLag",), tuple(f"JointCoulombFriction.j{i}" for i in range(3))

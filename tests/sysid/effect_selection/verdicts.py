@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from sysid.effect_selection.held_out import HeldOut
 from sysid.effect_selection.replication import Standing
 from sysid.effect_selection.verdict import Verdict
 from sysid.models import Channel
+from sysid.residuals.held_out import HeldOut
 
 ERRORS = HeldOut(
     np.array([[10.0], [-10.0]]),

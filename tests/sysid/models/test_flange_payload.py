@@ -8,8 +8,8 @@ import pytest
 from drake_disasm.effects import FlangePayload, JointCoulombFriction
 from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario
-from sysid.effect_selection.candidates import candidates
 from sysid.effect_selection.close_loop import close_loop
+from sysid.fitting.candidates import candidates
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.scenario_parameters import Request

@@ -13,7 +13,7 @@ from drake_disasm.effects import (
 )
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario
-from sysid.effect_selection.candidates import Candidate, extended
+from sysid.fitting.candidates import Candidate, extended
 from sysid.identification import SearchSettings, Settings, identify
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel

@@ -3,7 +3,7 @@
 import numpy as np
 
 from drake_disasm.effects import JointCoulombFriction, JointViscousFriction
-from sysid.effect_selection.candidates import Candidate, extended
+from sysid.fitting.candidates import Candidate, extended
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.joint_units import prismatic_unit
 from tests.sysid.models.arm import write_motion_log

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sysid.effect_selection.held_out import HeldOut
 from sysid.models import Channel
 from sysid.report.loss_map import loss_map
+from sysid.residuals.held_out import HeldOut
 
 
 def _errors(after, episode=None, names=("log",), period=None):

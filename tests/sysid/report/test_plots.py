@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sysid.effect_selection.held_out import HeldOut
 from sysid.models import Channel
 from sysid.report import plots
 from sysid.report.thinning import even_rows, extreme_rows
+from sysid.residuals.held_out import HeldOut
 
 
 def _errors(rows, channels=3, episodes=1, period=0.005):

@@ -15,11 +15,11 @@ from drake_disasm.effects import (
 )
 from drake_disasm.logs import LogWriter, flat_columns, read_log
 from sysid.data_checks.check import check_data
-from sysid.effect_selection.candidates import candidates, extended
 from sysid.effect_selection.close_loop import close_loop
-from sysid.effect_selection.fitter import Fitter
 from sysid.effect_selection.linear_system import linear_system
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.fitting.candidates import candidates, extended
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import DEFAULT_SETTINGS
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.response.model import JointResponseModel, _assumption

@@ -5,8 +5,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import DEFAULT_SETTINGS
 from sysid.models.base import Array, LogModel
 from sysid.models.measurements import Channel, Measurements
 from sysid.parameters import Parameter

@@ -11,17 +11,17 @@ from sklearn.ensemble import (  # type: ignore[import-untyped]
 
 from drake_disasm.effects import Effect
 from drake_disasm.effects.learned import BoostedTrees, LearnedFunctions
-from sysid.effect_selection.candidates import extended
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.left_over import (
+from sysid.fitting.candidates import extended
+from sysid.fitting.fit import Fit
+from sysid.models.base import HUBER_DELTA, LogModel
+from sysid.objective import pseudo_residual
+from sysid.residuals.left_over import (
     FOLDS,
     LEARNER,
     LeftOver,
     contiguous_blocks,
     every_few,
 )
-from sysid.models.base import HUBER_DELTA, LogModel
-from sysid.objective import pseudo_residual
 
 Array = NDArray[np.float64]
 

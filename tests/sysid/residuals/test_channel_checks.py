@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sysid.effect_selection.channel_checks import channel_findings
-from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import SelectionSettings
 from sysid.models.base import LogModel
 from sysid.models.measurements import Channel, Measurements
 from sysid.parameters import Parameter
+from sysid.residuals.channel_checks import channel_findings
 from sysid.validation import null_logs
 from sysid.workers import Workers
 

@@ -23,8 +23,8 @@ from scipy.optimize import minimize
 from scipy.stats import pearsonr, ttest_1samp, wilcoxon
 
 from sysid.confidence import Z
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.fitter import Fitter
+from sysid.fitting.fit import Fit
+from sysid.fitting.fitter import Fitter
 from sysid.identification.whiteness import ljung_box
 from sysid.models.base import LogModel
 from sysid.objective import Objective, pseudo_residual

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.confidence import QUANTILES
-from sysid.effect_selection.candidates import extended
-from sysid.effect_selection.fit import Fit
+from sysid.fitting.candidates import extended
+from sysid.fitting.fit import Fit
 from sysid.identification.uncertainty import block_length, block_numbers
 from sysid.models.base import LogModel
 from sysid.models.measurements import Channel

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
 from sysid.data_checks.tails import tail_limit
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.fitting.fit import Fit
+from sysid.fitting.settings import SelectionSettings
 from sysid.identification.uncertainty import block_length
 from sysid.identification.whiteness import autocorrelation
 from sysid.models.base import HUBER_DELTA

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sysid.effect_selection.fit import Fit
+from sysid.fitting.fit import Fit
 from sysid.identification.whiteness import ljung_box
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from drake_disasm.effects import CommandGain, GroovePose
 from drake_disasm.logs import read_log
-from sysid.effect_selection.candidates import candidates
-from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.settings import SelectionSettings
 from sysid.effect_selection.verdict import parameter_values
+from sysid.fitting.candidates import candidates
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import SelectionSettings
 from sysid.models.twin import TwinModel
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log

@@ -5,12 +5,12 @@ import pytest
 
 from drake_disasm.effects import SensorCrossTalk, SensorDrift
 from drake_disasm.logs import read_logs, write_static_wrench
-from sysid.effect_selection.candidates import candidates
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.fitter import Fitter
-from sysid.effect_selection.held_out import contiguous_folds, held_out_errors
-from sysid.effect_selection.settings import DEFAULT_SETTINGS
+from sysid.fitting.candidates import candidates
+from sysid.fitting.fit import Fit
+from sysid.fitting.fitter import Fitter
+from sysid.fitting.settings import DEFAULT_SETTINGS
 from sysid.models.from_logs import ModelChoice, model_of
+from sysid.residuals.held_out import contiguous_folds, held_out_errors
 from sysid.workers import Workers
 
 _ROWS, _NOISE, _WEIGHT = 60, 0.05, 9.0  # readings, N and N m, N

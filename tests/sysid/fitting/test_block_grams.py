@@ -6,7 +6,7 @@ import statsmodels.api as sm
 from scipy.signal import lfilter
 from scipy.stats import t as t_distribution
 
-from sysid.effect_selection.block_grams import BlockGrams, blocks_of
+from sysid.fitting.block_grams import BlockGrams, blocks_of
 
 _ROWS, _CHANNELS, _P, _BLOCKS = 240, 2, 5, 12
 _BASE, _MORE = np.array([0, 1]), np.array([2, 3, 4])

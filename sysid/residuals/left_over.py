@@ -18,7 +18,7 @@ from sklearn.ensemble import (  # type: ignore[import-untyped]
 )
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from sysid.effect_selection.fit import Fit
+from sysid.fitting.fit import Fit
 from sysid.models.base import HUBER_DELTA
 from sysid.objective import pseudo_residual
 

@@ -10,10 +10,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.effect_selection.candidates import Candidate, extended
-from sysid.effect_selection.fit import Fit
-from sysid.effect_selection.fit_cache import cached_fit
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.fitting.candidates import Candidate, extended
+from sysid.fitting.fit import Fit
+from sysid.fitting.fit_cache import cached_fit
+from sysid.fitting.settings import SelectionSettings
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.identification.linearisation import Linearisation
 from sysid.identification.noise import with_estimated_noise

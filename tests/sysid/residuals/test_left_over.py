@@ -10,8 +10,8 @@ from drake_disasm.effects import JointCoulombFriction, JointViscousFriction
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
-from sysid.effect_selection.residual_model import _trees
 from sysid.models.joint_motion import JointMotionModel
+from sysid.residuals.residual_model import _trees
 from tests.sysid.models.arm import JOINTS, smooth_motion, write_two_link_arm
 
 _ROWS, _NOISE = 1500, 0.02

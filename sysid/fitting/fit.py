@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as t_distribution
 
-from sysid.effect_selection.block_grams import (
+from sysid.fitting.block_grams import (
     BlockGrams,
     NormalEquations,
     blocks_of,
 )
-from sysid.effect_selection.candidates import Candidate
-from sysid.effect_selection.settings import SelectionSettings
+from sysid.fitting.candidates import Candidate
+from sysid.fitting.settings import SelectionSettings
 from sysid.identification.linearisation import Linearisation
 from sysid.models.base import LogModel
 from sysid.objective import pseudo_residual

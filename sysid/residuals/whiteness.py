@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sysid.effect_selection.fit import Fit
+from sysid.fitting.fit import Fit
 from sysid.identification.whiteness import ljung_box
 
 _ALPHA = 0.001  # of one channel: there are up to a dozen
