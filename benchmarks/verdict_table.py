@@ -189,7 +189,7 @@ def _cell(*effects: Effect) -> Make:
     def _make(folder: Path) -> list[str]:
         scenario = load_scenario("removal")
         scenario.effects = list(effects)
-        record(folder / "log", scenario, _SEED)
+        record(folder / "log", scenario, "effect", _SEED)
         return ["--log", str(folder / "log"), "--scenario", "removal"]
 
     return _make
