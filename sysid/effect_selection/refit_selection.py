@@ -109,15 +109,15 @@ class RefitSelection:
         return found
 
     def _reaches_noise(self, fit: Fit, gains: Mapping[_Names, _Gained]) -> bool:
-        """Returns whether an effect explains all, or nothing says that it should.
+        """Returns whether all rows together are explained, or need not be.
 
         What explains a part may stand for another effect, which is not linear at null.
         """
         is_over = time.monotonic() > self.deadline
         if not fit.noise_is_stated or fit.states_model_error or is_over:
             return True
-        fits = sorted((found for _, found in gains.values()), key=lambda f: f.objective)
-        return any(found.is_at_noise for found in fits)
+        fits = (fit, *(found for _, found in gains.values()))
+        return min(found.objective for found in fits) <= self._settings.noise_level
 
     def _gained(
         self, fit: Fit, system: LinearSystem, trials: Sequence[Gain]
