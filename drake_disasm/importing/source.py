@@ -56,6 +56,10 @@ class Source:
         for stream in self.streams:
             if channel in stream.names:
                 return stream
+        for stream in self.streams:
+            for name, why in stream.left_out.items():
+                if channel == name or channel.rpartition(".")[0] == name:
+                    raise DisasmError(f"{self.path}: '{clipped(name)}' {why}")
         known = [name for stream in self.streams for name in stream.names]
         raise DisasmError(
             f"{self.path}: has no channel '{clipped(channel)}'; "
