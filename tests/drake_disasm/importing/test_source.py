@@ -120,9 +120,11 @@ def test_what_is_left_out_is_named_with_the_reason(tmp_path: Path) -> None:
 def test_two_publishers_on_one_topic_are_parted(tmp_path: Path) -> None:
     bag, arm, hand = FakeBag(), ["a", "b"], ["finger"]
     for i in range(20):
-        bag.add_joint_state(0.01 * (i + 1), arm, np.full(2, i), np.zeros(2))
+        bag.add_joint_state(0.01 * (i + 1), arm, np.full(2, float(i)), np.zeros(2))
         if i % 5 == 0:
-            bag.add_joint_state(0.01 * (i + 1.5), hand, np.full(1, i), np.zeros(1))
+            bag.add_joint_state(
+                0.01 * (i + 1.5), hand, np.full(1, float(i)), np.zeros(1)
+            )
     bag.write(tmp_path / "bag", True)
     source = read_source(tmp_path / "bag")
     assert [stream.rows for stream in source.streams] == [20, 4]
