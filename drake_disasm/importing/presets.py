@@ -92,8 +92,8 @@ class Preset:
         whole &= np.isfinite(v).all(axis=1)[1:-1] & np.isfinite(q[2:] - q[:-2]).all(1)
         slope = (q[2:] - q[:-2])[whole] / step[whole, None]
         for i in moving if len(slope) > 1 else ():
-            shared = [np.abs(_product(slope[:, i], v[1:-1][whole, k])) for k in moving]
-            if moving[int(np.argmax(shared))] != i:
+            shared = [_product(slope[:, i], v[1:-1][whole, k]) for k in moving]
+            if max(shared) <= 0.0 or moving[int(np.argmax(shared))] != i:
                 raise DisasmError(
                     f"{source.path}: preset '{self.name}' does not fit: column "
                     f"{1 + count + i} is not the velocity of column {1 + i}; write a "

@@ -18,7 +18,9 @@ from drake_disasm.importing.signals import clock_of
 Array = NDArray[np.float64]
 
 _HALF = 10  # rows on either side that a slope is of, over which jitter averages out
+_MANY = 101  # rows, of most of which the staircase is right
 _FEWEST = 100  # rows that tell anything
+_MOST_ROWS = 1e12
 _BLOCKS = 10  # of the record, for the spread of what the positions say
 _SURE = 2.0  # standard errors
 _NORMAL_MEDIAN = 0.6745  # of a normal variable's absolute value
@@ -36,21 +38,19 @@ class Evened:
         period: of sampling [s].
         jitter: standard deviation of the stamps about `time` [s].
         lost: rows that are missing.
-        by: what tells: "positions" or "sequence".
     """
 
     time: Array
     period: float
     jitter: float
     lost: int
-    by: str
 
     def words(self) -> str:
         """Returns what was found and done."""
         return (
-            f"stamps are of arrival, by their {self.by}: {1e3 * self.jitter:.2g} ms "
-            f"about even times of {1.0 / self.period:.4g} Hz, which are taken instead; "
-            f"{self.lost} rows are missing"
+            f"stamps are of arrival, since the positions follow even times better: "
+            f"{1e3 * self.jitter:.2g} ms about {1.0 / self.period:.4g} Hz; even times "
+            f"are taken, {self.lost} rows are missing"
         )
 
 
@@ -69,12 +69,13 @@ def evened(time: Array, q: Array, sequence: Array | None = None) -> Evened | Non
     ends = np.flatnonzero(np.diff(time) > (2 * _HALF + 1) * clock.period) + 1
     edges = [0, *ends.tolist(), len(time)]
     parts = [slice(*ends) for ends in itertools.pairwise(edges)]
-    found = {
-        (part.start, part.stop): _of_stretch(
-            time[part], q[part], None if sequence is None else sequence[part]
-        )
-        for part in parts
-    }
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        found = {
+            (part.start, part.stop): _of_stretch(
+                time[part], q[part], None if sequence is None else sequence[part]
+            )
+            for part in parts
+        }
     known = [each for each in found.values() if each]
     if not known:
         return None
@@ -84,7 +85,6 @@ def evened(time: Array, q: Array, sequence: Array | None = None) -> Evened | Non
         float(np.median([each.period for each in known])),
         float(np.sqrt(np.mean([each.jitter**2 for each in known]))),
         sum(each.lost for each in known),
-        known[0].by,
     )
 
 
@@ -97,20 +97,23 @@ def _of_stretch(time: Array, q: Array, sequence: Array | None) -> Evened | None:
     moving = speed > np.median(speed)
     if not moving.any():
         moving = speed > 0.0
-    if not moving.any() and sequence is None:
+    if not moving.any():
         return None
-    period = _period(time, sequence, rows, slope, change, moving)
+    steps = np.sum(change * slope, axis=1)[moving] / speed[moving]
+    period = float(np.median(steps))
     if not period > 0.0:
         return None
-    if sequence is None:
-        count = _placed(_counts(time, period), time, q)
-    else:
-        count = sequence - sequence[0]
+    count = _placed(_counts(time, period), time, q)
+    if not (np.abs(count) < _MOST_ROWS).all():
+        return None  # the positions are damaged
+    if sequence is not None:  # a node may skip rows that it doesn't number
+        numbered = sequence - sequence[0]
+        count = np.maximum.accumulate(count - numbered) + numbered
     period = _fitted(count, time)
     if not period > 0.0:
         return None
     says = _evidence(time, period * count, rows, slope, change)
-    if says < -_SURE or (says < _SURE and sequence is None):
+    if not says >= _SURE:
         return None
     late = time - period * count
     if clock_of(late + period * np.arange(len(late))).is_even:
@@ -120,7 +123,6 @@ def _of_stretch(time: Array, q: Array, sequence: Array | None) -> Evened | None:
         period,
         float(late.std()),
         int(count[-1]) - len(count) + 1,
-        "positions" if says >= _SURE else "sequence",
     )
 
 
@@ -131,21 +133,6 @@ def _slopes(time: Array, q: Array) -> tuple[NDArray[np.int_], Array, Array]:
     span = np.maximum(time[ahead] - time[behind], np.finfo(float).tiny)
     slope = (q[ahead] - q[behind]) / span[:, None]
     return rows, slope, q[rows + 1] - q[rows]
-
-
-def _period(
-    time: Array,
-    sequence: Array | None,
-    rows: NDArray[np.int_],
-    slope: Array,
-    change: Array,
-    moving: NDArray[np.bool_],
-) -> float:
-    """Returns the time between rows [s] that most changes of position are of."""
-    if sequence is not None:
-        return _fitted(sequence, time)
-    steps = np.sum(change * slope, axis=1)[moving] / np.sum(slope**2, axis=1)[moving]
-    return float(np.median(steps))
 
 
 def _fitted(count: Array, time: Array) -> float:
@@ -211,7 +198,7 @@ def _placed(count: Array, time: Array, q: Array) -> Array:
     steps = np.diff(count)
     steps[rows[certain]] = np.round(moved[certain])
     placed = np.concatenate([[0.0], np.cumsum(steps)])
-    apart = median_filter(count - placed, 2 * _HALF + 1, mode="nearest")
+    apart = median_filter(count - placed, _MANY, mode="nearest")
     number = np.arange(len(count))
     # Where the two part for good the positions are wrong; no row is before another.
     later = np.maximum.accumulate(placed + np.round(apart) - number)

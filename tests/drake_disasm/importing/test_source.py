@@ -1,5 +1,6 @@
 """What is read of tables, datasets and bags, and what is refused."""
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from scipy.io import savemat
 
 from drake_disasm.fakes.bag import FakeBag
+from drake_disasm.importing import bags
 from drake_disasm.importing.source import read_source
 from tests.refusals import refusal
 
@@ -183,3 +185,24 @@ def test_what_crashes_scipy_or_is_no_recording_is_refused(tmp_path: Path) -> Non
     assert "can't be read: " in refusal(read_source, path)
     assert "neither a ROS 2 bag" in refusal(read_source, tmp_path)
     assert "does not exist" in refusal(read_source, tmp_path / "none.csv")
+
+
+def test_interfaces_of_a_joint_are_its_channels() -> None:
+    """DynamicJointState holds a message for each joint."""
+
+    @dataclasses.dataclass
+    class Interface:
+        interface_names: list[str]
+        values: np.ndarray
+
+    @dataclasses.dataclass
+    class State:
+        joint_names: list[str]
+        interface_values: list[Interface]
+
+    joint = Interface(["position", "effort"], np.array([0.5, 2.0]))
+    found = dict(bags._numbers(State(["elbow"], [joint]), ""))
+    assert found == {
+        "interface_values.elbow.values.position": 0.5,
+        "interface_values.elbow.values.effort": 2.0,
+    }
