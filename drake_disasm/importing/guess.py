@@ -144,7 +144,8 @@ def guessed_map(source: Source, kind: str, known: Known | None = None) -> FieldM
 
 def _of_joints(source: Source, known: Known, kind: str) -> FieldMap:
     """Returns the map of an arm's positions and torques, or what was commanded."""
-    stream, columns, joints = None, dict[str, Column](), ()
+    stream, columns = None, dict[str, Column]()
+    joints: tuple[str, ...] = ()
     reasons = list[str]()
     for each in source.streams:
         try:

@@ -16,12 +16,14 @@ from typing import Any
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import read_text
+from drake_disasm.common.text import clipped
 from drake_disasm.importing.field_map import Column, FieldMap
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.units import NORMALISED
 from drake_disasm.importing.vocabulary import matched, tokens_of
 
 _MOST_BYTES = 2**20
+_MOST_STEPS = 2**32
 _STEP = 2.0 * math.pi / 4096.0  # rad, of the encoders of Feetech's and Dynamixel's
 _REMEDY = "give what LeRobot's calibration wrote, .../calibration/robots/TYPE/ID.json"
 _GRIPPER = "gripper"  # the motor whose range LeRobot counts from 0 to 100
@@ -65,8 +67,8 @@ def _angles(column: Column, source: Source, known: Mapping[str, float]) -> Colum
         order, _ = matched([name], [tokens_of(motor) for motor in known])
         if not order:
             raise DisasmError(
-                f"calibration: has no motor '{name}'; it has {', '.join(known)}; "
-                f"{_REMEDY}"
+                f"calibration: has no motor '{clipped(name)}'; it has "
+                f"{clipped(', '.join(known))}; {_REMEDY}"
             )
         scales.append(list(known.values())[order[0]])
     return dataclasses.replace(column, unit="rad", scales=tuple(scales))
@@ -76,16 +78,25 @@ def _read(path: Path) -> dict[str, float]:
     """Returns the angle [rad] that 1 is of each motor, by its name."""
     try:
         raw: Any = json.loads(read_text(path, _REMEDY, _MOST_BYTES))
-    except ValueError:
+    except (ValueError, RecursionError):
         raise DisasmError(f"{path}: is not JSON; {_REMEDY}") from None
     found = dict[str, float]()
     for name, motor in raw.items() if isinstance(raw, dict) else ():
         own = motor if isinstance(motor, dict) else {}
-        ends = [own.get(key) for key in ("range_min", "range_max")]
-        if not all(isinstance(end, int) for end in ends) or ends[0] >= ends[1]:
-            raise DisasmError(f"{path}: motor '{name}' has no range; {_REMEDY}")
+        span = _span(own.get("range_min"), own.get("range_max"))
+        if not span:
+            raise DisasmError(
+                f"{path}: motor '{clipped(str(name))}' has no range; {_REMEDY}"
+            )
         share = 1.0 if name.rpartition("_")[2] == _GRIPPER else 0.5
-        found[str(name)] = share * (ends[1] - ends[0]) * _STEP / 100.0
+        found[str(name)] = share * span * _STEP / 100.0
     if not found:
         raise DisasmError(f"{path}: has no motors; {_REMEDY}")
     return found
+
+
+def _span(first: object, last: object) -> int:
+    """Returns how many steps are between the ends of a range; 0 for no range."""
+    if not (isinstance(first, int) and isinstance(last, int)):
+        return 0
+    return last - first if 0 < last - first < _MOST_STEPS else 0

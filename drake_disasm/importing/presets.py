@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.importing.field_map import Column
 from drake_disasm.importing.source import Source
-from drake_disasm.importing.stream import Stream
+from drake_disasm.importing.stream import LARGEST, Stream
 from drake_disasm.importing.units import NORMALISED
 from drake_disasm.importing.vocabulary import NAMES, Names, numbered
 
@@ -86,13 +86,16 @@ class Preset:
         count = len(self.joints)
         time = columns[0]
         q, v = (np.stack(columns[1 + k : 1 + k + count], 1) for k in (0, count))
-        moving = np.flatnonzero((np.ptp(q, axis=0) > 0) & (np.ptp(v, axis=0) > 0))
+        whole = np.asarray((np.abs(np.stack(columns, 1)) < LARGEST).all(axis=1))
+        if not whole.any():
+            return
+        is_moving = (np.ptp(q[whole], axis=0) > 0) & (np.ptp(v[whole], axis=0) > 0)
+        moving = np.flatnonzero(is_moving)
         step = time[2:] - time[:-2]
-        whole = (step > 0) & np.isfinite(q).all(axis=1)[1:-1]
-        whole &= np.isfinite(v).all(axis=1)[1:-1] & np.isfinite(q[2:] - q[:-2]).all(1)
-        slope = (q[2:] - q[:-2])[whole] / step[whole, None]
+        rows = np.asarray(whole[2:] & whole[1:-1] & whole[:-2] & (step > 0))
+        slope = (q[2:] - q[:-2])[rows] / step[rows, None]
         for i in moving if len(slope) > 1 else ():
-            shared = [_product(slope[:, i], v[1:-1][whole, k]) for k in moving]
+            shared = [_product(slope[:, i], v[1:-1][rows, k]) for k in moving]
             if max(shared) <= 0.0 or moving[int(np.argmax(shared))] != i:
                 raise DisasmError(
                     f"{source.path}: preset '{self.name}' does not fit: column "
@@ -122,7 +125,9 @@ def _product(one: np.ndarray, other: np.ndarray) -> float:
     """Returns the correlation of two vectors; 0 if one is constant."""
     if not (np.ptp(one) > 0 and np.ptp(other) > 0):
         return 0.0
-    return float(np.corrcoef(one, other)[0, 1])
+    with np.errstate(all="ignore"):
+        found = float(np.corrcoef(one, other)[0, 1])
+    return found if np.isfinite(found) else 0.0
 
 
 def _currents(column: Column, stream: Stream) -> Column:
@@ -163,7 +168,7 @@ def _motor_constant(current: Array, moment: Array, v: Array) -> float:
         [moment, np.ones_like(v), v, np.sign(v), np.gradient(v)] if len(v) > 1 else [v],
         axis=1,
     )
-    whole = np.isfinite(basis).all(axis=1) & np.isfinite(current)
+    whole = (np.abs(basis) < LARGEST).all(axis=1) & (np.abs(current) < LARGEST)
     basis, current = basis[whole], current[whole]
     spare = len(current) - basis.shape[1]
     if spare < 1 or np.ptp(moment[whole]) == 0.0:

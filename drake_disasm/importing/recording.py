@@ -21,12 +21,11 @@ from drake_disasm.importing.shift import (
 from drake_disasm.importing.signals import clock_of, resample
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stamps import Evened, evened
-from drake_disasm.importing.stream import Stream
+from drake_disasm.importing.stream import LARGEST, Stream
 from drake_disasm.importing.units import factor
 
 Array = NDArray[np.float64]
 
-_LARGEST = 1e50  # a larger value is damage: its square times another's would overflow
 _MOST_DROPPED = 0.1  # of the rows, unless the user accepts more
 _CLOSEST = 0.01  # of the median period: rows that are closer can't tell a slope
 
@@ -186,9 +185,9 @@ def _clean(
     Raises:
         DisasmError: they are fewer than two, or nine tenths without being accepted.
     """
-    whole = np.abs(time) < _LARGEST
+    whole = np.abs(time) < LARGEST
     for values in columns.values():
-        whole &= (np.abs(values) < _LARGEST).all(axis=1)
+        whole &= (np.abs(values) < LARGEST).all(axis=1)
     order = np.flatnonzero(whole)
     if not accept:
         _check_fine(name, time[order])

@@ -13,6 +13,9 @@ from drake_disasm.common.text import clipped
 
 Array = NDArray[np.float64]
 
+#: A larger value is damage: its square times another's would overflow.
+LARGEST = 1e50
+
 
 @dataclasses.dataclass(frozen=True)
 class Stream:

@@ -276,7 +276,8 @@ def _features(path: Path) -> tuple[dict[str, str], dict[str, str]]:
         names = known.get("names")
         if isinstance(names, dict) and len(names) == 1:
             names = next(iter(names.values()))
-        for i, name in enumerate(names if isinstance(names, list) else ()):
+        names = names if isinstance(names, list) else []
+        for i, name in enumerate(names):
             channel = f"{feature}.{i}" if len(names) > 1 else feature
             labels[channel] = f"{feature}.{name}"
     return labels, videos
@@ -289,7 +290,7 @@ def _columns(table: pyarrow.Table) -> tuple[dict[str, np.ndarray], dict[str, str
         kind = table.schema.field(name).type
         if pyarrow.types.is_list(kind) or pyarrow.types.is_fixed_size_list(kind):
             rows = table[name].to_pylist()
-            if len({len(row) if row is not None else -1 for row in rows}) == 1:
+            if len({-1 if row is None else len(row) for row in rows}) == 1:
                 found[name] = np.array(rows)
             else:
                 out[name] = "holds lists of several lengths"
