@@ -116,20 +116,28 @@ def _ur() -> Subject:
 
 def _join() -> Subject:
     """Positions in one file, torques in another, of which one is damaged."""
-    folder, columns = new_folder(), _motion()
+    folder, columns, whole = new_folder(), _motion(), dict[str, str]()
     for ending in ("q", "tau"):
         own = {n: c for n, c in columns.items() if n.startswith((ending, "time"))}
         rows = [",".join(own), *_text(np.stack(list(own.values()), axis=1))]
-        (folder / f"{ending}.csv").write_text("\n".join(rows) + "\n")
+        whole[ending] = "\n".join(rows) + "\n"
 
-    def read() -> None:
+    def make(rng: Random) -> dict[str, bytes]:
+        """Returns both files, of which one is damaged."""
+        damaged_one = ("q", "tau")[rng.integers(2)]
+        content = {name: text.encode() for name, text in whole.items()}
+        return content | {damaged_one: either_way(whole[damaged_one], damaged_csv, rng)}
+
+    def read(content: dict[str, bytes]) -> None:
         """Imports both as one recording."""
+        for name, data in content.items():
+            (folder / f"{name}.csv").write_bytes(data)
         sources = [read_source(folder / f"{name}.csv") for name in ("q", "tau")]
         for way in WAYS:
             source = joined(sources, way, Known())
             _write(source, guessed_map(source, "joint_motion"))
 
-    return folder_subject(folder, read)
+    return Subject(make, read)
 
 
 def _npz() -> Subject:

@@ -1,8 +1,9 @@
 """Makes a log of what other programs recorded: tables, bags, datasets.
 
 Reads CSV, NPZ, NPY, MATLAB, Parquet, LeRobot datasets, ROS 1 and ROS 2 bags and MCAP.
-What is what is guessed from names and message types, or said by a small YAML map; both
-can be looked at with --show, and a guessed map can be saved and edited.
+What is what is guessed from names, metadata and message types, or said by a small YAML
+map; --show prints every channel with its use or why it has none, and a guessed map can
+be saved and edited. Joints are matched with the URDF's by name.
 
 Joint motion is brought to one even time line and filtered without phase shift, by one
 filter for all columns, whose cut-off is chosen from the data's spectrum; velocities and
@@ -47,6 +48,8 @@ _EXAMPLES = """examples:
   drake-disasm import-log run.csv --save-map map.yaml --show      then edit it
   drake-disasm import-log run.csv --map map.yaml --out out/from_table
   drake-disasm import-log run.npz --urdf arm.urdf --cutoff 12 --out out/filtered
+  drake-disasm import-log run.csv --preset rtde --urdf ur10e.urdf --out out/ur
+  drake-disasm import-log q.csv tau.csv --join time --out out/joined
 then:
   drake-disasm check-log --log out/log
   drake-disasm close-loop --log out/log --out out/closed
