@@ -1,5 +1,6 @@
 """Several files as columns of one recording."""
 
+import collections
 import hashlib
 from collections.abc import Sequence
 
@@ -22,7 +23,7 @@ WAYS = ("time", "rows")
 def joined(sources: Sequence[Source], way: str, known: Known) -> Source:
     """Returns the tables of several files as one, on the first one's rows.
 
-    A channel whose name was there before has its file's name before it. On time, other
+    Channels that several files have get their file's name before theirs. On time, other
     files' channels are taken at the first one's times, by cubic splines, where all were
     recorded.
 
@@ -39,10 +40,14 @@ def joined(sources: Sequence[Source], way: str, known: Known) -> Source:
     tables = [_table(source) for source in sources]
     by_time = way == "time" and known.rate is None
     parts = _on_time(sources, tables, known) if by_time else _by_rows(sources, tables)
+    count = collections.Counter(name for part in parts for name in part)
+    time = time_label(tables[0], known)
     channels, labels = dict[str, Array](), dict[str, str]()
-    for source, table, part in zip(sources, tables, parts, strict=True):
+    for i, (source, table, part) in enumerate(zip(sources, tables, parts, strict=True)):
         for name, values in part.items():
-            unique = name if name not in channels else f"{source.path.stem}:{name}"
+            is_first_time = i == 0 and name == time
+            is_alone = count[name] == 1 or is_first_time
+            unique = name if is_alone else f"{source.path.stem}.{name}"
             if unique in channels:
                 raise DisasmError(
                     f"`join`: '{unique}' is in two files of one name; rename one"

@@ -159,7 +159,11 @@ def test_files_are_joined_as_columns(tmp_path: Path) -> None:
         np.testing.assert_allclose(tau, np.cos(time[: len(tau)]), atol=1e-5)
         assert set(source.files) == {str(first.path), str(other.path)}
     by_rows = joined([first, same], "rows", Known())
-    assert by_rows.streams[0].names == ["t", "q", "b:t", "tau"]
+    assert by_rows.streams[0].names == ["t", "q", "b.t", "tau"]
+    named = {"t": time, "elbow": np.sin(time)}
+    pair = [_source(tmp_path / f"{n}.npz", **named) for n in ("position", "effort")]
+    fields = guessed_map(joined(pair, "time", Known()), "joint_motion")
+    assert fields.columns["tau"].channels == ("effort.elbow",)  # by its file's name
     assert "has 200 rows, a.npz 600" in refusal(joined, [first, slow], "rows", Known())
     later = _source(tmp_path / "d.npz", t=time + 100.0, tau=time)
     assert "no clock in common" in refusal(joined, [first, later], "time", Known())
