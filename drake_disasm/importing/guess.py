@@ -30,7 +30,16 @@ _EPISODE = ("episode_index", "episode", "trial", "run")
 _WRENCH = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 _QUATERNION = ("orientation.w", "orientation.x", "orientation.y", "orientation.z")
 _PLAIN_WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
-_PLAIN_QUATERNION = ("qw", "qx", "qy", "qz")
+_WRENCHES = (
+    _PLAIN_WRENCH,
+    ("fx", "fy", "fz", "mx", "my", "mz"),
+    ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"),
+)
+_QUATERNIONS = (
+    ("qw", "qx", "qy", "qz"),
+    ("orientation_w", "orientation_x", "orientation_y", "orientation_z"),
+    ("quat_w", "quat_x", "quat_y", "quat_z"),
+)
 
 #: What is looked for, by the kind of log.
 _OF_JOINTS = {
@@ -330,7 +339,8 @@ def unit_of_times(values: np.ndarray) -> str:
 def _other_wrenches(source: Source, stream: Stream) -> dict[str, Column]:
     """Returns a wrench of another topic, as extra columns."""
     for other in source.streams:
-        channels = _wrench_of(other) if other is not stream else None
+        is_topic = other is not stream and bool(other.name)
+        channels = _wrench_of(other) if is_topic else None
         if channels:
             return {
                 f"extra.{name}": Column((channel,))
@@ -341,11 +351,41 @@ def _other_wrenches(source: Source, stream: Stream) -> dict[str, Column]:
 
 def _wrench_of(stream: Stream) -> tuple[str, ...] | None:
     if not stream.name:
-        return _PLAIN_WRENCH if set(_PLAIN_WRENCH) <= set(stream.names) else None
+        return _components(stream, _WRENCHES)
     for prefix in ("wrench.", ""):
         names = tuple(f"{stream.name}:{prefix}{end}" for end in _WRENCH)
         if set(names) <= set(stream.names):
             return names
+    return None
+
+
+def _quaternion_of(stream: Stream) -> tuple[str, ...] | None:
+    if not stream.name:
+        return _components(stream, _QUATERNIONS)
+    for prefix in ("pose.", ""):
+        names = tuple(f"{stream.name}:{prefix}{end}" for end in _QUATERNION)
+        if set(names) <= set(stream.names):
+            return names
+    return None
+
+
+def _components(
+    stream: Stream, ways: Sequence[tuple[str, ...]]
+) -> tuple[str, ...] | None:
+    """Returns a table's channels of a vector's components, in one of these ways.
+
+    All of them may have the same before their names.
+    """
+    labels = {"_".join(x.tokens).lower(): x.channel for x in labels_of(stream)}
+    for way in ways:
+        heads = [name.removesuffix(way[0]) for name in labels if name.endswith(way[0])]
+        found = [
+            tuple(labels[f"{head}{end}"] for end in way)
+            for head in heads
+            if all(f"{head}{end}" in labels for end in way)
+        ]
+        if len(found) == 1:
+            return found[0]
     return None
 
 
@@ -355,13 +395,8 @@ def _static_wrench(source: Source, known: Known) -> FieldMap:
         if wrench := _wrench_of(stream):
             columns["wrench"] = Column(wrench)
             main = stream
-        for prefix in ("pose.", ""):
-            ends = _QUATERNION if stream.name else _PLAIN_QUATERNION
-            names = tuple(
-                f"{stream.name}:{prefix}{e}" if stream.name else e for e in ends
-            )
-            if set(names) <= set(stream.names):
-                columns["R_WS"] = Column(names)
+        if quaternion := _quaternion_of(stream):
+            columns["R_WS"] = Column(quaternion)
     if main is None or len(columns) < 2:
         raise NoGuessError(
             source.path, "no channels are called as a wrench with an orientation is"

@@ -23,7 +23,6 @@ from drake_disasm.importing.matlab import load_mat
 from drake_disasm.importing.stream import Stream, flat, readable
 
 _COMMENTS = ("#", "%")
-_DELIMITERS = ",;\t "
 _MOST_META = 2**24  # bytes
 
 
@@ -81,8 +80,14 @@ class _Rows(Iterator[str]):
 
 
 def _delimiter_of(line: str) -> str:
-    """Returns what separates a line's cells; a comma beside semicolons is decimal."""
-    return ";" if ";" in line else max(_DELIMITERS, key=line.strip().count)
+    """Returns what separates a line's cells.
+
+    A comma beside semicolons is decimal; a blank beside commas or tabs is in a name.
+    """
+    if ";" in line:
+        return ";"
+    likely = max(",\t", key=line.strip().count)
+    return likely if likely in line.strip() else " "
 
 
 def _split(line: str, delimiter: str) -> list[str]:

@@ -195,11 +195,10 @@ def matched(
         numbers of the known names; () and reasons where a joint has none or several.
     """
     found, reasons = [], []
-    plain = [_bare(words) for words in known]
     for joint in joints:
-        own = _bare(tokens_of(joint))
-        same = [i for i, words in enumerate(plain) if words == own]
-        near = [i for i, words in enumerate(plain) if _ends_alike(words, own)]
+        own = tokens_of(joint)
+        same = [i for i, words in enumerate(known) if _bare(words) == _bare(own)]
+        near = [i for i, words in enumerate(known) if _ends_alike(words, own)]
         either = same or near
         if len(either) == 1:
             found.append(either[0])
@@ -213,13 +212,24 @@ def matched(
 
 
 def _bare(words: Tokens) -> Tokens:
-    low = tuple(word.lower() for word in words)
-    return tuple(word for word in low if word != "joint") or low
+    """Returns a name in small letters without "joint", but of "joint_1"."""
+    low = _parted(words)
+    bare = tuple(word for word in low if word != "joint")
+    return bare if any(not word.isdigit() for word in bare) else low
+
+
+def _parted(words: Tokens) -> Tokens:
+    """Returns words in small letters, numbers apart: "Joint1" is ("joint", "1")."""
+    return tuple(re.findall(r"\d+|[a-z]+", " ".join(words).lower()))
 
 
 def _ends_alike(one: Tokens, other: Tokens) -> bool:
-    n = min(len(one), len(other))
-    return one[-n:] == other[-n:]
+    """Whether one of two names ends with the other, with or without "joint"."""
+    for a, b in ((_bare(one), _bare(other)), (_parted(one), _parted(other))):
+        n = min(len(a), len(b))
+        if n and a[-n:] == b[-n:] and not all(word.isdigit() for word in a[-n:]):
+            return True
+    return False
 
 
 def is_alive(stream: Stream, channels: Sequence[str]) -> bool:

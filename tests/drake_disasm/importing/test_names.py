@@ -47,12 +47,38 @@ def _guess(source: Source, kind: str = "joint_motion", **known: Any) -> FieldMap
         ("elbow_joint", "elbow"),
         ("elbow_joint", "ur10e/Elbow-Joint"),
         ("left_arm_elbow_joint", "elbow_joint"),
-        ("A1", "- A1"),
+        ("lbr_A1", "- A1"),
+        ("joint_2", "Joint2"),
+        ("iiwa_joint_2", "joint 2"),
     ],
 )
 def test_prefixes_and_marks_are_no_part_of_a_name(joint: str, name: str) -> None:
     known = [tokens_of("wrist"), tokens_of(name)]
     assert matched([joint], known) == ([1], [])
+
+
+def test_a_number_alone_is_no_name() -> None:
+    names = [tokens_of(f"joint{i}") for i in (1, 2, 3)]
+    assert matched(["wrist_1_joint", "wrist_2_joint"], names)[0] == []
+
+
+@pytest.mark.parametrize(
+    ("before", "wrench"),
+    [
+        ("", "fx fy fz tx ty tz"),
+        ("F_ext_", "Fx Fy Fz Mx My Mz"),
+        ("ati/", "force_x force_y force_z torque_x torque_y torque_z"),
+    ],
+)
+def test_wrenches_are_known_by_many_names(
+    tmp_path: Path, before: str, wrench: str
+) -> None:
+    names = [f"{before}{name}" for name in wrench.split()]
+    names += [f"tool_orientation_{axis}" for axis in "xyzw"]
+    columns = {name: np.full(9, k) for k, name in enumerate(names)}
+    fields = _guess(_table(tmp_path / "run.csv", **columns), "static_wrench")
+    assert fields.columns["wrench"].channels == tuple(names[:6])
+    assert fields.columns["R_WS"].channels == (names[9], *names[6:9])
 
 
 def test_joints_are_matched_by_name_whatever_their_order(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ _Q = np.arange(10.0).reshape(5, 2)
     "text",
     [
         "t,q,name\n0,1,a\n0.1,2,b\n",
+        "t,q,joint 1 name of\n0,1,x\n0.1,2,x\n",
         "# from a drive\nt;q\n0;1\n0.1;2\n",
         "t\tq\n0\t1\n0.1\t2\n",
         "t q\n0 1\n0.1 2\n",
