@@ -11,7 +11,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.importing.guess import Known, time_label, unit_of_times
 from drake_disasm.importing.signals import resample
 from drake_disasm.importing.source import Source
-from drake_disasm.importing.stream import Stream
+from drake_disasm.importing.stream import CLOSEST, LARGEST, Stream
 from drake_disasm.importing.units import factor
 
 Array = NDArray[np.float64]
@@ -152,8 +152,11 @@ def _common(sources: Sequence[Source], times: Sequence[Array]) -> tuple[float, f
 
 def _taken(time: Array, values: Array, at: Array) -> Array:
     """Returns values (n,) at other times (m,), from the rows that hold numbers."""
-    whole = np.isfinite(time) & np.isfinite(values)
+    whole = (np.abs(time) < LARGEST) & (np.abs(values) < LARGEST)
     stamps, first = np.unique(time[whole], return_index=True)
+    steps = np.diff(stamps, prepend=-np.inf)
+    apart = steps > CLOSEST * np.median(steps)
+    stamps, first = stamps[apart], first[apart]
     if len(stamps) < 2:
         return np.full(len(at), np.nan)
     found = resample(stamps, values[whole][first][:, None], at)[:, 0]

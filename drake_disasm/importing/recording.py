@@ -21,13 +21,12 @@ from drake_disasm.importing.shift import (
 from drake_disasm.importing.signals import clock_of, resample
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stamps import Evened, evened
-from drake_disasm.importing.stream import LARGEST, Stream
+from drake_disasm.importing.stream import CLOSEST, LARGEST, Stream
 from drake_disasm.importing.units import factor
 
 Array = NDArray[np.float64]
 
 _MOST_DROPPED = 0.1  # of the rows, unless the user accepts more
-_CLOSEST = 0.01  # of the median period: rows that are closer can't tell a slope
 
 
 @dataclasses.dataclass(frozen=True)
@@ -198,7 +197,7 @@ def _clean(
     if found:
         time = time.copy()
         time[order] = found.time
-    closest = _CLOSEST * clock_of(time[order]).period
+    closest = CLOSEST * clock_of(time[order]).period
     greatest = np.maximum.accumulate(time[order])
     later = np.diff(time[order], prepend=-np.inf) > 0.0
     later[1:] &= time[order][1:] - greatest[:-1] > closest

@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 #: A larger value is damage: its square times another's would overflow.
 LARGEST = 1e50
+#: Share of the median period: rows that are closer can't tell a slope.
+CLOSEST = 0.01
 
 
 @dataclasses.dataclass(frozen=True)
