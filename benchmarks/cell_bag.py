@@ -22,6 +22,7 @@ from drake_disasm.free_motion.cell_urdf import cell_urdf
 from drake_disasm.free_motion.playing import MotionPlayer
 from drake_disasm.free_motion.table import MotionTable
 from drake_disasm.importing import (
+    Known,
     Processing,
     guessed_map,
     import_recordings,
@@ -153,7 +154,9 @@ def _imported(
 ) -> tuple[Verdict, dict[str, Shift]]:
     """Returns the verdict on a recording, and its shifts."""
     read = read_source(source)
-    fields = guessed_map(read, "joint_motion", movable_joints(str(urdf)), str(urdf))
+    fields = guessed_map(
+        read, "joint_motion", Known(movable_joints(str(urdf)), urdf=str(urdf))
+    )
     imported = import_recordings([read], fields, Processing())
     write_log(imported, [read], fields, folder, {"program": "cell_bag"})
     closed = close_loop(model_of([read_log(folder)], ModelChoice()))

@@ -31,6 +31,7 @@ READERS = (
     *("log_csv", "log_parquet", "log_unfinished", "scenario", "policy", "checkpoint"),
     *("hardware", "parameters", "results"),
     *("import_csv", "import_npz", "import_npy", "import_mat", "import_parquet"),
+    *("import_ur", "import_join", "import_calibration"),
     *("import_lerobot", "import_mcap", "import_ros2", "import_ros1", "import_map"),
 )
 CODECS = (

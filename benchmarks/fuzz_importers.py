@@ -1,6 +1,8 @@
 """What is fuzzed of the import: each format, from the file to the log."""
 
+import dataclasses
 import io
+import json
 import shutil
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -9,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
-from mutations import Random, damaged, damaged_csv
+from mutations import Random, damaged, damaged_csv, damaged_yaml
 from scipy.io import savemat
 from subject import (
     Subject,
@@ -27,15 +29,22 @@ from drake_disasm.common.archive import Arrays
 from drake_disasm.fakes.bag import FakeBag
 from drake_disasm.importing import (
     FieldMap,
+    Known,
     Processing,
     Source,
     guessed_map,
     import_recordings,
+    map_to_fill_in,
     read_map,
     read_source,
     write_log,
 )
 from drake_disasm.importing.description import described, summary
+from drake_disasm.importing.field_map import Column
+from drake_disasm.importing.joining import WAYS, joined
+from drake_disasm.importing.lerobot import calibrated
+from drake_disasm.importing.presets import PRESETS
+from drake_disasm.importing.units import NORMALISED
 
 _JOINTS = ("shoulder", "elbow")
 _TIME = np.arange(120) / 50.0  # s
@@ -50,11 +59,18 @@ def _motion() -> Arrays:
     return found
 
 
-def _import(path: Path, kind: str = "joint_motion") -> None:
+def _import(path: Path, kind: str = "joint_motion", known: Known | None = None) -> None:
     """Does all that the program does, with a guessed map."""
     source = read_source(path)
-    described(source)
-    _write(source, guessed_map(source, kind))
+    if known and known.preset:
+        source = known.preset.labelled(source)
+    described(source, kind)
+    map_to_fill_in(kind, source)
+    fields = guessed_map(source, kind, known)
+    described(source, kind, fields)
+    if any(column.unit == NORMALISED for column in fields.columns.values()):
+        fields = calibrated(fields, source, "degrees")
+    _write(source, fields)
 
 
 def _write(source: Source, fields: FieldMap) -> None:
@@ -80,6 +96,48 @@ def _csv() -> Subject:
 
 def _text(table: np.ndarray) -> list[str]:
     return [",".join(f"{value:.6g}" for value in row) for row in table]
+
+
+def _ur() -> Subject:
+    """A table without names, as RTDE records it, with late stamps."""
+    random = np.random.default_rng(0)
+    time = np.maximum.accumulate(_TIME + random.gamma(1.0, 0.004, len(_TIME)))
+    q = np.stack([np.sin(k * _TIME) for k in range(1, 7)], axis=1)
+    v = np.gradient(q, _TIME, axis=0)
+    table = np.column_stack([time, q, v, q + np.sign(v), q + np.sign(v), 9.0 * q])
+    text = "\n".join(_text(table)) + "\n"
+    known = Known(preset=PRESETS["rtde"])
+    return file_subject(
+        "r.csv",
+        lambda rng: either_way(text, damaged_csv, rng),
+        partial(_import, known=known),
+    )
+
+
+def _join() -> Subject:
+    """Positions in one file, torques in another, of which one is damaged."""
+    folder, columns, whole = new_folder(), _motion(), dict[str, str]()
+    for ending in ("q", "tau"):
+        own = {n: c for n, c in columns.items() if n.startswith((ending, "time"))}
+        rows = [",".join(own), *_text(np.stack(list(own.values()), axis=1))]
+        whole[ending] = "\n".join(rows) + "\n"
+
+    def make(rng: Random) -> dict[str, bytes]:
+        """Returns both files, of which one is damaged."""
+        damaged_one = ("q", "tau")[rng.integers(2)]
+        content = {name: text.encode() for name, text in whole.items()}
+        return content | {damaged_one: either_way(whole[damaged_one], damaged_csv, rng)}
+
+    def read(content: dict[str, bytes]) -> None:
+        """Imports both as one recording."""
+        for name, data in content.items():
+            (folder / f"{name}.csv").write_bytes(data)
+        sources = [read_source(folder / f"{name}.csv") for name in ("q", "tau")]
+        for way in WAYS:
+            source = joined(sources, way, Known())
+            _write(source, guessed_map(source, "joint_motion"))
+
+    return Subject(make, read)
 
 
 def _npz() -> Subject:
@@ -126,15 +184,49 @@ def _lerobot() -> Subject:
     flat = {"timestamp": columns["time"], "episode_index": table["episode_index"]}
     for name in ("meta", "data"):
         (folder / name).mkdir()
-    (folder / "meta/info.json").write_text("{}")
+    names = {"names": ["shoulder.pos", "elbow.pos"]}
+    features = {"features": dict.fromkeys(("action", "observation.state"), names)}
+    info = json.dumps(features, indent=1)
     path = folder / "data/episode_000000.parquet"
 
-    def read(content: bytes) -> None:
+    def read(content: tuple[bytes, bytes]) -> None:
         """Imports what an arm was told and did."""
-        path.write_bytes(content)
+        meta, data = content
+        (folder / "meta/info.json").write_bytes(meta)
+        path.write_bytes(data)
         _import(folder, "joint_response")
 
-    return Subject(parquet_damage(stream.getvalue(), flat), read)
+    damage = parquet_damage(stream.getvalue(), flat)
+
+    def make(rng: Random) -> tuple[bytes, bytes]:
+        """Returns metadata and a table, of which one is damaged."""
+        if rng.integers(2):
+            return either_way(info, damaged_yaml, rng), stream.getvalue()
+        return info.encode(), damage(rng)
+
+    return Subject(make, read)
+
+
+def _calibration() -> Subject:
+    """LeRobot's file of its motors' ranges."""
+    folder = new_folder()
+    columns = {"time": _TIME, "q.0": _TIME, "q.1": 2.0 * _TIME}
+    np.savez(folder / "r.npz", allow_pickle=False, **columns)
+    source = read_source(folder / "r.npz")
+    q = Column(("q.0", "q.1"), NORMALISED)
+    fields = FieldMap("joint_motion", {"q": q}, "time", joints=_JOINTS)
+    motor = {"id": 1, "range_min": 800, "range_max": 3000}
+    text = json.dumps({"0": motor, "1": motor}, indent=1)
+
+    def make(rng: Random) -> bytes:
+        """Returns a damaged one."""
+        return either_way(text, damaged_yaml, rng)
+
+    def read(path: Path) -> None:
+        """Imports with it."""
+        _write(source, calibrated(fields, source, str(path)))
+
+    return file_subject("c.json", make, read)
 
 
 def _bag(mcap: bool = True) -> Path:
@@ -178,13 +270,18 @@ def _map() -> Subject:
     path = new_folder() / "r.npz"
     np.savez(path, allow_pickle=False, **_motion())
     source = read_source(path)
-    guess = guessed_map(source, "joint_motion").to_yaml()
-    return yaml_subject("m.yaml", [guess], lambda m: _write(source, read_map(m)))
+    guess = guessed_map(source, "joint_motion")
+    rated = dataclasses.replace(guess, time=None, rate=50.0)
+    texts = [guess.to_yaml(), rated.to_yaml()]
+    return yaml_subject("m.yaml", texts, lambda m: _write(source, read_map(m)))
 
 
 #: By name: what makes each format's subject.
 IMPORTERS: Mapping[str, Callable[[], Subject]] = {
     "import_csv": _csv,
+    "import_ur": _ur,
+    "import_join": _join,
+    "import_calibration": _calibration,
     "import_npz": _npz,
     "import_npy": _npy,
     "import_mat": _mat,

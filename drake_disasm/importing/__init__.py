@@ -3,13 +3,18 @@
 ::
 
     source = read_source(Path("run.mcap"))
-    fields = guessed_map(source, "joint_motion", joints, "arm.urdf")
+    fields = guessed_map(source, "joint_motion", Known(joints, urdf="arm.urdf"))
     imported = import_recordings([source], fields, Processing())
     write_log(imported, [source], fields, Path("out/log"), {})
 """
 
 from drake_disasm.importing.field_map import FieldMap, read_map
-from drake_disasm.importing.guess import NoGuessError, guessed_map, map_to_fill_in
+from drake_disasm.importing.guess import (
+    Known,
+    NoGuessError,
+    guessed_map,
+    map_to_fill_in,
+)
 from drake_disasm.importing.importer import Imported, import_recordings, write_log
 from drake_disasm.importing.processing import Processing
 from drake_disasm.importing.source import Source, read_source
@@ -17,6 +22,7 @@ from drake_disasm.importing.source import Source, read_source
 __all__ = [
     "FieldMap",
     "Imported",
+    "Known",
     "NoGuessError",
     "Processing",
     "Source",

@@ -1,39 +1,51 @@
 """What is in a recording, and what was done to it, in words."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
+from drake_disasm.importing.field_map import FieldMap
+from drake_disasm.importing.guess import Known, time_label, unit_of_times
 from drake_disasm.importing.importer import Imported
 from drake_disasm.importing.signals import clock_of, quantum
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stream import Stream
+from drake_disasm.importing.units import factor
+from drake_disasm.importing.usage import uses
 
-_SHOWN = 60  # channels of a stream
+Array = NDArray[np.float64]
+
+_FIRST = 3  # values of a channel that are shown
 
 
-def described(source: Source, time: str | None = None, unit: float = 1.0) -> str:
-    """Returns the streams of a recording with rates, gaps and ranges.
+def described(
+    source: Source, kind: str = "joint_motion", fields: FieldMap | None = None
+) -> str:
+    """Returns what is in a recording, and what becomes of it.
+
+    Streams with their rates and gaps, every channel with its range, its first values
+    and its use, and what is left out, with the reason.
 
     Args:
         source: the recording.
-        time: channel of a table's time, if it is known.
-        unit: of that [s].
+        kind: of the log that is wanted.
+        fields: the map; None where none is guessed.
     """
-    lines = [f"{source.path}:"]
+    lines, becomes = [f"{source.path}:"], uses(source, kind, fields)
     for stream in source.streams:
-        lines += _stream_lines(stream, time, unit)
+        lines += _stream_lines(stream, becomes, fields)
     return "\n".join(lines)
 
 
-def _stream_lines(stream: Stream, time: str | None, unit: float) -> Iterator[str]:
+def _stream_lines(
+    stream: Stream, becomes: Mapping[str, str], fields: FieldMap | None
+) -> Iterator[str]:
     head = f"  {stream.name or 'table'}: {stream.rows} rows"
     if stream.kind:
         head += f", {stream.kind}"
-    times = stream.time
-    if times is None and time in stream.channels:
-        times = unit * stream.channels[str(time)]
+    times = _times(stream, fields)
     if times is not None and len(times) > 1:
         head += f", {_clock_words(times)}"
     if stream.received is not None and stream.time is not stream.received:
@@ -45,10 +57,27 @@ def _stream_lines(stream: Stream, time: str | None, unit: float) -> Iterator[str
     yield head
     for name, value in stream.constants.items():
         yield f"    {name} = {value:.6g} (a constant)"
-    for name in stream.names[:_SHOWN]:
-        yield f"    {name}: {_range_words(stream.channels[name])}"
-    if len(stream.names) > _SHOWN:
-        yield f"    ... and {len(stream.names) - _SHOWN} more"
+    for name, values in stream.channels.items():
+        label = stream.labels.get(name)
+        text = f"{name} ({label})" if label else name
+        first = ", ".join(f"{value:.5g}" for value in values[:_FIRST])
+        yield f"    {text}: {_range_words(values)}; {first} ... -> {becomes[name]}"
+    for name, why in stream.left_out.items():
+        yield f"    {name}: left out: it {why}"
+
+
+def _times(stream: Stream, fields: FieldMap | None) -> Array | None:
+    """Returns the times (n,) of a stream [s], by the map or a channel's name."""
+    if fields and fields.rate is not None:
+        return np.arange(stream.rows) / fields.rate
+    if stream.time is not None:
+        return stream.time
+    name = fields.time if fields else time_label(stream, Known())
+    if name not in stream.channels or (fields and fields.is_order):
+        return None
+    values = stream.channels[str(name)]
+    unit = fields.time_unit if fields else unit_of_times(values)
+    return values * factor(unit, "map: time")
 
 
 def _clock_words(time: np.ndarray) -> str:
@@ -83,10 +112,11 @@ def summary(imported: Imported) -> str:
     """Returns what was done, and what the data are like."""
     count = len(imported.episodes)
     lines = [f"{imported.rows} rows in {count} episode{'s' if count > 1 else ''}"]
-    dropped = sum(each.dropped for each in imported.recordings)
-    if dropped:
-        lines.append(f"{dropped} rows without numbers or with earlier times left out")
+    for why, rows in imported.dropped.items():
+        lines.append(f"{rows} row{'s' if rows > 1 else ''} {why} left out")
     for each in imported.recordings:
+        if each.evened:
+            lines.append(f"{each.name}: {each.evened.words()}")
         for name, s in each.shifts.items():
             words = (
                 f"off by {1e3 * s.seconds:+.2f} ms (95 %: {1e3 * s.low:+.2f} to "

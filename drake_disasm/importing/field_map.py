@@ -12,11 +12,16 @@
       tau: {from: [i1, i2], scale: [2.1, -1.4]}   # motor constant, sign
       extra.temperature: {from: temp}
 
+Where times are not recorded, or too coarsely, `time: {rate: 125}` takes the rows as
+that many a second. Readings at rest may have an order instead of times: `order: {from:
+n}`, or `order: {}` for that of the table.
+
 In a bag a channel is "/topic:field", and the time is what the messages' headers carry.
 A scale may be the name of a constant of the recording, with a minus before it.
 """
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -39,6 +44,7 @@ _KEYS = (
     "drive",
     "frames",
     "time",
+    "order",
     "episode",
     "columns",
 )
@@ -75,6 +81,11 @@ class Column:
             DisasmError: a constant is not in the recording, or a unit is not known.
         """
         unit = factor(self.unit, where) if self.unit else 1.0
+        if self.unit == "A" and not self.scales:
+            raise DisasmError(
+                f"{where}: is a motor's current; give `scale`, the motor constants "
+                "[N m/A] by joint, in the map"
+            )
         found = []
         for scale in self.scales or (1.0,) * len(self.channels):
             if isinstance(scale, str):
@@ -112,8 +123,9 @@ class FieldMap:
     Attributes:
         kind: of the log.
         columns: by our quantity's name; "extra.NAME" for anything else.
-        time: channel of the time, or None in a bag.
-        time_unit: of it.
+        time: channel of the time, or of the order; None in a bag.
+        time_unit: of it; "1" of an order.
+        rate: rows a second [Hz], where no channel is the time; None otherwise.
         episode: channel whose value tells episodes apart, or "".
         task: name of the task.
         urdf: of the arm, or "".
@@ -126,6 +138,7 @@ class FieldMap:
     columns: Mapping[str, Column]
     time: str | None = None
     time_unit: str = "s"
+    rate: float | None = None
     episode: str = ""
     task: str = "recorded"
     urdf: str = ""
@@ -152,6 +165,22 @@ class FieldMap:
                     f"{len(column.channels)} channels; give one, or one for each"
                 )
         factor(self.time_unit, "map: time")
+        if self.rate is not None and not 0.0 < self.rate < math.inf:
+            raise DisasmError(
+                f"map: time.rate {self.rate:g} is not above zero; give rows a second"
+            )
+        if self.rate is not None and self.time is not None:
+            raise DisasmError("map: time has a rate and a channel; give one of them")
+        if self.is_order and not _may_be_ordered(self.kind):
+            raise DisasmError(
+                f"map: a {self.kind} log needs times, not an order; give time: {{from: "
+                "NAME} or time: {rate: HZ}"
+            )
+
+    @property
+    def is_order(self) -> bool:
+        """Whether `time` is an order of rows."""
+        return self.time_unit == "1"
 
     def to_yaml(self) -> str:
         """Returns it as a file's text."""
@@ -164,7 +193,11 @@ class FieldMap:
             found["drive"] = dict(self.drive)
         if self.frames:
             found["frames"] = dict(self.frames)
-        if self.time:
+        if self.rate is not None:
+            found["time"] = {"rate": self.rate}
+        elif self.is_order:
+            found["order"] = {"from": self.time} if self.time else {}
+        elif self.time:
             found["time"] = {"from": self.time, "unit": self.time_unit}
         if self.episode:
             found["episode"] = self.episode
@@ -226,13 +259,16 @@ def parse_map(raw: object) -> FieldMap:
     for key in ("kind", "columns"):
         if key not in values:
             raise DisasmError(f"map: missing key '{key}'; {_REMEDY}")
-    time = _mapping(values.get("time", {}), "time", ("from", "unit"))
-    columns = _mapping(values["columns"], "columns")
+    columns = dict(_mapping(values["columns"], "columns"))
+    if "order" in columns:  # as the log has it
+        values = {**values, "order": columns.pop("order")}
+    time = _time(values)
     return FieldMap(
         kind=str(values["kind"]),
         columns={str(name): _column(str(name), own) for name, own in columns.items()},
         time=str(time["from"]) if "from" in time else None,
         time_unit=str(time.get("unit", "s")),
+        rate=_number(time["rate"], "time.rate") if "rate" in time else None,
         episode=str(values.get("episode", "")),
         task=str(values.get("task", "recorded")),
         urdf=str(values.get("urdf", "")),
@@ -243,6 +279,23 @@ def parse_map(raw: object) -> FieldMap:
         },
         drive=dict(_mapping(values.get("drive", {}), "drive")),
     )
+
+
+def _time(values: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Returns what a map says of the time, or of the order as a time without unit."""
+    if "order" not in values:
+        return _mapping(values.get("time", {}), "time", ("from", "unit", "rate"))
+    if "time" in values:
+        raise DisasmError("map: has time and order; give one of them")
+    order = values["order"]
+    raw = order if isinstance(order, Mapping) else {"from": order}
+    names = _list(_mapping(raw, "order", ("from",)).get("from", []), "order")
+    return {"unit": "1"} | ({"from": names[0]} if names else {})
+
+
+def _may_be_ordered(kind: str) -> bool:
+    """Whether rows of a kind of log may have an order in place of times."""
+    return any(q.name == "order" for q in KINDS[kind].quantities)
 
 
 def _column(name: str, raw: object) -> Column:

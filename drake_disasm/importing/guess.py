@@ -1,55 +1,76 @@
-"""Guesses what is what in a recording, from names and message types."""
+"""Guesses what is what in a recording, from names, metadata and message types."""
 
-import re
-from collections.abc import Sequence
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.text import clipped
 from drake_disasm.importing.field_map import Column, FieldMap
+from drake_disasm.importing.presets import Preset
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stream import Stream
-from drake_disasm.importing.units import UNITS
+from drake_disasm.importing.units import NORMALISED
+from drake_disasm.importing.vocabulary import (
+    NAMES,
+    Label,
+    Tokens,
+    is_alive,
+    labels_of,
+    matched,
+    named,
+    numbered,
+    tokens_of,
+)
 from drake_disasm.logs.schema import KINDS
 
-#: What channels of a table are called, the more usual names first; a number may follow.
-_NAMES = {
-    "time": (
-        "time", "t", "times", "timestamp", "stamp", "time_s", "seconds", "__time",
-        "date", "datetime",
-    ),
-    "q": (
-        "q", "qm", "position", "positions", "pos", "joint_position", "joint_positions",
-        "joint_pos", "q_measured", "actual_q", "angle", "angles", "theta",
-        "observation.state", "msr_pos", "q_msr",
-    ),
-    "tau": (
-        "tau", "torque", "torques", "effort", "efforts", "joint_torque",
-        "joint_torques", "joint_effort", "tau_measured", "actual_torque", "tau_j",
-        "msr_trq", "force", "tau_msr", "tau_m",
-    ),
-    "q_commanded": (
-        "q_commanded", "q_cmd", "q_desired", "q_des", "q_d", "q_ref", "q_target",
-        "goal_position", "goal_positions", "goal", "position_command", "command",
-        "commanded_position", "desired_position", "target_position", "target_q",
-        "reference", "setpoint", "action",
-    ),
-    "supply": ("supply", "input_volts", "supply_voltage", "voltage", "vin"),
-    "enabled": ("enabled", "torque_enable", "enable", "motor_on"),
-}  # fmt: skip
 _EPISODE = ("episode_index", "episode", "trial", "run")
 _WRENCH = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 _QUATERNION = ("orientation.w", "orientation.x", "orientation.y", "orientation.z")
 _PLAIN_WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
-_PLAIN_QUATERNION = ("qw", "qx", "qy", "qz")
+_WRENCHES = (
+    _PLAIN_WRENCH,
+    ("fx", "fy", "fz", "mx", "my", "mz"),
+    ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"),
+)
+_QUATERNIONS = (
+    ("qw", "qx", "qy", "qz"),
+    ("orientation_w", "orientation_x", "orientation_y", "orientation_z"),
+    ("quat_w", "quat_x", "quat_y", "quat_z"),
+)
 
 #: What is looked for, by the kind of log.
 _OF_JOINTS = {
     "joint_motion": ("q", "tau"),
     "joint_response": ("q", "q_commanded", "supply", "enabled"),
 }
-#: Before measured and commanded points of a controller's state, old and new names.
-_PREFIXES = {"": "", "actual.": "desired.", "feedback.": "reference."}
+_SCALARS = ("supply", "enabled")
+
+
+@dataclasses.dataclass(frozen=True)
+class Known:
+    """What is known of a recording beside its names.
+
+    Attributes:
+        joints: their names, of a URDF or of the user; () for the recording's.
+        in_order: whether `joints` are in the order of the channels, where no name says.
+        urdf: of the arm, or "".
+        rate: rows a second [Hz], or None.
+        preset: what wrote the recording, or None.
+    """
+
+    joints: Sequence[str] = ()
+    in_order: bool = False
+    urdf: str = ""
+    rate: float | None = None
+    preset: Preset | None = None
+
+    @property
+    def names(self) -> Mapping[str, tuple[str, ...]]:
+        """What the quantities are called; by a preset, first what it calls them."""
+        return self.preset.all_names if self.preset else NAMES
 
 
 class NoGuessError(DisasmError):
@@ -69,7 +90,7 @@ class NoGuessError(DisasmError):
         self.reason = reason
         super().__init__(
             f"{where}: {reason}; `show` prints the channels, `save_map` writes a map "
-            "to fill in, which is given by `map`"
+            "to fill in, which is given by `map`; `preset` knows some programs' names"
         )
 
 
@@ -87,7 +108,7 @@ def map_to_fill_in(kind: str, source: Source) -> str:
         *(f"#   {', '.join(names[i : i + 6])}" for i in range(0, len(names), 6)),
         f"kind: {kind}",
         "joints: []  # their names in the URDF, in the order of the channels",
-        "time: {from: TIME, unit: s}",
+        f"time: {{from: {_likely_time(source)}, unit: s}}  # or {{rate: HZ}}",
         "columns:",
     ]
     for quantity in KINDS[kind].quantities:
@@ -97,9 +118,18 @@ def map_to_fill_in(kind: str, source: Source) -> str:
     return "\n".join(lines) + "\n"
 
 
-def guessed_map(
-    source: Source, kind: str, joints: Sequence[str] = (), urdf: str = ""
-) -> FieldMap:
+def _likely_time(source: Source) -> str:
+    """Returns the channel that is called as time is, or increases in every row."""
+    for stream in source.streams:
+        if (name := time_label(stream, Known())) is not None:
+            return json.dumps(name, ensure_ascii=False)
+        for name, values in stream.channels.items():
+            if len(values) > 2 and (np.diff(values) > 0.0).all():
+                return json.dumps(name, ensure_ascii=False)
+    return "TIME"
+
+
+def guessed_map(source: Source, kind: str, known: Known | None = None) -> FieldMap:
     """Returns a map of what is there, as far as names tell.
 
     Velocities and accelerations of the recording are left out: they are made from the
@@ -108,197 +138,209 @@ def guessed_map(
     Args:
         source: the recording.
         kind: of the log.
-        joints: their names, of a URDF; () for the recording's.
-        urdf: of the arm.
+        known: of it.
 
     Raises:
         NoGuessError: nothing that the kind needs is known by its name.
     """
-    if kind in ("joint_motion", "joint_response"):
-        return _joint_motion(source, joints, urdf, kind)
+    known = known or Known()
+    if kind in _OF_JOINTS:
+        return _of_joints(source, known, kind)
     if kind == "static_wrench":
-        return _static_wrench(source)
+        return _static_wrench(source, known)
     raise NoGuessError(source.path, f"a map of kind {kind} is not guessed")
 
 
-def _joint_motion(
-    source: Source, joints: Sequence[str], urdf: str, kind: str
-) -> FieldMap:
+def _of_joints(source: Source, known: Known, kind: str) -> FieldMap:
     """Returns the map of an arm's positions and torques, or what was commanded."""
-    quantities = _OF_JOINTS[kind]
     stream, columns = None, dict[str, Column]()
+    joints: tuple[str, ...] = ()
+    reasons = list[str]()
     for each in source.streams:
-        found = _joints_of(each, joints, quantities)
+        try:
+            found, names = _columns_of(each, known, _OF_JOINTS[kind])
+        except _AmbiguousError as error:
+            reasons.append(str(error))
+            continue
         if "q" in found and (stream is None or len(found) > len(columns)):
-            stream, columns = each, found
+            stream, columns, joints = each, found, names
     if stream is None:
-        raise NoGuessError(source.path, "no channel is called as joint positions are")
-    count = len(columns["q"].channels)
-    columns = {n: c for n, c in columns.items() if len(c.channels) == count}
+        raise NoGuessError(source.path, _why_no_positions(known, reasons))
     if kind == "joint_response" and "q_commanded" not in columns:
         raise NoGuessError(
             source.path, "no channel is called as commanded joint positions are"
         )
+    time, unit = _time_and_unit(stream, known, source)
     return FieldMap(
         kind=kind,
         columns=columns | _other_wrenches(source, stream),
-        time=_time_of(stream),
-        time_unit=_time_unit(stream),
+        time=time,
+        time_unit=unit,
+        rate=known.rate,
         episode=next((n for n in _EPISODE if n in stream.channels), ""),
-        urdf=urdf,
-        joints=_names_of(columns["q"].channels, joints),
+        urdf=known.urdf,
+        joints=joints,
     )
 
 
-def _joints_of(
-    stream: Stream, joints: Sequence[str], quantities: Sequence[str]
-) -> dict[str, Column]:
-    """Returns those quantities of joints that a stream has."""
-    if stream.name:
-        found = _joints_of_topic(stream, joints)
-        return {q: column for q, column in found.items() if q in quantities}
-    found = dict[str, Column]()
-    for quantity in quantities:
-        channels = _numbered(stream, quantity)
-        if not channels or (joints and len(channels) != len(joints)):
-            channels = _by_joint(stream, quantity, joints) or channels
-        if channels:
-            found[quantity] = _column(channels)
-    return found
+class _AmbiguousError(DisasmError):
+    """Names of a stream's joints say no order."""
 
 
-def _joints_of_topic(stream: Stream, joints: Sequence[str]) -> dict[str, Column]:
-    """Returns positions and efforts of JointState, or of a controller's state."""
-    for prefix, goal in _PREFIXES.items():
-        fields = {"q": f"{prefix}position.", "tau": f"{prefix}effort."}
-        if goal:
-            fields["q_commanded"] = f"{goal}position."
-        found = {
-            q: tuple(n for n in stream.names if n.startswith(f"{stream.name}:{field}"))
-            for q, field in fields.items()
-        }
-        if joints:
-            found = {q: _ordered(c, joints) for q, c in found.items()}
-        if found["q"]:
-            moving = {q: c for q, c in found.items() if c and _is_alive(stream, c)}
-            return {q: Column(c) for q, c in moving.items()}
-    return {}
+def _why_no_positions(known: Known, reasons: Sequence[str]) -> str:
+    if reasons:
+        return reasons[0]
+    if known.preset:
+        names = ", ".join(known.preset.names["q"][:3])
+        return (
+            f"preset '{known.preset.name}' does not fit: no channel is called {names}"
+        )
+    return "no channel is called as joint positions are"
 
 
-def _ordered(channels: Sequence[str], joints: Sequence[str]) -> tuple[str, ...]:
-    """Returns the joints' channels in their order; none if one is not there."""
-    by_joint = {name.rpartition(".")[2]: name for name in channels}
-    if not all(joint in by_joint for joint in joints):
-        return ()
-    return tuple(by_joint[joint] for joint in joints)
+def _columns_of(
+    stream: Stream, known: Known, quantities: Sequence[str]
+) -> tuple[dict[str, Column], tuple[str, ...]]:
+    """Returns those quantities of joints that a stream has, and the joints' names."""
+    names = known.names
+    labels, joints, keys = _positions(stream, known)
+    if not labels:
+        return {}, ()
+    found = {"q": labels}
+    for quantity in quantities[1:]:
+        own = numbered(stream, names.get(quantity, ()))
+        if len(own) != (1 if quantity in _SCALARS else len(labels)):
+            by_name = named(stream, quantity, names)
+            both = [by_name.get(key, []) for key in keys]
+            own = [x[0] for x in both] if all(len(x) == 1 for x in both) else []
+        if own and (quantity != "tau" or is_alive(stream, [x.channel for x in own])):
+            found[quantity] = own
+    columns = {q: _column(x) for q, x in found.items()}
+    if preset := known.preset:
+        columns = {q: preset.adapted(q, c, stream) for q, c in columns.items()}
+    return {q: _lerobot(c, stream) for q, c in columns.items()}, joints
 
 
-def _is_alive(stream: Stream, channels: Sequence[str]) -> bool:
-    """Whether any channel is not constant: an effort that nobody fills in is 0."""
-    return any(np.ptp(stream.channels[name]) > 0 for name in channels)
+#: Channels of the positions, names of the joints, and what the channels' names have.
+_Positions = tuple[list[Label], tuple[str, ...], list[Tokens]]
 
 
-def _plain_names(stream: Stream) -> dict[str, str]:
-    """Returns the channels by their names in small letters, without unit, with dots.
+def _positions(stream: Stream, known: Known) -> _Positions:
+    """Returns the channels of the joints' positions, and the joints' names.
 
-    "/joint_states/Position[0] [deg]" is "joint_states.position[0]".
+    Numbered ones are those of a chain from its base. Named ones are matched with the
+    joints that are known, whatever order they are in.
+
+    Raises:
+        _AmbiguousError: they are named, and not as the joints are.
     """
-    found = dict[str, str]()
-    for name in stream.names:
-        plain = _name_and_unit(name)[0].lower().replace("/", ".").strip(".")
-        found.setdefault(plain, name)
-    return found
+    joints = tuple(known.joints)
+    counted = numbered(stream, known.names["q"])
+    own = known.preset.joints if known.preset else ()
+    if len(own) == len(counted) > 0:
+        by_preset = {tokens_of(n): [x] for n, x in zip(own, counted, strict=True)}
+        return _as_known(by_preset, joints or own, known)
+    by_name = named(stream, "q", known.names)
+    if by_name and (not counted or (joints and len(counted) != len(joints))):
+        return _as_known(by_name, joints, known)
+    numbers = [f"joint_{i}" for i in range(len(counted))]
+    return counted, joints or tuple(numbers), [tokens_of(name) for name in numbers]
 
 
-def _name_and_unit(channel: str) -> tuple[str, str]:
-    """Returns a channel's name, and the unit in brackets behind it, if it is known."""
-    match = re.fullmatch(r"(.*?)[ _]*[\[(]([^\[\]()]+)[\])]", channel)
-    is_unit = match and match[2].strip() in UNITS and not match[2].strip().isdigit()
-    return (match[1], match[2].strip()) if match and is_unit else (channel, "")
+def _as_known(
+    by_name: Mapping[Tokens, list[Label]], joints: tuple[str, ...], known: Known
+) -> _Positions:
+    """Returns named channels in the order of the joints that are known, or their own.
+
+    Raises:
+        _AmbiguousError: a name is there twice, or they are not those of the joints.
+    """
+    for name, labels in by_name.items():
+        if len(labels) > 1:
+            both = " and ".join(f"'{clipped(x.channel)}'" for x in labels[:2])
+            raise _AmbiguousError(
+                f"{both} are both the position of '{'_'.join(name)}'; rename one, or "
+                "name the right one in a map"
+            )
+    listed = list(by_name)
+    first = [labels[0] for labels in by_name.values()]
+    if not joints:
+        return first, tuple("_".join(name) for name in listed), listed
+    order, reasons = matched(joints, listed)
+    if len(order) == len(joints) and not reasons:
+        return [first[i] for i in order], joints, [listed[i] for i in order]
+    if known.in_order and len(first) == len(joints) and not order:
+        return first, joints, listed
+    names = ", ".join("_".join(name) for name in listed[:9])
+    raise _AmbiguousError(
+        (reasons or [f"the recording's joints ({names}) are not {', '.join(joints)}"])[
+            0
+        ]
+        + "; give `joints`, the URDF's names in the order of the recording's, or a map"
+    )
 
 
-def _column(channels: Sequence[str]) -> Column:
+def _column(labels: Sequence[Label]) -> Column:
     """Returns a quantity of these channels, in the unit that their names say."""
-    units = {_name_and_unit(name)[1] for name in channels}
-    return Column(tuple(channels), units.pop() if len(units) == 1 else "")
+    units = {label.unit for label in labels}
+    channels = tuple(label.channel for label in labels)
+    return Column(channels, units.pop() if len(units) == 1 else "")
 
 
-def _numbered(stream: Stream, quantity: str) -> list[str]:
-    """Returns channels as NAME, or NAME0, NAME.0, NAME_0, NAME[0] ... in order.
+def _lerobot(column: Column, stream: Stream) -> Column:
+    """Returns positions of LeRobot's own motors as such: they are not radians."""
+    labels = [stream.labels.get(name, "") for name in column.channels]
+    if column.unit or not all(label.endswith(".pos") for label in labels):
+        return column
+    return dataclasses.replace(column, unit=NORMALISED)
 
-    Or behind a prefix that all of them have and no others: field.NAME0.
+
+def time_label(stream: Stream, known: Known) -> str | None:
+    """Returns the channel of a table that is called as time is; None if none is."""
+    labels = {label.plain: label.channel for label in reversed(labels_of(stream))}
+    for name in known.names["time"]:
+        if name in labels:
+            return labels[name]
+        behind = [c for text, c in labels.items() if text.endswith(f".{name}")]
+        if len(behind) == 1:  # of a structure
+            return behind[0]
+    return None
+
+
+def _time_and_unit(
+    stream: Stream, known: Known, source: Source
+) -> tuple[str | None, str]:
+    """Returns the channel of the time, and its unit.
+
+    The unit is that of its name, of the preset, or by how far apart its values are.
     """
-    plain = _plain_names(stream)
-    for usual in _NAMES[quantity]:
-        if usual in plain:
-            return [plain[usual]]
-        pattern = re.compile(rf"(|.*\.){re.escape(usual)}[._\[ ]?(\d+)\]?$")
-        by_prefix = dict[str, dict[int, str]]()
-        for name, channel in plain.items():
-            if match := pattern.match(name):
-                by_prefix.setdefault(match[1], {})[int(match[2])] = channel
-        if len(by_prefix) != 1 and "" not in by_prefix:
-            continue
-        found = by_prefix.get("") or next(iter(by_prefix.values()))
-        if min(found) < 2 and sorted(found) == list(
-            range(min(found), min(found) + len(found))
-        ):
-            return [found[i] for i in sorted(found)]
-    return []
-
-
-def _by_joint(stream: Stream, quantity: str, joints: Sequence[str]) -> list[str]:
-    """Returns channels whose names join a quantity's and a joint's."""
-    plain = _plain_names(stream)
-    for usual in _NAMES[quantity]:
-        for form in ("{q}.{j}", "{q}_{j}", "{j}.{q}", "{j}_{q}"):
-            ends = [form.format(q=usual, j=joint.lower()) for joint in joints]
-            found = [
-                [c for n, c in plain.items() if n == end or n.endswith(f".{end}")]
-                for end in ends
-            ]
-            if found and all(len(channels) == 1 for channels in found):
-                return [channel for [channel] in found]
-    return []
-
-
-def _time_of(stream: Stream) -> str | None:
-    if stream.time is not None:
-        return None
-    plain = _plain_names(stream)
-    found = next((plain[name] for name in _NAMES["time"] if name in plain), None)
-    if found is None:
-        raise NoGuessError(stream.name or "table", "no channel is called as time is")
-    return found
-
-
-def _time_unit(stream: Stream) -> str:
-    """Returns the unit of the time, by its name or how far apart its values are."""
-    name = _time_of(stream)
+    if known.rate is not None or stream.time is not None:
+        return None, "s"
+    name = time_label(stream, known)
     if name is None:
-        return "s"
-    if said := _name_and_unit(name)[1]:
-        return said
-    step = float(np.median(np.diff(stream.channels[name])))
+        raise NoGuessError(
+            source.path,
+            "no channel is called as time is (give the rows a second by `rate`)",
+        )
+    said = next(x.unit for x in labels_of(stream) if x.channel == name)
+    unit = said or (known.preset.time_unit if known.preset else "")
+    return name, unit or unit_of_times(stream.channels[name])
+
+
+def unit_of_times(values: np.ndarray) -> str:
+    """Returns the unit in which most steps of times (n,) are of a usual size."""
+    step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
     for unit, most in (("s", 0.5), ("ms", 500.0), ("us", 5e5)):
         if step < most:
             return unit
     return "ns"
 
 
-def _names_of(channels: Sequence[str], joints: Sequence[str]) -> tuple[str, ...]:
-    if joints:
-        return tuple(joints)
-    ends = [re.split(r"[.:]", name)[-1] for name in channels]
-    if len(set(ends)) < len(ends) or all(end.isdigit() for end in ends):
-        return tuple(f"joint_{i}" for i in range(len(channels)))
-    return tuple(ends)
-
-
 def _other_wrenches(source: Source, stream: Stream) -> dict[str, Column]:
     """Returns a wrench of another topic, as extra columns."""
     for other in source.streams:
-        channels = _wrench_of(other) if other is not stream else None
+        is_topic = other is not stream and bool(other.name)
+        channels = _wrench_of(other) if is_topic else None
         if channels:
             return {
                 f"extra.{name}": Column((channel,))
@@ -309,7 +351,7 @@ def _other_wrenches(source: Source, stream: Stream) -> dict[str, Column]:
 
 def _wrench_of(stream: Stream) -> tuple[str, ...] | None:
     if not stream.name:
-        return _PLAIN_WRENCH if set(_PLAIN_WRENCH) <= set(stream.names) else None
+        return _components(stream, _WRENCHES)
     for prefix in ("wrench.", ""):
         names = tuple(f"{stream.name}:{prefix}{end}" for end in _WRENCH)
         if set(names) <= set(stream.names):
@@ -317,21 +359,60 @@ def _wrench_of(stream: Stream) -> tuple[str, ...] | None:
     return None
 
 
-def _static_wrench(source: Source) -> FieldMap:
-    columns, time = dict[str, Column](), None
+def _quaternion_of(stream: Stream) -> tuple[str, ...] | None:
+    if not stream.name:
+        return _components(stream, _QUATERNIONS)
+    for prefix in ("pose.", ""):
+        names = tuple(f"{stream.name}:{prefix}{end}" for end in _QUATERNION)
+        if set(names) <= set(stream.names):
+            return names
+    return None
+
+
+def _components(
+    stream: Stream, ways: Sequence[tuple[str, ...]]
+) -> tuple[str, ...] | None:
+    """Returns a table's channels of a vector's components, in one of these ways.
+
+    All of them may have the same before their names.
+    """
+    labels = {"_".join(x.tokens).lower(): x.channel for x in labels_of(stream)}
+    for way in ways:
+        heads = [name.removesuffix(way[0]) for name in labels if name.endswith(way[0])]
+        found = [
+            tuple(labels[f"{head}{end}"] for end in way)
+            for head in heads
+            if all(f"{head}{end}" in labels for end in way)
+        ]
+        if len(found) == 1:
+            return found[0]
+    return None
+
+
+def _static_wrench(source: Source, known: Known) -> FieldMap:
+    columns, main = dict[str, Column](), None
     for stream in source.streams:
         if wrench := _wrench_of(stream):
             columns["wrench"] = Column(wrench)
-            time = _time_of(stream)
-        for prefix in ("pose.", ""):
-            ends = _QUATERNION if stream.name else _PLAIN_QUATERNION
-            names = tuple(
-                f"{stream.name}:{prefix}{e}" if stream.name else e for e in ends
-            )
-            if set(names) <= set(stream.names):
-                columns["R_WS"] = Column(names)
-    if len(columns) < 2:
+            main = stream
+        if quaternion := _quaternion_of(stream):
+            columns["R_WS"] = Column(quaternion)
+    if main is None or len(columns) < 2:
         raise NoGuessError(
             source.path, "no channels are called as a wrench with an orientation is"
         )
-    return FieldMap("static_wrench", columns, time, frames={"wrench": "S"})
+    time, unit = _time_or_order(main, known)
+    return FieldMap(
+        "static_wrench", columns, time, unit, known.rate, frames={"wrench": "S"}
+    )
+
+
+def _time_or_order(stream: Stream, known: Known) -> tuple[str | None, str]:
+    """Returns the channel of the time with its unit, or that of the order with "1"."""
+    if stream.time is not None or known.rate is not None:
+        return None, "s"
+    name = time_label(stream, known)
+    if name is not None:
+        return name, unit_of_times(stream.channels[name])
+    order = numbered(stream, NAMES["order"])
+    return (order[0].channel if len(order) == 1 else None), "1"

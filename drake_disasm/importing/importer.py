@@ -1,5 +1,6 @@
 """Writes recordings as a log, with what was done to them in its provenance."""
 
+import collections
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.importing.field_map import FieldMap, quantity_of
 from drake_disasm.importing.processing import Done, Processed, Processing, process
-from drake_disasm.importing.recording import Recording, recordings_of
+from drake_disasm.importing.recording import Recording, check_share, recordings_of
 from drake_disasm.importing.signals import LowPass, clock_of
 from drake_disasm.importing.source import Source
+from drake_disasm.importing.usage import check_torques
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns
 from drake_disasm.logs.schema import KINDS, Form
 
@@ -42,6 +44,16 @@ class Imported:
     done: Done | None
 
     @property
+    def dropped(self) -> dict[str, int]:
+        """How many rows of all recordings were left out, by the reason."""
+        found = collections.Counter[str]()
+        for each in self.recordings:
+            found.update(each.dropped)
+        if self.done and self.done.short:
+            found["between gaps that are too near"] = self.done.short
+        return dict(found)
+
+    @property
     def rows(self) -> int:
         """Of all episodes."""
         return sum(len(next(iter(each.values()))) for each in self.episodes)
@@ -52,6 +64,8 @@ def import_recordings(
     fields: FieldMap,
     processing: Processing,
     shifts: bool = True,
+    accept: bool = False,
+    even: bool = True,
 ) -> Imported:
     """Returns recordings as episodes of a log.
 
@@ -60,23 +74,32 @@ def import_recordings(
         fields: what is what in all of them.
         processing: of joint motion; rows of other kinds are taken as they are.
         shifts: whether to take away shifts between streams of a bag.
+        accept: whether torques, or more than a tenth of the rows, may be left out.
+        even: whether stamps of arrival are made even.
 
     Raises:
         DisasmError: the map does not fit them, or nothing is left.
     """
     _check_needed(fields)
+    for source in () if accept else sources:
+        check_torques(source, fields)
     found = [
         each.between(*processing.between)
         for source in sources
-        for each in recordings_of(source, fields, shifts)
+        for each in recordings_of(source, fields, shifts, accept, even)
     ]
     if fields.kind != "joint_motion":
-        episodes = tuple(_as_recorded(each, fields.kind) for each in found)
+        episodes = tuple(
+            _as_recorded(each, fields.kind, fields.is_order) for each in found
+        )
         period = (
             clock_of(found[0].time).period if fields.kind == "transitions" else None
         )
         return Imported(tuple(found), episodes, period, None)
     parts, done = process(found, processing)
+    rows = sum(len(each.time) for each in found)
+    short = {"between gaps that are too near": done.short}
+    check_share(found[0].name, short, rows, accept)
     period = float(np.median(np.diff(parts[0].columns["time"])))
     episodes = tuple(_from_its_begin(part) for part in parts)
     return Imported(tuple(found), episodes, period, done)
@@ -92,8 +115,11 @@ def _check_needed(fields: FieldMap) -> None:
             )
 
 
-def _as_recorded(recording: Recording, kind: str) -> dict[str, Array]:
-    columns = {"time": recording.time - recording.time[0], **recording.columns}
+def _as_recorded(recording: Recording, kind: str, is_order: bool) -> dict[str, Array]:
+    clock = {"time": recording.time - recording.time[0]}
+    if is_order:
+        clock = {"order": recording.time}
+    columns = clock | recording.columns
     return _unstacked(columns, kind)
 
 
@@ -159,9 +185,9 @@ def origin(
 ) -> dict[str, Any]:
     """Returns everything that was done, as plain data."""
     found: dict[str, Any] = {
-        "sources": {str(source.path): source.sha256 for source in sources},
+        "sources": {p: sha for source in sources for p, sha in source.files.items()},
         "map": yaml.safe_load(fields.to_yaml()),
-        "rows_dropped": sum(each.dropped for each in imported.recordings),
+        "rows_dropped": imported.dropped,
     }
     shifts = {
         f"{each.name}: {name}": dataclasses.asdict(shift) | {"taken": shift.is_seen}
@@ -170,6 +196,9 @@ def origin(
     }
     if shifts:
         found["shifts"] = {n: _finite(values) for n, values in shifts.items()}
+    stamps = {e.name: e.evened.words() for e in imported.recordings if e.evened}
+    if stamps:
+        found["stamps"] = stamps
     if imported.done:
         found["processing"] = processing_origin(imported.done)
     return found

@@ -22,7 +22,7 @@ class MatlabError(Exception):
 
 
 def load_mat(path: Path) -> Arrays:
-    """Returns the arrays of numbers in a MATLAB file, a struct's as "struct.name".
+    """Returns the arrays in a MATLAB file, a struct's as "struct.name".
 
     Args:
         path: of a file of version 7 or older.
@@ -49,8 +49,14 @@ def _members(values: Mapping[str, Any], prefix: str = "") -> Arrays:
         if isinstance(value, dict):
             found |= _members(value, f"{prefix}{name}.")
         else:
-            found[prefix + name] = np.asarray(value)
-    return {n: array for n, array in found.items() if array.dtype.kind in "fiub"}
+            found[prefix + name] = _plain(value)
+    return found
+
+
+def _plain(value: Any) -> np.ndarray:
+    """Returns an array, of numbers or of the letters that stand for others."""
+    array = np.asarray(value)
+    return array if array.dtype.kind in "fiubc" else np.array(["no numbers"])
 
 
 def _main(path: str) -> int:

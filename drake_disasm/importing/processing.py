@@ -66,6 +66,7 @@ class Done:
         decimation: every how many rows are kept.
         quanta: steps to which columns are rounded, by "q.0"; those that are.
         resampled: recordings that were not sampled evenly.
+        short: rows in stretches between gaps that are shorter than the filter.
     """
 
     clocks: tuple[Clock, ...]
@@ -74,6 +75,7 @@ class Done:
     decimation: int
     quanta: dict[str, float]
     resampled: int
+    short: int = 0
 
 
 def process(
@@ -117,8 +119,23 @@ def process(
         decimation,
         _quanta(recordings),
         resampled,
+        _short(recordings, parts, found),
     )
     return kept, done
+
+
+def _short(
+    recordings: Sequence[Recording],
+    parts: Sequence[Recording],
+    found: Sequence[Processed | None],
+) -> int:
+    """Returns how many rows are in stretches of which nothing is left."""
+    lengths = [
+        rows.stop - rows.start for each in recordings for rows in stretches(each.time)
+    ]
+    tiny = sum(length for length in lengths if length < _FEWEST)
+    pairs = zip(parts, found, strict=True)
+    return tiny + sum(len(part.time) for part, kept in pairs if kept is None)
 
 
 def _cutoff_of(

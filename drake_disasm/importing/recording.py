@@ -20,13 +20,13 @@ from drake_disasm.importing.shift import (
 )
 from drake_disasm.importing.signals import clock_of, resample
 from drake_disasm.importing.source import Source
-from drake_disasm.importing.stream import Stream
+from drake_disasm.importing.stamps import Evened, evened
+from drake_disasm.importing.stream import CLOSEST, LARGEST, Stream
 from drake_disasm.importing.units import factor
 
 Array = NDArray[np.float64]
 
-_LARGEST = 1e50  # a larger value is damage: its square times another's would overflow
-_CLOSEST = 0.01  # of the median period: rows that are closer can't tell a slope
+_MOST_DROPPED = 0.1  # of the rows, unless the user accepts more
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,15 +37,17 @@ class Recording:
         name: of the source, with the episode's number if there are several.
         time: (n,) increasing [s].
         columns: (n, k) of each quantity, SI.
-        dropped: rows that held no number, or came no later than the one before.
+        dropped: how many rows were left out, by the reason.
         shifts: of other streams' clocks, by the stream's name.
+        evened: what was done to stamps of arrival; None of others.
     """
 
     name: str
     time: Array
     columns: dict[str, Array]
-    dropped: int = 0
+    dropped: dict[str, int] = dataclasses.field(default_factory=dict)
     shifts: dict[str, Shift] = dataclasses.field(default_factory=dict)
+    evened: Evened | None = None
 
     def between(self, begin: float, end: float) -> "Recording":
         """Returns the rows between two times since its begin [s].
@@ -65,7 +67,11 @@ class Recording:
 
 
 def recordings_of(
-    source: Source, fields: FieldMap, shifts: bool = True
+    source: Source,
+    fields: FieldMap,
+    shifts: bool = True,
+    accept: bool = False,
+    even: bool = True,
 ) -> list[Recording]:
     """Returns the episodes of a source.
 
@@ -73,6 +79,8 @@ def recordings_of(
         source: the recording.
         fields: what is what in it.
         shifts: whether to estimate and take away shifts between streams.
+        accept: whether more than a tenth of the rows may be left out.
+        even: whether stamps of arrival are made even.
 
     Raises:
         DisasmError: the map names what is not there, or nothing is left.
@@ -93,10 +101,14 @@ def recordings_of(
             f"{source.path.name}[{number:g}]" if fields.episode else source.path.name
         )
         part = {name: values[rows] for name, values in columns.items()}
-        found.append(_clean(label, time[rows], part))
+        numbered = None if stream.sequence is None else stream.sequence[rows]
+        evening = _Evening(even and fields.rate is None, numbered)
+        found.append(_clean(label, time[rows], part, accept, evening))
+    if not found:
+        raise DisasmError(f"{source.path}: '{fields.episode}' numbers no episode")
     others = {n: c for n, c in fields.columns.items() if n not in own}
     features = _features(fields) if shifts and others else None
-    return [_with_others(each, source, others, features) for each in found]
+    return [_with_others(each, source, others, features, accept) for each in found]
 
 
 def _features(fields: FieldMap) -> Features | None:
@@ -114,11 +126,25 @@ def _main_stream(source: Source, fields: FieldMap) -> Stream:
 
 
 def _time(source: Source, stream: Stream, fields: FieldMap) -> Array:
+    """Returns the times (n,) of a stream's rows [s], or their order."""
+    if fields.rate is not None:
+        return np.arange(stream.rows) / fields.rate
     if fields.time is not None:
-        return source.channel(fields.time) * factor(fields.time_unit, "map: time")
-    if stream.time is None:
-        raise DisasmError("map: say which channel is the time: time: {from: NAME}")
-    return stream.time
+        time = source.channel(fields.time)
+        if len(time) != stream.rows:
+            raise DisasmError(
+                f"map: '{fields.time}' has {len(time)} rows, '{stream.names[0]}' "
+                f"{stream.rows}; name the time of these, or give `rate`"
+            )
+        return time * factor(fields.time_unit, "map: time")
+    if stream.time is not None:
+        return stream.time
+    if fields.is_order:
+        return np.arange(float(stream.rows))
+    raise DisasmError(
+        "map: say which channel is the time, time: {from: NAME}, or how many rows a "
+        "second there are, time: {rate: HZ}"
+    )
 
 
 def _values(source: Source, name: str, column: Column) -> Array:
@@ -135,21 +161,95 @@ def _values(source: Source, name: str, column: Column) -> Array:
     )
 
 
-def _clean(name: str, time: Array, columns: dict[str, Array]) -> Recording:
-    """Returns the rows that hold numbers at times that increase."""
-    whole = np.abs(time) < _LARGEST
+@dataclasses.dataclass(frozen=True)
+class _Evening:
+    """Whether stamps of arrival are made even, and the numbers (n,) of the rows."""
+
+    wanted: bool = False
+    sequence: Array | None = None
+
+
+_NONE = _Evening()
+
+
+def _clean(
+    name: str,
+    time: Array,
+    columns: dict[str, Array],
+    accept: bool,
+    evening: "_Evening" = _NONE,
+) -> Recording:
+    """Returns the rows that hold numbers at times that increase.
+
+    Raises:
+        DisasmError: they are fewer than two, or nine tenths without being accepted.
+    """
+    whole = np.abs(time) < LARGEST
     for values in columns.values():
-        whole &= (np.abs(values) < _LARGEST).all(axis=1)
+        whole &= (np.abs(values) < LARGEST).all(axis=1)
     order = np.flatnonzero(whole)
-    closest = _CLOSEST * clock_of(time[order]).period
+    if not accept:
+        _check_fine(name, time[order])
+    found = None
+    if evening.wanted and "q" in columns:
+        numbers = None if evening.sequence is None else evening.sequence[order]
+        found = evened(time[order], columns["q"][order], numbers)
+    if found:
+        time = time.copy()
+        time[order] = found.time
+    closest = CLOSEST * clock_of(time[order]).period
     greatest = np.maximum.accumulate(time[order])
     later = np.diff(time[order], prepend=-np.inf) > 0.0
     later[1:] &= time[order][1:] - greatest[:-1] > closest
     kept = order[later]
+    dropped = {
+        "without numbers": len(time) - len(order),
+        "at the time of an earlier row, or before": len(order) - len(kept),
+    }
+    dropped = {why: count for why, count in dropped.items() if count}
+    check_share(name, dropped, len(time), accept)
     if len(kept) < 2:
         raise DisasmError(f"{name}: no two rows hold numbers at times that increase")
     rows = {n: values[kept] for n, values in columns.items()}
-    return Recording(name, time[kept], rows, len(time) - len(kept))
+    return Recording(name, time[kept], rows, dropped, evened=found)
+
+
+def check_share(name: str, dropped: dict[str, int], rows: int, accept: bool) -> None:
+    """Refuses to leave out more than a tenth of the rows.
+
+    Args:
+        name: of the recording.
+        dropped: rows by the reason.
+        rows: in all.
+        accept: whether the user wants it so.
+
+    Raises:
+        DisasmError: says how many, and why.
+    """
+    if accept or sum(dropped.values()) <= _MOST_DROPPED * rows:
+        return
+    words = ", ".join(f"{count} {why}" for why, count in dropped.items())
+    raise DisasmError(
+        f"{name}: more than a tenth of {rows} rows would be left out: {words}; "
+        "correct the recording or the map, or accept it by `accept_left_out`"
+    )
+
+
+def _check_fine(name: str, time: Array) -> None:
+    """Refuses times of which more than a tenth are those of the row before."""
+    stamps, counts = np.unique(time, return_counts=True)
+    steps = np.diff(time)
+    if len(stamps) < 2 or (steps == 0.0).sum() <= _MOST_DROPPED * len(time):
+        return
+    if (steps < 0.0).any():
+        return  # episodes one after the other, rather than a coarse clock
+    first = 1 if len(stamps) > 2 else 0  # the first stamp may lack rows
+    rate = counts[first:-1].sum() / (stamps[-1] - stamps[first])
+    raise DisasmError(
+        f"{name}: the time has steps of {np.median(np.diff(stamps)):.4g} s with "
+        f"{np.median(counts):g} rows each; if these were sampled evenly, give their "
+        f"rate, `rate` {rate:.4g}"
+    )
 
 
 def _with_others(
@@ -157,14 +257,15 @@ def _with_others(
     source: Source,
     others: dict[str, Column],
     features: Features | None,
+    accept: bool,
 ) -> Recording:
     """Returns the rows with other streams' channels, where those reach."""
     for stream, columns in _by_stream(source, others):
         values = {n: _values(source, n, c) for n, c in columns.items()}
         if stream.time is None:
             raise DisasmError(f"map: {', '.join(values)} has no time of its own")
-        other = _clean(stream.name, stream.time, values)
-        recording = _joined(recording, other, features)
+        other = _clean(stream.name, stream.time, values, accept)
+        recording = _joined(recording, other, features, accept)
     return recording
 
 
@@ -182,7 +283,7 @@ def _by_stream(
 
 
 def _joined(
-    recording: Recording, other: Recording, features: Features | None
+    recording: Recording, other: Recording, features: Features | None, accept: bool
 ) -> Recording:
     seconds, known = 0.0, dict(recording.shifts)
     known[other.name] = UNKNOWN
@@ -198,11 +299,15 @@ def _joined(
         raise DisasmError(
             f"{recording.name}: {other.name} was recorded at another time"
         )
+    outside = {f"before or after {other.name}": int((~inside).sum())}
+    check_share(recording.name, outside, len(inside), accept)
+    dropped = recording.dropped | (outside if not inside.all() else {})
+    dropped |= {f"{why} in {other.name}": n for why, n in other.dropped.items()}
     columns = {name: values[inside] for name, values in recording.columns.items()}
     columns |= {
         name: resample(time, values, recording.time[inside])
         for name, values in other.columns.items()
     }
-    return dataclasses.replace(
-        recording, time=recording.time[inside], columns=columns, shifts=known
-    )
+    time = recording.time[inside]
+    name, even = recording.name, recording.evened
+    return Recording(name, time, columns, dropped, known, even)

@@ -38,11 +38,18 @@ class Source:
         path: of the file or folder.
         streams: of a table one, of a bag one for each topic.
         sha256: of the file's bytes, or of those of all files in the folder.
+        parts: paths and sums of the files that it is joined of, or ().
     """
 
     path: Path
     streams: tuple[Stream, ...]
     sha256: str
+    parts: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def files(self) -> dict[str, str]:
+        """The sums of its files, by their paths."""
+        return dict(self.parts or ((str(self.path), self.sha256),))
 
     def stream_of(self, channel: str) -> Stream:
         """Returns the stream that has a channel.
@@ -56,6 +63,10 @@ class Source:
         for stream in self.streams:
             if channel in stream.names:
                 return stream
+        for stream in self.streams:
+            for name, why in stream.left_out.items():
+                if channel == name or channel.rpartition(".")[0] == name:
+                    raise DisasmError(f"{self.path}: '{clipped(name)}' {why}")
         known = [name for stream in self.streams for name in stream.names]
         raise DisasmError(
             f"{self.path}: has no channel '{clipped(channel)}'; "

@@ -13,6 +13,11 @@ from drake_disasm.common.text import clipped
 
 Array = NDArray[np.float64]
 
+#: A larger value is damage: its square times another's would overflow.
+LARGEST = 1e50
+#: Share of the median period: rows that are closer can't tell a slope.
+CLOSEST = 0.01
+
 
 @dataclasses.dataclass(frozen=True)
 class Stream:
@@ -26,6 +31,9 @@ class Stream:
         received: (n,) when the recorder received them [s]; None for a table.
         kind: message type of a topic.
         constants: single numbers that stand beside a table, such as a gain.
+        labels: what metadata call a channel, where that is not its name.
+        left_out: why a part of the recording is no channel, by its name.
+        sequence: (n,) numbers of a topic's messages, of which some may be lost.
     """
 
     name: str
@@ -34,6 +42,9 @@ class Stream:
     received: Array | None = None
     kind: str = ""
     constants: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    left_out: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    sequence: Array | None = None
 
     @property
     def names(self) -> list[str]:
@@ -47,14 +58,13 @@ class Stream:
 
 
 def flat(arrays: Mapping[str, np.ndarray]) -> dict[str, Array]:
-    """Returns (n,) channels of arrays (n,) and (n, k, ...), as name, name.0, name.1."""
+    """Returns (n,) channels of arrays (n,) and (n, k), as name, name.0, name.1."""
     found = dict[str, Array]()
     for name, values in arrays.items():
-        array = np.asarray(values, dtype=np.float64)
-        if array.ndim == 1:
-            found[name] = array
+        columns = np.asarray(values, dtype=np.float64)
+        if columns.ndim == 1:
+            found[name] = columns
             continue
-        columns = array.reshape(len(array), -1)
         if columns.shape[1] == 1:
             found[name] = columns[:, 0]
             continue

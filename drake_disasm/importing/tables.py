@@ -1,8 +1,11 @@
 """Tables: CSV, NPZ, NPY, MATLAB, Parquet and LeRobot datasets."""
 
+import collections
 import csv
+import dataclasses
 import io
 import itertools
+import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,11 +17,13 @@ import pyarrow.csv  # type: ignore[import-untyped]
 import pyarrow.parquet  # type: ignore[import-untyped]
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import read_text
+from drake_disasm.common.text import clipped
 from drake_disasm.importing.matlab import load_mat
 from drake_disasm.importing.stream import Stream, flat, readable
 
 _COMMENTS = ("#", "%")
-_DELIMITERS = ",;\t "
+_MOST_META = 2**24  # bytes
 
 
 def read_csv(path: Path) -> list[Stream]:
@@ -44,8 +49,12 @@ def read_csv(path: Path) -> list[Stream]:
         lines = _Lines(itertools.chain([second], rows), delimiter, len(names))
         columns = _cells(path, lines, delimiter, names)
         numbers = ((n, _numbers(column, delimiter != ",")) for n, column in columns)
-        arrays = {name: found for name, found in numbers if found is not None}
-    return [_table(path, arrays)]
+        cells = list(numbers)
+    count = collections.Counter(names)
+    out = {n: "holds text" for n, found in cells if found is None}
+    out |= {n: f"names {k} columns: rename one" for n, k in count.items() if k > 1}
+    arrays = {n: found for n, found in cells if found is not None and n not in out}
+    return _tables(path, arrays, out)
 
 
 class _Rows(Iterator[str]):
@@ -71,8 +80,14 @@ class _Rows(Iterator[str]):
 
 
 def _delimiter_of(line: str) -> str:
-    """Returns what separates a line's cells; a comma beside semicolons is decimal."""
-    return ";" if ";" in line else max(_DELIMITERS, key=line.strip().count)
+    """Returns what separates a line's cells.
+
+    A comma beside semicolons is decimal; a blank beside commas or tabs is in a name.
+    """
+    if ";" in line:
+        return ";"
+    likely = max(",\t", key=line.strip().count)
+    return likely if likely in line.strip() else " "
 
 
 def _split(line: str, delimiter: str) -> list[str]:
@@ -210,7 +225,7 @@ def _times(cells: pyarrow.ChunkedArray) -> np.ndarray:
 def read_npz(path: Path) -> list[Stream]:
     """Reads NumPy's archive of arrays."""
     with readable(path), np.load(path, allow_pickle=False) as file:
-        return [_table(path, _numeric({name: file[name] for name in file.files}))]
+        return _tables(path, {name: file[name] for name in file.files})
 
 
 def read_npy(path: Path) -> list[Stream]:
@@ -219,19 +234,19 @@ def read_npy(path: Path) -> list[Stream]:
         array = np.load(path, allow_pickle=False)
         names = array.dtype.names
         found = {n: array[n] for n in names} if names else {"column": array}
-        return [_table(path, _numeric(found))]
+        return _tables(path, found)
 
 
 def read_mat(path: Path) -> list[Stream]:
     """Reads a MATLAB file of version 7 or older; a struct's members are struct.name."""
     with readable(path):
-        return [_table(path, load_mat(path))]
+        return _tables(path, load_mat(path))
 
 
 def read_parquet(path: Path) -> list[Stream]:
     """Reads a Parquet table; columns of lists are name.0, name.1, ..."""
     with readable(path):
-        return [_table(path, _columns(pyarrow.parquet.read_table(path)))]
+        return _tables(path, *_columns(pyarrow.parquet.read_table(path)))
 
 
 def read_lerobot(path: Path) -> list[Stream]:
@@ -242,26 +257,51 @@ def read_lerobot(path: Path) -> list[Stream]:
             raise DisasmError(f"{path}: has no data/**/*.parquet")
         tables = [pyarrow.parquet.read_table(file) for file in files]
         joined = pyarrow.concat_tables(tables, promote_options="default")
-        return [_table(path, _columns(joined))]
+        labels, videos = _features(path / "meta/info.json")
+        columns, out = _columns(joined)
+        streams = _tables(path, columns, videos | out)
+    known = {n: label for n, label in labels.items() if n in streams[0].channels}
+    return [dataclasses.replace(streams[0], labels=known), *streams[1:]]
 
 
-def _columns(table: pyarrow.Table) -> dict[str, np.ndarray]:
-    found = dict[str, np.ndarray]()
+def _features(path: Path) -> tuple[dict[str, str], dict[str, str]]:
+    """Returns the channels' names that LeRobot's metadata state, and what is video.
+
+    Names are a list, or a list behind a key such as "motors".
+    """
+    info = json.loads(read_text(path, "give the whole dataset", _MOST_META))
+    features = info.get("features", {}) if isinstance(info, dict) else {}
+    labels, videos = dict[str, str](), dict[str, str]()
+    for feature, known in features.items() if isinstance(features, dict) else ():
+        if not isinstance(known, dict):
+            continue
+        if known.get("dtype") in ("video", "image"):
+            videos[feature] = f"is {known['dtype']}"
+            continue
+        names = known.get("names")
+        if isinstance(names, dict) and len(names) == 1:
+            names = next(iter(names.values()))
+        names = names if isinstance(names, list) else []
+        for i, name in enumerate(names):
+            channel = f"{feature}.{i}" if len(names) > 1 else feature
+            labels[channel] = f"{feature}.{name}"
+    return labels, videos
+
+
+def _columns(table: pyarrow.Table) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Returns a table's columns, and what is left out of it."""
+    found, out = dict[str, np.ndarray](), dict[str, str]()
     for name in table.column_names:
         kind = table.schema.field(name).type
         if pyarrow.types.is_list(kind) or pyarrow.types.is_fixed_size_list(kind):
             rows = table[name].to_pylist()
-            if len({len(row) for row in rows}) == 1:
+            if len({-1 if row is None else len(row) for row in rows}) == 1:
                 found[name] = np.array(rows)
+            else:
+                out[name] = "holds lists of several lengths"
         else:
             found[name] = table[name].to_numpy()
-    return _numeric(found)
-
-
-def _numeric(arrays: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Returns those that hold real numbers, or times: those in seconds."""
-    found = {name: _seconds(np.asarray(array)) for name, array in arrays.items()}
-    return {n: a for n, a in found.items() if a.dtype.kind in "fiub"}
+    return found, out
 
 
 def _seconds(array: np.ndarray) -> np.ndarray:
@@ -273,14 +313,61 @@ def _seconds(array: np.ndarray) -> np.ndarray:
     return np.where(np.isnat(array), np.nan, numbers)
 
 
-def _table(path: Path, arrays: Mapping[str, np.ndarray]) -> Stream:
-    """Returns the arrays that are as long as most; single numbers as constants."""
-    constants = {n: float(a.ravel()[0]) for n, a in arrays.items() if a.size == 1}
-    rest = {n: a for n, a in arrays.items() if n not in constants}
-    sizes = [max(a.shape) for a in rest.values()]
-    if not sizes:
-        raise DisasmError(f"{path}: has no columns of numbers")
-    rows = max(set(sizes), key=sizes.count)
-    # MATLAB may hold rows where we have columns.
-    kept = {n: a if len(a) == rows else a.T for n, a in rest.items() if rows in a.shape}
-    return Stream("", flat(kept), constants=constants)
+def _tables(
+    path: Path, arrays: Mapping[str, Any], left_out: Mapping[str, str] | None = None
+) -> list[Stream]:
+    """Returns a stream for each length of arrays, the longest first.
+
+    Single numbers are constants. Arrays of three dimensions are left out: whether they
+    are episodes, images or matrices their shape doesn't say.
+
+    Args:
+        path: for messages.
+        arrays: of anything.
+        left_out: what is no array, with the reason.
+    """
+    given = {name: _seconds(np.asarray(array)) for name, array in arrays.items()}
+    out = dict(left_out or {}) | {n: w for n, a in given.items() if (w := _unfit(a))}
+    numbers = {n: a for n, a in given.items() if n not in out}
+    constants = {n: float(a.ravel()[0]) for n, a in numbers.items() if a.size == 1}
+    rest = {n: a for n, a in numbers.items() if n not in constants}
+    if not rest:
+        raise DisasmError(f"{path}: has no columns of numbers{_reasons(out)}")
+    clocks = {a.size for a in rest.values() if _is_clock(a)}
+    by_rows = dict[int, dict[str, np.ndarray]]()
+    for name, array in rest.items():
+        axis = int(np.argmax(array.shape))
+        for i, size in enumerate(array.shape):
+            axis = i if size in clocks and array.shape[axis] not in clocks else axis
+        # MATLAB may hold rows where we have columns.
+        table = by_rows.setdefault(array.shape[axis], {})
+        table[name] = array.T if axis else array
+    lengths = sorted(by_rows, reverse=True)
+    streams = [Stream("", flat(by_rows[n]), constants=constants) for n in lengths]
+    return [dataclasses.replace(streams[0], left_out=out), *streams[1:]]
+
+
+def _reasons(out: Mapping[str, str]) -> str:
+    first = "; ".join(f"{clipped(name)} {why}" for name, why in list(out.items())[:3])
+    return f": {first}" if first else ""
+
+
+def _unfit(array: np.ndarray) -> str:
+    """Returns why an array is no channels; "" if it is."""
+    if array.dtype.kind not in "fiub":
+        return "holds no real numbers"
+    if not array.size:
+        return "is empty"
+    if sum(size > 1 for size in array.shape) > 2 or array.ndim > 2:
+        shape = " x ".join(map(str, array.shape))
+        return (
+            f"has {array.ndim} dimensions, {shape}: which is which? save it as arrays "
+            "of rows and columns, episodes one after the other"
+        )
+    return ""
+
+
+def _is_clock(array: np.ndarray) -> bool:
+    """Whether an array is a vector of numbers that increase, as times do."""
+    is_vector = max(array.shape) == array.size
+    return is_vector and bool((np.diff(array.ravel().astype(float)) > 0.0).all())

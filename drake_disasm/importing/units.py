@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 
+#: LeRobot's -100 to 100 of a motor's calibrated range, or 0 to 100 of a gripper's.
+NORMALISED = "normalised"
+
 #: By name: the dimension, and how many SI units it is.
 UNITS: Mapping[str, tuple[str, float]] = {
     "s": ("time", 1.0),
@@ -38,6 +41,7 @@ UNITS: Mapping[str, tuple[str, float]] = {
     "N.m": ("torque", 1.0),
     "N*mm": ("torque", 1e-3),
     "Nmm": ("torque", 1e-3),
+    "A": ("current", 1.0),
     "1": ("none", 1.0),
     "%": ("none", 0.01),
 }
@@ -49,6 +53,11 @@ def factor(unit: str, where: str) -> float:
     Raises:
         DisasmError: it is not known.
     """
+    if unit == NORMALISED:
+        raise DisasmError(
+            f"{where}: is in LeRobot's normalised units; give its file of calibration "
+            "by `calibration`, or `calibration` degrees if it recorded these"
+        )
     if unit not in UNITS:
         raise DisasmError(
             f"{where}: unit '{unit}' is not known; {closest(unit, list(UNITS))}; or "

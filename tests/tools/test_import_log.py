@@ -166,3 +166,32 @@ def test_a_verdict_on_few_blocks_does_not_claim_to_be_all(tmp_path: Path) -> Non
     result = _result(tmp_path / "closed")
     assert result["ending"] == "partly"
     assert any("Friction" in name for name in result["confirmed"])
+
+
+def test_recordings_of_other_people_s_robots_come_in(tmp_path: Path) -> None:
+    """By commands alone; see ../shared/data/cases/README.md for the right answers."""
+    cases, ur = real_folder("cases"), real_folder("ur10e")
+    arm = ["--urdf", str(ur / "ur10e.urdf")]
+    run = run_program(
+        "import_log", str(ur / "unloaded.csv"), "--preset", "rtde", *arm,
+        "--out", str(tmp_path / "ur"),
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    scales = read_log(tmp_path / "ur").header.provenance["import"]["map"]["columns"]
+    # Both of the authors' sets are 8.5 to 15 N m/A; wrists have the same motor.
+    assert all(8.5 < constant < 15.0 for constant in scales["tau"]["scale"])
+    bag = cases / "bag_two_publishers/joint_states.bag"
+    run = run_program("import_log", str(bag), *arm, "--show")
+    assert "effort.elbow_joint" in run.stdout and "q.2, elbow_joint" in run.stdout
+    coarse = cases / "coarse_stamps"
+    run = run_program(
+        "import_log", str(coarse / "run.csv"), "--map", str(coarse / "map.yaml"),
+        "--out", str(tmp_path / "coarse"),
+    )  # fmt: skip
+    assert_one_line(run, ["--rate 125"])
+    late = cases / "jittery_stamps"
+    run = run_program(
+        "import_log", str(late / "run.csv"), "--map", str(late / "map.yaml"),
+        "--out", str(tmp_path / "late"),
+    )  # fmt: skip
+    assert "about 500 Hz; even times are taken" in run.stdout

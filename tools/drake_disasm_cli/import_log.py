@@ -1,8 +1,9 @@
 """Makes a log of what other programs recorded: tables, bags, datasets.
 
 Reads CSV, NPZ, NPY, MATLAB, Parquet, LeRobot datasets, ROS 1 and ROS 2 bags and MCAP.
-What is what is guessed from names and message types, or said by a small YAML map; both
-can be looked at with --show, and a guessed map can be saved and edited.
+What is what is guessed from names, metadata and message types, or said by a small YAML
+map; --show prints every channel with its use or why it has none, and a guessed map can
+be saved and edited. Joints are matched with the URDF's by name.
 
 Joint motion is brought to one even time line and filtered without phase shift, by one
 filter for all columns, whose cut-off is chosen from the data's spectrum; velocities and
@@ -23,6 +24,7 @@ from drake_disasm.common.files import write_text
 from drake_disasm.common.resources import model_path
 from drake_disasm.importing import (
     FieldMap,
+    Known,
     NoGuessError,
     Processing,
     Source,
@@ -34,8 +36,10 @@ from drake_disasm.importing import (
     write_log,
 )
 from drake_disasm.importing.description import described, summary
+from drake_disasm.importing.joining import WAYS, joined
+from drake_disasm.importing.lerobot import calibrated
 from drake_disasm.importing.plots import plot_import
-from drake_disasm.importing.units import factor
+from drake_disasm.importing.presets import PRESETS
 from drake_disasm.logs.header import HEADER_NAME, read_header
 
 _EXAMPLES = """examples:
@@ -44,6 +48,8 @@ _EXAMPLES = """examples:
   drake-disasm import-log run.csv --save-map map.yaml --show      then edit it
   drake-disasm import-log run.csv --map map.yaml --out out/from_table
   drake-disasm import-log run.npz --urdf arm.urdf --cutoff 12 --out out/filtered
+  drake-disasm import-log run.csv --preset rtde --urdf ur10e.urdf --out out/ur
+  drake-disasm import-log q.csv tau.csv --join time --out out/joined
 then:
   drake-disasm check-log --log out/log
   drake-disasm close-loop --log out/log --out out/closed
@@ -69,6 +75,12 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         help="of log (default: joint_motion; joint_response: commanded and measured "
         "positions; transitions need a map)",
     )
+    add(
+        "--join",
+        choices=WAYS,
+        help="the files are columns of one recording, joined at the same times, or row "
+        "by row (default: they are episodes)",
+    )
     add("--out", type=Path, metavar="DIR", help="folder of the log")
     _add_map_arguments(add)
     _add_processing_arguments(add)
@@ -82,6 +94,19 @@ def _add_map_arguments(add: Callable[..., object]) -> None:
         help="print what is in the sources and the map, and stop",
     )
     add("--map", type=Path, metavar="FILE", help="what is what (default: guessed)")
+    add(
+        "--preset",
+        choices=list(PRESETS),
+        help="what recorded it: "
+        + "; ".join(f"{name}: {preset.about}" for name, preset in PRESETS.items()),
+    )
+    add(
+        "--calibration",
+        default="",
+        metavar="FILE|degrees",
+        help="of LeRobot's motors (.../calibration/robots/TYPE/ID.json), whose ranges "
+        "its normalised units are of; or what it recorded in their place",
+    )
     add("--save-map", type=Path, metavar="FILE", help="write the map, to edit it")
     add(
         "--urdf",
@@ -95,6 +120,17 @@ def _add_map_arguments(add: Callable[..., object]) -> None:
         default=[],
         metavar="NAME",
         help="names of the joints, in the order of the columns (default: the URDF's)",
+    )
+    add(
+        "--rate",
+        type=options.above_zero,
+        metavar="HZ",
+        help="rows a second, in place of the recorded times",
+    )
+    add(
+        "--accept-left-out",
+        action="store_true",
+        help="import though torques, or more than a tenth of the rows, are left out",
     )
     add("--task", metavar="NAME", help="name of the task (default: recorded)")
 
@@ -121,6 +157,11 @@ def _add_processing_arguments(add: Callable[..., object]) -> None:
         help="keep what was recorded between these times since its begin",
     )
     add(
+        "--keep-stamps",
+        action="store_true",
+        help="take stamps as they are, though they are those of arrival",
+    )
+    add(
         "--keep-shifts",
         action="store_true",
         help="don't take away shifts in time between topics of a bag",
@@ -136,7 +177,7 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     if not (args.show or args.out or args.save_map):
         raise DisasmError("--out: give a folder for the log, or --show to look first")
-    sources = [read_source(path) for path in args.sources]
+    sources = _sources(args)
     try:
         fields = _fields(args, sources)
     except NoGuessError as error:
@@ -148,8 +189,7 @@ def main(arguments: Sequence[str]) -> int:
         write_text(args.save_map, fields.to_yaml())
         print(f"map: {args.save_map}")
     if args.show:
-        unit = factor(fields.time_unit, "map: time")
-        print("\n".join(described(source, fields.time, unit) for source in sources))
+        print("\n".join(described(s, fields.kind, fields) for s in sources))
         print(f"map:\n{_indented(fields.to_yaml())}")
     if args.show or not args.out:
         return 0
@@ -158,6 +198,8 @@ def main(arguments: Sequence[str]) -> int:
         fields,
         Processing(args.cutoff, args.decimate, tuple(args.between)),
         shifts=not args.keep_shifts,
+        accept=args.accept_left_out,
+        even=not args.keep_stamps,
     )
     write_log(
         imported,
@@ -181,8 +223,19 @@ def _show_without_map(
         write_text(args.save_map, map_to_fill_in(args.kind, sources[0]))
         print(f"map to fill in: {args.save_map}")
     if args.show:
-        print("\n".join(described(source) for source in sources))
-    print(f"no map is guessed: {error.reason}")
+        print("\n".join(described(source, args.kind) for source in sources))
+    print(program.with_options(f"no map is guessed: {error.reason}"))
+
+
+def _sources(args: argparse.Namespace) -> list[Source]:
+    """Returns the recordings, with the names that a preset gives them."""
+    sources = [read_source(path) for path in args.sources]
+    if args.join:
+        preset = PRESETS[args.preset] if args.preset else None
+        sources = [joined(sources, args.join, Known(rate=args.rate, preset=preset))]
+    if args.preset:
+        return [PRESETS[args.preset].labelled(source) for source in sources]
+    return sources
 
 
 def _fields(args: argparse.Namespace, sources: Sequence[Source]) -> FieldMap:
@@ -194,9 +247,16 @@ def _fields(args: argparse.Namespace, sources: Sequence[Source]) -> FieldMap:
     if args.map:
         fields = read_map(args.map)
     else:
-        fields = guessed_map(sources[0], args.kind, joints, urdf)
+        preset = PRESETS[args.preset] if args.preset else None
+        known = Known(joints, bool(args.joints), urdf, args.rate, preset)
+        fields = guessed_map(sources[0], args.kind, known)
     changes = {"urdf": args.urdf, "joints": tuple(args.joints), "task": args.task}
-    return dataclasses.replace(fields, **{n: v for n, v in changes.items() if v})
+    fields = dataclasses.replace(fields, **{n: v for n, v in changes.items() if v})
+    if args.rate:
+        fields = dataclasses.replace(fields, time=None, time_unit="s", rate=args.rate)
+    if args.calibration:
+        fields = calibrated(fields, sources[0], args.calibration)
+    return fields
 
 
 def _urdf_of_log(source: Path) -> str:

@@ -1,5 +1,6 @@
 """What is read of tables, datasets and bags, and what is refused."""
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import pyarrow.parquet  # type: ignore[import-untyped]
 import pytest
 from scipy.io import savemat
 
+from drake_disasm.fakes.bag import FakeBag
+from drake_disasm.importing import bags
 from drake_disasm.importing.source import read_source
 from tests.refusals import refusal
 
@@ -20,6 +23,7 @@ _Q = np.arange(10.0).reshape(5, 2)
     "text",
     [
         "t,q,name\n0,1,a\n0.1,2,b\n",
+        "t,q,joint 1 name of\n0,1,x\n0.1,2,x\n",
         "# from a drive\nt;q\n0;1\n0.1;2\n",
         "t\tq\n0\t1\n0.1\t2\n",
         "t q\n0 1\n0.1 2\n",
@@ -90,9 +94,54 @@ def test_archives_matlab_and_parquet_agree(tmp_path: Path) -> None:
     assert names == ["column.0", "column.1"]
 
 
+def test_arrays_of_several_lengths_are_streams_of_their_own(tmp_path: Path) -> None:
+    slow, limits = np.arange(3.0), np.array([2.0, 1.0, 3.0, 0.0])
+    arrays = {"t": _T, "q": _Q, "t_slow": slow, "temp": slow**2, "limits": limits}
+    np.savez(tmp_path / "run.npz", **arrays)
+    source = read_source(tmp_path / "run.npz")
+    assert [stream.rows for stream in source.streams] == [5, 4, 3]
+    assert source.stream_of("temp").names == ["t_slow", "temp"]
+    # As many joints as rows and more: the clock tells which axis is which.
+    savemat(tmp_path / "run.mat", {"t": _T[:3], "q": np.arange(21.0).reshape(3, 7)})
+    [stream] = read_source(tmp_path / "run.mat").streams
+    assert stream.channels["q.6"].tolist() == [6.0, 13.0, 20.0]
+
+
+def test_what_is_left_out_is_named_with_the_reason(tmp_path: Path) -> None:
+    arrays = {"t": _T, "q": _Q, "cube": np.zeros((4, 5, 2)), "who": np.array(["a"])}
+    np.savez(tmp_path / "run.npz", **arrays)
+    source = read_source(tmp_path / "run.npz")
+    out = source.streams[0].left_out
+    assert set(out) == {"cube", "who"} and "4 x 5 x 2" in out["cube"]
+    assert "'cube' has 3 dimensions" in refusal(source.channel, "cube.0")
+    (tmp_path / "run.csv").write_text("t,q,q,note\n0,1,2,a\n1,2,3,b\n")
+    source = read_source(tmp_path / "run.csv")
+    assert set(source.streams[0].left_out) == {"q", "note"}
+    assert "'q' names 2 columns: rename one" in refusal(source.channel, "q")
+
+
+def test_two_publishers_on_one_topic_are_parted(tmp_path: Path) -> None:
+    bag, arm, hand = FakeBag(), ["a", "b"], ["finger"]
+    for i in range(20):
+        bag.add_joint_state(0.01 * (i + 1), arm, np.full(2, float(i)), np.zeros(2))
+        if i % 5 == 0:
+            bag.add_joint_state(
+                0.01 * (i + 1.5), hand, np.full(1, float(i)), np.zeros(1)
+            )
+    bag.write(tmp_path / "bag", True)
+    source = read_source(tmp_path / "bag")
+    assert [stream.rows for stream in source.streams] == [20, 4]
+    np.testing.assert_array_equal(
+        source.channel("/joint_states:position.finger"), [0.0, 5.0, 10.0, 15.0]
+    )
+
+
 def test_a_lerobot_dataset_s_episodes_follow_each_other(tmp_path: Path) -> None:
     (tmp_path / "meta").mkdir()
-    (tmp_path / "meta/info.json").write_text(json.dumps({"fps": 10}))
+    names = ["pan.pos", "lift.pos"]
+    (tmp_path / "meta/info.json").write_text(
+        json.dumps({"fps": 10, "features": {"observation.state": {"names": names}}})
+    )
     (tmp_path / "data/chunk-000").mkdir(parents=True)
     for episode in (0, 1):
         state = {"timestamp": _T, "observation.state": [list(r) for r in _Q + episode]}
@@ -101,6 +150,7 @@ def test_a_lerobot_dataset_s_episodes_follow_each_other(tmp_path: Path) -> None:
         pyarrow.parquet.write_table(table, file)
     [stream] = read_source(tmp_path).streams
     assert stream.rows == 10
+    assert stream.labels["observation.state.1"] == "observation.state.lift.pos"
     np.testing.assert_array_equal(
         stream.channels["observation.state.0"], [*_Q[:, 0], *(_Q[:, 0] + 1)]
     )
@@ -136,3 +186,24 @@ def test_what_crashes_scipy_or_is_no_recording_is_refused(tmp_path: Path) -> Non
     assert "can't be read: " in refusal(read_source, path)
     assert "neither a ROS 2 bag" in refusal(read_source, tmp_path)
     assert "does not exist" in refusal(read_source, tmp_path / "none.csv")
+
+
+def test_interfaces_of_a_joint_are_its_channels() -> None:
+    """DynamicJointState holds a message for each joint."""
+
+    @dataclasses.dataclass
+    class Interface:
+        interface_names: list[str]
+        values: np.ndarray
+
+    @dataclasses.dataclass
+    class State:
+        joint_names: list[str]
+        interface_values: list[Interface]
+
+    joint = Interface(["position", "effort"], np.array([0.5, 2.0]))
+    found = dict(bags._numbers(State(["elbow"], [joint]), ""))
+    assert found == {
+        "interface_values.elbow.values.position": 0.5,
+        "interface_values.elbow.values.effort": 2.0,
+    }

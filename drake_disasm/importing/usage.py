@@ -1,0 +1,111 @@
+"""What an import makes of each channel, and which torques it would leave out."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.text import clipped
+from drake_disasm.importing.field_map import FieldMap
+from drake_disasm.importing.source import Source
+from drake_disasm.importing.stream import Stream
+from drake_disasm.importing.vocabulary import (
+    NAMES,
+    is_alive,
+    labels_of,
+    named,
+    numbered,
+    read,
+)
+
+_MADE = "velocities and accelerations are made from the positions"
+#: Why a quantity is not in a map, where the kind does not take it.
+_WHY = {
+    "v": _MADE,
+    "vd": _MADE,
+    "current": "a motor's current; as `tau` it needs a scale, in N m/A",
+    "time": "another time",
+    "order": "another order",
+}
+
+
+def uses(source: Source, kind: str, fields: FieldMap | None = None) -> dict[str, str]:
+    """Returns what becomes of each channel, or why it is not used.
+
+    Args:
+        source: the recording.
+        kind: of the log.
+        fields: the map; None where none is guessed.
+    """
+    used = _used(fields) if fields else {}
+    found = dict[str, str]()
+    for stream in source.streams:
+        known = _quantities(stream)
+        for name in stream.names:
+            found[name] = used.get(name) or _why_not(stream, name, known, kind)
+    return found
+
+
+def _used(fields: FieldMap) -> dict[str, str]:
+    found = {fields.episode: "numbers the episodes"} if fields.episode else {}
+    if fields.time:
+        found[fields.time] = "order" if fields.is_order else "time"
+    for name, column in fields.columns.items():
+        many = len(column.channels) > 1
+        for i, channel in enumerate(column.channels):
+            joint = (
+                fields.joints[i] if len(fields.joints) == len(column.channels) else ""
+            )
+            found[channel] = f"{name}.{i}" if many else name
+            if joint and not name.startswith("extra"):
+                found[channel] += f", {joint}"
+    return found
+
+
+def _quantities(stream: Stream) -> dict[str, str]:
+    """Returns the quantity that each channel's name says, of those that do."""
+    found = {
+        label.channel: quantity
+        for label in labels_of(stream)
+        if (quantity := read(label, NAMES)[0])
+    }
+    for quantity, usual in NAMES.items():
+        for label in numbered(stream, usual):
+            found.setdefault(label.channel, quantity)
+    return found
+
+
+def _why_not(stream: Stream, name: str, known: Mapping[str, str], kind: str) -> str:
+    quantity = known.get(name)
+    values = stream.channels[name]
+    if quantity in _WHY:
+        return f"not used: {_WHY[quantity]}"
+    if not is_alive(stream, [name]):
+        return "not used: it says nothing"
+    steps = np.diff(values)
+    if quantity is None and len(steps) > 1 and (steps > 0.0).all():
+        return "not used: it increases in every row, as a time or a count does"
+    if quantity is None:
+        return f"not used: its name says no quantity of a {kind} log"
+    return f"not used: {quantity} by its name, and not in the map"
+
+
+def check_torques(source: Source, fields: FieldMap) -> None:
+    """Refuses a map of a joint's motion that leaves out torques that are there.
+
+    Raises:
+        DisasmError: names them.
+    """
+    if fields.kind != "joint_motion" or "tau" in fields.columns:
+        return
+    used = {name for column in fields.columns.values() for name in column.channels}
+    stream = source.stream_of(next(iter(fields.columns.values())).channels[0])
+    by_name = named(stream, "tau", NAMES)
+    labels = numbered(stream, NAMES["tau"]) + [x for k in by_name.values() for x in k]
+    left = [x.channel for x in labels if x.channel not in used]
+    if left and is_alive(stream, left):
+        names = ", ".join(map(clipped, left[:3])) + (" ..." if len(left) > 3 else "")
+        raise DisasmError(
+            f"{source.path}: has torques that are not in the map: {names}; add them as "
+            "tau, or accept it by `accept_left_out`"
+        )
