@@ -1,12 +1,14 @@
 """A verdict in plain English: a few sentences, and a line for each kind of effect.
 
-The model lacks dry friction at 6 joints. It also lacks an offset of the torque at j2 or
-friction that depends on the direction. With these effects the held-out error falls from
-6.7 to 2.1 % of the torque.
-  JointCoulombFriction of 6 joints  confirmed  size = 3.1 N m (2.9 to 3.3) at j1, ...
-  TorqueOffset.j2                   ambiguous  size = ...; or JointAsymmetricFriction
-to separate rivals, record: rests: an offset is there at rest
-held-out error by channel (1 episode that was not fitted): j1 1.2 -> 0.4 N m, ...
+::
+
+    The model lacks dry friction at 6 joints. It also lacks an offset of the torque at
+    j2 or friction that depends on the direction. With these effects the held-out error
+    falls from 6.7 to 2.1 % of the torque.
+      JointCoulombFriction of 6 joints  confirmed  size = 3.1 N m (2.9 to 3.3) at j1
+      TorqueOffset.j2                   ambiguous  or JointAsymmetricFriction
+    to separate rivals, record: rests: an offset is there at rest
+    held-out error by channel (1 episode that was not fitted): j1 1.2 -> 0.4 N m
 """
 
 from collections.abc import Sequence
