@@ -78,13 +78,15 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     columns = slide_motion()
     recorded = {name: columns[name] for name in ("time", "q", "tau")}
     np.savez(tmp_path / "run.npz", **recorded)
-    np.savetxt(
-        tmp_path / "run.csv",
-        np.stack(list(recorded.values()), 1),
-        delimiter=",",
-        header=",".join(recorded),
-        comments="",
-    )
+    tables = {"run": ("time", "q", "tau"), "q": ("time", "q"), "tau": ("time", "tau")}
+    for name, heads in tables.items():
+        np.savetxt(
+            tmp_path / f"{name}.csv",
+            np.stack([recorded[head] for head in heads], 1),
+            delimiter=",",
+            header=",".join(heads),
+            comments="",
+        )
     texts = {
         "arm.urdf": SLIDE,
         "arm.yaml": _HIDDEN,

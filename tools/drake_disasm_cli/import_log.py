@@ -48,7 +48,7 @@ _EXAMPLES = """examples:
   drake-disasm import-log run.csv --save-map map.yaml --show      then edit it
   drake-disasm import-log run.csv --map map.yaml --out out/from_table
   drake-disasm import-log run.npz --urdf arm.urdf --cutoff 12 --out out/filtered
-  drake-disasm import-log run.csv --preset rtde --urdf ur10e.urdf --out out/ur
+  drake-disasm import-log run.csv --preset fri --urdf arm.urdf --out out/fri
   drake-disasm import-log q.csv tau.csv --join time --out out/joined
 then:
   drake-disasm check-log --log out/log
