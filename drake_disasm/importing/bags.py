@@ -2,7 +2,7 @@
 
 import collections
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sized
 from pathlib import Path
 from typing import Any
 
@@ -188,25 +188,25 @@ def _of_field(child: Any, path: str, names: list[str]) -> Iterator[tuple[str, fl
     if isinstance(child, bool | int | float | np.number):
         yield path, float(child)
     elif isinstance(child, np.ndarray) and child.dtype.kind in "fiub":
-        ends = (
-            names if len(names) == len(child) else [str(i) for i in range(len(child))]
-        )
-        yield from zip((f"{path}.{end}" for end in ends), child.tolist(), strict=True)
+        yield from zip(_paths(path, child, names), child.tolist(), strict=True)
     elif (
         isinstance(child, list) and child and hasattr(child[0], "__dataclass_fields__")
     ):
         # DynamicJointState has each joint's interfaces in a message of their own.
-        ends = (
-            names if len(names) == len(child) else [str(i) for i in range(len(child))]
-        )
-        for end, each in zip(ends, child, strict=True):
-            yield from _numbers(each, f"{path}.{end}")
+        for own, each in zip(_paths(path, child, names), child, strict=True):
+            yield from _numbers(each, own)
     elif hasattr(child, "__dataclass_fields__"):
         # JointTrajectoryControllerState has its points' joints beside them.
         inner = dict(_numbers(child, path))
         if names:
             inner = {_with_joint(key, names): value for key, value in inner.items()}
         yield from inner.items()
+
+
+def _paths(path: str, items: Sized, names: list[str]) -> list[str]:
+    """Returns the path of each item, with its joint's name or its number."""
+    ends = names if len(names) == len(items) else map(str, range(len(items)))
+    return [f"{path}.{end}" for end in ends]
 
 
 def _with_joint(key: str, names: list[str]) -> str:

@@ -350,20 +350,31 @@ def _other_wrenches(source: Source, stream: Stream) -> dict[str, Column]:
 
 
 def _wrench_of(stream: Stream) -> tuple[str, ...] | None:
-    if not stream.name:
-        return _components(stream, _WRENCHES)
-    for prefix in ("wrench.", ""):
-        names = tuple(f"{stream.name}:{prefix}{end}" for end in _WRENCH)
-        if set(names) <= set(stream.names):
-            return names
-    return None
+    return _vector_of(stream, ("wrench.", ""), _WRENCH, _WRENCHES)
 
 
 def _quaternion_of(stream: Stream) -> tuple[str, ...] | None:
+    return _vector_of(stream, ("pose.", ""), _QUATERNION, _QUATERNIONS)
+
+
+def _vector_of(
+    stream: Stream,
+    prefixes: tuple[str, ...],
+    fields: tuple[str, ...],
+    ways: Sequence[tuple[str, ...]],
+) -> tuple[str, ...] | None:
+    """Returns the channels of a vector's components.
+
+    Args:
+        stream: a topic or a table.
+        prefixes: of the fields in a topic's messages.
+        fields: what they are called there.
+        ways: in which they are called in a table.
+    """
     if not stream.name:
-        return _components(stream, _QUATERNIONS)
-    for prefix in ("pose.", ""):
-        names = tuple(f"{stream.name}:{prefix}{end}" for end in _QUATERNION)
+        return _components(stream, ways)
+    for prefix in prefixes:
+        names = tuple(f"{stream.name}:{prefix}{end}" for end in fields)
         if set(names) <= set(stream.names):
             return names
     return None

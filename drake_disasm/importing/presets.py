@@ -34,6 +34,7 @@ class Preset:
         signs: of its quantities, where not the URDF's.
         joints: that it numbers, from the base; () where that differs.
         layout: of a table without names: the time, then these for each joint.
+        has_currents: whether its torques may be motor currents.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Preset:
     signs: Mapping[str, float] = dataclasses.field(default_factory=dict)
     joints: tuple[str, ...] = ()
     layout: tuple[str, ...] = ()
+    has_currents: bool = False
 
     @property
     def all_names(self) -> Names:
@@ -95,7 +97,7 @@ class Preset:
         rows = np.asarray(whole[2:] & whole[1:-1] & whole[:-2] & (step > 0))
         slope = (q[2:] - q[:-2])[rows] / step[rows, None]
         for i in moving if len(slope) > 1 else ():
-            shared = [_product(slope[:, i], v[1:-1][rows, k]) for k in moving]
+            shared = [_correlation(slope[:, i], v[1:-1][rows, k]) for k in moving]
             if max(shared) <= 0.0 or moving[int(np.argmax(shared))] != i:
                 raise DisasmError(
                     f"{source.path}: preset '{self.name}' does not fit: column "
@@ -116,12 +118,12 @@ class Preset:
         if quantity in self.signs:
             scales = (self.signs[quantity],) * len(column.channels)
             column = dataclasses.replace(column, scales=scales)
-        if self.name == "rtde" and quantity == "tau":
+        if self.has_currents and quantity == "tau":
             column = _currents(column, stream)
         return column
 
 
-def _product(one: np.ndarray, other: np.ndarray) -> float:
+def _correlation(one: np.ndarray, other: np.ndarray) -> float:
     """Returns the correlation of two vectors; 0 if one is constant."""
     if not (np.ptp(one) > 0 and np.ptp(other) > 0):
         return 0.0
@@ -197,6 +199,7 @@ _ALL = (
             *("actual_q", "actual_qd", "actual_current"),
             *("target_current", "target_moment"),
         ),
+        has_currents=True,
     ),
     Preset(
         "fri",

@@ -174,11 +174,6 @@ def read(label: Label, names: Names) -> tuple[str, Tokens]:
     return best, rest
 
 
-def joint_number(stream: Stream, name: str, usual: Sequence[str]) -> bool:
-    """Whether a channel is among those that `numbered` finds for a quantity."""
-    return any(label.channel == name for label in numbered(stream, usual))
-
-
 def matched(
     joints: Sequence[str], known: Sequence[Tokens]
 ) -> tuple[list[int], list[str]]:
