@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.effect_selection.forward_selection import wald_p
+from sysid.effect_selection.forward_selection import largest_t_p
 from sysid.effect_selection.linear_account import LinearAccount
 from sysid.fitting.block_grams import Columns, NormalEquations
 
@@ -133,5 +133,5 @@ def _gain(both: NormalEquations, k: int, folds: int) -> tuple[float, float]:
     if not len(copies):
         return 0.0, 1.0
     x, C = left.solution(copies), left.covariance(copies)
-    p = wald_p(x, C, left.degrees_of_freedom)
+    p = largest_t_p(x, C, left.degrees_of_freedom)
     return left.folds(folds).held_out_gain(copies), p

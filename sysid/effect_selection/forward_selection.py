@@ -421,11 +421,11 @@ def p_values(
     found, at = {}, len(base)
     for name, own in owners.items():
         part = slice(at, at := at + len(own))
-        found[name] = wald_p(x[part], C[part, part], small.degrees_of_freedom)
+        found[name] = largest_t_p(x[part], C[part, part], small.degrees_of_freedom)
     return found
 
 
-def wald_p(x: Array, C: Array, nu: int) -> float:
+def largest_t_p(x: Array, C: Array, nu: int) -> float:
     """Returns the p-value that coefficients (k,) with a covariance (k, k) are zero.
 
     The largest of their t-statistics, with nu degrees of freedom, and Bonferroni's
