@@ -48,18 +48,18 @@ from sysid.parameters import Parameter
 Array = NDArray[np.float64]
 
 _NAME = "benchmarks/filtered_intervals.py"
-_JOINTS = ("base", "shoulder", "elbow")
+JOINTS = ("base", "shoulder", "elbow")
 _PERIOD, _SECONDS = 0.002, 20.0
 _HARMONICS = (0.1, 0.2, 0.3, 0.5)  # Hz
 _SWING = 1.0  # rad/s, of all harmonics together
 _QUANTUM = 1e-5  # rad, of an encoder
 _NOISE = 0.5  # N m, white
 #: The first joints' rotors are part of base parameters.
-_EFFECTS: tuple[ArmTorqueEffect, ...] = (
-    *map(JointCoulombFriction, _JOINTS, (8.0, 6.0, 3.0)),
-    *map(JointViscousFriction, _JOINTS, (10.0, 8.0, 4.0)),
-    *map(JointLoadFriction, _JOINTS[1:], (0.08, 0.1)),
-    RotorInertia(_JOINTS[2], 0.5),
+EFFECTS: tuple[ArmTorqueEffect, ...] = (
+    *map(JointCoulombFriction, JOINTS, (8.0, 6.0, 3.0)),
+    *map(JointViscousFriction, JOINTS, (10.0, 8.0, 4.0)),
+    *map(JointLoadFriction, JOINTS[1:], (0.08, 0.1)),
+    RotorInertia(JOINTS[2], 0.5),
 )
 #: What is imported how: with the import's own cut-off, and a lower one [Hz].
 _CUTOFFS: tuple[float | None, ...] = (None, 6.0, 3.0)
@@ -108,13 +108,33 @@ def write_arm(path: Path) -> Path:
         parts.append(
             _LINK.format(
                 i=i, half=length / 2.0, mass=mass, big=big, small=0.2 * big,
-                joint=_JOINTS[i], parent=parent, height=height, axis=axis,
+                joint=JOINTS[i], parent=parent, height=height, axis=axis,
             )
         )  # fmt: skip
         parent, height = f"link_{i}", length
     links = "\n".join(parts)
     path.write_text(f'<robot name="arm"><link name="world_link"/>{links}</robot>')
     return path
+
+
+def recording(
+    urdf: Path, seed: int, period: float = _PERIOD
+) -> tuple[Array, Array, Array]:
+    """Returns times (n,), and positions and torques (n, joints), as measured.
+
+    Args:
+        urdf: of the arm.
+        seed: of the motion and the noise.
+        period: between rows [s].
+    """
+    random = np.random.default_rng(seed)
+    time: Array = period * np.arange(float(round(_SECONDS / period)))
+    q, v, vd = _fourier(random, time)
+    load = ArmDynamics(str(urdf), JOINTS).torques(q, v, vd)
+    samples = ArmSamples(JOINTS, q, v, vd, load)
+    tau = load + sum(effect.torques(samples) for effect in EFFECTS)
+    tau += _NOISE * random.standard_normal(tau.shape)
+    return time, np.round(q / _QUANTUM) * _QUANTUM, tau
 
 
 def record(path: Path, urdf: Path, seed: int) -> Path:
@@ -125,16 +145,9 @@ def record(path: Path, urdf: Path, seed: int) -> Path:
         urdf: of the arm.
         seed: of the motion and the noise.
     """
-    random = np.random.default_rng(seed)
-    time = _PERIOD * np.arange(round(_SECONDS / _PERIOD))
-    q, v, vd = _fourier(random, time)
-    load = ArmDynamics(str(urdf), _JOINTS).torques(q, v, vd)
-    samples = ArmSamples(_JOINTS, q, v, vd, load)
-    tau = load + sum(effect.torques(samples) for effect in _EFFECTS)
-    tau += _NOISE * random.standard_normal(tau.shape)
-    names = [f"{name}.{i}" for name in ("q", "tau") for i in range(len(_JOINTS))]
-    rounded = np.round(q / _QUANTUM) * _QUANTUM
-    table = np.column_stack([time, rounded, tau])
+    time, q, tau = recording(urdf, seed)
+    names = [f"{name}.{i}" for name in ("q", "tau") for i in range(len(JOINTS))]
+    table = np.column_stack([time, q, tau])
     header = ",".join(["time", *names])
     np.savetxt(path, table, "%.9g", ",", header=header, comments="")
     return path
@@ -142,11 +155,11 @@ def record(path: Path, urdf: Path, seed: int) -> Path:
 
 def _fourier(random: np.random.Generator, time: Array) -> tuple[Array, Array, Array]:
     """Returns q, v, vd (n, joints) of a few harmonics."""
-    q, v, vd = np.zeros((3, len(time), len(_JOINTS)))
+    q, v, vd = np.zeros((3, len(time), len(JOINTS)))
     for about in _HARMONICS:
         omega = 2.0 * np.pi * about * random.uniform(0.8, 1.2)
-        speed = random.normal(0.0, 0.5 * _SWING, len(_JOINTS))
-        phase = omega * time[:, None] + random.uniform(0.0, 2.0 * np.pi, len(_JOINTS))
+        speed = random.normal(0.0, 0.5 * _SWING, len(JOINTS))
+        phase = omega * time[:, None] + random.uniform(0.0, 2.0 * np.pi, len(JOINTS))
         q += speed / omega * np.sin(phase)
         v += speed * np.cos(phase)
         vd -= speed * omega * np.sin(phase)
@@ -164,7 +177,7 @@ def imported(table: Path, urdf: Path, folder: Path, cutoff: float | None) -> Log
     """
     source = read_source(table)
     fields = guessed_map(source, "joint_motion")
-    fields = dataclasses.replace(fields, urdf=str(urdf), joints=_JOINTS)
+    fields = dataclasses.replace(fields, urdf=str(urdf), joints=JOINTS)
     found = import_recordings([source], fields, Processing(cutoff))
     write_log(found, [source], fields, folder, {})
     return read_log(folder)
@@ -183,11 +196,11 @@ def fitted(log: Log) -> tuple[Linearisation, list[Parameter]]:
     """
     bare = JointMotionModel([log])
     effects = [
-        dataclasses.replace(effect, **{_field(effect): 0.0}) for effect in _EFFECTS
+        dataclasses.replace(effect, **{_field(effect): 0.0}) for effect in EFFECTS
     ]
     fields = [_field(effect) for effect in effects]
     added = [effect_parameter(effects, i, name) for i, name in enumerate(fields)]
-    noise = np.ones(len(_JOINTS))
+    noise = np.ones(len(JOINTS))
     measured = bare.measurements.with_noise(noise, "the same at all joints")
     objective = Objective(bare.with_measurements(measured).with_effects(effects, added))
     at = linearise(objective, objective.start, central=False)
@@ -204,10 +217,10 @@ def errors(log: Log) -> Errors:
     """Returns how far estimates of all effects are from the truth."""
     at, parameters = fitted(log)
     spread = uncertainty(at, np.zeros(len(at.residual), dtype=np.int64))
-    own = slice(-len(_EFFECTS), None)
+    own = slice(-len(EFFECTS), None)
     scale = np.array([p.high - p.low for p in parameters])
     estimate = np.array([p.low for p in parameters]) + scale * at.u[own]
-    truth = np.array([getattr(effect, _field(effect)) for effect in _EFFECTS])
+    truth = np.array([getattr(effect, _field(effect)) for effect in EFFECTS])
     error = scale * np.sqrt(np.diagonal(spread.bootstrap_covariance)[own])
     low, high = scale * spread.bootstrap[own].T
     off = estimate - truth

@@ -149,5 +149,16 @@ def _done_lines(imported: Imported) -> Iterator[str]:
         f"low-pass of {done.cutoff:.3g} Hz on all columns, without phase shift; v and "
         "vd are its derivatives where they were not recorded"
     )
+    if done.noise:
+        joint = max(done.noise, key=lambda each: done.noise[each])
+        share = f"{100.0 * done.noise[joint]:.2g} %"
+        yield f"noise in the accelerations: at most {share} of their rms (q.{joint})"
+    if done.over_velocity:
+        ratios = done.over_velocity
+        joint = max(ratios, key=lambda each: ratios[each])
+        yield (
+            f"accelerations from positions have at most {ratios[joint]:.3g} times the "
+            f"rms of those from the recorded velocities (q.{joint})"
+        )
     kept = "all others" if done.decimation == 1 else f"one of {done.decimation} others"
     yield f"{done.reach} rows lost at either end; {kept} kept"

@@ -221,6 +221,7 @@ def processing_origin(done: Done) -> dict[str, Any]:
         "rows_lost_at_each_end": done.reach,
         "decimation": done.decimation,
         "recordings_resampled": done.resampled,
+        "noise_in_accelerations": {f"q.{n}": float(s) for n, s in done.noise.items()},
         "quanta": {name: float(step) for name, step in done.quanta.items()},
         "gaps": sum(len(clock.gaps) for clock in done.clocks),
         "rows_lost": sum(clock.lost for clock in done.clocks),

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from drake_disasm.common.files import write_figure
+from drake_disasm.importing.cutoff import motion_spectra
 from drake_disasm.importing.importer import Imported
 from drake_disasm.importing.signals import (
     even_times,
     longest_stretch,
     resample,
-    spectrum_of,
 )
 
 _SHOWN = 2.0  # s
@@ -40,10 +40,9 @@ def plot_import(imported: Imported, path: Path) -> None:
     time = recording.time[longest]
     at = even_times(time)
     q = resample(time, recording.columns["q"][longest], at)
-    for i, column in enumerate(q.T):
-        if np.ptp(column) > 0:
-            own = spectrum_of(column, float(at[1] - at[0]))
-            axes[0].loglog(own.frequency, np.sqrt(own.power), label=f"joint {i}")
+    for own in motion_spectra([q], float(at[1] - at[0])):
+        label = f"joint {own.joint}"
+        axes[0].loglog(own.frequency, np.sqrt(own.density), label=label)
     if math.isfinite(done.cutoff):
         axes[0].axvline(done.cutoff, color="black", linestyle="--", label="cut-off")
     axes[0].set(xlabel="frequency [Hz]", ylabel="acceleration [SI / √Hz]")

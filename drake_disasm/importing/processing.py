@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.importing.cutoff import (
+    MotionSpectrum,
+    chosen_cutoff,
+    motion_spectra,
+)
 from drake_disasm.importing.recording import Recording
 from drake_disasm.importing.signals import (
     Clock,
     LowPass,
-    chosen_cutoff,
     clock_of,
     even_times,
     quantum,
@@ -24,6 +28,7 @@ Array = NDArray[np.float64]
 
 _FEWEST = 4  # rows of a stretch
 _SAME = 1e-3  # by which periods of two recordings may differ
+_BRIDGED = 0.25  # of the cut-off's period: so long a gap hides nothing of what passes
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,6 +72,10 @@ class Done:
         quanta: steps to which columns are rounded, by "q.0"; those that are.
         resampled: recordings that were not sampled evenly.
         short: rows in stretches between gaps that are shorter than the filter.
+        noise: in each joint's acceleration, as a share of its rms, by the joint's
+            number; of those that move.
+        over_velocity: rms of each joint's acceleration by that of the slope of its
+            recorded velocity; empty if that is not recorded.
     """
 
     clocks: tuple[Clock, ...]
@@ -76,6 +85,21 @@ class Done:
     quanta: dict[str, float]
     resampled: int
     short: int = 0
+    noise: dict[int, float] = dataclasses.field(default_factory=dict)
+    over_velocity: dict[int, float] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Stretch:
+    """What was recorded between two gaps.
+
+    Attributes:
+        even: its rows, a period apart.
+        recorded: how many there were.
+    """
+
+    even: Recording
+    recorded: int
 
 
 def process(
@@ -95,18 +119,21 @@ def process(
     """
     clocks = tuple(clock_of(recording.time) for recording in recordings)
     period = float(np.median([clock.period for clock in clocks]))
-    parts = [part for each in recordings for part in _even(each, period)]
-    if not parts:
+    coarse = [_stretches(each, period) for each in recordings]
+    if not any(coarse):
         raise DisasmError(
             f"no stretch of {_FEWEST} rows is without gaps; record without losses"
         )
-    cutoff = _cutoff_of(parts, period, processing)
+    spectra = _spectra(coarse, period)
+    cutoff = _cutoff_of(spectra, period, processing)
     low = LowPass(cutoff, period) if math.isfinite(cutoff) else None
+    bridged = _BRIDGED / cutoff
+    parts = [part for each in recordings for part in _stretches(each, period, bridged)]
     decimation = processing.decimate or (low.decimation if low else 1)
-    found = [_filtered(part, low, decimation) for part in parts]
+    found = [_filtered(part.even, low, decimation) for part in parts]
     kept = [each for each in found if each is not None]
     if not kept:
-        longest = max(len(part.time) for part in parts)
+        longest = max(len(part.even.time) for part in parts)
         raise DisasmError(
             f"no stretch without gaps is longer than the filter: {longest} rows, and "
             f"it takes {2 * low.reach if low else 0}; give a higher `cutoff`, or none"
@@ -119,32 +146,56 @@ def process(
         decimation,
         _quanta(recordings),
         resampled,
-        _short(recordings, parts, found),
+        sum(len(each.time) for each in recordings) - _used(parts, found),
+        _noise(spectra, cutoff),
+        _over_velocity([part.even for part in parts], low),
     )
     return kept, done
 
 
-def _short(
-    recordings: Sequence[Recording],
-    parts: Sequence[Recording],
-    found: Sequence[Processed | None],
-) -> int:
-    """Returns how many rows are in stretches of which nothing is left."""
-    lengths = [
-        rows.stop - rows.start for each in recordings for rows in stretches(each.time)
-    ]
-    tiny = sum(length for length in lengths if length < _FEWEST)
+def _noise(spectra: Sequence[MotionSpectrum], cutoff: float) -> dict[int, float]:
+    """Returns the most noise of all recordings in each joint's acceleration."""
+    found: dict[int, float] = {}
+    for each in spectra:
+        share = each.noise_share(cutoff)
+        found[each.joint] = max(share, found.get(each.joint, 0.0))
+    return found
+
+
+def _over_velocity(parts: Sequence[Recording], low: LowPass | None) -> dict[int, float]:
+    """Returns how positions' accelerations compare to recorded velocities' slopes."""
+    if low is None or "v" not in parts[0].columns:
+        return {}
+    rows = [part.columns for part in parts if len(part.time) > 2 * low.reach]
+    of_q, of_v = (
+        sum(np.sum(low(columns[name], order) ** 2, axis=0) for columns in rows)
+        for name, order in (("q", 2), ("v", 1))
+    )
+    ratios = np.sqrt(of_q / np.maximum(of_v, 1e-300))
+    return {n: float(ratios[n]) for n in range(len(ratios)) if of_v[n] > 0.0}
+
+
+def _used(parts: Sequence[_Stretch], found: Sequence[Processed | None]) -> int:
+    """Returns how many recorded rows are in stretches that are long enough."""
     pairs = zip(parts, found, strict=True)
-    return tiny + sum(len(part.time) for part, kept in pairs if kept is None)
+    return sum(part.recorded for part, kept in pairs if kept is not None)
+
+
+def _spectra(
+    recordings: Sequence[Sequence[_Stretch]], period: float
+) -> list[MotionSpectrum]:
+    """Returns those of the joints that move, of each recording's stretches."""
+    positions = [[part.even.columns["q"] for part in each] for each in recordings]
+    return [one for each in positions if each for one in motion_spectra(each, period)]
 
 
 def _cutoff_of(
-    parts: Sequence[Recording], period: float, processing: Processing
+    spectra: Sequence[MotionSpectrum], period: float, processing: Processing
 ) -> float:
-    """Returns the cut-off [Hz] that is wanted, or that the fastest stretch asks for."""
+    """Returns the cut-off [Hz] that is wanted, or that the motion asks for."""
     cutoff = processing.cutoff
     if cutoff is None:
-        cutoff = max(chosen_cutoff(part.columns["q"], period) for part in parts)
+        cutoff = chosen_cutoff(spectra, period)
     if math.isfinite(cutoff) and cutoff >= 0.5 / period:
         raise DisasmError(
             f"`cutoff` {cutoff:g}: is not below half the sampling rate, "
@@ -153,10 +204,12 @@ def _cutoff_of(
     return cutoff
 
 
-def _even(recording: Recording, period: float) -> list[Recording]:
-    """Returns the stretches between gaps, in rows a period [s] apart."""
+def _stretches(
+    recording: Recording, period: float, bridged: float = 0.0
+) -> list[_Stretch]:
+    """Returns what is between gaps; those up to a time `bridged` [s] are none."""
     found = []
-    for rows in stretches(recording.time):
+    for rows in stretches(recording.time, bridged):
         time = recording.time[rows]
         if len(time) < _FEWEST:
             continue
@@ -166,7 +219,8 @@ def _even(recording: Recording, period: float) -> list[Recording]:
             at = even_times(time, period)
             part = {name: resample(time, values, at) for name, values in part.items()}
             time = at
-        found.append(dataclasses.replace(recording, time=time, columns=part))
+        even = dataclasses.replace(recording, time=time, columns=part)
+        found.append(_Stretch(even, rows.stop - rows.start))
     return found
 
 

@@ -11,10 +11,10 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
 from drake_disasm.cell.parsing import add_model
+from drake_disasm.importing.cutoff import chosen_cutoff, motion_spectra
 from drake_disasm.importing.signals import (
     LARGEST_CUTOFF,
     LowPass,
-    chosen_cutoff,
     even_times,
     longest_stretch,
     resample,
@@ -139,7 +139,7 @@ def motion_features(
     at = even_times(time)
     period = float(at[1] - at[0])
     even = resample(time, q, at)
-    low = LowPass(chosen_cutoff(even, period), period)
+    low = LowPass(chosen_cutoff(motion_spectra([even], period), period), period)
     if len(at) < 4 * low.reach:
         return at, np.ones((len(at), 1)), low.cutoff
     every = low.decimation

@@ -14,18 +14,12 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
-from scipy.signal import oaconvolve, welch
+from scipy.signal import oaconvolve
 
 Array = NDArray[np.float64]
 
 _TRANSITION = 0.8  # of the cut-off: width of the transition band
-LARGEST_CUTOFF = 0.6  # of the Nyquist frequency
-_WINDOW = "blackmanharris"  # a slow motion is 1e9 times as strong as its noise
-_NOISE_BAND = (0.4, 0.9)  # of the Nyquist frequency: noise alone
-_LEAST_SLOPE = 1.0  # exponent below which the record was filtered before
-_CLEARLY = 4.0  # times the noise: twice in amplitude
-_ROOM = 2.0  # times where motion and noise meet
-_SEGMENTS = 8  # of a record, for its spectrum
+LARGEST_CUTOFF = 0.6  # of the Nyquist frequency, of any filter
 _ROWS_PER_PERIOD = 10.0  # of the cut-off, after decimation
 _JITTER = 0.01  # of the period: below it rows are taken as evenly spaced
 _FINE = 16  # points of the continuous kernel between taps
@@ -75,10 +69,15 @@ def clock_of(time: Array) -> Clock:
     )
 
 
-def stretches(time: Array) -> list[slice]:
-    """Returns the rows between gaps of increasing times (n,)."""
-    clock = clock_of(time)
-    ends = np.nonzero(np.diff(time) > _GAP * clock.period)[0] + 1
+def stretches(time: Array, bridged: float = 0.0) -> list[slice]:
+    """Returns the rows between gaps of increasing times (n,).
+
+    Args:
+        time: (n,) [s].
+        bridged: gaps up to this long are none [s].
+    """
+    longest = max(_GAP * clock_of(time).period, bridged)
+    ends = np.nonzero(np.diff(time) > longest)[0] + 1
     edges = [0, *ends, len(time)]
     return [slice(first, end) for first, end in itertools.pairwise(edges)]
 
@@ -160,82 +159,6 @@ class LowPass:
         """Every how many rows hold all that is let through, five times over."""
         rate = _ROWS_PER_PERIOD * self.cutoff
         return max(1, int(1.0 / (rate * self.period)))
-
-
-@dataclasses.dataclass(frozen=True)
-class Spectrum:
-    """Of one position.
-
-    Attributes:
-        frequency: (n,) [Hz].
-        power: (n,) density of the acceleration, smoothed.
-        cutoff: where that is least between motion and noise [Hz].
-    """
-
-    frequency: Array
-    power: Array
-    cutoff: float
-
-
-def spectrum_of(position: Array, period: float) -> Spectrum:
-    """Returns the spectrum of a channel's acceleration, and the cut-off it asks for.
-
-    A motion's acceleration fades towards high frequencies, that of noise grows: with
-    the fourth power of the frequency if it is white, as rounding is. What is found in
-    the upper part of the spectrum is continued downwards by a power law. Beyond the
-    last frequency where there is clearly more than that, the two meet where the
-    spectrum is least. The cut-off is twice that, since friction that changes its sign
-    has edges that a filter rounds. Where noise does not grow the record was filtered
-    before; all of the spectrum is searched then.
-
-    Args:
-        position: (n,), evenly spaced.
-        period: of the rows [s].
-    """
-    n = len(position)
-    line = position[0] + (position[-1] - position[0]) * np.arange(n) / (n - 1)
-    rows = min(n, max(16, 2 * n // (_SEGMENTS + 1)))
-    frequency, power = welch(
-        position - line, 1.0 / period, window=_WINDOW, nperseg=rows
-    )
-    frequency, power = frequency[1:], power[1:]
-    power = _smoothed(frequency, power * (2.0 * np.pi * frequency) ** 4)
-    first = min(_end_of_motion(frequency, power), len(frequency) - 1)
-    cutoff = _ROOM * float(frequency[first + np.argmin(power[first:])])
-    return Spectrum(frequency, power, min(cutoff, LARGEST_CUTOFF * frequency[-1]))
-
-
-def _end_of_motion(frequency: Array, power: Array) -> int:
-    """Returns the number after the last frequency with clearly more than noise."""
-    low, high = (share * frequency[-1] for share in _NOISE_BAND)
-    band = (frequency >= low) & (frequency <= high) & (power > 0.0)
-    if band.sum() < 2:
-        return len(frequency)
-    slope, level = np.polyfit(np.log(frequency[band]), np.log(power[band]), 1)
-    if slope < _LEAST_SLOPE:
-        return 0
-    above = np.flatnonzero(power > _CLEARLY * np.exp(level) * frequency**slope)
-    return int(above[-1]) + 1 if len(above) else 0
-
-
-def _smoothed(frequency: Array, power: Array) -> Array:
-    """Returns the mean over half an octave about each frequency."""
-    ends = np.searchsorted(frequency, np.outer((2.0**-0.25, 2.0**0.25), frequency))
-    total = np.concatenate([[0.0], np.cumsum(power)])
-    low, high = ends[0], np.maximum(ends[1], ends[0] + 1)
-    return (total[high] - total[low]) / (high - low)
-
-
-def chosen_cutoff(values: Array, period: float) -> float:
-    """Returns the cut-off [Hz] that the channel with the fastest motion asks for.
-
-    Args:
-        values: (n, k) positions, evenly spaced.
-        period: of them [s].
-    """
-    largest = LARGEST_CUTOFF * 0.5 / period
-    moving = [column for column in values.T if np.ptp(column) > 0]
-    return max((spectrum_of(c, period).cutoff for c in moving), default=largest)
 
 
 def quantum(values: Array) -> float:

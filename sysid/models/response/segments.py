@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.importing.cutoff import chosen_cutoff, motion_spectra
 from drake_disasm.importing.signals import (
-    chosen_cutoff,
     even_times,
     longest_stretch,
     quantum,
@@ -71,7 +71,8 @@ def reach_of(episodes: Sequence[Episode]) -> float:
         if len(time) > 2 * _LEAST_ROWS:
             even = even_times(time)
             q = resample(time, episode["q"][longest], even)
-            cutoffs.append(chosen_cutoff(q, float(even[1] - even[0])))
+            period = float(even[1] - even[0])
+            cutoffs.append(chosen_cutoff(motion_spectra([q], period), period))
     return 0.25 / max(cutoffs) if cutoffs else 0.0
 
 

@@ -35,25 +35,6 @@ def test_what_is_beyond_the_cutoff_is_gone_and_below_it_there() -> None:
     assert np.abs(low(fast)).max() < 3e-3
 
 
-def test_the_cutoff_is_where_motion_and_noise_meet() -> None:
-    random, t = np.random.default_rng(3), 0.002 * np.arange(20_000)
-    motion = sum(np.sin(2.0 * np.pi * f * t) / f**2 for f in (0.3, 1.1, 2.7, 5.2))
-    for noise in (1e-6, 1e-4):
-        q = motion + noise * random.standard_normal(len(t))
-        assert 5.2 < signals.chosen_cutoff(q[:, None], 0.002) < 30.0
-    rounded = np.round(motion / 1e-3) * 1e-3
-    assert 5.2 < signals.chosen_cutoff(rounded[:, None], 0.002) < 30.0
-
-
-def test_joints_that_rest_don_t_choose_the_cutoff() -> None:
-    t = 0.01 * np.arange(1000)
-    random = np.random.default_rng(1)
-    q = np.stack([np.sin(t) + 1e-5 * random.standard_normal(1000), np.zeros(1000)], 1)
-    assert (
-        signals.chosen_cutoff(q, 0.01) == signals.chosen_cutoff(q[:, :1], 0.01) < 25.0
-    )
-
-
 def test_a_clock_s_gaps_losses_and_jitter_are_told_apart() -> None:
     steps = np.full(1000, 0.01)
     steps[100], steps[500] = 0.02, 0.5
