@@ -14,13 +14,14 @@ from sysid.data_checks.constancy import (
 )
 from sysid.data_checks.contradictions import contradicting_rows
 from sysid.data_checks.delays import delay_findings
-from sysid.data_checks.derivatives import derivative_findings
+from sysid.data_checks.derivatives import derivative_findings, limit_findings
 from sysid.data_checks.expectation import expectation_of
 from sysid.data_checks.finding import DataFinding, Severity
 from sysid.data_checks.processing import processing_findings
 from sysid.data_checks.settings import DEFAULT_DATA_SETTINGS, DataSettings
 from sysid.data_checks.spikes import spike_findings
 from sysid.data_checks.subject import Subject, kept_rows
+from sysid.data_checks.torques import torque_findings
 from sysid.data_checks.units import log_unit_findings, predicted_unit_findings
 from sysid.models.base import LogModel
 from sysid.workers import Workers
@@ -73,9 +74,12 @@ def check_data(
     found += dead_channels(model, settings)
     if not _is_refused(found):
         expected = expectation_of(model, settings, workers or Workers())
+        found += limit_findings(subject)
         found += predicted_unit_findings(subject, expected)
         if not _is_refused(found):  # the rest takes the scale as it is
             found += [f for check in _OF_MODEL for f in check(subject, expected)]
+        if not _is_refused(found):  # and the order
+            found += torque_findings(subject, expected)
     return tuple(sorted(found, key=lambda f: f.severity is not Severity.REFUSE))
 
 

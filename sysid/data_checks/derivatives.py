@@ -1,4 +1,4 @@
-"""Velocities that contradict the positions, and accelerations the velocities."""
+"""Velocities and accelerations that contradict each other, or the arm's limits."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,6 +7,8 @@ from drake_disasm.logs import Episode
 from sysid.data_checks.finding import DataFinding, rows_of
 from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject
+from sysid.models.arm_plant import ArmPlant
+from sysid.models.joint_motion import JointMotionModel
 
 _PAIRS = (
     ("q", "v", "velocities", "positions"),
@@ -36,6 +38,30 @@ def derivative_findings(subject: Subject) -> list[DataFinding]:
             what = f"{rates} are not the derivatives of the {columns} at these rows"
             found.append(DataFinding("derivatives", what, _REMEDY, rows=rows))
     return found
+
+
+def limit_findings(subject: Subject) -> list[DataFinding]:
+    """Finds speeds and accelerations beyond the limits that the URDF states."""
+    model = subject.model
+    if not isinstance(model, JointMotionModel):
+        return []
+    plant = ArmPlant.of(model.urdf, model.joints).plant
+    found = []
+    for number, name in enumerate(model.joints):
+        joint = plant.GetJointByName(name)
+        limits = {
+            "v": float(joint.velocity_upper_limits()[0]),
+            "vd": float(joint.acceleration_upper_limits()[0]),
+        }
+        for column, limit in limits.items():
+            most = float(np.abs(subject.column(f"{column}.{number}")).max())
+            if limit > 0.0 and most > limit:
+                found.append(f"{column}.{number} ({name}) {most:.3g} of {limit:.3g}")
+    if not found:
+        return []
+    what = f"motion is beyond the limits of the URDF: {', '.join(found)}"
+    remedy = "look at the units, the cut-off of the import, and the URDF's limits"
+    return [DataFinding("limits", what, remedy)]
 
 
 def _contradicting(

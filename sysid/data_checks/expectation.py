@@ -103,12 +103,22 @@ class FittedExpectation(Expectation):
         ]
         shape = (*self.nominal.shape, 0)
         own = np.stack(columns, axis=-1) if columns else np.zeros(shape)
+        self._thin = thin
         self._columns = np.concatenate([own, _friction(thin)], axis=-1)
         self.scale = np.ones(len(measured.channels))
         values = measured.values[self.rows]
         self._scale_by(_rms(values - values.mean(axis=0)))
         left = _rms(self.residual(values))
         self._scale_by(np.maximum(left, _EXACT) * self.scale)
+
+    def friction(self, channel: int) -> Array:
+        """Returns a channel's offset and friction (n, k) at `rows`, of unit size."""
+        return _friction_of(self._thin, channel)
+
+    def columns(self, channel: int) -> Array:
+        """Returns all that the fit may have of a channel (n, k) at `rows`."""
+        found = self._columns[:, channel]
+        return found[:, found.any(axis=0)]
 
     def _scale_by(self, scale: Array) -> None:
         """Sets the scale, with its inverse products of the columns."""

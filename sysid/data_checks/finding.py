@@ -18,6 +18,7 @@ KINDS: Mapping[str, str] = {
     "constant": "a channel never changes, where it should",
     "derivatives": "velocities or accelerations are not the derivatives",
     "late": "a channel is late by whole rows",
+    "limits": "speeds or accelerations beyond what the URDF's limits permit",
     "moving": "readings at rest that move",
     "processing": "wrench is not ft_sensor processed",
     "quantum": "a channel comes in steps coarser than its noise",
@@ -25,6 +26,7 @@ KINDS: Mapping[str, str] = {
     "stuck": "a channel repeats a value over many rows",
     "time": "time jumps, stands, or is not in step with the period",
     "units": "a quantity that is not SI",
+    "unrelated": "a torque that shows nothing of its joint's motion",
 }
 #: Kinds with which data may be fitted all the same; nothing fits a dead channel.
 ACCEPTABLE = tuple(kind for kind in KINDS if kind != "constant")

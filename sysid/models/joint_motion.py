@@ -138,6 +138,11 @@ class JointMotionModel(LogModel):
         return {joint: inputs_of(samples, joint) for joint in samples.joints}
 
     @property
+    def urdf(self) -> str:
+        """The arm's, as `package://` or a path."""
+        return self._urdf
+
+    @property
     def travel(self) -> dict[str, float]:
         """See LogModel."""
         return travel_of(self.joints, self._motion.q)

@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     ArmEffect,
     ArmTorqueEffect,
@@ -61,6 +62,7 @@ _LATEST = 0.05  # s, of a goal
 _TRIED = 21  # delays of the goal, evenly spaced, that the guess is made of
 _MANY = 5.0  # times the greatest torque of the rigid bodies, at most, by any effect
 _CLEARLY = 0.1  # of what one kind of controller leaves, at most, if it is the other
+_FOLLOWS = 0.1  # of a motion's spread: a joint that errs by less does what it is told
 _MOST_ROWS = 2000  # that the guess is made of
 
 
@@ -218,14 +220,7 @@ class JointResponseModel(LogModel):
         for i, joint in enumerate(self._joints):
             k, d = float(guess.stiffness[i]), float(guess.damping[i])
             if not k > 0.0:
-                raise refusal(
-                    logs[0].folder,
-                    f"joint '{joint}' does not follow 'q_commanded.{i}'",
-                    self.assumptions[0].remedy
-                    if self.assumptions
-                    else "check signs and units of both, the gain, and that the joint "
-                    "carries something by the URDF",
-                )
+                raise self._not_driven(i, episodes, logs)
             unit, of_damping = "N m/rad", "N m s/rad"
             if joint in self._prismatic:
                 unit, of_damping = prismatic_unit(unit), prismatic_unit(of_damping)
@@ -246,6 +241,33 @@ class JointResponseModel(LogModel):
             "delay", guess.delay, 0.0, _LATEST, "s", "of what is commanded"
         )
         return (*found, delay)
+
+    def _not_driven(
+        self, number: int, episodes: Sequence[Episode], logs: Sequence[Log]
+    ) -> DisasmError:
+        """Returns why a joint has no stiffness: it follows at once, or not at all."""
+        where = logs[0].folder
+        goal, q = (
+            np.concatenate([e[name] for e in episodes]) for name in ("q_commanded", "q")
+        )
+        error, spread = np.sqrt(np.mean((q - goal) ** 2, axis=0)), q.std(axis=0)
+        if np.linalg.norm(error) < _FOLLOWS * np.linalg.norm(spread):
+            apart = f"{1e3 * error.min():.2g} to {1e3 * error.max():.2g}"
+            return refusal(
+                where,
+                f"joints follow what is commanded within {apart} mrad (mm) rms: this "
+                "log says nothing of stiffness, friction or load",
+                "record motor currents or joint torques, and import them as kind "
+                "joint_motion",
+            )
+        return refusal(
+            where,
+            f"joint '{self._joints[number]}' does not follow 'q_commanded.{number}'",
+            self.assumptions[0].remedy
+            if self.assumptions
+            else "check signs and units of both, the gain, and that the joint carries "
+            "something by the URDF",
+        )
 
     # Effects.
 

@@ -13,7 +13,7 @@ LINK = """<link name="{0}"><inertial><origin xyz="{1}"/><mass value="{2}"/>
 </inertial></link>"""
 JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>
 <origin xyz="{3}" rpy="{4}"/><axis xyz="0 0 1"/>
-<limit lower="-3" upper="3" velocity="3" effort="99"/></joint>"""
+<limit lower="-3" upper="3" velocity="20" effort="99"/></joint>"""
 
 
 def write_two_link_arm(path: Path, more: str = "") -> Path:

@@ -126,6 +126,10 @@ def test_degrees_and_a_wrong_sign_are_found(log, tmp_path):
     degrees = rewritten(log, tmp_path / "degrees", q=np.rad2deg(q))
     findings = check_data([degrees], JointResponseModel([degrees]))
     assert any("57" in f.what or "degrees" in f.what for f in findings)
+    goal = log.episodes[0]["q_commanded"]
+    near = rewritten(log, tmp_path / "near", q=goal + 0.01 * (goal - q))
+    with refused("says nothing of stiffness"):
+        JointResponseModel([near])
     mirrored = rewritten(log, tmp_path / "mirrored", q=-q)
     with refused("does not follow"):
         JointResponseModel([mirrored])

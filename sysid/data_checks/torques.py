@@ -1,0 +1,92 @@
+"""Torques of an arm that are no torques of its joints: amperes, or another channel's."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sysid.data_checks.expectation import Expectation, FittedExpectation
+from sysid.data_checks.finding import DataFinding
+from sysid.data_checks.settings import DataSettings
+from sysid.data_checks.subject import Subject
+from sysid.models.base import Array
+
+_SURROGATES = 39  # of which a channel of its joint is above all but two, 95 %
+_PLACED = 0.95
+
+
+def torque_findings(subject: Subject, expected: Expectation) -> list[DataFinding]:
+    """Finds torques of another scale than the URDF's, or that show no motion."""
+    if not isinstance(expected, FittedExpectation) or not subject.is_of_joints:
+        return []
+    measured = subject.model.measurements
+    names = [channel.name for channel in measured.channels]
+    values = measured.values[expected.rows]
+    found = _of_another_scale(names, values, expected, subject.settings)
+    if len(values) > subject.settings.dead_channel_rows:
+        found += _of_another_joint(names, values, expected, subject.settings)
+    return found
+
+
+def _of_another_scale(
+    names: Sequence[str],
+    values: Array,
+    expected: FittedExpectation,
+    settings: DataSettings,
+) -> list[DataFinding]:
+    """Compares torques (n, joints) with what the URDF's masses take.
+
+    Only of joints at which these show beside friction and an offset. All of them must
+    be off in the same way: single links of a URDF may be placeholders.
+    """
+    scales = {}
+    for number, name in enumerate(names):
+        both = np.column_stack([expected.nominal[:, number], values[:, number]])
+        own = expected.friction(number)
+        both = both - own @ np.linalg.lstsq(own, both, rcond=None)[0]
+        norm, size = np.linalg.norm(both, axis=0)
+        product = float(both[:, 0] @ both[:, 1])
+        if abs(product) > settings.unit_correlation * norm * size:
+            scales[name] = abs(product) / norm**2
+    if not scales:
+        return []
+    low, high = min(scales.values()), max(scales.values())
+    if high * settings.unit_band > 1.0 and low < settings.unit_band:
+        return []
+    what = (
+        f"torques are {low:.2g} to {high:.2g} times what the URDF's masses take "
+        f"({', '.join(scales)}): motor currents [A], or another arm's URDF?"
+    )
+    remedy = "give the motor constants [N m/A] as `scale` in the map, or the arm's URDF"
+    return [DataFinding("units", what, remedy)]
+
+
+def _of_another_joint(
+    names: Sequence[str],
+    values: Array,
+    expected: FittedExpectation,
+    settings: DataSettings,
+) -> list[DataFinding]:
+    """Finds torques that their joint's motion does not explain.
+
+    It explains them no better than at other times (surrogates: Theiler et al., 1992),
+    or far less than another joint's does.
+    """
+    spans = [np.linalg.qr(expected.columns(n))[0] for n in range(len(names))]
+    shifts = np.linspace(0, len(values), _SURROGATES + 2)[1:-1].astype(int)
+    found = {}
+    for number in np.flatnonzero(np.ptp(values, axis=0) > 0.0):
+        torque = values[:, number] - values[:, number].mean()
+        moved = np.stack([np.roll(torque, shift) for shift in shifts], axis=1)
+        by_chance = np.sum((spans[number].T @ moved) ** 2, axis=0)
+        left = [np.linalg.norm(torque - Q @ (Q.T @ torque)) for Q in spans]
+        own, best = left[number], int(np.argmin(left))
+        if np.mean(by_chance < torque @ torque - own**2) < _PLACED:
+            found[names[number]] = "nothing"
+        elif left[best] < settings.explained * own:
+            found[names[number]] = f"that of {names[best]}"
+    if not found:
+        return []
+    words = ", ".join(f"of {name} {motion}" for name, motion in found.items())
+    what = f"torques show another motion than their joint's: {words}"
+    remedy = "look whether the channel is this joint's, and whether it is alive"
+    return [DataFinding("unrelated", what, remedy)]
