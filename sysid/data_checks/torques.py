@@ -1,4 +1,4 @@
-"""Torques of an arm that are no torques of its joints: amperes, or another channel's."""
+"""Torques of an arm that are none of its joints: amperes, or another channel's."""
 
 from collections.abc import Sequence
 
@@ -74,7 +74,7 @@ def _of_another_joint(
     spans = [np.linalg.qr(expected.columns(n))[0] for n in range(len(names))]
     shifts = np.linspace(0, len(values), _SURROGATES + 2)[1:-1].astype(int)
     found = {}
-    for number in np.flatnonzero(np.ptp(values, axis=0) > 0.0):
+    for number in np.flatnonzero(np.ptp(values, axis=0) > 0.0).tolist():
         torque = values[:, number] - values[:, number].mean()
         moved = np.stack([np.roll(torque, shift) for shift in shifts], axis=1)
         by_chance = np.sum((spans[number].T @ moved) ** 2, axis=0)
