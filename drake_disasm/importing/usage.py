@@ -98,14 +98,37 @@ def check_torques(source: Source, fields: FieldMap) -> None:
     """
     if fields.kind != "joint_motion" or "tau" in fields.columns:
         return
-    used = {name for column in fields.columns.values() for name in column.channels}
-    stream = source.stream_of(next(iter(fields.columns.values())).channels[0])
+    used, stream = _used(fields), source.stream_of(_first(fields))
     by_name = named(stream, "tau", NAMES)
     labels = numbered(stream, NAMES["tau"]) + [x for k in by_name.values() for x in k]
     left = [x.channel for x in labels if x.channel not in used]
     if left and is_alive(stream, left):
-        names = ", ".join(map(clipped, left[:3])) + (" ..." if len(left) > 3 else "")
         raise DisasmError(
-            f"{source.path}: has torques that are not in the map: {names}; add them as "
-            "tau, or accept it by `accept_left_out`"
+            f"{source.path}: has torques that are not in the map: {_some(left)}; add "
+            "them as tau, or accept it by `accept_left_out`"
         )
+
+
+def without_torques(source: Source, fields: FieldMap) -> str:
+    """Returns what a log of joint motion without torques is not good for, or ""."""
+    if fields.kind != "joint_motion" or "tau" in fields.columns:
+        return ""
+    stream, used = source.stream_of(_first(fields)), _used(fields)
+    left = [n for n in stream.names if n not in used and is_alive(stream, [n])]
+    words = "the log has no torques, without which no effect can be found"
+    if not left:
+        return words
+    return (
+        f"{words}; not used: {_some(left)}; if these are torques, save the map by "
+        "`save_map` and name them there as tau"
+    )
+
+
+def _first(fields: FieldMap) -> str:
+    """Returns the first channel of a map."""
+    return next(iter(fields.columns.values())).channels[0]
+
+
+def _some(names: list[str]) -> str:
+    """Returns the first names of a list, in words."""
+    return ", ".join(map(clipped, names[:3])) + (" ..." if len(names) > 3 else "")

@@ -40,6 +40,7 @@ from drake_disasm.importing.joining import WAYS, joined
 from drake_disasm.importing.lerobot import calibrated
 from drake_disasm.importing.plots import plot_import
 from drake_disasm.importing.presets import PRESETS
+from drake_disasm.importing.usage import without_torques
 from drake_disasm.logs.header import HEADER_NAME, read_header
 
 _EXAMPLES = """examples:
@@ -211,6 +212,8 @@ def main(arguments: Sequence[str]) -> int:
     if imported.done:
         plot_import(imported, args.out / "import.png")
     print(program.with_options(summary(imported)))
+    if words := without_torques(sources[0], fields):
+        print(program.with_options(words))
     print(f"log: {args.out}")
     return 0
 

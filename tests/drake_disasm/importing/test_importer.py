@@ -1,5 +1,6 @@
 """From recordings to logs: maps, guesses, time lines, and what stands in the log."""
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from drake_disasm.importing import (
 from drake_disasm.importing.field_map import Column, parse_map
 from drake_disasm.importing.shift import link_features
 from drake_disasm.importing.source import Source
+from drake_disasm.importing.usage import without_torques
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import load_scenario
 from tests.drake_disasm.importing.bag import motion, record_arm
@@ -328,3 +330,14 @@ def test_a_bench_in_the_urdf_is_not_what_the_sensor_carries(tmp_path: Path) -> N
     found = [link_features(urdf, joints)(q, v, vd) for urdf in (str(path), arm)]
     np.testing.assert_allclose(*found, atol=1e-9)
     assert np.ptp(found[0], axis=0)[1:].min() > 0.1  # it moves
+
+
+def test_a_log_without_torques_says_what_was_not_used(tmp_path: Path) -> None:
+    t = 0.01 * np.arange(500)
+    wave = np.sin(t)
+    source = _csv(tmp_path / "run.csv", ("time", "q_0", "t_0"), t, wave, 3.0 * wave)
+    fields = guessed_map(source, "joint_motion")
+    assert "not used: t_0" in without_torques(source, fields)
+    column = {"tau": Column(("t_0",))}
+    whole = dataclasses.replace(fields, columns={**fields.columns, **column})
+    assert without_torques(source, whole) == ""
