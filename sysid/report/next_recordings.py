@@ -47,12 +47,12 @@ class LimitRow:
     shapes: tuple[str, ...]
 
 
-def recordings(verdict: Verdict, at_task: bool) -> list[Recording]:
+def recordings(verdict: Verdict, setting: str) -> list[Recording]:
     """Returns what to record next, the most urgent first.
 
     Args:
         verdict: of a search.
-        at_task: whether its log is of steps of the task.
+        setting: in which its log was recorded, see `LogModel`.
     """
     lines, found = kind_lines(verdict), []
     for each in (line for line in lines if line.rivals):
@@ -60,13 +60,13 @@ def recordings(verdict: Verdict, at_task: bool) -> list[Recording]:
         purpose = f"whether it is {enumeration(names, 'or')}"
         found += [Recording(purpose, text) for text in each.experiments]
     for each in (line for line in lines if line.status == "suggested"):
-        if text := revealing_kind(each.names[0], at_task):
+        if text := revealing_kind(each.names[0], setting):
             purpose = f"whether it is {in_words(each.names[0])} at all"
             found.append(Recording(purpose, text))
     found += [
         Recording(f"{in_words(kind)}, which this log could not have shown", text)
         for kind in verdict.undetectable
-        if (text := revealing_kind(kind, at_task))
+        if (text := revealing_kind(kind, setting))
     ]
     return list(dict.fromkeys(found))
 
