@@ -330,14 +330,18 @@ def _time_and_unit(
         )
     said = next(x.unit for x in labels_of(stream) if x.channel == name)
     unit = said or (known.preset.time_unit if known.preset else "")
-    return name, unit or unit_of_times(stream.channels[name])
+    return name, unit or unit_of_times(stream.channels[name], may_be_ordered(kind))
 
 
-def unit_of_times(values: np.ndarray) -> str:
-    """Returns the unit in which most steps of times (n,) are of a usual size."""
-    step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
-    for unit, most in (("s", 0.5), ("ms", 500.0), ("us", 5e5)):
-        if step < most:
+def unit_of_times(values: np.ndarray, at_rest: bool = False) -> str:
+    """Returns the unit in which most steps of times (n,) are of a usual size.
+
+    Of readings at rest, that in which they take from half a minute to eight hours.
+    """
+    steps = np.diff(values) if len(values) > 1 else np.zeros(1)
+    size, most = (np.sum(steps), 3e4) if at_rest else (np.median(steps), 0.5)
+    for unit, factor in (("s", 1.0), ("ms", 1e3), ("us", 1e6)):
+        if size < most * factor:
             return unit
     return "ns"
 

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effect_class, enumeration, in_words
 from sysid.effect_selection.experiments import revealing_kind
@@ -89,7 +91,8 @@ def _limit_row(kind: str, field: str, limits: list[DetectionLimit]) -> LimitRow:
         if limit.amplitude is not None
     )
     hidden = [x.effect.partition(".")[2] for x in limits if x.amplitude is None]
-    units = " or ".join(dict.fromkeys(limit.unit for limit in limits))
+    own = [limit for limit in limits if np.isfinite(limit.share)] or limits
+    units = " or ".join(dict.fromkeys(limit.unit for limit in own))
     least, greatest = (found[0], found[-1]) if found else (None, None)
     shapes = dict.fromkeys(x.shape for x in limits if x.shape and x.amplitude)
     return LimitRow(
