@@ -61,7 +61,7 @@ class JointMotionModel(LogModel):
     of_base: ClassVar[str] = "not a base parameter of this arm"
     kind: ClassVar[str] = "joint_motion"
     effect_types = IN_TORQUES
-    residual_effect = ArmResidualModel
+    residual_effect: ClassVar[type[Effect] | None] = ArmResidualModel
 
     def __init__(
         self,

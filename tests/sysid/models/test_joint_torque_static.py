@@ -164,3 +164,22 @@ def test_refuses_a_log_of_motion(tmp_path):
     )
     with refused("'joint_motion'", "'joint_torque_static'"):
         JointTorqueStaticModel([log])
+
+
+def test_a_base_on_the_wall_is_seen_in_torques_at_rest(tmp_path):
+    """By fits in which velocities, and all torques of motion, are columns of zeros."""
+    q = iiwa_poses(40, seed=0)
+    tau = iiwa_weight(q, gravity=(GRAVITY, 0.0, 0.0))
+    tau += 0.1 * np.random.default_rng(5).standard_normal(tau.shape)
+    log = write_rests(tmp_path / "log", IIWA, IIWA_JOINTS, q, tau)
+    [way] = model_of([log], ModelChoice()).bookkeeping()
+    assert way.name == "GravityDirection" and "by 90 degrees" in way.what
+
+
+def test_positions_in_degrees_are_known_at_rest(tmp_path):
+    q = iiwa_poses(10, seed=0)
+    log = write_rests(
+        tmp_path / "log", IIWA, IIWA_JOINTS, np.degrees(q), iiwa_weight(q)
+    )
+    [way] = model_of([log], ModelChoice()).bookkeeping()
+    np.testing.assert_allclose(nominal(way.model), iiwa_weight(q), atol=1e-9)
