@@ -55,11 +55,15 @@ class JointMotionModel(LogModel):
     after the base parameters. Where a log's provenance states a low-pass filter,
     effects' torques pass through it that are not linear in the motion, see
     FilteredTorques.
+
+    Attributes:
+        kind: of the logs.
+        of_base: what is said of a name that is no base parameter's.
     """
 
     affine = True
-    of_base: ClassVar[str] = "not a base parameter of this arm"
     kind: ClassVar[str] = "joint_motion"
+    of_base: ClassVar[str] = "not a base parameter of this arm"
     effect_types = IN_TORQUES
     residual_effect: ClassVar[type[Effect] | None] = ArmResidualModel
 

@@ -55,17 +55,15 @@ class JointTorqueStaticModel(JointMotionModel):
     from the other side, it is less or has the other sign. Of a joint that has not moved
     since the pose before, and in an episode's first pose, the sign is unknown, and
     taken for zero. Poses that are reached from both sides show it: the mean of the two
-    torques is gravity, half their difference friction (as in Lin et al. 2019, "A
-    reliable gravity compensation control strategy for dVRK robotic arms with nonlinear
-    disturbance forces", and Liu and Quach 2001, "Estimation and compensation of gravity
-    and friction forces for robot arms").
+    torques is gravity, half their difference friction (as Lin et al. 2019 record them,
+    "A reliable gravity compensation control strategy for dVRK robotic arms with
+    nonlinear disturbance forces").
     """
 
     kind = "joint_torque_static"
     setting = "rest"
     residual_effect = None
     shown_elsewhere = (*_OF_MOTION, JointElasticity, EncoderError)
-
     of_base = "not a base parameter of this arm at rest, which shows no inertias"
 
     def __init__(
@@ -95,12 +93,15 @@ class JointTorqueStaticModel(JointMotionModel):
 
     @staticmethod
     def _motions(logs: Sequence[Log]) -> Sequence[Motion]:
-        """See JointMotionModel; an order stands in for times."""
-        episodes = [e for log in logs for e in log.episodes]
-        clocks = [e["time"] if "time" in e else e["order"] for e in episodes]
+        """See JointMotionModel; nothing moves, and an order stands in for times."""
         return [
-            {"time": clock, "q": episode["q"]}
-            for clock, episode in zip(clocks, episodes, strict=True)
+            {
+                "time": episode["time" if "time" in episode else "order"],
+                "q": episode["q"],
+                **dict.fromkeys(("v", "vd"), np.zeros_like(episode["q"])),
+            }
+            for log in logs
+            for episode in log.episodes
         ]
 
     @staticmethod
@@ -115,14 +116,9 @@ class JointTorqueStaticModel(JointMotionModel):
         joints: Sequence[str],
         motions: Sequence[Motion],
     ) -> ArmMotion:
-        """See JointMotionModel; nothing moves, whatever velocities there are."""
-        still = [
-            {"time": each["time"], "q": each["q"]}
-            | dict.fromkeys(("v", "vd"), np.zeros_like(each["q"]))
-            for each in motions
-        ]
+        """See JointMotionModel."""
         came = np.concatenate([arrivals(each["q"]) for each in motions])
-        found = ArmMotion.of(arm, base, joints, still)
+        found = ArmMotion.of(arm, base, joints, motions)
         return dataclasses.replace(found, dry_v=_ARRIVAL * came)
 
     def _on_arm(self, theta: Array) -> list[ArmEffect]:

@@ -140,6 +140,24 @@ def test_dry_friction_at_all_joints_is_named_with_its_size(small_arm):
     assert [v.value for v in sizes] == pytest.approx([0.3, 0.3], abs=0.03)
 
 
+def test_from_one_side_friction_is_an_offset_as_well(tmp_path):
+    urdf = write_two_link_arm(tmp_path / "two.urdf")
+    random = np.random.default_rng(1)
+    q = np.column_stack([np.linspace(-1.5, 1.5, 80), random.uniform(-1.5, 1.5, 80)])
+    bare = write_rests(tmp_path / "bare", urdf, JOINTS, q, np.cos(q))
+    model = model_of([bare], ModelChoice())
+    tau = model.predictions(np.array([p.nominal for p in model.parameters]))
+    tau[:, 0] += 0.3 * arrivals(q)[:, 0]
+    tau += 0.03 * random.standard_normal(q.shape)
+    log = write_rests(tmp_path / "log", urdf, JOINTS, q, tau)
+    found = close_loop(model_of([log], ModelChoice()))
+    either = {
+        f"{kind}.{JOINTS[0]}" for kind in ("JointCoulombFriction", "TorqueOffset")
+    }
+    assert either <= named(found.verdict) and not found.verdict.confirmed
+    assert "reached from both sides" in found.text
+
+
 def test_rests_that_are_far_apart_in_time_are_no_jumps(small_arm):
     q, log = small_arm
     time = np.cumsum(np.random.default_rng(1).uniform(1.0, 60.0, len(q)))
