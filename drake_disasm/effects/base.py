@@ -147,6 +147,7 @@ class Effect:
         experiment: the recording that shows it apart from others, in words.
         task_experiment: the same in steps of the task, if that is no recording of
             these: readings at rest, say.
+        rest_experiment: the same of an arm at rest, if that is a motion.
         experiments_against: what separates it from a rival, by the rival's name; one
             of the two need say it.
     """
@@ -157,6 +158,7 @@ class Effect:
     noun: ClassVar[str] = ""
     experiment: ClassVar[str] = ""
     task_experiment: ClassVar[str] = ""
+    rest_experiment: ClassVar[str] = ""
     experiments_against: ClassVar[Mapping[str, str]] = {}
 
     @property
@@ -406,11 +408,14 @@ class ArmEffect(Effect):
             sensors alone.
         needs_both_ways: whether only motion of its joint in both directions can show
             what it is.
+        is_dry: whether it depends on the direction of the velocity alone, once that is
+            above creeping: at rest it keeps the direction from which its joint came.
     """
 
     is_common: ClassVar[bool] = True
     moves_the_arm: ClassVar[bool] = True
     needs_both_ways: ClassVar[bool] = False
+    is_dry: ClassVar[bool] = False
 
     @classmethod
     def least_shapes(cls, travel: float) -> dict[str, float]:

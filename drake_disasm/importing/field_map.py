@@ -171,7 +171,7 @@ class FieldMap:
             )
         if self.rate is not None and self.time is not None:
             raise DisasmError("map: time has a rate and a channel; give one of them")
-        if self.is_order and not _may_be_ordered(self.kind):
+        if self.is_order and not may_be_ordered(self.kind):
             raise DisasmError(
                 f"map: a {self.kind} log needs times, not an order; give time: {{from: "
                 "NAME} or time: {rate: HZ}"
@@ -293,7 +293,7 @@ def _time(values: Mapping[str, Any]) -> Mapping[str, Any]:
     return {"unit": "1"} | ({"from": names[0]} if names else {})
 
 
-def _may_be_ordered(kind: str) -> bool:
+def may_be_ordered(kind: str) -> bool:
     """Whether rows of a kind of log may have an order in place of times."""
     return any(q.name == "order" for q in KINDS[kind].quantities)
 

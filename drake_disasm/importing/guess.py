@@ -8,7 +8,7 @@ import numpy as np
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.text import clipped
-from drake_disasm.importing.field_map import Column, FieldMap
+from drake_disasm.importing.field_map import Column, FieldMap, may_be_ordered
 from drake_disasm.importing.presets import Preset
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stream import Stream
@@ -44,9 +44,12 @@ _QUATERNIONS = (
 #: What is looked for, by the kind of log.
 _OF_JOINTS = {
     "joint_motion": ("q", "tau"),
+    "joint_torque_static": ("q", "tau"),
     "joint_response": ("q", "q_commanded", "supply", "enabled"),
 }
 _SCALARS = ("supply", "enabled")
+#: What some kinds need besides positions, in words.
+_NEEDED = {"q_commanded": "commanded joint positions", "tau": "joint torques"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -166,11 +169,10 @@ def _of_joints(source: Source, known: Known, kind: str) -> FieldMap:
             stream, columns, joints = each, found, names
     if stream is None:
         raise NoGuessError(source.path, _why_no_positions(known, reasons))
-    if kind == "joint_response" and "q_commanded" not in columns:
-        raise NoGuessError(
-            source.path, "no channel is called as commanded joint positions are"
-        )
-    time, unit = _time_and_unit(stream, known, source)
+    for name, words in _NEEDED.items():
+        if KINDS[kind].needs(name) and name not in columns:
+            raise NoGuessError(source.path, f"no channel is called as {words} are")
+    time, unit = _time_and_unit(stream, known, source, kind)
     return FieldMap(
         kind=kind,
         columns=columns | _other_wrenches(source, stream),
@@ -308,15 +310,19 @@ def time_label(stream: Stream, known: Known) -> str | None:
 
 
 def _time_and_unit(
-    stream: Stream, known: Known, source: Source
+    stream: Stream, known: Known, source: Source, kind: str
 ) -> tuple[str | None, str]:
     """Returns the channel of the time, and its unit.
 
     The unit is that of its name, of the preset, or by how far apart its values are.
+    Without a time, that of the order with "1", where the kind of log may have one.
     """
     if known.rate is not None or stream.time is not None:
         return None, "s"
     name = time_label(stream, known)
+    if name is None and may_be_ordered(kind):
+        order = numbered(stream, NAMES["order"])
+        return (order[0].channel if len(order) == 1 else None), "1"
     if name is None:
         raise NoGuessError(
             source.path,
@@ -324,14 +330,18 @@ def _time_and_unit(
         )
     said = next(x.unit for x in labels_of(stream) if x.channel == name)
     unit = said or (known.preset.time_unit if known.preset else "")
-    return name, unit or unit_of_times(stream.channels[name])
+    return name, unit or unit_of_times(stream.channels[name], may_be_ordered(kind))
 
 
-def unit_of_times(values: np.ndarray) -> str:
-    """Returns the unit in which most steps of times (n,) are of a usual size."""
-    step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
-    for unit, most in (("s", 0.5), ("ms", 500.0), ("us", 5e5)):
-        if step < most:
+def unit_of_times(values: np.ndarray, at_rest: bool = False) -> str:
+    """Returns the unit in which most steps of times (n,) are of a usual size.
+
+    Of readings at rest, that in which they take from half a minute to eight hours.
+    """
+    steps = np.diff(values) if len(values) > 1 else np.zeros(1)
+    size, most = (np.sum(steps), 3e4) if at_rest else (np.median(steps), 0.5)
+    for unit, factor in (("s", 1.0), ("ms", 1e3), ("us", 1e6)):
+        if size < most * factor:
             return unit
     return "ns"
 
@@ -412,18 +422,7 @@ def _static_wrench(source: Source, known: Known) -> FieldMap:
         raise NoGuessError(
             source.path, "no channels are called as a wrench with an orientation is"
         )
-    time, unit = _time_or_order(main, known)
+    time, unit = _time_and_unit(main, known, source, "static_wrench")
     return FieldMap(
         "static_wrench", columns, time, unit, known.rate, frames={"wrench": "S"}
     )
-
-
-def _time_or_order(stream: Stream, known: Known) -> tuple[str | None, str]:
-    """Returns the channel of the time with its unit, or that of the order with "1"."""
-    if stream.time is not None or known.rate is not None:
-        return None, "s"
-    name = time_label(stream, known)
-    if name is not None:
-        return name, unit_of_times(stream.channels[name])
-    order = numbered(stream, NAMES["order"])
-    return (order[0].channel if len(order) == 1 else None), "1"

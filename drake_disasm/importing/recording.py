@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.importing.field_map import Column, FieldMap
+from drake_disasm.importing.field_map import Column, FieldMap, may_be_ordered
 from drake_disasm.importing.shift import (
     MOST_JOINTS,
     UNKNOWN,
@@ -94,6 +94,8 @@ def recordings_of(
     }
     columns = {name: _values(source, name, column) for name, column in own.items()}
     numbers = source.channel(fields.episode) if fields.episode else np.zeros(len(time))
+    # Rests are read when they are reached: their stamps were never even.
+    may_even = even and fields.rate is None and not may_be_ordered(fields.kind)
     found = []
     for number in np.unique(numbers[np.isfinite(numbers)]):
         rows = numbers == number
@@ -102,7 +104,7 @@ def recordings_of(
         )
         part = {name: values[rows] for name, values in columns.items()}
         numbered = None if stream.sequence is None else stream.sequence[rows]
-        evening = _Evening(even and fields.rate is None, numbered)
+        evening = _Evening(may_even, numbered)
         found.append(_clean(label, time[rows], part, accept, evening))
     if not found:
         raise DisasmError(f"{source.path}: '{fields.episode}' numbers no episode")

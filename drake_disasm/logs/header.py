@@ -33,7 +33,7 @@ class LogHeader:
     """The content of `log.yaml`; schema and units are constants of the format.
 
     Attributes:
-        kind: "transitions", "static_wrench", "joint_motion" or "joint_response".
+        kind: one of `KINDS`, such as "joint_motion".
         task: name of the task, for people and for choosing logs.
         provenance: free: program, version, command, date, seed, commit, ...
         frames: the frame in which each quantity is expressed. What the kind leaves

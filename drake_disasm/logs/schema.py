@@ -134,6 +134,11 @@ class Kind:
         """The quantity of that name, or None."""
         return next((q for q in self.quantities if q.name == name), None)
 
+    def needs(self, name: str) -> bool:
+        """Whether each table must hold the quantity of that name."""
+        quantity = self.quantity(name)
+        return quantity is not None and quantity.required
+
     @property
     def boolean_columns(self) -> frozenset[str]:
         """The names of the columns that hold true or false."""
@@ -312,6 +317,30 @@ JOINT_MOTION = Kind(
     },
 )
 
+JOINT_TORQUE_STATIC = Kind(
+    name="joint_torque_static",
+    quantities=(
+        _time("order", "1", "order of the poses, any increasing numbers", False),
+        _time("time", "s", "when the row was read", False),
+        _joints("q", "rad", "joint positions at rest (m for a prismatic joint)", True),
+        _joints(
+            "tau",
+            "N·m",
+            "joint torques at rest, positive about the joint's axis, exerted on its "
+            "child link (N for a prismatic joint)",
+            True,
+        ),
+        _EXTRA,
+    ),
+    keys={
+        "period": Rule.FORBIDDEN,
+        "joints": Rule.REQUIRED,
+        "urdf": Rule.OPTIONAL,
+        "drive": Rule.FORBIDDEN,
+    },
+    one_of=("order", "time"),
+)
+
 JOINT_RESPONSE = Kind(
     name="joint_response",
     quantities=(
@@ -348,6 +377,14 @@ JOINT_RESPONSE = Kind(
 KINDS: Mapping[str, Kind] = MappingProxyType(
     {
         kind.name: kind
-        for kind in (TRANSITIONS, STATIC_WRENCH, JOINT_MOTION, JOINT_RESPONSE)
+        for kind in (
+            TRANSITIONS,
+            STATIC_WRENCH,
+            JOINT_MOTION,
+            JOINT_TORQUE_STATIC,
+            JOINT_RESPONSE,
+        )
     }
 )
+#: Kinds of readings at rest: rows may be as far apart in time as any.
+AT_REST = (STATIC_WRENCH.name, JOINT_TORQUE_STATIC.name)

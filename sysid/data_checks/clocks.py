@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.importing.signals import stretches
+from drake_disasm.logs.schema import AT_REST
 from sysid.data_checks.finding import DataFinding, rows_of
 from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject
@@ -12,7 +13,7 @@ from sysid.models.base import Array
 
 def clock_findings(subject: Subject) -> list[DataFinding]:
     """Finds what is wrong with `time`; readings at rest may be as far apart as any."""
-    if subject.kind == "static_wrench":
+    if subject.kind in AT_REST:
         return []
     return _jumps(subject) + _wrong_periods(subject)
 

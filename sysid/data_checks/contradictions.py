@@ -6,9 +6,12 @@ from numpy.typing import NDArray
 from sysid.data_checks.finding import DataFinding, rows_of
 from sysid.data_checks.settings import DEFAULT_DATA_SETTINGS, DataSettings
 from sysid.models.base import Array, LogModel
+from sysid.models.joint_torque_static import JointTorqueStaticModel
 from sysid.models.measurements import Measurements
 from sysid.models.static_wrench import StaticWrenchModel
 
+AtRest = StaticWrenchModel | JointTorqueStaticModel
+_AT_REST = (StaticWrenchModel, JointTorqueStaticModel)
 _SLOW = 8  # cosines over a log: drift, warm-up and a step are made of these
 
 
@@ -17,9 +20,9 @@ def contradicting_rows(
 ) -> list[DataFinding]:
     """Finds rows of a model's log that contradict the kind of the log.
 
-    Of readings at rest: rows that move, and forces that change at one orientation, as
-    in contact. A model that leaves such rows unexplained does not lack an effect, and
-    what it leaves is not noise.
+    Of readings at rest: rows that move, and a sensor's forces that change at one
+    orientation, as in contact. A model that leaves such rows unexplained does not lack
+    an effect, and what it leaves is not noise.
 
     Args:
         model: of all rows, or of those that are to be explained.
@@ -28,10 +31,12 @@ def contradicting_rows(
     Returns:
         Findings; rows are numbered in the model's episodes.
     """
-    if not isinstance(model, StaticWrenchModel) or model.clock is None:
+    if not isinstance(model, _AT_REST) or model.clock is None:
         return []
     moving = _moving_rows(model, model.clock, settings)
     found = _moving(model.measurements, moving, settings)
+    if not isinstance(model, StaticWrenchModel):
+        return found
     return found + _contact(model, model.clock, ~moving, settings)
 
 
@@ -42,7 +47,7 @@ def _moving(
     if not moving.any():
         return []
     what = (
-        "readings that should be at rest, but whose orientation changes within "
+        "readings that should be at rest, but move within "
         f"{settings.rest_window:g} s before and after"
     )
     rows = rows_of(
@@ -57,7 +62,7 @@ def _moving(
 
 
 def _moving_rows(
-    model: StaticWrenchModel, clock: Array, settings: DataSettings
+    model: AtRest, clock: Array, settings: DataSettings
 ) -> NDArray[np.bool_]:
     """Returns which rows (n,) turn on both sides, as far as there are rows near.
 
@@ -67,7 +72,7 @@ def _moving_rows(
     for number in np.unique(model.measurements.episode):
         own = np.flatnonzero(model.measurements.episode == number)
         while len(own):
-            moving = _turning(clock[own], model.orientations[own], settings)
+            moving = _turning(model, clock, own, settings)
             resting[own[moving]] = False
             if not moving.any():
                 break
@@ -75,35 +80,42 @@ def _moving_rows(
     return ~resting
 
 
-def _turning(time: Array, R_WS: Array, settings: DataSettings) -> NDArray[np.bool_]:
-    """Returns which rows (n,) turn on both sides.
+def _turning(
+    model: AtRest, clock: Array, rows: NDArray[np.int64], settings: DataSettings
+) -> NDArray[np.bool_]:
+    """Returns which of some rows (n,) of an episode turn on both sides.
 
     A row that has no other one near in time may well be at rest.
     """
-    near, resting = np.zeros((2, len(time)), dtype=bool)
+    near, resting = np.zeros((2, len(rows)), dtype=bool)
     for side in (-1, 1):
-        some, still = _still(time[::side], R_WS[::side], settings)
+        some, still = _still(model, clock, rows[::side], settings)
         near |= some[::side]
         resting |= (some & still)[::side]
     return near & ~resting
 
 
 def _still(
-    time: Array, R_WS: Array, settings: DataSettings
+    model: AtRest, clock: Array, rows: NDArray[np.int64], settings: DataSettings
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Returns which rows (n,) have rows before them in the window, and rest in it."""
-    n = len(time)
+    """Returns which rows (n,) have rows before them in the window, and rest in it.
+
+    Args:
+        model: of readings at rest.
+        clock: (m,) of all its rows [s].
+        rows: (n,) of an episode, one way or the other.
+        settings: thresholds.
+    """
+    n, time = len(rows), clock[rows]
     some, still = np.zeros(n, dtype=bool), np.ones(n, dtype=bool)
     for back in range(1, n):
         since = np.abs(time[back:] - time[:-back])
         near = since <= settings.rest_window
         if not near.any():
             break
-        trace = np.einsum("nij,nij->n", R_WS[back:], R_WS[:-back])
-        angle = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
         limit = settings.rest_angle + settings.rest_rate * since
         some[back:] |= near
-        still[back:] &= ~near | (angle <= limit)
+        still[back:] &= ~near | (model.turned(rows[back:], rows[:-back]) <= limit)
     return some, still
 
 

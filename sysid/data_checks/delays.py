@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.logs.schema import AT_REST
 from sysid.data_checks.expectation import Expectation
 from sysid.data_checks.finding import DataFinding
 from sysid.data_checks.settings import DataSettings
@@ -21,7 +22,7 @@ def delay_findings(subject: Subject, expected: Expectation) -> list[DataFinding]
     Poses and wrenches of transitions are shifted as a whole, torques joint by joint.
     Readings at rest have no delay.
     """
-    if subject.kind == "static_wrench":
+    if subject.kind in AT_REST:
         return []
     shifts = {
         name: _best_shift(subject, expected, channels)

@@ -13,7 +13,7 @@ from sysid.models.base import Array, LogModel
 from sysid.models.measurements import episode_names
 
 #: The quantity that the channels of an arm's model are measured by, by kind of log.
-_BY_JOINT = {"joint_motion": "tau", "joint_response": "q"}
+_BY_JOINT = {"joint_motion": "tau", "joint_torque_static": "tau", "joint_response": "q"}
 
 
 @dataclass(frozen=True)

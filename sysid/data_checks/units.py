@@ -29,6 +29,7 @@ def log_unit_findings(subject: Subject) -> list[DataFinding]:
         "transitions": _transitions,
         "static_wrench": _static_wrench,
         "joint_motion": _joint_motion,
+        "joint_torque_static": _degrees_of_joints,
         "joint_response": _joint_response,
     }
     return find[subject.kind](subject)
@@ -40,7 +41,7 @@ def predicted_unit_findings(
     """Finds forces and torques that the nominal model expects at another scale."""
     settings, measured = subject.settings, subject.model.measurements
     values = measured.values[expected.rows]
-    is_arm = subject.kind == "joint_motion"
+    is_arm = subject.kind in ("joint_motion", "joint_torque_static")
     table = frames_of(subject, expected.rows)[0]
     nominal, values = table.of(expected.nominal), table.of(values)
     noise = np.where(np.isnan(measured.noise), np.inf, measured.noise)

@@ -34,5 +34,5 @@ def refuse_rest(model: LogModel) -> None:
         joint = next(iter(travel))
         raise DisasmError(
             f"{joint}: does not move in any row, nor does another joint; record a "
-            "motion, or map the columns of its positions"
+            "motion, or several poses, or map the columns of its positions"
         )

@@ -14,6 +14,7 @@ from sysid.effect_selection.detection import (
     detection_limits,
     undetectable,
 )
+from sysid.effect_selection.effect_names import effect_class
 from sysid.effect_selection.experiments import separating
 from sysid.effect_selection.replication import Standing
 from sysid.effect_selection.search import SearchResult
@@ -196,7 +197,7 @@ def judge(
     verdict = Verdict(
         "none",
         placed,
-        tuple(_ties(each, last.model.has_commands) for each in placed),
+        tuple(_ties(each, last.model.setting) for each in placed),
         parameter_values(last, len(found.first.theta)) + _scatter_values(scatter),
         contradictions(found.account, names, last.is_at_noise),
         _excess(last, scatter),
@@ -242,8 +243,15 @@ def _ending(found: Verdict, last: Fit) -> Ending:
     if found.correlated and not last.noise_is_stated:
         return "unexplained"
     kinds = {x.effect.partition(".")[0] for x in found.limits}
-    shown = len(kinds) - len(found.undetectable)
+    kinds = {kind for kind in kinds if not _is_elsewhere(kind, last.model)}
+    shown = len(kinds - set(found.undetectable))
     return "none" if shown >= limits.min_detectable * len(kinds) else "too short"
+
+
+def _is_elsewhere(kind: str, model: LogModel) -> bool:
+    """Returns whether a kind of effect is for another kind of log to show."""
+    known = effect_class(kind)
+    return known is not None and issubclass(known, model.shown_elsewhere)
 
 
 def _single_strokes(found: Verdict, last: Fit) -> tuple[str, ...]:
@@ -315,8 +323,8 @@ def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
     )
 
 
-def _ties(standing: Standing, at_task: bool) -> tuple[Tie, ...]:
+def _ties(standing: Standing, setting: str) -> tuple[Tie, ...]:
     """Returns what is ambiguous with an effect, each once."""
     others = dict.fromkeys(" and ".join(rival) for rival in standing.rivals)
     name = standing.name
-    return tuple(Tie(other, separating(name, other, at_task)) for other in others)
+    return tuple(Tie(other, separating(name, other, setting)) for other in others)

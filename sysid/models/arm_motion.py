@@ -44,6 +44,7 @@ _BY_SAMPLE = (
     "q",
     "v",
     "vd",
+    "dry_v",
     "Y",
     "Y_payload",
     "Y_tilt",
@@ -61,6 +62,8 @@ class ArmMotion:
         time: (n,) [s].
         episode: (n,) number of each sample's episode.
         q, v, vd: (n, joints).
+        dry_v: (n, joints) velocity as dry friction sees it: v, or at rest that with
+            which the joint came.
         Y: (n, joints, b) regressor of the base parameters.
         Y_payload: (n, joints, 10) of a body in the frame of the last link.
         Y_tilt: (n, joints, b, 2) derivative of Y by a tilt [rx, ry] of the base.
@@ -77,6 +80,7 @@ class ArmMotion:
     q: Array
     v: Array
     vd: Array
+    dry_v: Array
     Y: Array
     Y_payload: Array
     Y_tilt: Array
@@ -116,6 +120,7 @@ class ArmMotion:
             q,
             v,
             vd,
+            v,
             Y[:, :, base.independent],
             Y[:, :, arm.last_link],
             Y_tilt[:, :, base.independent],
@@ -153,7 +158,9 @@ class ArmMotion:
             if filtered is not None and has_edges(effect):
                 edged.append(effect)
             elif isinstance(effect, _ADDED) and not effect.is_null:
-                torque = torque + torque_of(effect, samples, self.paths, self.row)
+                v = self.dry_v if effect.is_dry else self.v
+                seen = dataclasses.replace(samples, v=v)
+                torque = torque + torque_of(effect, seen, self.paths, self.row)
         return torque if filtered is None else torque + filtered(samples.load, edged)
 
     def samples(self, beta: Array, effects: Sequence[ArmEffect]) -> ArmSamples:

@@ -91,6 +91,10 @@ class LogModel(abc.ABC):
             compared by fits.
         has_commands: whether rows are commanded steps of an arm, which `displaced`
             can move: the arm may then scatter about its commands.
+        setting: in which its logs are recorded, and others should be: "task" for steps
+            of the task, "rest" for an arm at rest; "" for any.
+        shown_elsewhere: classes of effects that other kinds of logs show: one of its
+            own need not, for a verdict that nothing is missing.
         assumptions: that a check of the data reports.
     """
 
@@ -101,6 +105,8 @@ class LogModel(abc.ABC):
     held_out_share: ClassVar[float] = 0.0
     makes_contact: ClassVar[bool] = True
     has_commands: ClassVar[bool] = False
+    setting: ClassVar[str] = ""
+    shown_elsewhere: ClassVar[tuple[type[Effect], ...]] = ()
     assumptions: tuple[Assumption, ...] = ()
     _effects: tuple[Effect, ...] = ()
     _own_parameters: tuple[Parameter, ...] | None = None  # None: none was frozen

@@ -173,8 +173,8 @@ class ChannelGrams:
         of non-negative least squares (Lawson and Hanson 1974).
         """
         A, b = A / np.outer(self._norm, self._norm), b / self._norm
-        held = self._is_positive
-        free = ~held
+        free = ~self._is_positive
+        held = self._is_positive & (np.diagonal(A) > 0.0)  # of no row: stays zero
         inverse = np.linalg.pinv(A[np.ix_(free, free)], _RANK, hermitian=True)
         x = np.zeros(len(b))
         if held.any():

@@ -11,6 +11,7 @@ from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario, scenario_from_mapping
 from sysid.models.base import LogModel
 from sysid.models.joint_motion import JointMotionModel
+from sysid.models.joint_torque_static import JointTorqueStaticModel
 from sysid.models.response.model import JointResponseModel
 from sysid.models.static_wrench import DEFAULT_PARAMETERS, StaticWrenchModel
 from sysid.models.twin import TwinModel
@@ -21,6 +22,7 @@ OBJECTIVES = {
     "transitions": ("transitions", "rollout"),
     "static_wrench": ("static_wrench",),
     "joint_motion": ("joint_motion",),
+    "joint_torque_static": ("joint_torque_static",),
     "joint_response": ("joint_response",),
 }
 
@@ -64,7 +66,8 @@ def model_of(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
         )
     make = {
         "static_wrench": _static_wrench,
-        "joint_motion": _joint_motion,
+        "joint_motion": _joint_torques,
+        "joint_torque_static": _joint_torques,
         "joint_response": _joint_response,
     }
     model = make.get(kind, _twin)(logs, choice)
@@ -101,9 +104,11 @@ def _static_wrench(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
     return StaticWrenchModel(logs, scenario, parameters, known is not None)
 
 
-def _joint_motion(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
+def _joint_torques(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
     known = choice.scenario or stated_scenario(logs)
-    model = JointMotionModel(logs, choice.urdf, known)
+    is_rest = logs[0].header.kind == JointTorqueStaticModel.kind
+    make = JointTorqueStaticModel if is_rest else JointMotionModel
+    model = make(logs, choice.urdf, known)
     names = [request.name for request in choice.requests]
     return model.only(names) if names else model
 

@@ -63,7 +63,7 @@ def gravity_in(
     scale = np.where(tau.std(axis=0) > 0.0, tau.std(axis=0), 1.0)
     if not tau.any() or np.abs(by_written).max() <= _ROUNDED * scale.max():
         return None
-    fits = _Fits(tau, friction_columns(motion.v), scale)
+    fits = _Fits(tau, friction_columns(motion.dry_v), scale)
     share, error = fits.shares(columns, rest)
     length = float(np.linalg.norm(share))
     if length + STANDARD_ERRORS * error < 0.5:

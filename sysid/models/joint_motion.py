@@ -1,8 +1,8 @@
 """An arm's joint torques from its motion: rigid bodies, of any URDF."""
 
 import dataclasses
-from collections.abc import Iterator, Sequence
-from typing import Any, Self
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,8 @@ from sysid.models.regressor import ArmDynamics, BaseSet, base_set
 from sysid.models.signed_order import SignedOrder
 from sysid.parameters import Parameter
 
+#: Columns of an episode, such as time and q.
+Motion = Episode | Mapping[str, Array]
 _NEEDED = ("q", "v", "vd", "tau")
 _REACH = 5.0  # times the value with which a parameter alone gives all the torque
 
@@ -53,11 +55,17 @@ class JointMotionModel(LogModel):
     after the base parameters. Where a log's provenance states a low-pass filter,
     effects' torques pass through it that are not linear in the motion, see
     FilteredTorques.
+
+    Attributes:
+        kind: of the logs.
+        of_base: what is said of a name that is no base parameter's.
     """
 
     affine = True
+    kind: ClassVar[str] = "joint_motion"
+    of_base: ClassVar[str] = "not a base parameter of this arm"
     effect_types = IN_TORQUES
-    residual_effect = ArmResidualModel
+    residual_effect: ClassVar[type[Effect] | None] = ArmResidualModel
 
     def __init__(
         self,
@@ -76,19 +84,18 @@ class JointMotionModel(LogModel):
             DisasmError: a log is of another kind or arm, lacks a quantity, there is
                 no URDF, or an effect acts at a joint that the log does not have.
         """
-        episodes = [e for log in logs for e in log.episodes]
-        refuse_other_logs(logs, "joint_motion", "inverse dynamics")
-        _refuse_missing(episodes)
+        refuse_other_logs(logs, self.kind, "inverse dynamics")
+        episodes = self._motions(logs)
         header = logs[0].header
         self._urdf = arm_urdf(logs, urdf)
         self._gravity = tuple(UniformGravityFieldElement().gravity_vector())
         arm = ArmDynamics(self._urdf, header.joints)
-        base = base_set(arm.random_regressor())
+        base = self._base_set(arm)
         self._scenario = scenario or Scenario()
         self._effects = tuple(self._scenario.effects)
         refuse_other_joints(self._effects, header.joints)
         # Shifts in time and filters need neighbours of rows that are not fitted.
-        self._whole = ArmMotion.of(arm, base, header.joints, episodes)
+        self._whole = self._motion_of(arm, base, header.joints, episodes)
         self._motion = self._whole
         filters = log_filters(logs)
         self._filtered = FilteredTorques(self._whole, filters) if filters else None
@@ -102,6 +109,32 @@ class JointMotionModel(LogModel):
             logs, channels, lambda _, episode: episode["tau"]
         )
         self.parameters = self._base_parameters(arm, base)
+
+    @staticmethod
+    def _motions(logs: Sequence[Log]) -> Sequence[Motion]:
+        """Returns time, q, v and vd of each episode.
+
+        Raises:
+            DisasmError: one of them is not there.
+        """
+        episodes = [e for log in logs for e in log.episodes]
+        _refuse_missing(episodes)
+        return episodes
+
+    @staticmethod
+    def _base_set(arm: ArmDynamics) -> BaseSet:
+        """Returns the inertial parameters that the kind of log can reveal."""
+        return base_set(arm.random_regressor())
+
+    @staticmethod
+    def _motion_of(
+        arm: ArmDynamics,
+        base: BaseSet,
+        joints: Sequence[str],
+        motions: Sequence[Motion],
+    ) -> ArmMotion:
+        """Returns an arm's motion, see ArmMotion.of."""
+        return ArmMotion.of(arm, base, joints, motions)
 
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
@@ -150,7 +183,7 @@ class JointMotionModel(LogModel):
     @property
     def one_way(self) -> tuple[str, ...]:
         """See LogModel."""
-        return one_way_joints(self.joints, self._motion.v)
+        return one_way_joints(self.joints, self._motion.dry_v)
 
     def covariates(self, channel: int) -> dict[str, Array]:
         """See LogModel: the joint's own motion."""
@@ -170,8 +203,7 @@ class JointMotionModel(LogModel):
         for name in names:
             if name not in known:
                 raise DisasmError(
-                    f"parameter {name}: not a base parameter of this arm; "
-                    f"{closest(name, known)}"
+                    f"parameter {name}: {self.of_base}; {closest(name, known)}"
                 )
         rest = {p.name: p.nominal for p in base if p.name not in names}
         return self.freeze(rest)
@@ -370,12 +402,12 @@ class JointMotionModel(LogModel):
         }
         under = np.array(self._gravity) if gravity is None else gravity
         arm = self._arm_under(under)
-        base = base_set(arm.random_regressor())
+        base = self._base_set(arm)
         episodes = [
             {name: part[whole.episode == number] for name, part in parts.items()}
             for number in np.unique(whole.episode)
         ]
-        whole = ArmMotion.of(arm, base, whole.joints, episodes)
+        whole = self._motion_of(arm, base, whole.joints, episodes)
         known = self._filtered
         model = self.replace(
             _whole=whole,

@@ -111,9 +111,14 @@ class LinkTorques:
         return self._load[rows]
 
     def _with_derivatives(self, load: Array) -> Array:
-        """Returns a load (n,) with its first two derivatives in time, (3, n)."""
+        """Returns a load (n,) with its first two derivatives in time, (3, n).
+
+        Of an arm at rest these are zero: it is read in one pose after the other.
+        """
         found = np.zeros((3, len(load)))
         found[0] = load
+        if not self._motion[1:].any():
+            return found
         for number in np.unique(self._episode):
             own = self._episode == number
             found[1:, own] = time_derivatives(self._time[own], load[own])

@@ -55,7 +55,7 @@ class TorqueFits:
         self._taken = spread_rows(len(tau), _MOST_ROWS)
         self._thin = motion.rows(self._taken)
         self._scale = _positive(tau[self._taken].std(axis=0))
-        self._friction = friction_columns(self._thin.v)
+        self._friction = friction_columns(self._thin.dry_v)
 
     @property
     def are_known(self) -> bool:

@@ -116,12 +116,17 @@ class ArmDynamics:
             found[i] = tau[self._columns]
         return found
 
-    def random_regressor(self) -> Array:
-        """Returns Y of random states: it excites all that motion can reveal."""
+    def random_regressor(self, at_rest: bool = False) -> Array:
+        """Returns Y of random states: it excites all that motion, or rest, can reveal.
+
+        Args:
+            at_rest: whether nothing moves.
+        """
         generator = np.random.default_rng(0)
         size = (_EXCITATION, len(self._columns))
         low, high = -np.ones(size), np.ones(size)
-        states = [generator.uniform(k * low, k * high) for k in (3.0, 2.0, 5.0)]
+        reach = (3.0, 0.0, 0.0) if at_rest else (3.0, 2.0, 5.0)
+        states = [generator.uniform(k * low, k * high) for k in reach]
         return self.regressor(*states)
 
     def _stacked(self, blocks: Sequence[Array]) -> Array:

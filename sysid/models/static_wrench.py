@@ -112,6 +112,11 @@ class StaticWrenchModel(ScenarioModel):
         """R_WS (rows, 3, 3) of the readings."""
         return self._R_WS
 
+    def turned(self, rows: NDArray[np.int64], others: NDArray[np.int64]) -> Array:
+        """Returns the angle (n,) between the orientations of rows [rad]."""
+        trace = np.einsum("nij,nij->n", self._R_WS[rows], self._R_WS[others])
+        return np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
+
     @property
     def clock(self) -> Array | None:
         """Time (rows,) since each log began [s]; None: only an order is known."""

@@ -69,6 +69,7 @@ class TwinModel(ScenarioModel):
     residual_effect = SensorResidualModel
     held_out_share = 0.25
     has_commands = True
+    setting = "task"
 
     def __init__(
         self,

@@ -32,7 +32,7 @@ def closing_page(
         verdict=closed.verdict,
         kinds=kind_rows(closed.verdict),
         limits=limit_rows(closed.verdict.limits),
-        recordings=recordings(closed.verdict, closed.last.model.has_commands),
+        recordings=recordings(closed.verdict, closed.last.model.setting),
         worse=_made_worse(closed),
         losses=found,
         noise=_noise_origin(closed),

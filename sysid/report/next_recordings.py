@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effect_class, enumeration, in_words
 from sysid.effect_selection.experiments import revealing_kind
@@ -47,12 +49,12 @@ class LimitRow:
     shapes: tuple[str, ...]
 
 
-def recordings(verdict: Verdict, at_task: bool) -> list[Recording]:
+def recordings(verdict: Verdict, setting: str) -> list[Recording]:
     """Returns what to record next, the most urgent first.
 
     Args:
         verdict: of a search.
-        at_task: whether its log is of steps of the task.
+        setting: in which its log was recorded, see `LogModel`.
     """
     lines, found = kind_lines(verdict), []
     for each in (line for line in lines if line.rivals):
@@ -60,13 +62,13 @@ def recordings(verdict: Verdict, at_task: bool) -> list[Recording]:
         purpose = f"whether it is {enumeration(names, 'or')}"
         found += [Recording(purpose, text) for text in each.experiments]
     for each in (line for line in lines if line.status == "suggested"):
-        if text := revealing_kind(each.names[0], at_task):
+        if text := revealing_kind(each.names[0], setting):
             purpose = f"whether it is {in_words(each.names[0])} at all"
             found.append(Recording(purpose, text))
     found += [
         Recording(f"{in_words(kind)}, which this log could not have shown", text)
         for kind in verdict.undetectable
-        if (text := revealing_kind(kind, at_task))
+        if (text := revealing_kind(kind, setting))
     ]
     return list(dict.fromkeys(found))
 
@@ -89,7 +91,8 @@ def _limit_row(kind: str, field: str, limits: list[DetectionLimit]) -> LimitRow:
         if limit.amplitude is not None
     )
     hidden = [x.effect.partition(".")[2] for x in limits if x.amplitude is None]
-    units = " or ".join(dict.fromkeys(limit.unit for limit in limits))
+    own = [limit for limit in limits if np.isfinite(limit.share)] or limits
+    units = " or ".join(dict.fromkeys(limit.unit for limit in own))
     least, greatest = (found[0], found[-1]) if found else (None, None)
     shapes = dict.fromkeys(x.shape for x in limits if x.shape and x.amplitude)
     return LimitRow(

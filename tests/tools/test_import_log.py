@@ -12,6 +12,7 @@ import pytest
 from drake_disasm.cell.parsing import movable_joints
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from tests.sysid.real_data import real_folder, write_arm, write_slide
+from tests.tools.inputs import SLIDE
 from tests.tools.programs import assert_one_line, run_program
 
 
@@ -61,6 +62,30 @@ def test_a_recording_becomes_a_log(table: Path, tmp_path: Path) -> None:
     assert (tmp_path / "log/import.png").read_bytes().startswith(b"\x89PNG")
     again = run_program("import_log", str(table), "--out", str(tmp_path / "log"))
     assert_one_line(again, ["is not empty"])
+
+
+def test_torques_at_rest_go_from_a_table_to_a_verdict(tmp_path: Path) -> None:
+    """The load is the same in all poses: friction per load can do the same."""
+    urdf, table = tmp_path / "lift.urdf", tmp_path / "poses.csv"
+    urdf.write_text(SLIDE.replace('xyz="1 0 0"', 'xyz="0 0 1"'))
+    random = np.random.default_rng(0)
+    q = random.uniform(-0.5, 0.5, 60)
+    tau = 95.0 * 9.81 + 20.0 * np.sign(np.diff(q, prepend=q[0]))
+    tau += random.standard_normal(60)
+    rows = np.column_stack([np.arange(60), q, tau])
+    np.savetxt(table, rows, delimiter=",", header="order,q,tau", comments="")
+    kind = ("--kind", "joint_torque_static", "--urdf", urdf)
+    shown = run_program("import-log", table, *kind, "--show")
+    assert "order: {from: order}" in shown.stdout and "tau, slide" in shown.stdout
+    log, out = tmp_path / "log", tmp_path / "out"
+    assert run_program("import-log", table, *kind, "--out", log).returncode == 0
+    checked = run_program("check-log", "--log", log, "--workers=1")
+    assert "data: nothing is wrong" in checked.stdout, checked.stderr
+    closed = run_program("close-loop", "--log", log, "--out", out, "--workers=1")
+    assert closed.returncode == 0, closed.stderr
+    found = json.loads((out / "result.json").read_text())
+    assert found["effects"] == found["ambiguous"] and "CoulombFric" in found["text"]
+    assert "each pose reached from both sides, with two payloads" in closed.stdout
 
 
 @pytest.mark.parametrize(

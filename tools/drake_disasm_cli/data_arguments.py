@@ -54,7 +54,7 @@ def add_nominal_arguments(add: Callable[..., Any]) -> None:
         metavar="NAME|FILE",
         help="the nominal model (default: the scenario that the log states)",
     )
-    add("--urdf", metavar="FILE", help="the arm of a joint_motion log")
+    add("--urdf", metavar="FILE", help="the arm of a log of joints")
 
 
 def checked(

@@ -92,7 +92,7 @@ def _add_input_arguments(add: Callable[..., object]) -> None:
         default=[],
         metavar="NAME|FILE",
         help="what to identify: section.field, Effect.field, or a YAML file with "
-        "bounds (default for static_wrench and joint_motion: all there are)",
+        "bounds (default for sensors and arms: all there are)",
     )
     add(
         "--objective",
@@ -100,7 +100,7 @@ def _add_input_arguments(add: Callable[..., object]) -> None:
         help="what is compared: for transitions, each step simulated from its measured "
         "state (default), or whole episodes by rollout",
     )
-    add("--urdf", metavar="FILE", help="the arm of a joint_motion log")
+    add("--urdf", metavar="FILE", help="the arm of a log of joints")
     add(
         "--noise",
         action="append",

@@ -28,8 +28,13 @@ class JointCoulombFriction(JointEffect):
         0.02, "rad/s", 1e-4, 0.1, "velocity of the transition", _CREEP
     )
 
+    is_dry = True
     noun = "dry friction"
     experiment = "this joint at three or more constant speeds, both ways"
+    rest_experiment = (
+        "each pose reached from both sides by this joint: half the difference of its "
+        "torques is dry friction"
+    )
     experiments_against: ClassVar = {
         "JointViscousFriction": "three or more constant speeds",
         "JointLoadFriction": "the same motion with two payloads",

@@ -35,6 +35,7 @@ class EncoderError(ArmEffect):
     experiment = (
         "rests over the whole range of this joint, and fast swings of it in two places"
     )
+    rest_experiment = "rests over the whole range of this joint, with a known payload"
     experiments_against: ClassVar = {
         "TorqueGain": "rests with two known payloads: a gain shows at its joint alone, "
         "a wrong angle at all joints",

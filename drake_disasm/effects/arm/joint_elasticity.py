@@ -30,6 +30,9 @@ class JointElasticity(ArmEffect):
 
     noun = "a gear that yields"
     experiment = "swings of this joint at several frequencies, under a known load"
+    rest_experiment = (
+        "the same poses with two known payloads: a gear yields with the load"
+    )
     experiments_against: ClassVar = {
         "RotorInertia": "fast reversals: with a spring, torque grows with a higher "
         "power of the frequency than with inertia",

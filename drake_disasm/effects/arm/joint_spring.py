@@ -32,6 +32,10 @@ class JointSpring(JointEffect):
         "this joint slowly over its whole range, both ways, in two poses of the joints "
         "before it"
     )
+    rest_experiment = (
+        "rests of this joint over its whole range, its axis turned upright by the "
+        "joints before it, so that gravity does not load it"
+    )
     experiments_against: ClassVar = {
         "TorqueOffset": "rests of this joint over its whole range",
         "TorqueRipple": "this joint slowly over its whole range: a spring's torque "

@@ -27,8 +27,10 @@ class JointLoadFriction(JointEffect):
         0.02, "rad/s", 1e-4, 0.1, "velocity of the transition", _CREEP
     )
 
+    is_dry = True
     noun = "friction in proportion to the load"
     experiment = "the same motion with two payloads"
+    rest_experiment = "each pose reached from both sides, with two payloads"
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

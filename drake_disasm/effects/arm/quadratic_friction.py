@@ -26,8 +26,10 @@ class JointQuadraticFriction(JointEffect):
         0.02, "rad/s", 1e-4, 0.1, "velocity of the transition", (0.02,)
     )
 
+    is_dry = True
     noun = "friction that grows with the square of the load"
     experiment = "the same motion with three payloads"
+    rest_experiment = "each pose reached from both sides, with three payloads"
     experiments_against: ClassVar = {
         "JointLoadFriction": "the same motion with three payloads",
     }

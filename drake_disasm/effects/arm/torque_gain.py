@@ -25,6 +25,7 @@ class TorqueGain(JointEffect):
     is_filtered = True
     noun = "a gain error of the torque"
     experiment = "the same motion with two known payloads"
+    rest_experiment = "the same poses with two known payloads"
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

@@ -30,6 +30,9 @@ class TorqueRipple(JointEffect):
 
     noun = "torque ripple"
     experiment = "this joint slowly over its whole range, both ways, the others at rest"
+    rest_experiment = (
+        "rests of this joint close together over its whole range, the others unmoved"
+    )
 
     def torque(self, samples: JointSamples) -> np.ndarray:
         """See JointEffect."""

@@ -242,3 +242,37 @@ def test_torques_that_are_there_are_not_left_out(tmp_path: Path) -> None:
     message = refusal(import_recordings, [source], fields, Processing())
     assert "has torques that are not in the map: tau" in message
     assert import_recordings([source], fields, Processing(), accept=True).rows
+
+
+def _rests(path: Path, **clock: Any) -> Source:
+    names = {f"q{i}": _Q[:20, i] for i in range(2)}
+    return _table(path, **clock, **names, **{f"tau{i}": _Q[:20, i + 2] for i in (0, 1)})
+
+
+@pytest.mark.parametrize(
+    ("clock", "channel", "unit"),
+    [
+        ({"order": np.arange(20)}, "order", "1"),
+        ({}, None, "1"),
+        ({"time": 7.0 * np.arange(20)}, "time", "s"),  # rests are seconds apart
+        ({"time": 7000.0 * np.arange(20)}, "time", "ms"),
+    ],
+    ids=["order", "order of the table", "seconds", "milliseconds"],
+)
+def test_torques_at_rest_are_guessed_with_times_or_an_order(
+    tmp_path: Path, clock: dict[str, Any], channel: str | None, unit: str
+) -> None:
+    source = _rests(tmp_path / "run.csv", **clock)
+    fields = _guess(source, "joint_torque_static")
+    assert (fields.time, fields.time_unit) == (channel, unit)
+    assert fields.columns["q"].channels == ("q0", "q1")
+    [episode] = import_recordings([source], fields, Processing()).episodes
+    np.testing.assert_allclose(episode["tau"], _Q[:20, 2:4], atol=1e-8)
+    assert set(episode) == {"q", "tau", "order" if unit == "1" else "time"}
+
+
+def test_rests_without_torques_are_refused(tmp_path: Path) -> None:
+    source = _table(tmp_path / "run.csv", q0=_Q[:20, 0], q1=_Q[:20, 1])
+    message = refusal(_guess, source, "joint_torque_static")
+    assert "no channel is called as joint torques are" in message
+    assert "called as time is" in refusal(_guess, source)  # a motion needs times

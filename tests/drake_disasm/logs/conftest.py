@@ -19,6 +19,7 @@ SAMPLE_HEADERS = {
         LogHeader("transitions", "lock", _ORIGIN, period=0.1, scenario=_EFFECTS),
         LogHeader("static_wrench", "weigh", {"sensor": "a"}, frames={"wrench": "W"}),
         LogHeader("joint_motion", "excite", {}, {}, 0.01, ("a", "b", "c"), _URDF),
+        LogHeader("joint_torque_static", "hold", {}, joints=("a", "b"), urdf=_URDF),
         LogHeader("joint_response", "swing", {}, {}, None, ("a", "b"), _URDF, _DRIVE),
     )
 }
@@ -71,6 +72,11 @@ def _joint_motion(rng: np.random.Generator, rows: int) -> dict[str, Any]:
     return {"time": 1.5e9 + 0.01 * np.arange(rows), **motion}
 
 
+def _joint_torque_static(rng: np.random.Generator, rows: int) -> dict[str, Any]:
+    values = {name: rng.normal(size=(rows, 2)) for name in ("q", "tau")}
+    return {"order": np.arange(rows, dtype=float), **values}
+
+
 def _joint_response(rng: np.random.Generator, rows: int) -> dict[str, Any]:
     names = ("q_commanded", "q", "gain", "supply", "enabled", "current")
     motion = {name: rng.normal(size=(rows, 2)) for name in names}
@@ -81,6 +87,7 @@ SAMPLES = {
     "transitions": _transitions,
     "static_wrench": _static_wrench,
     "joint_motion": _joint_motion,
+    "joint_torque_static": _joint_torque_static,
     "joint_response": _joint_response,
 }
 

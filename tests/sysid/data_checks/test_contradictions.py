@@ -1,5 +1,7 @@
 """Rows that contradict readings at rest, and readings that are what they say."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -10,6 +12,8 @@ from drake_disasm.logs import Log, read_log, write_static_wrench
 from sysid.data_checks import check_data, contradicting_rows, without_flagged_rows
 from sysid.models.base import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
+from tests.sysid.models.arm import JOINTS, write_two_link_arm
+from tests.sysid.models.rests import write_rests
 from tests.sysid.real_data import real_folder, write_static
 
 _POSES, _EACH, _PERIOD = 12, 40, 0.1
@@ -92,6 +96,25 @@ def test_moving_rows_contradict_until_they_are_left_out(tmp_path):
     findings = check_data([log], whole)
     assert found in findings
     assert contradicting_rows(without_flagged_rows([log], whole, findings)) == []
+
+
+def test_joints_that_move_between_poses_contradict_rests(tmp_path):
+    """From pose to pose in a second, at 10 Hz, and three seconds in each."""
+    urdf = write_two_link_arm(tmp_path / "two.urdf")
+    poses = np.random.default_rng(0).uniform(-1.0, 1.0, (12, 2))
+    way = np.clip(np.arange(40) / 10.0, 0.0, 1.0)[:, None]
+    q = np.vstack([a + way * (b - a) for a, b in itertools.pairwise(poses)])
+    logs = [
+        write_rests(tmp_path / name, urdf, JOINTS, q, np.cos(q), time)
+        for name, time in (("timed", 0.1 * np.arange(len(q))), ("ordered", None))
+    ]
+    [found] = contradicting_rows(model(logs[0]))
+    assert found.kind == "moving"
+    [rows] = found.rows.values()
+    assert set(range(1, 10)) <= {row % 40 for row in rows} <= set(range(11))
+    resting = without_flagged_rows([logs[0]], model(logs[0]), [found])
+    assert contradicting_rows(resting) == []
+    assert contradicting_rows(model(logs[1])) == []
 
 
 def test_an_order_says_nothing_of_motion(tmp_path):

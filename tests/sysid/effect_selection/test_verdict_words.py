@@ -233,7 +233,7 @@ def test_errors_that_fall_and_rise_are_said_in_their_units(
 def test_a_log_of_the_task_is_not_told_to_record_readings_at_rest():
     of_task = [e for e in registered_effects() if not issubclass(e, ArmEffect)]
     for one, other in itertools.product(of_task, of_task):
-        told = separating(one.__name__, other.__name__, at_task=True)
+        told = separating(one.__name__, other.__name__, setting="task")
         assert "readings" not in told and "known weight" not in told
     assert "readings" in separating("SensorBias", "GrooveFriction")
     drifts = separating("SensorWarmUp", "SensorDrift")

@@ -45,7 +45,7 @@ def test_detection_limits_of_joints_are_one_row():
     assert warm_up.shapes == ("time_constant=1",) and offset.shapes == ()
     assert (offset.least, offset.greatest) == ((0.1, "j2"), (0.3, "j1"))
     assert offset.hidden == ("j3",) and bias.least is None
-    told = recordings(made_verdict("none", limits=limits), at_task=False)
+    told = recordings(made_verdict("none", limits=limits), setting="")
     assert [each.purpose for each in told] == [
         "an offset of the sensor, which this log could not have shown"
     ]
@@ -54,14 +54,14 @@ def test_detection_limits_of_joints_are_one_row():
 
 def test_a_log_of_the_task_gets_recordings_of_the_task():
     limits = (DetectionLimit("SensorBias", "fx", None, "N", 2.0),)
-    (told,) = recordings(made_verdict("none", limits=limits), at_task=True)
+    (told,) = recordings(made_verdict("none", limits=limits), setting="task")
     assert "readings" not in told.what
 
 
 def test_what_separates_rivals_comes_first():
     ties = ((Tie("JointLoadFriction.j1", "two payloads"),),)
     found = made_verdict("unexplained", ("JointCoulombFriction.j1",), ties)
-    first, second = recordings(found, at_task=False)
+    first, second = recordings(found, setting="")
     assert first.purpose == (
         "whether it is dry friction or friction in proportion to the load"
     )
