@@ -33,7 +33,8 @@ class LogHeader:
     """The content of `log.yaml`; schema and units are constants of the format.
 
     Attributes:
-        kind: "transitions", "static_wrench", "joint_motion" or "joint_response".
+        kind: "transitions", "static_wrench", "contact", "joint_motion" or
+            "joint_response".
         task: name of the task, for people and for choosing logs.
         provenance: free: program, version, command, date, seed, commit, ...
         frames: the frame in which each quantity is expressed. What the kind leaves

@@ -289,6 +289,36 @@ STATIC_WRENCH = Kind(
     one_of=("order", "time"),
 )
 
+CONTACT = Kind(
+    name="contact",
+    quantities=(
+        _time("time", "s", "when the reading was made"),
+        _vector(
+            "R_WS",
+            QUATERNION,
+            "1",
+            "W",
+            "orientation of the sensor S in the world W (z up)",
+        ),
+        _vector(
+            "wrench",
+            WRENCH,
+            _WRENCH_UNIT,
+            "SW",
+            "raw reading: wrench on the sensor, at So, of its load and of the contact",
+        ),
+        Quantity(
+            "free",
+            "1",
+            "1 where it is known that nothing but its load touches the sensor, else 0",
+            required=False,
+        ),
+        _EXTRA,
+    ),
+    keys=STATIC_WRENCH.keys,
+    min_rows=2,
+)
+
 JOINT_MOTION = Kind(
     name="joint_motion",
     quantities=(
@@ -348,6 +378,12 @@ JOINT_RESPONSE = Kind(
 KINDS: Mapping[str, Kind] = MappingProxyType(
     {
         kind.name: kind
-        for kind in (TRANSITIONS, STATIC_WRENCH, JOINT_MOTION, JOINT_RESPONSE)
+        for kind in (
+            TRANSITIONS,
+            STATIC_WRENCH,
+            CONTACT,
+            JOINT_MOTION,
+            JOINT_RESPONSE,
+        )
     }
 )

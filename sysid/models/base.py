@@ -92,6 +92,7 @@ class LogModel(abc.ABC):
         has_commands: whether rows are commanded steps of an arm, which `displaced`
             can move: the arm may then scatter about its commands.
         assumptions: that a check of the data reports.
+        rows_in_use: of each episode's table, by the episode's name; empty: all rows.
     """
 
     parameters: tuple[Parameter, ...]
@@ -102,6 +103,7 @@ class LogModel(abc.ABC):
     makes_contact: ClassVar[bool] = True
     has_commands: ClassVar[bool] = False
     assumptions: tuple[Assumption, ...] = ()
+    rows_in_use: Mapping[str, NDArray[np.int64]] = {}
     _effects: tuple[Effect, ...] = ()
     _own_parameters: tuple[Parameter, ...] | None = None  # None: none was frozen
     _frozen: Mapping[str, float] = {}

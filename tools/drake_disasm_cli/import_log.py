@@ -40,6 +40,7 @@ from drake_disasm.importing.joining import WAYS, joined
 from drake_disasm.importing.lerobot import calibrated
 from drake_disasm.importing.plots import plot_import
 from drake_disasm.importing.presets import PRESETS
+from drake_disasm.logs import KINDS
 from drake_disasm.logs.header import HEADER_NAME, read_header
 
 _EXAMPLES = """examples:
@@ -71,9 +72,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add(
         "--kind",
         default="joint_motion",
-        choices=["joint_motion", "joint_response", "static_wrench", "transitions"],
+        choices=sorted(KINDS),
         help="of log (default: joint_motion; joint_response: commanded and measured "
-        "positions; transitions need a map)",
+        "positions; contact: a sensor's wrench in any task; transitions need a map)",
     )
     add(
         "--join",
