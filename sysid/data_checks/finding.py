@@ -14,11 +14,11 @@ from drake_disasm.common.errors import DisasmError
 KINDS: Mapping[str, str] = {
     "assumed": "what the model takes for granted, since the log doesn't say it",
     "axes": "axes are swapped or have the wrong sign",
-    "contact": "readings of a load at rest whose forces change at one orientation",
+    "contact": "readings of a load whose forces change at one orientation",
     "constant": "a channel never changes, where it should",
     "derivatives": "velocities or accelerations are not the derivatives",
     "late": "a channel is late by whole rows",
-    "moving": "readings at rest that move",
+    "moving": "readings that move, where that shows, or that should be at rest",
     "processing": "wrench is not ft_sensor processed",
     "quantum": "a channel comes in steps coarser than its noise",
     "spikes": "single rows far from their neighbours",

@@ -1,5 +1,6 @@
 """Wrench of a sensor during a task with contact: what it reads in free space."""
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
@@ -17,7 +18,7 @@ from sysid.models.static_wrench import StaticWrenchModel
 from sysid.models.wrench_bookkeeping import Readings
 from sysid.parameters import Parameter
 
-_SUMMED = 1000  # rows in contact, evenly spread, of which the wrench is summed up
+_SUMMED = 1000  # rows in contact, and in free space, by which the contact is described
 _TURNED = 1e-4  # mean square of gravity's direction, along the axis of its second most
 _RECORD = (
     "record some seconds in free space, at rest in three or more orientations, before "
@@ -57,17 +58,28 @@ class _Rows:
             np.concatenate([sensor_wrench(log.header, e) for log, e in pairs]),
         )
 
-    def without_load(self, free: NDArray[np.bool_], g_W: Array) -> Array:
-        """Returns the wrench (n, 6) less weight and zero, as rows in free space say.
+    def spread(self, mask: NDArray[np.bool_]) -> Self:
+        """Returns some of the rows (n,) where the mask is true, evenly spread."""
+        rows = np.flatnonzero(mask)
+        rows = rows[:: max(1, -(-len(rows) // _SUMMED))]
+        return dataclasses.replace(
+            self, **{name: part[rows] for name, part in vars(self).items()}
+        )
+
+    def without_load_of(self, free: Self, g_W: Array) -> Array:
+        """Returns the wrench (n, 6) without weight and zero, as others show them.
 
         Args:
-            free: (n,) which rows are.
+            free: rows in free space.
             g_W: (3,) gravity [m/s^2].
         """
-        columns = Readings(self.R_WS, self.wrench, g_W, in_W=False).columns()
-        flat = columns[free].reshape(-1, columns.shape[2])
-        fit = np.linalg.lstsq(flat, self.wrench[free].reshape(-1), rcond=None)[0]
-        return np.asarray(self.wrench - columns @ fit)
+        own, known = (
+            Readings(rows.R_WS, rows.wrench, g_W, in_W=False).columns()
+            for rows in (self, free)
+        )
+        flat = known.reshape(-1, known.shape[2])
+        fit = np.linalg.lstsq(flat, free.wrench.reshape(-1), rcond=None)[0]
+        return np.asarray(self.wrench - own @ fit)
 
 
 class ContactModel(StaticWrenchModel):
@@ -109,10 +121,8 @@ class ContactModel(StaticWrenchModel):
         used = rows_of_logs(logs, self.rows_in_use)
         super().__init__(used, scenario, parameters, known_payload)
         self._time = rows.time[free]
-        others = np.flatnonzero(~free)
-        spread = others[:: max(1, -(-len(others) // _SUMMED))]
-        self._contact = (rows.time[spread], rows.R_WS[spread], rows.wrench[spread])
-        left = rows.without_load(free, self._g_W)[~free]
+        self._contact = rows.spread(~free)
+        left = self._contact.without_load_of(rows.spread(free), self._g_W)
         self.assumptions = (
             _of_rows(rows, free, found, left),
             *_of_steady_rows(rows, found),
@@ -121,17 +131,17 @@ class ContactModel(StaticWrenchModel):
 
     def describe(self, theta: Array) -> dict[str, tuple[float, str]]:
         """Returns weight and centre of mass, and the wrench of the contact (rms)."""
-        time, R_WS, wrench = self._contact
-        described = super().describe(theta)
-        if len(time):
-            force, torque = _rms(wrench - self.reading(theta, time, R_WS))
+        rows, described = self._contact, super().describe(theta)
+        if len(rows.time):
+            read = self.reading(theta, rows.time, rows.R_WS)
+            force, torque = _rms(rows.wrench - read)
             described["contact force (rms)"] = (force, "N")
             described["contact torque (rms)"] = (torque, "N m")
         return described
 
     def _read(self, readings: Readings) -> Self:
         """See StaticWrenchModel; of the contact only what was written is at hand."""
-        none = tuple(array[:0] for array in self._contact)
+        none = self._contact.spread(np.zeros(len(self._contact.time), dtype=bool))
         return super()._read(readings).replace(_contact=none)
 
 
@@ -209,8 +219,8 @@ def _of_orientations(R_WS: Array) -> list[Assumption]:
     varies about two.
     """
     down_S = -R_WS[:, 2]
-    spread = np.linalg.eigvalsh(np.cov(down_S.T, bias=True)) if len(R_WS) > 1 else []
-    if len(spread) and spread[1] > _TURNED:
+    off = down_S - down_S.mean(axis=0)
+    if float(np.linalg.eigvalsh(off.T @ off)[1]) > _TURNED * len(off):
         return []
     what = (
         "the rows in free space hardly vary in orientation: the weight, its lever and "

@@ -6,6 +6,12 @@ slowly, within the noise: consensus with a truncated loss, as of RANSAC (Torr an
 Zisserman 2000). The search over sets is exact for a given load (dynamic programming),
 and starts from loads that robust least squares finds in differences of neighbouring
 rows, which have no zero (graduated non-convexity, Yang et al. 2020).
+
+What this takes for granted: the quietest tenth of the log shows the noise, and no
+contact is held, within the noise, for as long as the sensor is in free space. A zero
+that moves at once does so one time. Of simulated tasks that press, slide and turn, and
+hold what they press with, no set was wrong where 15 to 30 % of the log are in free
+space; of 20 % one in ten was left open, of 15 % all.
 """
 
 from collections.abc import Iterator
@@ -172,7 +178,11 @@ class _Load:
 
     def wrench(self, R_SW: Array) -> Array:
         """Returns the wrench (k, 6) in orientations (k, 3, 3)."""
-        return np.asarray(_columns(R_SW, self.down, len(self.theta)) @ self.theta)
+        down_S = R_SW @ self.down
+        if len(self.theta) == _ANY:
+            return np.asarray(down_S @ self.theta.reshape(_CHANNELS, 3).T)
+        weight, moment = np.split(self.theta, 2)
+        return np.hstack([R_SW @ weight, np.cross(moment, down_S)])
 
 
 _RIGID, _ANY = 6, 18
@@ -180,15 +190,9 @@ _NO_LOAD = _Load(_DOWN, np.zeros(_RIGID))
 
 
 def _columns(R_SW: Array, down: Array, size: int) -> Array:
-    """Returns the derivatives (k, 6, size) of a load's wrench; see `_Load`."""
-    down_S = R_SW @ down
-    if size == _ANY:
-        return _by_channel(down_S)
-    found = np.zeros((len(R_SW), _CHANNELS, _RIGID))
-    found[:, :3, :3] = R_SW
-    for axis in range(3):
-        found[:, 3:, 3 + axis] = np.cross(np.eye(3)[axis], down_S)
-    return found
+    """Returns the derivatives (k, 6, size) of a load's wrench by its theta."""
+    loads = [_Load(down, unit) for unit in np.eye(size)]
+    return np.stack([load.wrench(R_SW) for load in loads], axis=2)
 
 
 def _by_channel(values: Array) -> Array:
@@ -252,12 +256,12 @@ def _longest_chain(left: Array) -> tuple[Mask, float]:
             if way[best] > 0.0:
                 score[layer, j] = way[best] + _AGREES
                 before[layer, j] = best
-    layer, at = np.unravel_index(int(np.argmax(score)), score.shape)
+    layer, at = divmod(int(np.argmax(score)), k)
     highest, free = float(score[layer, at]), np.zeros(k, dtype=bool)
     while at >= 0:
         free[at] = True
-        step = before[layer, at]
-        if layer == 1:
+        step = int(before[layer, at])
+        if layer == 1:  # of the blocks before, those of the other layer come first
             layer, step = (0, step) if step < at else (1, step - at)
         at = step
     return free, highest / (_AGREES * k)
@@ -299,7 +303,7 @@ def _refitted(blocks: _Blocks, load: _Load, size: int) -> Iterator[_Consensus]:
 
 
 def _starts(blocks: _Blocks) -> Iterator[_Load]:
-    """Yields no load, the one that changes speak for, and that of all blocks."""
+    """Yields no load, the load by differences of blocks, and that of all blocks."""
     yield _NO_LOAD
     k, load = len(blocks.wrench), _NO_LOAD
     lags = [lag for lag in _LAGS if lag < k // 2]
@@ -341,6 +345,7 @@ def _fitted(blocks: _Blocks, rows: Mask, noise: Array, size: int) -> _Load:
     own = blocks.select(rows)
 
     def coefficients(down: Array, count: int) -> Array:
+        """Returns the load's theta (count,), without those of the zero."""
         columns = _columns(own.R_SW, down, count)
         both = np.concatenate([columns, own.slow], axis=2)
         return _solved(both, own.wrench, noise)[:count]
