@@ -136,7 +136,7 @@ def _sample_log(folder: Path, kind: str, file_format: str, rng: Random) -> Array
         kind,
         "fuzz",
         {"program": "fuzz", "versions": {"a": "1"}},
-        frames={"wrench": "S"} if kind == "static_wrench" else {},
+        frames={"wrench": "S"} if kind in ("static_wrench", "contact") else {},
         period=None if keys["period"] is Rule.FORBIDDEN else 0.1,
         joints=("a", "b", "c") if keys["joints"] is Rule.REQUIRED else (),
     )

@@ -149,8 +149,8 @@ def guessed_map(source: Source, kind: str, known: Known | None = None) -> FieldM
     known = known or Known()
     if kind in _OF_JOINTS:
         return _of_joints(source, known, kind)
-    if kind == "static_wrench":
-        return _static_wrench(source, known)
+    if kind in ("static_wrench", "contact"):
+        return _sensor(source, known, kind)
     raise NoGuessError(source.path, f"a map of kind {kind} is not guessed")
 
 
@@ -410,7 +410,8 @@ def _components(
     return None
 
 
-def _static_wrench(source: Source, known: Known) -> FieldMap:
+def _sensor(source: Source, known: Known, kind: str) -> FieldMap:
+    """Returns the map of a force/torque sensor's readings."""
     columns, main = dict[str, Column](), None
     for stream in source.streams:
         if wrench := _wrench_of(stream):
@@ -422,7 +423,7 @@ def _static_wrench(source: Source, known: Known) -> FieldMap:
         raise NoGuessError(
             source.path, "no channels are called as a wrench with an orientation is"
         )
-    time, unit = _time_and_unit(main, known, source, "static_wrench")
-    return FieldMap(
-        "static_wrench", columns, time, unit, known.rate, frames={"wrench": "S"}
-    )
+    time, unit = _time_and_unit(main, known, source, kind)
+    if kind == "contact" and "free" in main.channels:
+        columns["free"] = Column(("free",))
+    return FieldMap(kind, columns, time, unit, known.rate, frames={"wrench": "S"})

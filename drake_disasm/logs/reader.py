@@ -1,11 +1,12 @@
 """Reading logs: everything is checked, and refused by name, before use."""
 
+import dataclasses
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,11 @@ class Episode:
     def rows(self) -> int:
         """The number of rows; an episode of transitions has one step fewer."""
         return len(next(iter(self.columns.values())))
+
+    def select(self, rows: NDArray[np.int64]) -> Self:
+        """The same episode with some of its rows, by their numbers."""
+        columns = {name: values[rows] for name, values in self.columns.items()}
+        return dataclasses.replace(self, columns=MappingProxyType(columns))
 
     def components(self, quantity: str) -> tuple[str, ...]:
         """The columns of a quantity, in declared order; empty if it has none."""

@@ -294,6 +294,36 @@ STATIC_WRENCH = Kind(
     one_of=("order", "time"),
 )
 
+CONTACT = Kind(
+    name="contact",
+    quantities=(
+        _time("time", "s", "when the reading was made"),
+        _vector(
+            "R_WS",
+            QUATERNION,
+            "1",
+            "W",
+            "orientation of the sensor S in the world W (z up)",
+        ),
+        _vector(
+            "wrench",
+            WRENCH,
+            _WRENCH_UNIT,
+            "SW",
+            "raw reading: wrench on the sensor, at So, of its load and of the contact",
+        ),
+        Quantity(
+            "free",
+            "1",
+            "1 where it is known that nothing but its load touches the sensor, else 0",
+            required=False,
+        ),
+        _EXTRA,
+    ),
+    keys=STATIC_WRENCH.keys,
+    min_rows=2,
+)
+
 JOINT_MOTION = Kind(
     name="joint_motion",
     quantities=(
@@ -380,11 +410,12 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         for kind in (
             TRANSITIONS,
             STATIC_WRENCH,
+            CONTACT,
             JOINT_MOTION,
             JOINT_TORQUE_STATIC,
             JOINT_RESPONSE,
         )
     }
 )
-#: Kinds of readings at rest: rows may be as far apart in time as any.
-AT_REST = (STATIC_WRENCH.name, JOINT_TORQUE_STATIC.name)
+#: Kinds of readings of what gravity does: rows may be as far apart in time as any.
+SLOW_KINDS = (STATIC_WRENCH.name, CONTACT.name, JOINT_TORQUE_STATIC.name)

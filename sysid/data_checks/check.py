@@ -69,7 +69,7 @@ def check_data(
         settings: thresholds.
         workers: evaluate the model; this process if left out.
     """
-    subject = Subject(logs, model, settings)
+    subject = Subject.of(logs, model, settings)
     found = [finding for check in _OF_LOGS for finding in check(subject)]
     found += dead_channels(model, settings)
     if not _is_refused(found):
@@ -80,6 +80,7 @@ def check_data(
             found += [f for check in _OF_MODEL for f in check(subject, expected)]
         if not _is_refused(found):  # and the order
             found += torque_findings(subject, expected)
+    found = [subject.as_read(finding) for finding in found]
     return tuple(sorted(found, key=lambda f: f.severity is not Severity.REFUSE))
 
 
@@ -110,7 +111,7 @@ def without_flagged_rows(
             flagged.setdefault(name, set()).update(rows)
     if not flagged:
         return model
-    subject = Subject(logs, model, DEFAULT_DATA_SETTINGS)
+    subject = Subject.of(logs, model, DEFAULT_DATA_SETTINGS)
     kept = kept_rows(subject, flagged, whole_episodes)
     if not kept.any():
         raise DisasmError(

@@ -22,7 +22,8 @@ def contradicting_rows(
 
     Of readings at rest: rows that move, and a sensor's forces that change at one
     orientation, as in contact. A model that leaves such rows unexplained does not lack
-    an effect, and what it leaves is not noise.
+    an effect, and what it leaves is not noise. Of readings in free space: the same
+    forces, and rows that move if they are off by more than those at rest.
 
     Args:
         model: of all rows, or of those that are to be explained.
@@ -34,9 +35,12 @@ def contradicting_rows(
     if not isinstance(model, _AT_REST) or model.clock is None:
         return []
     moving = _moving_rows(model, model.clock, settings)
-    found = _moving(model.measurements, moving, settings)
-    if not isinstance(model, StaticWrenchModel):
-        return found
+    if isinstance(model, JointTorqueStaticModel):
+        return _moving(model.measurements, moving, settings)
+    if model.at_rest:
+        found = _moving(model.measurements, moving, settings)
+    else:
+        found = _inertial(model, moving, settings)
     return found + _contact(model, model.clock, ~moving, settings)
 
 
@@ -50,15 +54,45 @@ def _moving(
         "readings that should be at rest, but move within "
         f"{settings.rest_window:g} s before and after"
     )
+    return [_moving_finding(measured, moving, what)]
+
+
+def _moving_finding(
+    measured: Measurements, moving: NDArray[np.bool_], what: str
+) -> DataFinding:
     rows = rows_of(
         {
             name: moving[measured.episode == number]
             for number, name in enumerate(measured.names)
         }
     )
-    return [
-        DataFinding("moving", what, "leave them out: `drop_flagged_rows`", rows=rows)
-    ]
+    remedy = "leave them out: `drop_flagged_rows`"
+    return DataFinding("moving", what, remedy, rows=rows)
+
+
+def _inertial(
+    model: StaticWrenchModel, moving: NDArray[np.bool_], settings: DataSettings
+) -> list[DataFinding]:
+    """Returns the finding of rows (n,) that turn, if their forces are off by more.
+
+    Weight, a zero and what changes slowly are taken away: a load that is accelerated
+    exerts more than that.
+    """
+    if min(moving.sum(), (~moving).sum()) <= settings.contact_rows:
+        return []
+    force, R_WS = model.measurements.values[:, :3], model.orientations
+    row = np.arange(len(force), dtype=float)
+    left = _fast(force, np.swapaxes(R_WS, 1, 2), row)
+    turning, resting = (
+        float(np.sqrt(np.mean(left[rows] ** 2))) for rows in (moving, ~moving)
+    )
+    if turning <= settings.contact_noise * resting:
+        return []
+    what = (
+        f"forces in free space are off by {turning:.2g} N (rms) while the sensor turns "
+        f"and by {resting:.2g} N at rest: the load's inertia"
+    )
+    return [_moving_finding(model.measurements, moving, what)]
 
 
 def _moving_rows(
@@ -149,13 +183,15 @@ def _contact(
         return []
     what = (
         f"forces change by {np.sqrt(changed):.2g} N (rms) at one orientation, and by "
-        f"{noise:.2g} N from one row to the next: these are no readings of a load at "
-        "rest"
+        f"{noise:.2g} N from one row to the next: these are no readings of a load "
+        f"{'at rest' if model.at_rest else 'in free space'}"
     )
     remedy = (
         "record the raw reading of the sensor in free space, at rest in six or more "
-        "orientations; for contact, a log of transitions"
+        "orientations"
     )
+    if model.at_rest:
+        remedy += "; if it is of a task with contact, import it as `kind` contact"
     return [DataFinding("contact", what, remedy)]
 
 

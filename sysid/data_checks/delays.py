@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.logs.schema import AT_REST
+from drake_disasm.logs.schema import SLOW_KINDS
 from sysid.data_checks.expectation import Expectation
 from sysid.data_checks.finding import DataFinding
 from sysid.data_checks.settings import DataSettings
@@ -20,9 +20,9 @@ def delay_findings(subject: Subject, expected: Expectation) -> list[DataFinding]
     """Finds channels that agree with what is expected of rows before or after.
 
     Poses and wrenches of transitions are shifted as a whole, torques joint by joint.
-    Readings at rest have no delay.
+    Readings of a load alone, which turns slowly, have no delay.
     """
-    if subject.kind in AT_REST:
+    if subject.kind in SLOW_KINDS:
         return []
     shifts = {
         name: _best_shift(subject, expected, channels)

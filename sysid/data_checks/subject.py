@@ -1,16 +1,19 @@
 """What the checks look at: the episodes of logs, and the model that predicts them."""
 
+import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.schema import WRENCH
+from sysid.data_checks.finding import DataFinding
 from sysid.data_checks.settings import DataSettings
 from sysid.models.base import Array, LogModel
-from sysid.models.measurements import episode_names
+from sysid.models.measurements import episode_names, rows_of_logs
 
 #: The quantity that the channels of an arm's model are measured by, by kind of log.
 _BY_JOINT = {"joint_motion": "tau", "joint_torque_static": "tau", "joint_response": "q"}
@@ -21,7 +24,7 @@ class Subject:
     """Logs of one kind, and their model.
 
     Attributes:
-        logs: as they were read.
+        logs: of the rows that the model uses.
         model: of these logs, all rows.
         settings: thresholds.
     """
@@ -29,6 +32,20 @@ class Subject:
     logs: Sequence[Log]
     model: LogModel
     settings: DataSettings
+
+    @classmethod
+    def of(cls, logs: Sequence[Log], model: LogModel, settings: DataSettings) -> Self:
+        """Returns logs, as they were read, with their model."""
+        return cls(rows_of_logs(logs, model.rows_in_use), model, settings)
+
+    def as_read(self, finding: DataFinding) -> DataFinding:
+        """Returns a finding with the numbers that its rows have in the logs as read."""
+        in_use = self.model.rows_in_use
+        rows = {
+            name: tuple(in_use[name][list(own)].tolist()) if name in in_use else own
+            for name, own in finding.rows.items()
+        }
+        return dataclasses.replace(finding, rows=rows)
 
     @property
     def kind(self) -> str:
@@ -98,6 +115,8 @@ def kept_rows(
     kept = np.ones(subject.model.measurements.rows, dtype=bool)
     for number, (name, _) in enumerate(subject.named()):
         bad = np.array(sorted(flagged.get(name, ())), dtype=np.int64)
+        if name in subject.model.rows_in_use:
+            bad = np.flatnonzero(np.isin(subject.model.rows_in_use[name], bad))
         rows, first = subject.model_rows(number)
         if whole_episodes and len(bad):
             kept[rows] = False

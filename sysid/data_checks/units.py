@@ -28,6 +28,7 @@ def log_unit_findings(subject: Subject) -> list[DataFinding]:
     find = {
         "transitions": _transitions,
         "static_wrench": _static_wrench,
+        "contact": _static_wrench,
         "joint_motion": _joint_motion,
         "joint_torque_static": _degrees_of_joints,
         "joint_response": _joint_response,
@@ -96,7 +97,7 @@ def _turns(episode: Episode) -> Array:
 
 
 def _static_wrench(subject: Subject) -> list[DataFinding]:
-    """Looks at the mass and the lever that readings at rest imply."""
+    """Looks at the mass and the lever that readings of a load imply."""
     settings, found = subject.settings, []
     parts = [(log, e) for log in subject.logs for e in log.episodes]
     wrench = np.concatenate([sensor_wrench(log.header, e) for log, e in parts])

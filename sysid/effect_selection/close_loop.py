@@ -80,6 +80,11 @@ class ClosedLoop:
         return self.verdict.is_provisional
 
     @property
+    def derived(self) -> dict[str, tuple[float, str]]:
+        """What follows from the parameters, with units: the weight of a load, say."""
+        return self.last.model.describe(self.last.theta)
+
+    @property
     def sentence(self) -> str:
         """The verdict in plain English."""
         return verdict_sentence(self.verdict, self.errors)
@@ -91,11 +96,14 @@ class ClosedLoop:
 
     @property
     def text(self) -> str:
-        """The verdict in lines: sentences, effects, what to record, errors.
+        """The verdict in lines: sentences, effects, what to record, errors, derived.
 
         A provisional one says so in a line before them.
         """
         text = verdict_text(self.verdict, self.errors)
+        if self.derived:
+            values = (f"{n} {v:.3g} {unit}" for n, (v, unit) in self.derived.items())
+            text += f"\nderived: {', '.join(values)}"
         if not self.is_provisional:
             return text
         count = len(self.search.untested)

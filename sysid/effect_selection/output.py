@@ -21,6 +21,10 @@ def to_mapping(closed: ClosedLoop) -> dict[str, Any]:
     return {
         **_verdict(closed.verdict),
         "model_parameters": _of_model(closed.last),
+        "derived": {
+            name: {"value": value, "unit": unit}
+            for name, (value, unit) in closed.derived.items()
+        },
         "sentence": closed.sentence,
         "not_told_apart": closed.not_told_apart,
         "text": closed.text,

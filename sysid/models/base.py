@@ -96,6 +96,7 @@ class LogModel(abc.ABC):
         shown_elsewhere: classes of effects that other kinds of logs show: one of its
             own need not, for a verdict that nothing is missing.
         assumptions: that a check of the data reports.
+        rows_in_use: of each episode's table, by the episode's name; empty: all rows.
     """
 
     parameters: tuple[Parameter, ...]
@@ -108,6 +109,7 @@ class LogModel(abc.ABC):
     setting: ClassVar[str] = ""
     shown_elsewhere: ClassVar[tuple[type[Effect], ...]] = ()
     assumptions: tuple[Assumption, ...] = ()
+    rows_in_use: Mapping[str, NDArray[np.int64]] = {}
     _effects: tuple[Effect, ...] = ()
     _own_parameters: tuple[Parameter, ...] | None = None  # None: none was frozen
     _frozen: Mapping[str, float] = {}

@@ -10,6 +10,7 @@ from drake_disasm.common.quantity import closest
 from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario, scenario_from_mapping
 from sysid.models.base import LogModel
+from sysid.models.contact import ContactModel
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.joint_torque_static import JointTorqueStaticModel
 from sysid.models.response.model import JointResponseModel
@@ -21,6 +22,7 @@ from sysid.scenario_parameters import Request, scenario_parameters
 OBJECTIVES = {
     "transitions": ("transitions", "rollout"),
     "static_wrench": ("static_wrench",),
+    "contact": ("contact",),
     "joint_motion": ("joint_motion",),
     "joint_torque_static": ("joint_torque_static",),
     "joint_response": ("joint_response",),
@@ -66,6 +68,7 @@ def model_of(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
         )
     make = {
         "static_wrench": _static_wrench,
+        "contact": _contact,
         "joint_motion": _joint_torques,
         "joint_torque_static": _joint_torques,
         "joint_response": _joint_response,
@@ -98,10 +101,20 @@ def _twin(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
 
 
 def _static_wrench(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
+    return _readings(StaticWrenchModel, logs, choice)
+
+
+def _contact(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
+    return _readings(ContactModel, logs, choice)
+
+
+def _readings(
+    kind: type[StaticWrenchModel], logs: Sequence[Log], choice: ModelChoice
+) -> LogModel:
     requests = choice.requests or tuple(Request(n) for n in DEFAULT_PARAMETERS)
     known = choice.scenario or stated_scenario(logs)
     scenario, parameters = scenario_parameters(known or Scenario(), requests)
-    return StaticWrenchModel(logs, scenario, parameters, known is not None)
+    return kind(logs, scenario, parameters, known is not None)
 
 
 def _joint_torques(logs: Sequence[Log], choice: ModelChoice) -> LogModel:

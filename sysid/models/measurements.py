@@ -1,7 +1,7 @@
 """What was measured: rows of channels, each with its noise, of one or more episodes."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Self
 
 import numpy as np
@@ -179,6 +179,29 @@ class Measurements:
 def episode_names(logs: Sequence[Log]) -> list[str]:
     """Returns the name of each episode of some logs, such as `log/episode_0003`."""
     return [f"{log.folder.name}/{e.name}" for log in logs for e in log.episodes]
+
+
+def rows_of_logs(
+    logs: Sequence[Log], rows: Mapping[str, NDArray[np.int64]]
+) -> list[Log]:
+    """Returns logs of some rows, without episodes that have none.
+
+    Args:
+        logs: in their order.
+        rows: numbers of the rows of each episode's table, by the episode's name; those
+            of an episode that is not named are all kept.
+    """
+    found = []
+    for log in logs:
+        names = episode_names([log])
+        kept = [
+            e.select(rows[name]) if name in rows else e
+            for name, e in zip(names, log.episodes, strict=True)
+        ]
+        kept = [episode for episode in kept if episode.rows]
+        if kept:
+            found.append(dataclasses.replace(log, episodes=tuple(kept)))
+    return found
 
 
 def _period(times: Sequence[Array]) -> float | None:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterator, Sequence
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,9 @@ class StaticWrenchModel(ScenarioModel):
     """
 
     affine = True
+    #: Of logs, and whether that says that the sensor is at rest in each row.
+    kind: ClassVar[str] = "static_wrench"
+    at_rest: ClassVar[bool] = True
     effect_types = (SensorEffect,)
     residual_effect = SensorResidualModel
 
@@ -78,14 +81,7 @@ class StaticWrenchModel(ScenarioModel):
             DisasmError: a log is of another kind, or a parameter is of something
                 else than a sensor effect.
         """
-        for log in logs:
-            if log.header.kind != "static_wrench":
-                raise refusal(
-                    log.folder / "log.yaml",
-                    f"a log of kind '{log.header.kind}', static readings are "
-                    "'static_wrench'",
-                    "name such a log",
-                )
+        self.refuse_other_kinds(logs)
         self.parameters, self.scenario = tuple(parameters), scenario
         self._g_W = _GRAVITY_W
         self._in_W = all(log.header.frames.get("wrench") == "W" for log in logs)
@@ -101,11 +97,36 @@ class StaticWrenchModel(ScenarioModel):
         )
         self._refuse_other_parameters()
 
+    @classmethod
+    def refuse_other_kinds(cls, logs: Sequence[Log]) -> None:
+        """Refuses logs that are not of the model's kind.
+
+        Raises:
+            DisasmError: one is not.
+        """
+        for log in logs:
+            if log.header.kind != cls.kind:
+                raise refusal(
+                    log.folder / "log.yaml",
+                    f"a log of kind '{log.header.kind}', where '{cls.kind}' is needed",
+                    "name such a log",
+                )
+
     def predict(self, theta: Array, rows: slice) -> Array:
         """See LogModel."""
+        return self.reading(theta, self._time[rows], self._R_WS[rows])
+
+    def reading(self, theta: Array, time: Array, R_WS: Array) -> Array:
+        """Returns readings (n, 6) in free space [N, N m].
+
+        Args:
+            theta: (p,) values of `parameters`.
+            time: (n,) since the log began [s].
+            R_WS: (n, 3, 3) orientations of the sensor.
+        """
         effects = sensor_chain(self.scenario_at(theta).effects)
-        sensing = Sensing(self._time[rows], self._R_WS[rows], self._g_W)
-        return sensed(self._payload.weight(self._R_WS[rows]), effects, sensing)
+        sensing = Sensing(time, R_WS, self._g_W)
+        return sensed(self._payload.weight(R_WS), effects, sensing)
 
     @property
     def orientations(self) -> Array:

@@ -75,7 +75,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         default="joint_motion",
         choices=sorted(KINDS),
         help="of log (default: joint_motion; joint_torque_static: torques at rest; "
-        "joint_response: commanded and measured positions; transitions need a map)",
+        "joint_response: commanded and measured positions; contact: a sensor's wrench "
+        "in any task; transitions need a map)",
     )
     add(
         "--join",

@@ -232,6 +232,21 @@ def test_readings_at_rest_are_taken_as_they_are(tmp_path: Path) -> None:
     np.testing.assert_array_equal(episode["wrench"], wrench)
 
 
+def test_a_sensor_in_contact_is_guessed_with_the_rows_in_free_space(
+    tmp_path: Path,
+) -> None:
+    names = ["time", "qw", "qx", "qy", "qz", "fx", "fy", "fz", "tx", "ty", "tz", "free"]
+    quaternion = np.tile([1.0, 0.0, 0.0, 0.0], (9, 1))
+    free = (np.arange(9) < 4).astype(float)
+    columns = (0.1 * np.arange(9.0), quaternion, np.zeros((9, 6)), free)
+    source = _csv(tmp_path / "run.csv", names, *columns)
+    fields = guessed_map(source, "contact")
+    found = import_recordings([source], fields, Processing())
+    write_log(found, [source], fields, tmp_path / "log", {})
+    [episode] = read_log(tmp_path / "log").episodes
+    np.testing.assert_array_equal(episode["free"], free)
+
+
 def test_names_and_units_of_many_kinds_are_guessed(tmp_path: Path) -> None:
     time = 0.01 * np.arange(100)
     for names in (

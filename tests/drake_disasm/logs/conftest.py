@@ -18,6 +18,7 @@ SAMPLE_HEADERS = {
     for header in (
         LogHeader("transitions", "lock", _ORIGIN, period=0.1, scenario=_EFFECTS),
         LogHeader("static_wrench", "weigh", {"sensor": "a"}, frames={"wrench": "W"}),
+        LogHeader("contact", "press", {}, frames={"wrench": "S"}),
         LogHeader("joint_motion", "excite", {}, {}, 0.01, ("a", "b", "c"), _URDF),
         LogHeader("joint_torque_static", "hold", {}, joints=("a", "b"), urdf=_URDF),
         LogHeader("joint_response", "swing", {}, {}, None, ("a", "b"), _URDF, _DRIVE),
@@ -66,6 +67,15 @@ def _static_wrench(rng: np.random.Generator, rows: int) -> dict[str, Any]:
     }
 
 
+def _contact(rng: np.random.Generator, rows: int) -> dict[str, Any]:
+    return {
+        "time": 0.1 * np.arange(rows),
+        "R_WS": _poses(rng, rows)[:, 3:],
+        "wrench": rng.normal(size=(rows, 6)),
+        "free": (np.arange(rows) < 3).astype(float),
+    }
+
+
 def _joint_motion(rng: np.random.Generator, rows: int) -> dict[str, Any]:
     names = ("q", "v", "vd", "tau")
     motion = {name: rng.normal(size=(rows, 3)) for name in names}
@@ -86,6 +96,7 @@ def _joint_response(rng: np.random.Generator, rows: int) -> dict[str, Any]:
 SAMPLES = {
     "transitions": _transitions,
     "static_wrench": _static_wrench,
+    "contact": _contact,
     "joint_motion": _joint_motion,
     "joint_torque_static": _joint_torque_static,
     "joint_response": _joint_response,

@@ -82,7 +82,7 @@ def test_contact_is_no_load(weight, tmp_path):
     log = write(tmp_path, 3.0 * contact(), weight)
     [found] = contradicting_rows(model(log))
     assert found.kind == "contact" and not found.rows
-    assert "N (rms) at one orientation" in found.what and "transitions" in found.remedy
+    assert "N (rms) at one orientation" in found.what and "contact" in found.remedy
     assert found in check_data([log], model(log))
 
 
