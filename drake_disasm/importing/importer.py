@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.importing.field_map import FieldMap, quantity_of
+from drake_disasm.importing.orientations import JOINTS, normalised
 from drake_disasm.importing.processing import Done, Processed, Processing, process
 from drake_disasm.importing.recording import Recording, check_share, recordings_of
 from drake_disasm.importing.signals import LowPass, clock_of
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.usage import check_torques
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns
-from drake_disasm.logs.schema import KINDS, Form
+from drake_disasm.logs.schema import KINDS, Form, Rule
 
 Array = NDArray[np.float64]
 
@@ -119,7 +120,11 @@ def _as_recorded(recording: Recording, kind: str, is_order: bool) -> dict[str, A
     clock = {"time": recording.time - recording.time[0]}
     if is_order:
         clock = {"order": recording.time}
-    columns = clock | recording.columns
+    # Those of another stream are interpolated.
+    columns = clock | {
+        name: normalised(values) if quantity_of(kind, name).is_rotation else values
+        for name, values in recording.columns.items()
+    }
     return _unstacked(columns, kind)
 
 
@@ -158,15 +163,19 @@ def write_log(
     Raises:
         DisasmError: the folder is not empty, or the log would not be valid.
     """
+    arm: dict[str, Any] = {"joints": fields.joints, "urdf": _lasting(fields.urdf)}
+    if any(column.form == JOINTS for column in fields.columns.values()):
+        # What tells an orientation alone is no part of a log without an arm.
+        rules = KINDS[fields.kind].keys
+        arm = {k: v for k, v in arm.items() if rules[k] is not Rule.FORBIDDEN}
     header = LogHeader(
         kind=fields.kind,
         task=fields.task,
         provenance=dict(provenance) | {"import": origin(imported, sources, fields)},
         frames=fields.frames,
         period=imported.period,
-        joints=fields.joints,
-        urdf=_lasting(fields.urdf),
         drive=dict(fields.drive) or None,
+        **arm,
     )
     with LogWriter(folder, header) as writer:
         for columns in imported.episodes:
