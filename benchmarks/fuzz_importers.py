@@ -9,10 +9,11 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import yaml
-from mutations import Random, damaged, damaged_csv, damaged_yaml
+from mutations import Random, damaged, damaged_csv, damaged_workbook, damaged_yaml
 from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 from subject import (
@@ -142,6 +143,18 @@ def _join() -> Subject:
             _write(source, guessed_map(source, "joint_motion"))
 
     return Subject(make, read)
+
+
+def _xlsx() -> Subject:
+    columns, stream, book = _motion(), io.BytesIO(), openpyxl.Workbook()
+    book.active.append(list(columns))
+    for row in np.stack(list(columns.values()), axis=1):
+        book.active.append(row.tolist())
+    book.create_sheet("empty")
+    book.save(stream)
+    data = stream.getvalue()
+    make = blindly_or(data, partial(damaged_workbook, data))
+    return file_subject("r.xlsx", make, _import)
 
 
 def _npz() -> Subject:
@@ -316,6 +329,7 @@ IMPORTERS: Mapping[str, Callable[[], Subject]] = {
     "import_ur": _ur,
     "import_join": _join,
     "import_calibration": _calibration,
+    "import_xlsx": _xlsx,
     "import_npz": _npz,
     "import_npy": _npy,
     "import_mat": _mat,
