@@ -74,7 +74,7 @@ def _chosen(path: Path, book: Any, sheet: str) -> Any:
         names = ", ".join(each.title for each in filled)
         raise DisasmError(
             f"{path}: has {len(filled)} sheets, {clipped(names)}; name one, such as "
-            f"{path.name}:{clipped(filled[0].title)}"
+            f"'{path.name}:{clipped(filled[0].title)}'"
         )
     if not filled:
         raise DisasmError(f"{path}: has no rows")

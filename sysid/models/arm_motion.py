@@ -122,7 +122,13 @@ class ArmMotion:
             np.einsum("njkt,k->njt", Y_tilt, arm.inertia),
             base.beta(arm.inertia),
             LinkTorques(
-                arm.urdf, joints, time, episode, np.stack([q, v, vd]), arm.gravity
+                arm.urdf,
+                joints,
+                time,
+                episode,
+                np.stack([q, v, vd]),
+                arm.gravity,
+                arm.own_inertia,
             ),
             PathMemory(joints, episode, q),
         )

@@ -35,7 +35,7 @@ from drake_disasm.importing import (
     read_source,
     write_log,
 )
-from drake_disasm.importing.description import described, summary
+from drake_disasm.importing.description import described, joint_words, summary
 from drake_disasm.importing.joining import WAYS, joined
 from drake_disasm.importing.lerobot import calibrated
 from drake_disasm.importing.plots import plot_import
@@ -191,6 +191,8 @@ def main(arguments: Sequence[str]) -> int:
     if args.show:
         print("\n".join(described(s, fields.kind, fields) for s in sources))
         print(f"map:\n{_indented(fields.to_yaml())}")
+    if words := joint_words(fields):
+        print(program.with_options(words))
     if args.show or not args.out:
         return 0
     imported = import_recordings(

@@ -73,7 +73,7 @@ def test_one_sheet_of_several_is_named(tmp_path: Path) -> None:
     torques = [("t", "tau_0"), (0.0, 5.0), (0.1, 6.0)]
     path = _book(tmp_path / "run.xlsx", **{"q": [_NAMES, *_ROWS], "tau 1": torques})
     message = refusal(read_source, path)
-    assert "has 2 sheets, q, tau 1; name one, such as run.xlsx:q" in message
+    assert "has 2 sheets, q, tau 1; name one, such as 'run.xlsx:q'" in message
     sources = [read_source(Path(f"{path}:{sheet}")) for sheet in ("q", "tau 1")]
     assert sources[0].sha256 == sources[1].sha256
     both = joined(sources, "rows", Known())
