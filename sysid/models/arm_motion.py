@@ -128,7 +128,7 @@ class ArmMotion:
                 episode,
                 np.stack([q, v, vd]),
                 arm.gravity,
-                arm.own_inertia,
+                arm.given_inertia,
             ),
             PathMemory(joints, episode, q),
         )

@@ -37,7 +37,7 @@ class ArmDynamics:
 
     Attributes:
         urdf: of the arm.
-        gravity, own_inertia: see Args.
+        gravity, given_inertia: see Args.
         links: names of the links that move, in the order of pi.
         inertia: nominal pi.
         prismatic: names of the joints that slide; others turn.
@@ -57,7 +57,7 @@ class ArmDynamics:
         gravity: Sequence[float] | None = None,
         inertia: Array | None = None,
     ) -> None:
-        self.urdf, self.gravity, self.own_inertia = urdf, gravity, inertia
+        self.urdf, self.gravity, self.given_inertia = urdf, gravity, inertia
         arm = ArmPlant.of(urdf, joints, gravity)
         self._plant, self._columns = arm.plant, arm.columns
         self._bodies = arm.bodies

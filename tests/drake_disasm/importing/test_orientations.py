@@ -9,6 +9,7 @@ import yaml
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from drake_disasm.common.spatial import pose_to_vector, rotation_vector
+from drake_disasm.fakes.bag import FakeBag
 from drake_disasm.importing import (
     FieldMap,
     Known,
@@ -251,3 +252,31 @@ def test_a_ur_s_pose_and_force_are_known(tmp_path: Path) -> None:
     assert fields.frames == {"wrench": "W"}
     _assert_same(_imported(source, fields), _WXYZ)
     assert "in W, as RTDE" in uses(source, "static_wrench", fields)[names[-1]]
+
+
+def test_joints_of_another_topic_are_interpolated(tmp_path: Path) -> None:
+    """Readings of 50 Hz beside joints of 20 Hz, which turn by half a turn and more."""
+    (tmp_path / "arm.urdf").write_text(_URDF)
+    bag, turn = FakeBag(), 2.0
+    for time in np.arange(0.05, 3.0, 0.05):
+        state = np.array([0.0, turn * time])
+        bag.add_joint_state(time, ("lift", "turn"), state, np.zeros(2))
+    for time in np.arange(0.1, 2.9, 0.02):
+        bag.add_wrench(time, np.ones(6))
+    bag.write(tmp_path / "bag", True)
+    source = read_source(tmp_path / "bag")
+    joints = [f"/joint_states:position.{name}" for name in ("lift", "turn")]
+    wrench = [f"/ft:wrench.{a}.{b}" for a in ("force", "torque") for b in "xyz"]
+    fields = {
+        "kind": "static_wrench",
+        "urdf": str(tmp_path / "arm.urdf"),
+        "frames": {"wrench": "S"},
+        "columns": {
+            "wrench": wrench,
+            "R_WS": {"from": joints, "as": "joints", "frame": "hand"},
+        },
+    }
+    [episode] = import_recordings([source], parse_map(fields), Processing()).episodes
+    half = 0.5 * turn * (episode["time"] + 0.1)
+    expected = np.column_stack([np.cos(half), np.sin(half), 0.0 * half, 0.0 * half])
+    _assert_same(episode["R_WS"], expected, 1e-6)
