@@ -33,6 +33,7 @@ READERS = (
     *("import_csv", "import_npz", "import_npy", "import_mat", "import_parquet"),
     *("import_ur", "import_join", "import_calibration"),
     *("import_lerobot", "import_mcap", "import_ros2", "import_ros1", "import_map"),
+    *("import_orientations", "import_xlsx"),
 )
 CODECS = (
     *("hex_sample", "hex_request", "robotiq_status", "robotiq_command"),

@@ -9,10 +9,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
-from mutations import Random, damaged, damaged_csv, damaged_yaml
+import yaml
+from mutations import Random, damaged, damaged_csv, damaged_workbook, damaged_yaml
 from scipy.io import savemat
+from scipy.spatial.transform import Rotation
 from subject import (
     Subject,
     archive_damage,
@@ -43,10 +46,12 @@ from drake_disasm.importing.description import described, summary
 from drake_disasm.importing.field_map import Column
 from drake_disasm.importing.joining import WAYS, joined
 from drake_disasm.importing.lerobot import calibrated
+from drake_disasm.importing.orientations import FORMS, JOINTS
 from drake_disasm.importing.presets import PRESETS
 from drake_disasm.importing.units import NORMALISED
 
 _JOINTS = ("shoulder", "elbow")
+_URDF = "package://disasm_models/iiwa14/iiwa14.urdf"
 _TIME = np.arange(120) / 50.0  # s
 
 
@@ -138,6 +143,18 @@ def _join() -> Subject:
             _write(source, guessed_map(source, "joint_motion"))
 
     return Subject(make, read)
+
+
+def _xlsx() -> Subject:
+    columns, stream, book = _motion(), io.BytesIO(), openpyxl.Workbook()
+    book.active.append(list(columns))
+    for row in np.stack(list(columns.values()), axis=1):
+        book.active.append(row.tolist())
+    book.create_sheet("empty")
+    book.save(stream)
+    data = stream.getvalue()
+    make = blindly_or(data, partial(damaged_workbook, data))
+    return file_subject("r.xlsx", make, _import)
 
 
 def _npz() -> Subject:
@@ -276,12 +293,43 @@ def _map() -> Subject:
     return yaml_subject("m.yaml", texts, lambda m: _write(source, read_map(m)))
 
 
+def _orientations() -> Subject:
+    """Maps of readings at rest, whose orientation is given in each form."""
+    folder, wrench = new_folder(), [f"w.{i}" for i in range(6)]
+    q = np.stack([np.sin(_TIME), np.cos(2.0 * _TIME), 0.1 * _TIME], axis=1)
+    turns = Rotation.from_rotvec(q)
+    arrays = {
+        "rotation_vector": q,
+        "roll_pitch_yaw": turns.as_euler("xyz"),
+        "quaternion_xyzw": turns.as_quat(),
+        "matrix": turns.as_matrix().reshape(-1, 9),
+        "joints": q[:, :2],
+    }
+    w = np.ones((len(_TIME), 6))
+    np.savez(folder / "r.npz", allow_pickle=False, t=_TIME, w=w, **arrays)
+    arm = {"joints": ["iiwa_joint_1", "iiwa_joint_2"], "urdf": _URDF}
+    texts = []
+    for form, values in arrays.items():
+        channels = [f"{form}.{i}" for i in range(values.shape[1])]
+        column = {"from": channels, "as": form}
+        column |= {"unit": "rad"} if FORMS[form].has_angles else {}
+        column |= {"frame": "iiwa_link_7"} if form == JOINTS else {}
+        fields = {"kind": "static_wrench", "time": {"from": "t"}}
+        fields |= arm if form == JOINTS else {}
+        columns = {"R_WS": column, "wrench": {"from": wrench}}
+        fields |= {"frames": {"wrench": "S"}, "columns": columns}
+        texts.append(yaml.safe_dump(fields, sort_keys=False))
+    source = read_source(folder / "r.npz")
+    return yaml_subject("m.yaml", texts, lambda m: _write(source, read_map(m)))
+
+
 #: By name: what makes each format's subject.
 IMPORTERS: Mapping[str, Callable[[], Subject]] = {
     "import_csv": _csv,
     "import_ur": _ur,
     "import_join": _join,
     "import_calibration": _calibration,
+    "import_xlsx": _xlsx,
     "import_npz": _npz,
     "import_npy": _npy,
     "import_mat": _mat,
@@ -291,4 +339,5 @@ IMPORTERS: Mapping[str, Callable[[], Subject]] = {
     "import_ros2": _ros2,
     "import_ros1": _ros1,
     "import_map": _map,
+    "import_orientations": _orientations,
 }

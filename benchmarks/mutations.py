@@ -1,6 +1,7 @@
 """Ways to damage files and datagrams, at random and by design."""
 
 import io
+import re
 import warnings
 import zipfile
 from collections.abc import Callable
@@ -41,6 +42,17 @@ _NUMBERS = (
     *("nan", "inf", "-inf", "1e300", "-1e300", "1e400", "", " ", "abc", "true", "0x1"),
     *("9" * 5000, '"', '"1,2"', "1;2", "1e", "--1", "\x00", "1.7e308", "5e-324"),
 )
+#: What stands between quotes, or between tags.
+_IN_XML = re.compile(r'(?<=")[^"<>]*(?=")|(?<=>)[^<>]+(?=<)')
+_XML_WORDS = (
+    *("-1", "0", "999999999", "A0", "XFD1048576", "ZZZZ1", "1e400", "nan", "", "&#0;"),
+    *("s", "e", "d", "b", "str", "inlineStr", "2024-01-01", "9" * 5000, "x" * 20_000),
+)
+_XML_BOMB = (
+    '<!DOCTYPE x [<!ENTITY a0 "x">'
+    + "".join(f'<!ENTITY a{i} "{f"&a{i - 1};" * 10}">' for i in range(1, 10))
+    + "]>"
+)
 
 
 def damaged(data: bytes, rng: Random) -> bytes:
@@ -73,6 +85,36 @@ def damaged_yaml(text: str, rng: Random) -> str:
             del lines[i]
     bomb = _BOMB if rng.integers(20) == 0 else ""
     return bomb + "\n".join(lines) + "\n"
+
+
+def damaged_xml(text: str, rng: Random) -> str:
+    """Returns XML after one to four changes of its attributes and texts."""
+    for _ in range(rng.integers(1, 5)):
+        places = list(_IN_XML.finditer(text))
+        if not places:
+            break
+        place = places[rng.integers(len(places))]
+        word = _XML_WORDS[rng.integers(len(_XML_WORDS))]
+        text = text[: place.start()] + word + text[place.end() :]
+    if rng.integers(20) == 0:
+        head, end, rest = text.rpartition("?>")
+        text = head + end + _XML_BOMB + rest.replace("<v>", "<v>&a9;", 1)
+    return text
+
+
+def damaged_workbook(data: bytes, rng: Random) -> bytes:
+    """Returns a zip of XML files, one of which is damaged by design."""
+    if rng.integers(3) == 0:
+        return _rezipped(data, rng)
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(buffer, "w") as new:
+        chosen = old.namelist()[rng.integers(len(old.namelist()))]
+        for name in old.namelist():
+            text = old.read(name).decode()
+            if name == chosen or ("sheet" in name and rng.integers(2)):
+                text = damaged_xml(text, rng)
+            new.writestr(name, text.encode(errors="replace"))
+    return buffer.getvalue()
 
 
 def damaged_csv(text: str, rng: Random) -> str:

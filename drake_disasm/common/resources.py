@@ -10,6 +10,11 @@ from pydrake.multibody.parsing import PackageMap
 from drake_disasm.common.errors import DisasmError
 
 MODELS_PACKAGE = "disasm_models"
+#: Of one body on one joint, for an axis without a URDF, by what the joint does.
+ONE_JOINT_MODELS = {
+    "turns": f"package://{MODELS_PACKAGE}/one_joint/revolute.urdf",
+    "slides": f"package://{MODELS_PACKAGE}/one_joint/prismatic.urdf",
+}
 
 
 @cache

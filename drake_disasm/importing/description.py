@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from drake_disasm.importing.field_map import FieldMap
 from drake_disasm.importing.guess import Known, time_label, unit_of_times
-from drake_disasm.importing.importer import Imported
+from drake_disasm.importing.importer import Imported, lone_joint
 from drake_disasm.importing.signals import clock_of, quantum
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stream import Stream
@@ -131,6 +131,16 @@ def summary(imported: Imported) -> str:
         if steps:
             lines.append(f"rounded, which is noise of a third of that: {steps}")
     return "\n".join(lines)
+
+
+def joint_words(fields: FieldMap) -> str:
+    """Returns what is assumed of a single joint without a URDF; "" of others."""
+    how = lone_joint(fields)
+    other = "slides, give `unit: m`" if how == "turns" else "turns, give `unit: rad`"
+    return how and (
+        f"no URDF: '{fields.joints[0]}' {how}, and moves one unknown body (if it "
+        f"{other} of q in a map)"
+    )
 
 
 def _done_lines(imported: Imported) -> Iterator[str]:

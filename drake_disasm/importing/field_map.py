@@ -16,6 +16,12 @@ Where times are not recorded, or too coarsely, `time: {rate: 125}` takes the row
 that many a second. Readings at rest may have an order instead of times: `order: {from:
 n}`, or `order: {}` for that of the table.
 
+An orientation may be a quaternion, a rotation vector, roll, pitch and yaw, a matrix row
+by row, or follow from joint angles and the URDF; a pose has x, y, z before it::
+
+    R_WS: {from: [rx, ry, rz], as: rotation_vector, unit: deg}
+    R_WS: {from: [q_0, q_1], as: joints, frame: tool0}
+
 In a bag a channel is "/topic:field", and the time is what the messages' headers carry.
 A scale may be the name of a constant of the recording, with a minus before it.
 """
@@ -31,9 +37,11 @@ import yaml
 from drake_disasm.common import bounded_yaml
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import read_text
+from drake_disasm.common.quantity import closest
 from drake_disasm.common.text import clipped, shown
+from drake_disasm.importing.orientations import FORMS, JOINTS, USUAL, unit_factors
 from drake_disasm.importing.units import factor
-from drake_disasm.logs.schema import KINDS, Form, Quantity
+from drake_disasm.logs.schema import KINDS, QUATERNION, Form, Quantity
 
 _MOST_BYTES = 2**20
 _KEYS = (
@@ -48,7 +56,7 @@ _KEYS = (
     "episode",
     "columns",
 )
-_COLUMN_KEYS = ("from", "unit", "scale", "sign", "offset")
+_COLUMN_KEYS = ("from", "as", "frame", "unit", "scale", "sign", "offset")
 _REMEDY = "see docs/guides/import-log.md, or let `show` guess and `save_map` write one"
 
 Scale = float | str
@@ -63,12 +71,18 @@ class Column:
         unit: of the channels; "" for SI.
         scales: one for each channel, sign included; numbers, or names of constants.
         offset: added, in SI units.
+        form: in which the channels give an orientation; "" of other quantities.
+        frame: of the URDF, whose orientation joints give; "" of other forms.
+        why: what a guess of the form rests on.
     """
 
     channels: tuple[str, ...]
     unit: str = ""
     scales: tuple[Scale, ...] = ()
     offset: float = 0.0
+    form: str = ""
+    frame: str = ""
+    why: str = dataclasses.field(default="", compare=False)
 
     def factors(self, constants: Mapping[str, float], where: str) -> list[float]:
         """Returns what each channel is multiplied by.
@@ -80,22 +94,34 @@ class Column:
         Raises:
             DisasmError: a constant is not in the recording, or a unit is not known.
         """
-        unit = factor(self.unit, where) if self.unit else 1.0
+        units = self._units(where)
         if self.unit == "A" and not self.scales:
             raise DisasmError(
                 f"{where}: is a motor's current; give `scale`, the motor constants "
                 "[N m/A] by joint, in the map"
             )
         found = []
-        for scale in self.scales or (1.0,) * len(self.channels):
+        scales = self.scales or (1.0,) * len(self.channels)
+        for scale, unit in zip(scales, units, strict=True):
             if isinstance(scale, str):
                 scale = _constant(scale, constants, where)
             found.append(unit * scale)
         return found
 
+    def _units(self, where: str) -> list[float]:
+        """Returns how many SI units each channel's unit is."""
+        if self.form:
+            return unit_factors(self.unit, self.form, len(self.channels), where)
+        unit = factor(self.unit, where) if self.unit else 1.0
+        return [unit] * len(self.channels)
+
     def to_mapping(self) -> dict[str, Any]:
         """Returns it as plain data."""
         found: dict[str, Any] = {"from": list(self.channels)}
+        if self.form:
+            found["as"] = self.form
+        if self.frame:
+            found["frame"] = self.frame
         if self.unit:
             found["unit"] = self.unit
         if self.scales:
@@ -147,13 +173,15 @@ class FieldMap:
     drive: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Checks columns against the kind.
+        """Checks columns against the kind, and fills in the usual form of rotations.
 
         Raises:
             DisasmError: a column that the kind does not have, or of another size.
         """
+        formed = {n: _formed(self.kind, n, c) for n, c in self.columns.items()}
+        object.__setattr__(self, "columns", formed)
         for name, column in self.columns.items():
-            wanted = width_of(self.kind, name, len(self.joints))
+            wanted = width_of(self.kind, name, len(self.joints), column.form)
             if wanted is not None and len(column.channels) != wanted:
                 raise DisasmError(
                     f"map: {name} has {len(column.channels)} channels, not {wanted}; "
@@ -226,9 +254,49 @@ def quantity_of(kind: str, name: str) -> Quantity:
     return found
 
 
-def width_of(kind: str, name: str, joints: int) -> int | None:
-    """Returns how many components a column has; None where a robot's joints decide."""
+def _formed(kind: str, name: str, column: Column) -> Column:
+    """Returns a column whose form is known, if it is a rotation's.
+
+    Raises:
+        DisasmError: the form does not exist, or is not for this quantity.
+    """
     quantity = quantity_of(kind, name)
+    if not quantity.is_rotation:
+        if column.form or column.frame:
+            raise DisasmError(f"map: {name} is no orientation; leave `as` out")
+        return column
+    form = column.form or USUAL
+    if form not in FORMS:
+        raise DisasmError(
+            f"map: {name}.as: {shown(form)} is not known; {closest(form, list(FORMS))}"
+        )
+    if form == JOINTS and quantity.frames != ("W",):
+        raise DisasmError(
+            f"map: {name} does not follow from joints, which give what is in the "
+            "arm's base frame; give its own channels"
+        )
+    if (form == JOINTS) != bool(column.frame):
+        raise DisasmError(
+            f"map: {name}: `frame` names the URDF's frame whose orientation `as: "
+            "joints` gives; give both, or neither"
+        )
+    return dataclasses.replace(column, form=form)
+
+
+def width_of(kind: str, name: str, joints: int, form: str = "") -> int | None:
+    """Returns how many channels a column has; None where a robot's joints decide.
+
+    Args:
+        kind: of the log.
+        name: of the column.
+        joints: how many there are; 0 if that is not known.
+        form: of an orientation, one of FORMS.
+    """
+    quantity = quantity_of(kind, name)
+    if form == JOINTS:
+        return joints or None
+    if form:
+        return len(quantity.components) - len(QUATERNION) + FORMS[form].channels
     if quantity.form is Form.VECTOR:
         return len(quantity.components)
     if quantity.form is Form.JOINTS:
@@ -316,6 +384,8 @@ def _column(name: str, raw: object) -> Column:
         unit=str(values.get("unit", "")),
         scales=_combined(_spread(scales, channels), _spread(signs, channels), name),
         offset=float(_number(values.get("offset", 0.0), name)),
+        form=str(values.get("as", "")),
+        frame=str(values.get("frame", "")),
     )
 
 

@@ -2,17 +2,19 @@
 
 import dataclasses
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.text import clipped
 from drake_disasm.importing.field_map import Column, FieldMap, may_be_ordered
+from drake_disasm.importing.orientations import FORMS
 from drake_disasm.importing.presets import Preset
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stream import Stream
 from drake_disasm.importing.units import NORMALISED
+from drake_disasm.importing.vectors import orientation_of, unclear_angles, wrench_of
 from drake_disasm.importing.vocabulary import (
     NAMES,
     Label,
@@ -24,23 +26,9 @@ from drake_disasm.importing.vocabulary import (
     numbered,
     tokens_of,
 )
-from drake_disasm.logs.schema import KINDS
+from drake_disasm.logs.schema import KINDS, WRENCH
 
 _EPISODE = ("episode_index", "episode", "trial", "run")
-_WRENCH = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
-_QUATERNION = ("orientation.w", "orientation.x", "orientation.y", "orientation.z")
-_PLAIN_WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
-_WRENCHES = (
-    _PLAIN_WRENCH,
-    ("fx", "fy", "fz", "mx", "my", "mz"),
-    ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"),
-)
-_QUATERNIONS = (
-    ("qw", "qx", "qy", "qz"),
-    ("orientation_w", "orientation_x", "orientation_y", "orientation_z"),
-    ("quat_w", "quat_x", "quat_y", "quat_z"),
-)
-
 #: What is looked for, by the kind of log.
 _OF_JOINTS = {
     "joint_motion": ("q", "tau"),
@@ -112,13 +100,25 @@ def map_to_fill_in(kind: str, source: Source) -> str:
         f"kind: {kind}",
         "joints: []  # their names in the URDF, in the order of the channels",
         f"time: {{from: {_likely_time(source)}, unit: s}}  # or {{rate: HZ}}",
+        *_frames_to_choose(kind),
         "columns:",
     ]
     for quantity in KINDS[kind].quantities:
         if quantity.name not in ("time", "extra"):
             mark = "" if quantity.required else "# "
-            lines.append(f"  {mark}{quantity.name}: {{from: []}}  # {quantity.meaning}")
+            hint = f"; `as` {', '.join(FORMS)}" if quantity.is_rotation else ""
+            lines.append(
+                f"  {mark}{quantity.name}: {{from: []}}  # {quantity.meaning}{hint}"
+            )
     return "\n".join(lines) + "\n"
+
+
+def _frames_to_choose(kind: str) -> Iterator[str]:
+    """Yields the lines of a map that choose frames, where a kind leaves a choice."""
+    for quantity in KINDS[kind].quantities:
+        if quantity.frame_is_stated and len(quantity.frames) > 1:
+            first, *rest = quantity.frames
+            yield f"frames: {{{quantity.name}: {first}}}  # or {', '.join(rest)}"
 
 
 def _likely_time(source: Source) -> str:
@@ -350,80 +350,45 @@ def _other_wrenches(source: Source, stream: Stream) -> dict[str, Column]:
     """Returns a wrench of another topic, as extra columns."""
     for other in source.streams:
         is_topic = other is not stream and bool(other.name)
-        channels = _wrench_of(other) if is_topic else None
-        if channels:
+        found = wrench_of(other) if is_topic else None
+        if found:
             return {
                 f"extra.{name}": Column((channel,))
-                for name, channel in zip(_PLAIN_WRENCH, channels, strict=True)
+                for name, channel in zip(WRENCH, found[0].channels, strict=True)
             }
     return {}
 
 
-def _wrench_of(stream: Stream) -> tuple[str, ...] | None:
-    return _vector_of(stream, ("wrench.", ""), _WRENCH, _WRENCHES)
-
-
-def _quaternion_of(stream: Stream) -> tuple[str, ...] | None:
-    return _vector_of(stream, ("pose.", ""), _QUATERNION, _QUATERNIONS)
-
-
-def _vector_of(
-    stream: Stream,
-    prefixes: tuple[str, ...],
-    fields: tuple[str, ...],
-    ways: Sequence[tuple[str, ...]],
-) -> tuple[str, ...] | None:
-    """Returns the channels of a vector's components.
-
-    Args:
-        stream: a topic or a table.
-        prefixes: of the fields in a topic's messages.
-        fields: what they are called there.
-        ways: in which they are called in a table.
-    """
-    if not stream.name:
-        return _components(stream, ways)
-    for prefix in prefixes:
-        names = tuple(f"{stream.name}:{prefix}{end}" for end in fields)
-        if set(names) <= set(stream.names):
-            return names
-    return None
-
-
-def _components(
-    stream: Stream, ways: Sequence[tuple[str, ...]]
-) -> tuple[str, ...] | None:
-    """Returns a table's channels of a vector's components, in one of these ways.
-
-    All of them may have the same before their names.
-    """
-    labels = {"_".join(x.tokens).lower(): x.channel for x in labels_of(stream)}
-    for way in ways:
-        heads = [name.removesuffix(way[0]) for name in labels if name.endswith(way[0])]
-        found = [
-            tuple(labels[f"{head}{end}"] for end in way)
-            for head in heads
-            if all(f"{head}{end}" in labels for end in way)
-        ]
-        if len(found) == 1:
-            return found[0]
-    return None
-
-
 def _sensor(source: Source, known: Known, kind: str) -> FieldMap:
     """Returns the map of a force/torque sensor's readings."""
-    columns, main = dict[str, Column](), None
+    columns, main, frame = dict[str, Column](), None, "S"
     for stream in source.streams:
-        if wrench := _wrench_of(stream):
-            columns["wrench"] = Column(wrench)
+        if found := wrench_of(stream, known.preset):
+            columns["wrench"], frame = found
             main = stream
-        if quaternion := _quaternion_of(stream):
-            columns["R_WS"] = Column(quaternion)
+        if orientation := orientation_of(stream, known.preset):
+            columns["R_WS"] = orientation
     if main is None or len(columns) < 2:
-        raise NoGuessError(
-            source.path, "no channels are called as a wrench with an orientation is"
-        )
+        raise NoGuessError(source.path, _why_no_reading(source, known))
     time, unit = _time_and_unit(main, known, source, kind)
     if kind == "contact" and "free" in main.channels:
         columns["free"] = Column(("free",))
-    return FieldMap(kind, columns, time, unit, known.rate, frames={"wrench": "S"})
+    return FieldMap(kind, columns, time, unit, known.rate, frames={"wrench": frame})
+
+
+def _why_no_reading(source: Source, known: Known) -> str:
+    """Returns what no name tells of a wrench and its orientation."""
+    tables = [stream for stream in source.streams if not stream.name]
+    for stream in tables:
+        if names := unclear_angles(stream):
+            return (
+                f"{', '.join(names)} may be a rotation vector or roll, pitch and yaw; "
+                "say which by `as` in a map"
+            )
+    names = known.names["q"]
+    if any(numbered(s, names) or named(s, "q", known.names) for s in source.streams):
+        return (
+            "no channels are called as an orientation is; if it follows from the "
+            "joints, give `as: joints` and the sensor's `frame` in a map"
+        )
+    return "no channels are called as a wrench with an orientation is"

@@ -12,14 +12,17 @@ import yaml
 from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.resources import ONE_JOINT_MODELS
 from drake_disasm.importing.field_map import FieldMap, quantity_of
+from drake_disasm.importing.orientations import JOINTS, normalised
 from drake_disasm.importing.processing import Done, Processed, Processing, process
 from drake_disasm.importing.recording import Recording, check_share, recordings_of
 from drake_disasm.importing.signals import LowPass, clock_of
 from drake_disasm.importing.source import Source
+from drake_disasm.importing.units import UNITS
 from drake_disasm.importing.usage import check_torques
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns
-from drake_disasm.logs.schema import KINDS, Form
+from drake_disasm.logs.schema import KINDS, Form, Rule
 
 Array = NDArray[np.float64]
 
@@ -119,7 +122,11 @@ def _as_recorded(recording: Recording, kind: str, is_order: bool) -> dict[str, A
     clock = {"time": recording.time - recording.time[0]}
     if is_order:
         clock = {"order": recording.time}
-    columns = clock | recording.columns
+    # Those of another stream are interpolated.
+    columns = clock | {
+        name: normalised(values) if quantity_of(kind, name).is_rotation else values
+        for name, values in recording.columns.items()
+    }
     return _unstacked(columns, kind)
 
 
@@ -158,26 +165,47 @@ def write_log(
     Raises:
         DisasmError: the folder is not empty, or the log would not be valid.
     """
+    arm: dict[str, Any] = {"joints": fields.joints, "urdf": _lasting(fields)}
+    if any(column.form == JOINTS for column in fields.columns.values()):
+        # What tells an orientation alone is no part of a log without an arm.
+        rules = KINDS[fields.kind].keys
+        arm = {k: v for k, v in arm.items() if rules[k] is not Rule.FORBIDDEN}
     header = LogHeader(
         kind=fields.kind,
         task=fields.task,
         provenance=dict(provenance) | {"import": origin(imported, sources, fields)},
         frames=fields.frames,
         period=imported.period,
-        joints=fields.joints,
-        urdf=_lasting(fields.urdf),
         drive=dict(fields.drive) or None,
+        **arm,
     )
     with LogWriter(folder, header) as writer:
         for columns in imported.episodes:
             writer.write_episode(flat_columns(fields.kind, columns))
 
 
-def _lasting(urdf: str) -> str | None:
-    """Returns the name of a URDF that holds wherever a program is started."""
+def _lasting(fields: FieldMap) -> str | None:
+    """Returns the name of a map's URDF that holds wherever a program is started."""
+    urdf = fields.urdf
+    if how := lone_joint(fields):
+        return ONE_JOINT_MODELS[how]
     if not urdf or urdf.startswith("package:"):
         return urdf or None
     return str(Path(urdf).resolve())
+
+
+def lone_joint(fields: FieldMap) -> str:
+    """Returns what a single joint without a URDF does; "" where there is no such joint.
+
+    It slides if its position is in a unit of length or its torque in one of force, or
+    else turns. A packaged model stands in for its URDF.
+    """
+    is_alone = len(fields.joints) == 1 and not fields.urdf
+    if fields.kind != "joint_motion" or not is_alone:
+        return ""
+    units = [fields.columns[n].unit for n in ("q", "tau") if n in fields.columns]
+    dimensions = [UNITS[unit][0] for unit in units if unit in UNITS]
+    return "slides" if {"length", "force"} & {*dimensions} else "turns"
 
 
 def origin(

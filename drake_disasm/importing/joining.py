@@ -47,7 +47,7 @@ def joined(sources: Sequence[Source], way: str, known: Known) -> Source:
         for name, values in part.items():
             is_first_time = i == 0 and name == time
             is_alone = count[name] == 1 or is_first_time
-            unique = name if is_alone else f"{source.path.stem}.{name}"
+            unique = name if is_alone else f"{source.label}.{name}"
             if unique in channels:
                 raise DisasmError(
                     f"`join`: '{unique}' is in two files of one name; rename one"

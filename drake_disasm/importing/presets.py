@@ -35,6 +35,8 @@ class Preset:
         joints: that it numbers, from the base; () where that differs.
         layout: of a table without names: the time, then these for each joint.
         has_currents: whether its torques may be motor currents.
+        pose_form: of the orientation behind x, y, z in its "pose", or "".
+        wrench_frame: in which its "wrench" is.
     """
 
     name: str
@@ -46,6 +48,8 @@ class Preset:
     joints: tuple[str, ...] = ()
     layout: tuple[str, ...] = ()
     has_currents: bool = False
+    pose_form: str = ""
+    wrench_frame: str = "S"
 
     @property
     def all_names(self) -> Names:
@@ -192,6 +196,8 @@ _ALL = (
             "v": ("actual_qd",),
             "tau": (*("actual_current_as_torque", "joint_torque", "actual_current"),),
             "q_commanded": ("target_q",),
+            "pose": ("actual_tcp_pose",),
+            "wrench": ("actual_tcp_force",),
         },
         "s",
         joints=_UR_JOINTS,
@@ -200,6 +206,8 @@ _ALL = (
             *("target_current", "target_moment"),
         ),
         has_currents=True,
+        pose_form="rotation_vector",
+        wrench_frame="W",  # at the TCP, in the base's axes
     ),
     Preset(
         "fri",

@@ -1,13 +1,27 @@
 """A recording as rows of a log: mapped, in SI units, on one time line."""
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.cell.parsing import movable_joints
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.importing.field_map import Column, FieldMap, may_be_ordered
+from drake_disasm.common.text import clipped
+from drake_disasm.importing.field_map import (
+    Column,
+    FieldMap,
+    may_be_ordered,
+    quantity_of,
+)
+from drake_disasm.importing.orientations import (
+    FORMS,
+    JOINTS,
+    check_angles,
+    frame_poses,
+    quaternions,
+)
 from drake_disasm.importing.shift import (
     MOST_JOINTS,
     UNKNOWN,
@@ -22,7 +36,7 @@ from drake_disasm.importing.signals import clock_of, resample
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stamps import Evened, evened
 from drake_disasm.importing.stream import CLOSEST, LARGEST, Stream
-from drake_disasm.importing.units import factor
+from drake_disasm.importing.units import UNITS, factor
 
 Array = NDArray[np.float64]
 
@@ -92,7 +106,7 @@ def recordings_of(
         for name, column in fields.columns.items()
         if source.stream_of(column.channels[0]) is stream
     }
-    columns = {name: _values(source, name, column) for name, column in own.items()}
+    columns = {n: _values(source, n, column, fields) for n, column in own.items()}
     numbers = source.channel(fields.episode) if fields.episode else np.zeros(len(time))
     # Rests are read when they are reached: their stamps were never even.
     may_even = even and fields.rate is None and not may_be_ordered(fields.kind)
@@ -110,11 +124,14 @@ def recordings_of(
         raise DisasmError(f"{source.path}: '{fields.episode}' numbers no episode")
     others = {n: c for n, c in fields.columns.items() if n not in own}
     features = _features(fields) if shifts and others else None
-    return [_with_others(each, source, others, features, accept) for each in found]
+    rest = dataclasses.replace(fields, columns=others)
+    return [_with_others(each, source, rest, features, accept) for each in found]
 
 
 def _features(fields: FieldMap) -> Features | None:
     """Returns what wrenches depend on: the last link's motion, of an arm we know."""
+    if "q" not in fields.columns:
+        return None
     if fields.urdf:
         return link_features(fields.urdf, fields.joints)
     return joint_features if len(fields.joints) <= MOST_JOINTS else None
@@ -149,18 +166,41 @@ def _time(source: Source, stream: Stream, fields: FieldMap) -> Array:
     )
 
 
-def _values(source: Source, name: str, column: Column) -> Array:
-    """Returns a quantity's values (n, k) in SI units."""
+def _values(source: Source, name: str, column: Column, fields: FieldMap) -> Array:
+    """Returns a quantity's values (n, k) in SI units, orientations as quaternions."""
     stream = source.stream_of(column.channels[0])
     for channel in column.channels:
         if source.stream_of(channel) is not stream:
             raise DisasmError(
                 f"map: {name} takes channels of two topics; take them from one"
             )
+    where = f"map: {name}"
     raw = np.stack([stream.channels[channel] for channel in column.channels], axis=1)
-    return (
-        raw * np.array(column.factors(stream.constants, f"map: {name}")) + column.offset
-    )
+    values = raw * np.array(column.factors(stream.constants, where)) + column.offset
+    if column.form == JOINTS:
+        return _of_frame(values, name, column, fields)
+    if not column.form:
+        return values
+    first = len(column.channels) - FORMS[column.form].channels
+    has_unit = UNITS.get(column.unit, ("",))[0] == "angle"
+    turned = quaternions(values[:, first:], column.form, has_unit, where)
+    return np.concatenate([values[:, :first], turned], axis=1)
+
+
+def _of_frame(q: Array, name: str, column: Column, fields: FieldMap) -> Array:
+    """Returns orientations, or poses, of a frame of the arm by its joints (n, j)."""
+    where = f"map: {name}"
+    if not fields.urdf:
+        raise DisasmError(f"{where} follows from joints; give the arm's URDF by `urdf`")
+    joints = fields.joints or movable_joints(fields.urdf)
+    if len(joints) != q.shape[1]:
+        raise DisasmError(
+            f"{where} has {q.shape[1]} channels for the URDF's {len(joints)} joints "
+            f"({clipped(', '.join(joints))}); name theirs by `joints`"
+        )
+    check_angles(q, bool(column.unit), where)
+    poses = frame_poses(q, fields.urdf, joints, column.frame)
+    return poses[:, -len(quantity_of(fields.kind, name).components) :]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -257,13 +297,13 @@ def _check_fine(name: str, time: Array) -> None:
 def _with_others(
     recording: Recording,
     source: Source,
-    others: dict[str, Column],
+    others: FieldMap,
     features: Features | None,
     accept: bool,
 ) -> Recording:
     """Returns the rows with other streams' channels, where those reach."""
-    for stream, columns in _by_stream(source, others):
-        values = {n: _values(source, n, c) for n, c in columns.items()}
+    for stream, columns in _by_stream(source, others.columns):
+        values = {n: _values(source, n, c, others) for n, c in columns.items()}
         if stream.time is None:
             raise DisasmError(f"map: {', '.join(values)} has no time of its own")
         other = _clean(stream.name, stream.time, values, accept)
@@ -272,7 +312,7 @@ def _with_others(
 
 
 def _by_stream(
-    source: Source, columns: dict[str, Column]
+    source: Source, columns: Mapping[str, Column]
 ) -> Iterator[tuple[Stream, dict[str, Column]]]:
     for stream in source.streams:
         own = {

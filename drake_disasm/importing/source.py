@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.text import clipped
-from drake_disasm.importing import bags, tables
+from drake_disasm.importing import bags, sheets, tables
 from drake_disasm.importing.stream import Stream
 
 _MOST_BYTES = 2**33
@@ -20,6 +20,7 @@ _CHUNK = 2**20
 _READERS: Mapping[str, Callable[[Path], list[Stream]]] = {
     ".csv": tables.read_csv,
     ".txt": tables.read_csv,
+    ".xlsx": sheets.read_xlsx,
     ".npz": tables.read_npz,
     ".npy": tables.read_npy,
     ".mat": tables.read_mat,
@@ -45,6 +46,11 @@ class Source:
     streams: tuple[Stream, ...]
     sha256: str
     parts: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def label(self) -> str:
+        """What to call it by: its sheet, or its file without the ending."""
+        return sheets.parted(self.path)[1] or self.path.stem
 
     @property
     def files(self) -> dict[str, str]:
@@ -86,22 +92,25 @@ def _nearest(name: str, known: list[str]) -> str:
 
 
 def read_source(path: Path) -> Source:
-    """Reads a recording: CSV, NPZ, NPY, MAT, Parquet, LeRobot, ROS bag or MCAP.
+    """Reads a recording: CSV, XLSX, NPZ, NPY, MAT, Parquet, LeRobot, ROS bag or MCAP.
 
     Args:
-        path: of a file, of a ROS 2 bag's folder, or of a LeRobot dataset's.
+        path: of a file, FILE.xlsx:SHEET, or of the folder of a ROS 2 bag or a LeRobot
+            dataset.
 
     Raises:
         DisasmError: it is not there, of no known format, or can't be read.
     """
-    if not path.exists():
-        raise DisasmError(f"{path}: does not exist")
+    file, sheet = sheets.parted(path)
+    if not file.exists():
+        raise DisasmError(f"{file}: does not exist")
     files = (
-        [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.is_file())
+        [file] if file.is_file() else sorted(p for p in file.rglob("*") if p.is_file())
     )
     if sum(file.stat().st_size for file in files) > _MOST_BYTES:
         raise DisasmError(f"{path}: is larger than {_MOST_BYTES / 2**30:g} GiB; cut it")
-    return Source(path, tuple(_read(path, files)), _hash(files))
+    streams = sheets.read_xlsx(file, sheet) if sheet else _read(file, files)
+    return Source(path, tuple(streams), _hash(files))
 
 
 def _read(path: Path, files: list[Path]) -> list[Stream]:

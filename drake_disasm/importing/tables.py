@@ -48,9 +48,16 @@ def read_csv(path: Path) -> list[Stream]:
             raise DisasmError(f"{path}: has no rows")
         lines = _Lines(itertools.chain([second], rows), delimiter, len(names))
         columns = _cells(path, lines, delimiter, names)
-        numbers = ((n, _numbers(column, delimiter != ",")) for n, column in columns)
-        cells = list(numbers)
+        numbers = [_numbers(column, delimiter != ",") for _, column in columns]
+    return streams_of_columns(path, names, numbers)
+
+
+def streams_of_columns(
+    path: Path, names: Sequence[str], columns: Sequence[np.ndarray | None]
+) -> list[Stream]:
+    """Returns a table's columns (n,), without those that are None: they hold text."""
     count = collections.Counter(names)
+    cells = list(zip(names, columns, strict=True))
     out = {n: "holds text" for n, found in cells if found is None}
     out |= {n: f"names {k} columns: rename one" for n, k in count.items() if k > 1}
     arrays = {n: found for n, found in cells if found is not None and n not in out}

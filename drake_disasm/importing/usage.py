@@ -7,6 +7,7 @@ import numpy as np
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.text import clipped
 from drake_disasm.importing.field_map import FieldMap
+from drake_disasm.importing.orientations import JOINTS
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stream import Stream
 from drake_disasm.importing.vocabulary import (
@@ -52,13 +53,16 @@ def _used(fields: FieldMap) -> dict[str, str]:
         found[fields.time] = "order" if fields.is_order else "time"
     for name, column in fields.columns.items():
         many = len(column.channels) > 1
+        is_of_joints = (
+            column.form in ("", JOINTS)
+            and not name.startswith("extra")
+            and len(fields.joints) == len(column.channels)
+        )
+        head = f"{name} as {column.form}" if column.form else name
         for i, channel in enumerate(column.channels):
-            joint = (
-                fields.joints[i] if len(fields.joints) == len(column.channels) else ""
-            )
-            found[channel] = f"{name}.{i}" if many else name
-            if joint and not name.startswith("extra"):
-                found[channel] += f", {joint}"
+            use = f"{head}.{i}" if many else head
+            use += f", {fields.joints[i]}" if is_of_joints else ""
+            found[channel] = f"{use} ({column.why})" if column.why else use
     return found
 
 

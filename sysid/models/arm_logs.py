@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
-from drake_disasm.common.resources import model_path
+from drake_disasm.common.resources import ONE_JOINT_MODELS, model_path
 from drake_disasm.effects import Effect
 from drake_disasm.logs import Log
 from drake_disasm.logs.refusal import refusal
@@ -13,13 +13,18 @@ from drake_disasm.logs.refusal import refusal
 def arm_urdf(logs: Sequence[Log], urdf: str | None) -> str:
     """Returns the URDF that is given, or the one that the first log names.
 
+    One joint whose motion was logged needs none.
+
     Raises:
         DisasmError: there is none.
     """
     where, remedy = logs[0].folder / "log.yaml", "give the arm's URDF by `urdf`"
-    if not urdf and logs[0].header.urdf is None:
+    header = logs[0].header
+    if not urdf and header.urdf is None:
+        if header.kind == "joint_motion" and len(header.joints) == 1:
+            return ONE_JOINT_MODELS["turns"]
         raise refusal(where, "no 'urdf'", remedy)
-    urdf = str(urdf or logs[0].header.urdf)
+    urdf = str(urdf or header.urdf)
     model_path(urdf, f"{remedy}, or correct {where}")
     return urdf
 

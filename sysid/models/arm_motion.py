@@ -127,7 +127,13 @@ class ArmMotion:
             np.einsum("njkt,k->njt", Y_tilt, arm.inertia),
             base.beta(arm.inertia),
             LinkTorques(
-                arm.urdf, joints, time, episode, np.stack([q, v, vd]), arm.gravity
+                arm.urdf,
+                joints,
+                time,
+                episode,
+                np.stack([q, v, vd]),
+                arm.gravity,
+                arm.given_inertia,
             ),
             PathMemory(joints, episode, q),
         )

@@ -11,6 +11,7 @@ from pydrake.multibody.tree import PrismaticJoint, RigidBody
 from drake_disasm.cell.parsing import add_model
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
+from drake_disasm.common.resources import ONE_JOINT_MODELS
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,8 @@ class ArmPlant:
 
         Args:
             urdf: a path, or `package://`.
-            joints: names of the actuated joints, in the order of a log's columns.
+            joints: names of the actuated joints, in the order of a log's columns;
+                that of a packaged model of one joint may have any.
             gravity: (3,) in the base's frame [m/s^2]; None for an arm that stands
                 upright.
 
@@ -49,16 +51,20 @@ class ArmPlant:
         bodies = [plant.get_body(i) for i in plant.GetBodyIndices(instance)]
         weld_root(plant, bodies)
         plant.Finalize()
+        if len(joints) == 1 and urdf in ONE_JOINT_MODELS.values():
+            return cls(plant, bodies, [0])
         return cls(plant, bodies, _velocity_columns(plant, joints, urdf))
 
     def prismatic(self, joints: Sequence[str]) -> frozenset[str]:
         """Returns the names of those joints that slide."""
-        kind = PrismaticJoint.kTypeName
-        return frozenset(
-            name
-            for name in joints
-            if self.plant.GetJointByName(name).type_name() == kind
-        )
+        all_joints = [self.plant.get_joint(i) for i in self.plant.GetJointIndices()]
+        slide = {
+            joint.velocity_start()
+            for joint in all_joints
+            if joint.type_name() == PrismaticJoint.kTypeName
+        }
+        names = zip(joints, self.columns, strict=True)
+        return frozenset(name for name, column in names if column in slide)
 
     @property
     def last_body(self) -> int:

@@ -14,8 +14,10 @@ from drake_disasm.effects import (
     ArmDelay,
     ArmEffect,
     ArmResidualModel,
+    ArmTilt,
     DelayEffect,
     Effect,
+    FlangePayload,
 )
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
@@ -30,6 +32,7 @@ from sysid.models.joint_units import in_units_of_joints
 from sysid.models.log_filters import FilteredTorques, log_filters
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.motion_bookkeeping import TorqueFits
+from sysid.models.one_joint import assumption_of, is_one_joint, likely_inertia
 from sysid.models.rate_factors import (
     MOST_TURN,
     median_reach,
@@ -91,6 +94,11 @@ class JointMotionModel(LogModel):
         self._gravity = tuple(UniformGravityFieldElement().gravity_vector())
         arm = ArmDynamics(self._urdf, header.joints)
         base = self._base_set(arm)
+        self._inertia = None
+        if is_one_joint(self._urdf):
+            self.assumptions = (assumption_of(self._urdf),)
+            self._inertia = likely_inertia(arm, base, episodes)
+            arm = ArmDynamics(self._urdf, header.joints, self._gravity, self._inertia)
         self._scenario = scenario or Scenario()
         self._effects = tuple(self._scenario.effects)
         refuse_other_joints(self._effects, header.joints)
@@ -169,6 +177,13 @@ class JointMotionModel(LogModel):
         )
         inputs_of = ArmResidualModel.inputs_of
         return {joint: inputs_of(samples, joint) for joint in samples.joints}
+
+    def applicable_effects(self, library: Sequence[type[Effect]]) -> list[Effect]:
+        """See LogModel; nothing is known of how an axis without a URDF is mounted."""
+        found = super().applicable_effects(library)
+        if self._inertia is None:
+            return found
+        return [e for e in found if not isinstance(e, ArmTilt | FlangePayload)]
 
     @property
     def urdf(self) -> str:
@@ -354,6 +369,8 @@ class JointMotionModel(LogModel):
         written = np.array(self._gravity)
         if self._own_parameters is not None or not written.any():
             return  # base parameters are others under another gravity
+        if self._inertia is not None:
+            return  # nobody wrote how the axis stands
         found = fits.gravity(self._arm_under, written)
         if found is None:
             return
@@ -383,7 +400,8 @@ class JointMotionModel(LogModel):
         yield Bookkeeping(name, what, remedy, model, 2 * int(gravity.any())), lost
 
     def _arm_under(self, gravity: Array) -> ArmDynamics:
-        return ArmDynamics(self._urdf, self.joints, tuple(gravity.tolist()))
+        under = tuple(gravity.tolist())
+        return ArmDynamics(self._urdf, self.joints, under, self._inertia)
 
     def _rewritten(
         self,

@@ -98,6 +98,7 @@ class JointTorqueStaticModel(JointMotionModel):
             {
                 "time": episode["time" if "time" in episode else "order"],
                 "q": episode["q"],
+                "tau": episode["tau"],
                 **dict.fromkeys(("v", "vd"), np.zeros_like(episode["q"])),
             }
             for log in logs

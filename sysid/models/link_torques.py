@@ -39,7 +39,7 @@ class LinkTorques:
         joints: their names.
         time, episode: (n,) of the samples [s].
         motion: (3, n, joints) q, v, vd.
-        gravity: of the arm, see ArmDynamics.
+        gravity, inertia: of the arm, see ArmDynamics.
     """
 
     def __init__(
@@ -50,8 +50,10 @@ class LinkTorques:
         episode: NDArray[np.int64],
         motion: Array,
         gravity: Sequence[float] | None = None,
+        inertia: Array | None = None,
     ) -> None:
-        self._urdf, self._joints, self._gravity = urdf, tuple(joints), gravity
+        self._arm = urdf, tuple(joints), gravity, inertia
+        self._joints = tuple(joints)
         self._time, self._episode, self._motion = time, episode, motion
         self._load = np.full(motion.shape[1:], np.nan)
         self._known: dict[tuple[str, str], Array] = {}
@@ -99,14 +101,14 @@ class LinkTorques:
         step = _SHIFT / largest
         linked = self._motion[:, rows].copy()
         linked[:, :, i] -= step * behind[:, rows]
-        arm = ArmDynamics(self._urdf, self._joints, self._gravity)
+        arm = ArmDynamics(*self._arm)
         return (arm.torques(*linked) - self._loads(rows)) / step
 
     def _loads(self, rows: NDArray[np.int64]) -> Array:
         """Returns the torques (rows, joints) by the URDF."""
         asked = rows[np.isnan(self._load[rows, 0])]
         if len(asked):
-            arm = ArmDynamics(self._urdf, self._joints, self._gravity)
+            arm = ArmDynamics(*self._arm)
             self._load[asked] = arm.torques(*self._motion[:, asked])
         return self._load[rows]
 

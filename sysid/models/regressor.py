@@ -10,6 +10,7 @@ from pydrake.multibody.tree import (
     JacobianWrtVariable,
     MultibodyForces,
     SpatialInertia,
+    UnitInertia,
 )
 from scipy.linalg import qr
 
@@ -36,9 +37,9 @@ class ArmDynamics:
 
     Attributes:
         urdf: of the arm.
-        gravity: see Args.
+        gravity, given_inertia: see Args.
         links: names of the links that move, in the order of pi.
-        inertia: pi by the URDF.
+        inertia: nominal pi.
         prismatic: names of the joints that slide; others turn.
         last_link: where in pi the link is that is farthest from the base.
 
@@ -46,6 +47,7 @@ class ArmDynamics:
         urdf: a path, or `package://`.
         joints: names of the actuated joints, in the order of q, v, vd and tau.
         gravity: (3,) in the base's frame [m/s^2]; None for an arm that stands upright.
+        inertia: pi of physical bodies; None for the URDF's.
     """
 
     def __init__(
@@ -53,16 +55,24 @@ class ArmDynamics:
         urdf: str,
         joints: Sequence[str],
         gravity: Sequence[float] | None = None,
+        inertia: Array | None = None,
     ) -> None:
-        self.urdf, self.gravity = urdf, gravity
+        self.urdf, self.gravity, self.given_inertia = urdf, gravity, inertia
         arm = ArmPlant.of(urdf, joints, gravity)
         self._plant, self._columns = arm.plant, arm.columns
         self._bodies = arm.bodies
         self._context = arm.plant.CreateDefaultContext()
         self.prismatic = arm.prismatic(joints)
         self.links = tuple(body.name() for body in self._bodies)
+        if inertia is not None:
+            parts = np.split(inertia, len(self._bodies))
+            for body, own in zip(self._bodies, parts, strict=True):
+                body.SetSpatialInertiaInBodyFrame(self._context, _spatial(own))
         self.inertia = np.concatenate(
-            [_inertial(body.default_spatial_inertia()) for body in self._bodies]
+            [
+                _inertial(body.CalcSpatialInertiaInBodyFrame(self._context))
+                for body in self._bodies
+            ]
         )
         last = len(INERTIAL) * arm.last_body
         self.last_link = slice(last, last + len(INERTIAL))
@@ -271,6 +281,13 @@ def _inertial(M_B: SpatialInertia) -> Array:
     inertia = M_B.CalcRotationalInertia().CopyToFullMatrix3()
     upper = inertia[np.triu_indices(3)]
     return np.concatenate([[mass], mass * M_B.get_com(), upper])
+
+
+def _spatial(inertial: Array) -> SpatialInertia:
+    """Returns the spatial inertia about Bo in B of INERTIAL (10,); the inverse."""
+    mass, first, rest = inertial[0], inertial[1:4], inertial[4:] / inertial[0]
+    Gxx, Gxy, Gxz, Gyy, Gyz, Gzz = rest
+    return SpatialInertia(mass, first / mass, UnitInertia(Gxx, Gyy, Gzz, Gxy, Gxz, Gyz))
 
 
 def _skew(a: Array) -> Array:

@@ -192,7 +192,8 @@ def _orientations(readings: Readings) -> Iterator[Way]:
         yield Way(
             "QuaternionOrder",
             f"the columns read as the quaternion are in the order {text}",
-            "put the quaternion's columns into the order w, x, y, z",
+            "put the quaternion's columns into the order w, x, y, z, or say which it "
+            "is by `as` of R_WS in the map of import-log",
             readings.oriented(other.as_matrix()),
         )
 

@@ -1,9 +1,9 @@
 """Makes a log of what other programs recorded: tables, bags, datasets.
 
-Reads CSV, NPZ, NPY, MATLAB, Parquet, LeRobot datasets, ROS 1 and ROS 2 bags and MCAP.
-What is what is guessed from names, metadata and message types, or said by a small YAML
-map; --show prints every channel with its use or why it has none, and a guessed map can
-be saved and edited. Joints are matched with the URDF's by name.
+Reads CSV, XLSX, NPZ, NPY, MATLAB, Parquet, LeRobot datasets, ROS 1 and ROS 2 bags and
+MCAP. What is what is guessed from names, metadata and message types, or said by a small
+YAML map; --show prints every channel with its use or why it has none, and a guessed map
+can be saved and edited. Joints are matched with the URDF's by name.
 
 Joint motion is brought to one even time line and filtered without phase shift, by one
 filter for all columns, whose cut-off is chosen from the data's spectrum; velocities and
@@ -35,7 +35,7 @@ from drake_disasm.importing import (
     read_source,
     write_log,
 )
-from drake_disasm.importing.description import described, summary
+from drake_disasm.importing.description import described, joint_words, summary
 from drake_disasm.importing.joining import WAYS, joined
 from drake_disasm.importing.lerobot import calibrated
 from drake_disasm.importing.plots import plot_import
@@ -67,8 +67,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         nargs="+",
         type=Path,
         metavar="SOURCE",
-        help="a file, or the folder of a ROS 2 bag or a LeRobot dataset; several "
-        "become episodes of one log",
+        help="a file, FILE.xlsx:SHEET, or the folder of a ROS 2 bag or a LeRobot "
+        "dataset; several become episodes of one log",
     )
     add(
         "--kind",
@@ -194,6 +194,8 @@ def main(arguments: Sequence[str]) -> int:
     if args.show:
         print("\n".join(described(s, fields.kind, fields) for s in sources))
         print(f"map:\n{_indented(fields.to_yaml())}")
+    if words := joint_words(fields):
+        print(program.with_options(words))
     if args.show or not args.out:
         return 0
     imported = import_recordings(

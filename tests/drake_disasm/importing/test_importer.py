@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from drake_disasm.cell.parsing import movable_joints
+from drake_disasm.common.resources import ONE_JOINT_MODELS
 from drake_disasm.free_motion.cell_urdf import cell_urdf
 from drake_disasm.importing import (
     FieldMap,
@@ -21,7 +22,9 @@ from drake_disasm.importing import (
     read_source,
     write_log,
 )
+from drake_disasm.importing.description import joint_words
 from drake_disasm.importing.field_map import Column, parse_map
+from drake_disasm.importing.importer import lone_joint
 from drake_disasm.importing.shift import link_features
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.usage import without_torques
@@ -200,6 +203,30 @@ def test_a_log_says_what_was_done(tmp_path: Path) -> None:
     done = origin["processing"]
     assert done["cutoff_Hz"] == found.done.cutoff if found.done else False
     assert log.header.joints == ("a", "b") and log.episodes[0].rows == found.rows
+
+
+@pytest.mark.parametrize(
+    ("q", "tau", "urdf", "how"),
+    [
+        ({}, {}, "", "turns"),
+        ({"unit": "mm"}, {}, "", "slides"),
+        ({}, {"unit": "N"}, "", "slides"),
+        ({"unit": "mm"}, {}, "arm.urdf", ""),
+    ],
+)
+def test_a_single_joint_needs_no_urdf(
+    tmp_path: Path, q: dict[str, str], tau: dict[str, str], urdf: str, how: str
+) -> None:
+    source = read_source(_table(tmp_path / "run.npz"))
+    columns = {"q": {"from": "angle.0", **q}, "tau": {"from": "current.0", **tau}}
+    one = {"joints": ["a"], "urdf": urdf, "columns": columns}
+    fields = parse_map(_FIELDS | one)
+    found = import_recordings([source], fields, Processing())
+    write_log(found, [source], fields, tmp_path / "log", {})
+    expected = ONE_JOINT_MODELS[how] if how else str(Path(urdf).resolve())
+    assert read_log(tmp_path / "log").header.urdf == expected
+    assert lone_joint(fields) == how and how in joint_words(fields)
+    assert lone_joint(parse_map(_FIELDS)) == ""
 
 
 def test_a_filter_or_gaps_that_leave_no_stretch_are_refused(tmp_path: Path) -> None:

@@ -63,7 +63,9 @@ def test_a_wrong_time_is_refused(changes: dict[str, Any], said: str) -> None:
 
 def test_readings_at_rest_may_have_an_order(tmp_path: Path) -> None:
     names = ("qw", "qx", "qy", "qz", "fx", "fy", "fz", "tx", "ty", "tz")
-    columns = dict(zip(names, np.random.default_rng(0).random((10, 9)), strict=True))
+    table = np.random.default_rng(0).random((10, 9))
+    table[:4] /= np.linalg.norm(table[:4], axis=0)
+    columns = dict(zip(names, table, strict=True))
     source = _source(tmp_path / "a.npz", order=2.0 * np.arange(9), **columns)
     fields = guessed_map(source, "static_wrench")
     [episode] = import_recordings([source], fields, Processing()).episodes
