@@ -9,6 +9,7 @@ from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject
 from sysid.models.arm_plant import ArmPlant
 from sysid.models.joint_motion import JointMotionModel
+from sysid.models.one_joint import is_one_joint
 
 _PAIRS = (
     ("q", "v", "velocities", "positions"),
@@ -43,7 +44,9 @@ def derivative_findings(subject: Subject) -> list[DataFinding]:
 def limit_findings(subject: Subject) -> list[DataFinding]:
     """Finds speeds and accelerations beyond the limits that the URDF states."""
     model = subject.model
-    if not isinstance(model, JointMotionModel):
+    if subject.kind != "joint_motion" or not isinstance(model, JointMotionModel):
+        return []
+    if is_one_joint(model.urdf):
         return []
     plant = ArmPlant.of(model.urdf, model.joints).plant
     found = []
