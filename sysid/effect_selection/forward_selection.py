@@ -84,7 +84,8 @@ class Gain:
 
     def is_about_as_good_as(self, best: "Gain", settings: SelectionSettings) -> bool:
         """Returns whether it gains and leaves nearly as much as another, the best."""
-        margin = settings.ambiguity_margin * min(best.share, 1.0 - best.share)
+        room = max(min(best.share, 1.0 - best.share), 0.0)  # the best may lose
+        margin = settings.ambiguity_margin * room
         return self.share >= best.share - margin
 
     def is_ambiguous_with(self, other: "Gain", settings: SelectionSettings) -> bool:

@@ -5,7 +5,13 @@ import pytest
 from scipy.signal import lfilter
 
 from drake_disasm.effects import JointCoulombFriction, JointViscousFriction
-from sysid.effect_selection.forward_selection import Term, largest_t_p, select
+from sysid.effect_selection.forward_selection import (
+    Gain,
+    Term,
+    largest_t_p,
+    select,
+    step_of,
+)
 from sysid.fitting.block_grams import BlockGrams, blocks_of
 from sysid.fitting.candidates import Candidate
 from sysid.fitting.settings import DEFAULT_SETTINGS
@@ -158,3 +164,10 @@ def test_p_values_are_uniform_where_nothing_is_to_be_found(size):
         p.append(largest_t_p(x, scores @ scores.T / nu, nu))
     share = np.mean(np.array(p) < 0.1)
     assert (0.06 if size == 1 else 0.0) <= share <= 0.14
+
+
+def test_of_fits_that_all_lose_the_one_that_loses_least_is_the_step():
+    candidate = Candidate.of(JointCoulombFriction("shoulder"))
+    term = Term((candidate,), np.arange(1), np.zeros(1, dtype=int))
+    losing = [Gain(term, share, np.full(8, share / 8)) for share in (-0.02, -0.3)]
+    assert step_of(losing, DEFAULT_SETTINGS).chosen is losing[0]
