@@ -163,6 +163,9 @@ def _done_lines(imported: Imported) -> Iterator[str]:
         joint = max(done.noise, key=lambda each: done.noise[each])
         share = f"{100.0 * done.noise[joint]:.2g} %"
         yield f"noise in the accelerations: at most {share} of their rms (q.{joint})"
+    if done.noisy:
+        names = ", ".join(f"q.{joint}" for joint in done.noisy)
+        yield f"hardly moves, compared with its noise: {names}"
     if done.over_velocity:
         ratios = done.over_velocity
         joint = max(ratios, key=lambda each: ratios[each])

@@ -73,7 +73,8 @@ class Done:
         resampled: recordings that were not sampled evenly.
         short: rows in stretches between gaps that are shorter than the filter.
         noise: in each joint's acceleration, as a share of its rms, by the joint's
-            number; of those that move.
+            number; of those whose motion stands out of the noise.
+        noisy: numbers of the joints that move, but not clearly more than their noise.
         over_velocity: rms of each joint's acceleration by that of the slope of its
             recorded velocity; empty if that is not recorded.
     """
@@ -86,6 +87,7 @@ class Done:
     resampled: int
     short: int = 0
     noise: dict[int, float] = dataclasses.field(default_factory=dict)
+    noisy: tuple[int, ...] = ()
     over_velocity: dict[int, float] = dataclasses.field(default_factory=dict)
 
 
@@ -148,6 +150,7 @@ def process(
         resampled,
         sum(len(each.time) for each in recordings) - _used(parts, found),
         _noise(spectra, cutoff),
+        tuple(sorted({each.joint for each in spectra if not each.is_resolved})),
         _over_velocity([part.even for part in parts], low),
     )
     return kept, done
@@ -156,7 +159,7 @@ def process(
 def _noise(spectra: Sequence[MotionSpectrum], cutoff: float) -> dict[int, float]:
     """Returns the most noise of all recordings in each joint's acceleration."""
     found: dict[int, float] = {}
-    for each in spectra:
+    for each in filter(lambda each: each.is_resolved, spectra):
         share = each.noise_share(cutoff)
         found[each.joint] = max(share, found.get(each.joint, 0.0))
     return found
@@ -220,7 +223,7 @@ def _stretches(
             part = {name: resample(time, values, at) for name, values in part.items()}
             time = at
         even = dataclasses.replace(recording, time=time, columns=part)
-        found.append(_Stretch(even, rows.stop - rows.start))
+        found.append(_Stretch(even, len(recording.time[rows])))
     return found
 
 
