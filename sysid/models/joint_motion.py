@@ -187,7 +187,7 @@ class JointMotionModel(LogModel):
 
     @property
     def urdf(self) -> str:
-        """The arm's, as `package://` or a path."""
+        """Where the arm's URDF is, as the logs or the caller say."""
         return self._urdf
 
     @property
