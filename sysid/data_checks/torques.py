@@ -11,6 +11,7 @@ from sysid.data_checks.subject import Subject
 from sysid.models.base import Array
 
 _SURROGATES = 39  # of which a channel of its joint is above all but two, 95 %
+_PIECES = 16  # of the log, in another order in each of these
 _PLACED = 0.95
 
 
@@ -70,21 +71,37 @@ def _of_another_joint(
 ) -> list[DataFinding]:
     """Finds torques that their joint's motion does not explain.
 
-    It explains them no better than at other times (surrogates: Theiler et al., 1992),
-    or far less than another joint's does.
+    It explains them no better than pieces of them in another order (block surrogates,
+    since the motion may repeat itself), or far less than another joint's torque does.
     """
+    centred = values - values.mean(axis=0)
+    size = np.linalg.norm(centred, axis=0)
+    correlation = np.abs(centred.T @ centred) / np.maximum(np.outer(size, size), 1e-300)
+    np.fill_diagonal(correlation, 0.0)
+    pieces = np.array_split(np.arange(len(values)), _PIECES)
+    random = np.random.default_rng(0)
+    orders = [
+        np.concatenate([pieces[i] for i in random.permutation(_PIECES)])
+        for _ in range(_SURROGATES)
+    ]
     spans = [np.linalg.qr(expected.columns(n))[0] for n in range(len(names))]
-    shifts = np.linspace(0, len(values), _SURROGATES + 2)[1:-1].astype(int)
+    whole = np.maximum(size**2, 1e-300)
+    explained = np.array(
+        [
+            np.sum((Q.T @ torque) ** 2)
+            for Q, torque in zip(spans, centred.T, strict=True)
+        ]
+    )
     found = {}
-    for number in np.flatnonzero(np.ptp(values, axis=0) > 0.0).tolist():
-        torque = values[:, number] - values[:, number].mean()
-        moved = np.stack([np.roll(torque, shift) for shift in shifts], axis=1)
+    for number in np.flatnonzero(size > 0.0).tolist():
+        best = int(np.argmax(correlation[number]))
+        moved = centred[np.stack(orders, axis=1), number]
         by_chance = np.sum((spans[number].T @ moved) ** 2, axis=0)
-        left = [np.linalg.norm(torque - Q @ (Q.T @ torque)) for Q in spans]
-        own, best = left[number], int(np.argmin(left))
-        if np.mean(by_chance < torque @ torque - own**2) < _PLACED:
+        own, other = (explained / whole)[[number, best]]
+        copied = 1.0 - correlation[number, best] ** 2
+        if np.mean(by_chance < explained[number]) < _PLACED:
             found[names[number]] = "nothing"
-        elif left[best] < settings.explained * own:
+        elif own < other and copied < settings.explained**2 * (1.0 - own):
             found[names[number]] = f"that of {names[best]}"
     if not found:
         return []

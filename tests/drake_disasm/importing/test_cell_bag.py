@@ -8,8 +8,9 @@ from cell_bag import FRICTION, LATE, verdicts
 from drake_disasm.scenario import load_scenario
 
 #: What the arm has, and its URDF doesn't say. Beside that either verdict may name what
-#: a filter leaves of friction's edges where there is no noise: delays below 3 ms.
-_OF_THE_ARM = ("RotorInertia", "JointViscousFriction", "JointCoulombFriction")
+#: a filter leaves of friction's edges where there is no noise: delays below 3 ms. The
+#: bag, which has noise, shows less of the controller's small viscous friction.
+_OF_THE_ARM = ("RotorInertia", "JointCoulombFriction")
 
 
 @pytest.mark.slow
