@@ -57,7 +57,7 @@ class SelectionSettings:
         _ABLATION,
     )
     max_steps: int = _setting(
-        20, "effects", "a guard: `min_gain` ends the selection before"
+        20, "effects", "a guard: `min_gain` ends the selection before", _ABLATION
     )
 
     # Which effects can't be told apart.
@@ -86,10 +86,13 @@ class SelectionSettings:
     )
     # How a model with effects is fitted.
     fit_iterations: int = _setting(
-        8, "iterations", "a guard: `fit_min_progress` usually ends a fit before"
+        8,
+        "iterations",
+        "a guard: `fit_min_progress` usually ends a fit before",
+        _ABLATION,
     )
     fit_min_progress: float = _setting(
-        1e-3, "of the objective", "an iteration that gains less ends the fit"
+        1e-3, "of the objective", "an iteration that gains less ends the fit", _ABLATION
     )
     costly_fit_iterations: int = _setting(
         6, "iterations", "fewer, where one evaluation takes seconds"
@@ -142,6 +145,7 @@ class SelectionSettings:
         1.2,
         "objective",
         "beyond it there is more than noise, where channels state their noise",
+        _ABLATION,
     )
     model_error_reach: float = _setting(
         1.0,
@@ -152,7 +156,10 @@ class SelectionSettings:
 
     # Whether nothing is missing.
     detection_power: float = _setting(
-        0.8, "1", "probability with which an effect of the detection limit is found"
+        0.8,
+        "1",
+        "probability with which an effect of the detection limit is found",
+        _ABLATION,
     )
     min_detectable: float = _setting(
         0.9,
@@ -163,6 +170,7 @@ class SelectionSettings:
         0.25,
         "of what was measured",
         "a held-out error that is more is said in the verdict, whatever passed",
+        _ABLATION,
     )
 
     # What is said of what is left.
@@ -170,6 +178,7 @@ class SelectionSettings:
         0.1,
         "of a channel's mean squared residual",
         "what a flexible learner explains of rows that it did not see",
+        _ABLATION,
     )
 
 
