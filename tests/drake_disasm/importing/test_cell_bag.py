@@ -27,4 +27,5 @@ def test_a_bag_of_the_cell_has_the_verdict_of_its_log(tmp_path: Path) -> None:
         values = {v.name: v.value for v in verdict.values}
         for joint, size in FRICTION.items():
             found = values[f"JointCoulombFriction.{joint}.size"]
-            assert found == pytest.approx(size, rel=0.02)
+            # Viscous friction that is not named is part of it.
+            assert found == pytest.approx(size, rel=0.05)
