@@ -9,6 +9,7 @@ Fuller, 1987, section 1.1).
 """
 
 import dataclasses
+import functools
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -62,7 +63,7 @@ class MotionSpectrum:
         speed = np.cumsum(self.density / self.frequency**2)
         return _HARMONICS * self._reached(speed, 1.0 - _SHARE)
 
-    @property
+    @functools.cached_property
     def is_resolved(self) -> bool:
         """Whether the motion stands out of the noise, which is most at the valley."""
         at = _smoothed(self.frequency, self.density)[self.valley]
@@ -77,7 +78,7 @@ class MotionSpectrum:
         noise = passed - self._variance[self.valley]
         return float(np.sqrt(max(noise, 0.0) / passed)) if passed > 0.0 else 0.0
 
-    @property
+    @functools.cached_property
     def _variance(self) -> Array:
         """(n,) up to each frequency, in steps of the frequency."""
         return np.cumsum(self.density)

@@ -1,6 +1,7 @@
 """What is in a recording, and what was done to it, in words."""
 
 import math
+import operator
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -159,18 +160,17 @@ def _done_lines(imported: Imported) -> Iterator[str]:
         f"low-pass of {done.cutoff:.3g} Hz on all columns, without phase shift; v and "
         "vd are its derivatives where they were not recorded"
     )
-    if done.noise:
-        joint = max(done.noise, key=lambda each: done.noise[each])
-        share = f"{100.0 * done.noise[joint]:.2g} %"
-        yield f"noise in the accelerations: at most {share} of their rms (q.{joint})"
-    if done.noisy:
-        names = ", ".join(f"q.{joint}" for joint in done.noisy)
+    if noise := done.noise:
+        joint, share = max(noise.items(), key=operator.itemgetter(1))
+        words = f"{100.0 * share:.2g} %"
+        yield f"noise in the accelerations: at most {words} of their rms (q.{joint})"
+    if noisy := done.noisy:
+        names = ", ".join(f"q.{joint}" for joint in noisy)
         yield f"hardly moves, compared with its noise: {names}"
     if done.over_velocity:
-        ratios = done.over_velocity
-        joint = max(ratios, key=lambda each: ratios[each])
+        joint, ratio = max(done.over_velocity.items(), key=operator.itemgetter(1))
         yield (
-            f"accelerations from positions have at most {ratios[joint]:.3g} times the "
+            f"accelerations from positions have at most {ratio:.3g} times the "
             f"rms of those from the recorded velocities (q.{joint})"
         )
     kept = "all others" if done.decimation == 1 else f"one of {done.decimation} others"

@@ -27,6 +27,7 @@ from drake_disasm.logs.schema import KINDS, Form, Rule
 Array = NDArray[np.float64]
 
 _MADE = ("time", "v", "vd")  # by `recording` and `processing`
+_SHORT = "between gaps that are too near"  # why rows are left out
 _FILTER = "zero-phase FIR low-pass, sinc with Blackman window"
 
 
@@ -53,7 +54,7 @@ class Imported:
         for each in self.recordings:
             found.update(each.dropped)
         if self.done and self.done.short:
-            found["between gaps that are too near"] = self.done.short
+            found[_SHORT] = self.done.short
         return dict(found)
 
     @property
@@ -101,8 +102,7 @@ def import_recordings(
         return Imported(tuple(found), episodes, period, None)
     parts, done = process(found, processing)
     rows = sum(len(each.time) for each in found)
-    short = {"between gaps that are too near": done.short}
-    check_share(found[0].name, short, rows, accept)
+    check_share(found[0].name, {_SHORT: done.short}, rows, accept)
     period = float(np.median(np.diff(parts[0].columns["time"])))
     episodes = tuple(_from_its_begin(part) for part in parts)
     return Imported(tuple(found), episodes, period, done)

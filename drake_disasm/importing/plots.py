@@ -7,13 +7,7 @@ from typing import Any
 import numpy as np
 
 from drake_disasm.common.files import write_figure
-from drake_disasm.importing.cutoff import motion_spectra
 from drake_disasm.importing.importer import Imported
-from drake_disasm.importing.signals import (
-    even_times,
-    longest_stretch,
-    resample,
-)
 
 _SHOWN = 2.0  # s
 
@@ -35,12 +29,7 @@ def plot_import(imported: Imported, path: Path) -> None:
     done = imported.done
     assert done is not None
     figure, axes = pyplot.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
-    recording = imported.recordings[0]
-    longest = longest_stretch(recording.time)
-    time = recording.time[longest]
-    at = even_times(time)
-    q = resample(time, recording.columns["q"][longest], at)
-    for own in motion_spectra([q], float(at[1] - at[0])):
+    for own in done.spectra[0]:
         label = f"joint {own.joint}"
         axes[0].loglog(own.frequency, np.sqrt(own.density), label=label)
     if math.isfinite(done.cutoff):

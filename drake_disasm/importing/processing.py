@@ -1,6 +1,7 @@
 """From recordings of joints to rows of a log: even, filtered, with derivatives."""
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -72,9 +73,7 @@ class Done:
         quanta: steps to which columns are rounded, by "q.0"; those that are.
         resampled: recordings that were not sampled evenly.
         short: rows in stretches between gaps that are shorter than the filter.
-        noise: in each joint's acceleration, as a share of its rms, by the joint's
-            number; of those whose motion stands out of the noise.
-        noisy: numbers of the joints that move, but not clearly more than their noise.
+        spectra: of each recording's joints that move.
         over_velocity: rms of each joint's acceleration by that of the slope of its
             recorded velocity; empty if that is not recorded.
     """
@@ -86,9 +85,27 @@ class Done:
     quanta: dict[str, float]
     resampled: int
     short: int = 0
-    noise: dict[int, float] = dataclasses.field(default_factory=dict)
-    noisy: tuple[int, ...] = ()
+    spectra: tuple[tuple[MotionSpectrum, ...], ...] = ()
     over_velocity: dict[int, float] = dataclasses.field(default_factory=dict)
+
+    @property
+    def noise(self) -> dict[int, float]:
+        """The most noise in each joint's acceleration, as a share of its rms.
+
+        By the joint's number, of those whose motion stands out of the noise.
+        """
+        found: dict[int, float] = {}
+        for each in itertools.chain(*self.spectra):
+            if each.is_resolved:
+                share = each.noise_share(self.cutoff)
+                found[each.joint] = max(share, found.get(each.joint, 0.0))
+        return found
+
+    @property
+    def noisy(self) -> list[int]:
+        """Numbers of the joints that move, but not clearly more than their noise."""
+        spectra = itertools.chain(*self.spectra)
+        return sorted({each.joint for each in spectra if not each.is_resolved})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,11 +143,14 @@ def process(
         raise DisasmError(
             f"no stretch of {_FEWEST} rows is without gaps; record without losses"
         )
-    spectra = _spectra(coarse, period)
+    spectra = tuple(_spectra(found, period) for found in coarse)
     cutoff = _cutoff_of(spectra, period, processing)
     low = LowPass(cutoff, period) if math.isfinite(cutoff) else None
-    bridged = _BRIDGED / cutoff
-    parts = [part for each in recordings for part in _stretches(each, period, bridged)]
+    parts = [
+        part
+        for each, clock, found in zip(recordings, clocks, coarse, strict=True)
+        for part in _joined(each, clock, found, period, cutoff)
+    ]
     decimation = processing.decimate or (low.decimation if low else 1)
     found = [_filtered(part.even, low, decimation) for part in parts]
     kept = [each for each in found if each is not None]
@@ -140,29 +160,39 @@ def process(
             f"no stretch without gaps is longer than the filter: {longest} rows, and "
             f"it takes {2 * low.reach if low else 0}; give a higher `cutoff`, or none"
         )
-    resampled = sum(not clock.is_even for clock in clocks)
-    done = Done(
+    return kept, Done(
         clocks,
         cutoff,
         low.reach if low else 0,
         decimation,
         _quanta(recordings),
-        resampled,
+        sum(not clock.is_even for clock in clocks),
         sum(len(each.time) for each in recordings) - _used(parts, found),
-        _noise(spectra, cutoff),
-        tuple(sorted({each.joint for each in spectra if not each.is_resolved})),
+        spectra,
         _over_velocity([part.even for part in parts], low),
     )
-    return kept, done
 
 
-def _noise(spectra: Sequence[MotionSpectrum], cutoff: float) -> dict[int, float]:
-    """Returns the most noise of all recordings in each joint's acceleration."""
-    found: dict[int, float] = {}
-    for each in filter(lambda each: each.is_resolved, spectra):
-        share = each.noise_share(cutoff)
-        found[each.joint] = max(share, found.get(each.joint, 0.0))
-    return found
+def _joined(
+    recording: Recording,
+    clock: Clock,
+    found: list[_Stretch],
+    period: float,
+    cutoff: float,
+) -> list[_Stretch]:
+    """Returns the stretches found, joined over gaps that hide nothing of what passes.
+
+    Args:
+        recording: that they are of.
+        clock: of it.
+        found: between all gaps.
+        period: of even rows [s].
+        cutoff: of the filter [Hz].
+    """
+    bridged = _BRIDGED / cutoff
+    if all(gap > bridged for gap in clock.gaps):
+        return found
+    return _stretches(recording, period, bridged)
 
 
 def _over_velocity(parts: Sequence[Recording], low: LowPass | None) -> dict[int, float]:
@@ -184,21 +214,19 @@ def _used(parts: Sequence[_Stretch], found: Sequence[Processed | None]) -> int:
     return sum(part.recorded for part, kept in pairs if kept is not None)
 
 
-def _spectra(
-    recordings: Sequence[Sequence[_Stretch]], period: float
-) -> list[MotionSpectrum]:
-    """Returns those of the joints that move, of each recording's stretches."""
-    positions = [[part.even.columns["q"] for part in each] for each in recordings]
-    return [one for each in positions if each for one in motion_spectra(each, period)]
+def _spectra(found: Sequence[_Stretch], period: float) -> tuple[MotionSpectrum, ...]:
+    """Returns those of the joints that move, of a recording's stretches."""
+    positions = [part.even.columns["q"] for part in found]
+    return tuple(motion_spectra(positions, period)) if positions else ()
 
 
 def _cutoff_of(
-    spectra: Sequence[MotionSpectrum], period: float, processing: Processing
+    spectra: Sequence[Sequence[MotionSpectrum]], period: float, processing: Processing
 ) -> float:
     """Returns the cut-off [Hz] that is wanted, or that the motion asks for."""
     cutoff = processing.cutoff
     if cutoff is None:
-        cutoff = chosen_cutoff(spectra, period)
+        cutoff = chosen_cutoff(itertools.chain(*spectra), period)
     if math.isfinite(cutoff) and cutoff >= 0.5 / period:
         raise DisasmError(
             f"`cutoff` {cutoff:g}: is not below half the sampling rate, "

@@ -99,13 +99,9 @@ def recordings_of(
     Raises:
         DisasmError: the map names what is not there, or nothing is left.
     """
-    stream = _main_stream(source, fields)
+    stream = main_stream(source, fields)
     time = _time(source, stream, fields)
-    own = {
-        name: column
-        for name, column in fields.columns.items()
-        if source.stream_of(column.channels[0]) is stream
-    }
+    own = _columns_of(source, stream, fields.columns)
     columns = {n: _values(source, n, column, fields) for n, column in own.items()}
     numbers = source.channel(fields.episode) if fields.episode else np.zeros(len(time))
     # Rests are read when they are reached: their stamps were never even.
@@ -137,7 +133,7 @@ def _features(fields: FieldMap) -> Features | None:
     return joint_features if len(fields.joints) <= MOST_JOINTS else None
 
 
-def _main_stream(source: Source, fields: FieldMap) -> Stream:
+def main_stream(source: Source, fields: FieldMap) -> Stream:
     """Returns the stream on whose time line the log is: that of the first column."""
     if not fields.columns:
         raise DisasmError("map: has no columns")
@@ -315,13 +311,19 @@ def _by_stream(
     source: Source, columns: Mapping[str, Column]
 ) -> Iterator[tuple[Stream, dict[str, Column]]]:
     for stream in source.streams:
-        own = {
-            name: c
-            for name, c in columns.items()
-            if source.stream_of(c.channels[0]) is stream
-        }
-        if own:
+        if own := _columns_of(source, stream, columns):
             yield stream, own
+
+
+def _columns_of(
+    source: Source, stream: Stream, columns: Mapping[str, Column]
+) -> dict[str, Column]:
+    """Returns the columns whose channels are in a stream."""
+    return {
+        name: column
+        for name, column in columns.items()
+        if source.stream_of(column.channels[0]) is stream
+    }
 
 
 def _joined(

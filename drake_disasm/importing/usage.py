@@ -8,6 +8,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.text import clipped
 from drake_disasm.importing.field_map import FieldMap
 from drake_disasm.importing.orientations import JOINTS
+from drake_disasm.importing.recording import main_stream
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stream import Stream
 from drake_disasm.importing.vocabulary import (
@@ -102,7 +103,7 @@ def check_torques(source: Source, fields: FieldMap) -> None:
     """
     if fields.kind != "joint_motion" or "tau" in fields.columns:
         return
-    used, stream = _used(fields), source.stream_of(_first(fields))
+    used, stream = _used(fields), main_stream(source, fields)
     by_name = named(stream, "tau", NAMES)
     labels = numbered(stream, NAMES["tau"]) + [x for k in by_name.values() for x in k]
     left = [x.channel for x in labels if x.channel not in used]
@@ -117,7 +118,7 @@ def without_torques(source: Source, fields: FieldMap) -> str:
     """Returns what a log of joint motion without torques is not good for, or ""."""
     if fields.kind != "joint_motion" or "tau" in fields.columns:
         return ""
-    stream, used = source.stream_of(_first(fields)), _used(fields)
+    stream, used = main_stream(source, fields), _used(fields)
     left = [n for n in stream.names if n not in used and is_alive(stream, [n])]
     words = "the log has no torques, without which no effect can be found"
     if not left:
@@ -126,11 +127,6 @@ def without_torques(source: Source, fields: FieldMap) -> str:
         f"{words}; not used: {_some(left)}; if these are torques, save the map by "
         "`save_map` and name them there as tau"
     )
-
-
-def _first(fields: FieldMap) -> str:
-    """Returns the first channel of a map."""
-    return next(iter(fields.columns.values())).channels[0]
 
 
 def _some(names: list[str]) -> str:

@@ -11,7 +11,6 @@ from sysid.models.measurements import Measurements
 from sysid.models.static_wrench import StaticWrenchModel
 
 AtRest = StaticWrenchModel | JointTorqueStaticModel
-_AT_REST = (StaticWrenchModel, JointTorqueStaticModel)
 _SLOW = 8  # cosines over a log: drift, warm-up and a step are made of these
 
 
@@ -32,7 +31,7 @@ def contradicting_rows(
     Returns:
         Findings; rows are numbered in the model's episodes.
     """
-    if not isinstance(model, _AT_REST) or model.clock is None:
+    if not isinstance(model, AtRest) or model.clock is None:
         return []
     moving = _moving_rows(model, model.clock, settings)
     if isinstance(model, JointTorqueStaticModel):

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.data_checks.expectation import Expectation, FittedExpectation
 from sysid.data_checks.finding import DataFinding
@@ -78,12 +79,7 @@ def _of_another_joint(
     size = np.linalg.norm(centred, axis=0)
     correlation = np.abs(centred.T @ centred) / np.maximum(np.outer(size, size), 1e-300)
     np.fill_diagonal(correlation, 0.0)
-    pieces = np.array_split(np.arange(len(values)), _PIECES)
-    random = np.random.default_rng(0)
-    orders = [
-        np.concatenate([pieces[i] for i in random.permutation(_PIECES)])
-        for _ in range(_SURROGATES)
-    ]
+    orders = _orders(len(values))
     spans = [np.linalg.qr(expected.columns(n))[0] for n in range(len(names))]
     whole = np.maximum(size**2, 1e-300)
     explained = np.array(
@@ -95,7 +91,7 @@ def _of_another_joint(
     found = {}
     for number in np.flatnonzero(size > 0.0).tolist():
         best = int(np.argmax(correlation[number]))
-        moved = centred[np.stack(orders, axis=1), number]
+        moved = centred[orders, number]
         by_chance = np.sum((spans[number].T @ moved) ** 2, axis=0)
         own, other = (explained / whole)[[number, best]]
         copied = 1.0 - correlation[number, best] ** 2
@@ -109,3 +105,12 @@ def _of_another_joint(
     what = f"torques show another motion than their joint's: {words}"
     remedy = "look whether the channel is this joint's, and whether it is alive"
     return [DataFinding("unrelated", what, remedy)]
+
+
+def _orders(rows: int) -> NDArray[np.int64]:
+    """Returns the rows' numbers with pieces in other orders (rows, surrogates)."""
+    pieces = np.array_split(np.arange(rows), _PIECES)
+    random = np.random.default_rng(0)
+    orders = [random.permutation(_PIECES) for _ in range(_SURROGATES)]
+    found = [np.concatenate([pieces[i] for i in order]) for order in orders]
+    return np.stack(found, axis=1)
