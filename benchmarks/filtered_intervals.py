@@ -30,6 +30,7 @@ from drake_disasm.effects import (
 )
 from drake_disasm.effects.fields import amplitudes
 from drake_disasm.importing import (
+    Known,
     Processing,
     guessed_map,
     import_recordings,
@@ -170,14 +171,13 @@ def imported(table: Path, urdf: Path, folder: Path, cutoff: float | None) -> Log
     """Returns the log that the import makes of a recording.
 
     Args:
-        table: the recording.
+        table: the recording, or a bag.
         urdf: of the arm.
         folder: of the log.
         cutoff: of the filter [Hz]; None for the import's own.
     """
     source = read_source(table)
-    fields = guessed_map(source, "joint_motion")
-    fields = dataclasses.replace(fields, urdf=str(urdf), joints=JOINTS)
+    fields = guessed_map(source, "joint_motion", Known(JOINTS, urdf=str(urdf)))
     found = import_recordings([source], fields, Processing(cutoff))
     write_log(found, [source], fields, folder, {})
     return read_log(folder)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from filtered_intervals import EFFECTS, JOINTS, recording, write_arm
+from filtered_intervals import EFFECTS, JOINTS, imported, recording, write_arm
 from numpy.typing import NDArray
 from results import Cell, add_results_argument, markdown, write_result
 from tqdm import tqdm
@@ -21,15 +21,7 @@ from tqdm import tqdm
 from drake_disasm.common import options
 from drake_disasm.common.program import argument_parser, run
 from drake_disasm.fakes.bag import FakeBag
-from drake_disasm.importing import (
-    Known,
-    Processing,
-    guessed_map,
-    import_recordings,
-    read_source,
-    write_log,
-)
-from drake_disasm.logs import read_log
+from drake_disasm.importing.importer import low_pass_of
 from sysid.effect_selection import close_loop
 from sysid.effect_selection.verdict import Verdict
 from sysid.models.from_logs import ModelChoice, model_of
@@ -119,13 +111,11 @@ def judged(variant: Variant, seed: int, folder: Path) -> Judged:
     for number in np.flatnonzero(random.random(len(time)) >= variant.lost):
         bag.add_joint_state(stamps[number], JOINTS, q[number], tau[number])
     bag.write(folder / "bag")
-    source = read_source(folder / "bag")
-    fields = guessed_map(source, "joint_motion", Known(JOINTS, urdf=str(urdf)))
-    found = import_recordings([source], fields, Processing())
-    write_log(found, [source], fields, folder / "log", {})
-    model = model_of([read_log(folder / "log")], ModelChoice(urdf=str(urdf)))
-    assert found.done is not None
-    return Judged(found.done.cutoff, close_loop(model).verdict)
+    log = imported(folder / "bag", urdf, folder / "log", None)
+    low = low_pass_of(log.header)
+    assert low is not None
+    model = model_of([log], ModelChoice(urdf=str(urdf)))
+    return Judged(low.cutoff, close_loop(model).verdict)
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:

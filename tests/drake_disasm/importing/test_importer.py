@@ -28,7 +28,7 @@ from drake_disasm.importing.importer import lone_joint
 from drake_disasm.importing.shift import link_features
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.usage import without_torques
-from drake_disasm.logs import read_log
+from drake_disasm.logs import Log, read_log
 from drake_disasm.scenario import load_scenario
 from tests.drake_disasm.importing.bag import motion, record_arm
 from tests.refusals import refusal
@@ -72,6 +72,14 @@ def _csv(path: Path, names: Sequence[str], *columns: np.ndarray) -> Source:
     table = np.column_stack(columns)
     np.savetxt(path, table, "%.17g", ",", header=",".join(names), comments="")
     return read_source(path)
+
+
+def _guessed_log(source: Source, kind: str, folder: Path) -> Log:
+    """Returns the log that is made of a source by a guessed map."""
+    fields = guessed_map(source, kind)
+    found = import_recordings([source], fields, Processing())
+    write_log(found, [source], fields, folder, {})
+    return read_log(folder)
 
 
 def _imported(path: Path, fields: FieldMap, **options: Any) -> Any:
@@ -252,10 +260,7 @@ def test_readings_at_rest_are_taken_as_they_are(tmp_path: Path) -> None:
     wrench = random.random((9, 6))
     columns = (np.arange(9.0), quaternion, wrench)
     source = _csv(tmp_path / "run.csv", names, *columns)
-    fields = guessed_map(source, "static_wrench")
-    found = import_recordings([source], fields, Processing())
-    write_log(found, [source], fields, tmp_path / "log", {})
-    [episode] = read_log(tmp_path / "log").episodes
+    [episode] = _guessed_log(source, "static_wrench", tmp_path / "log").episodes
     np.testing.assert_array_equal(episode["wrench"], wrench)
 
 
@@ -267,10 +272,7 @@ def test_a_sensor_in_contact_is_guessed_with_the_rows_in_free_space(
     free = (np.arange(9) < 4).astype(float)
     columns = (0.1 * np.arange(9.0), quaternion, np.zeros((9, 6)), free)
     source = _csv(tmp_path / "run.csv", names, *columns)
-    fields = guessed_map(source, "contact")
-    found = import_recordings([source], fields, Processing())
-    write_log(found, [source], fields, tmp_path / "log", {})
-    [episode] = read_log(tmp_path / "log").episodes
+    [episode] = _guessed_log(source, "contact", tmp_path / "log").episodes
     np.testing.assert_array_equal(episode["free"], free)
 
 
