@@ -116,8 +116,12 @@ class RefitSelection:
         is_over = time.monotonic() > self.deadline
         if not fit.noise_is_stated or fit.states_model_error or is_over:
             return True
-        fits = (fit, *(found for _, found in gains.values()))
-        return min(found.objective for found in fits) <= self._settings.noise_level
+        return self._is_explained([fit, *(found for _, found in gains.values())])
+
+    def _is_explained(self, fits: Sequence[Fit]) -> bool:
+        """Returns whether one of fits leaves no more than the noise that is stated."""
+        level = self._settings.noise_level
+        return any(f.noise_is_stated and f.objective <= level for f in fits)
 
     def _gained(
         self, fit: Fit, system: LinearSystem, trials: Sequence[Gain]
@@ -151,21 +155,35 @@ class RefitSelection:
         return [gain for gain in best if gain.share >= least][: limits.trials]
 
     def _prescreened(self, fit: Fit, gains: Sequence[Gain]) -> list[Gain]:
-        """Returns the effects that explain most by fits to a few rows."""
+        """Returns the effects that explain most by fits to a few rows, the best first.
+
+        Those that these rows tell from the best are kept as refuted.
+        """
         self._report(f"fitting {len(gains)} candidates to a few rows")
         sets = [gain.term.candidates for gain in gains]
-        _, fits = prescreening_fits(self.fitter, fit, sets, self.deadline)
+        before, fits = prescreening_fits(self.fitter, fit, sets, self.deadline)
         pairs = sorted(zip(gains, fits, strict=False), key=lambda pair: pair[1].loss)[
             : self._settings.trials
         ]
         self._starts = {gain.term.names: found for gain, found in pairs}
+        of_few = [self._gain(before, found) for _, found in pairs]
+        best = of_few[0] if of_few else None
+        self._refuted = {
+            gain.term.names
+            for (gain, _), own in zip(pairs, of_few, strict=True)
+            if best and not (own and own.is_ambiguous_with(best, self._settings))
+        }
         return [gain for gain, _ in pairs]
 
     def _fitted(
         self, fit: Fit, system: LinearSystem, trials: Sequence[Gain]
     ) -> list[Fit]:
-        """Returns a fit for each trial for which there is time."""
-        jobs = []
+        """Returns a fit for each trial for which there is time.
+
+        Of a model that takes long, those that are refuted are left out as soon as one
+        is found that leaves nothing but noise.
+        """
+        jobs, refuted = [], self._refuted
         for trial in trials:
             start = self._starts.get(trial.term.names)
             derivatives = {} if start else system.derivatives(trial.term)
@@ -174,11 +192,13 @@ class RefitSelection:
                 added = start.effects[len(fit.effects) :]
             jobs.append(_TrialFit(self.fitter, fit, added, start, derivatives))
         workers, found = self.fitter.workers, []
-        self._starts = {}
+        self._starts, self._refuted = {}, set()
         if workers.in_this_process or self.fitter.base.costly:
-            for job in jobs:
+            for trial, job in zip(trials, jobs, strict=True):
                 if time.monotonic() > self.deadline:
                     break
+                if trial.term.names in refuted and self._is_explained(found):
+                    continue
                 found.append(job.run())
                 self._report(f"{job.text}: objective {found[-1].objective:.4g}")
         elif jobs:
@@ -227,6 +247,7 @@ class RefitSelection:
         self.progress(ProgressUpdate("selecting effects", message=text))
 
     _starts: dict[_Names, Fit] = field(default_factory=dict)
+    _refuted: set[_Names] = field(default_factory=set)
 
 
 @dataclass(frozen=True)
