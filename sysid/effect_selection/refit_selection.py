@@ -191,7 +191,8 @@ class RefitSelection:
             if start:
                 added = start.effects[len(fit.effects) :]
             jobs.append(_TrialFit(self.fitter, fit, added, start, derivatives))
-        workers, found = self.fitter.workers, []
+        workers = self.fitter.workers
+        found: list[Fit] = []
         self._starts, self._refuted = {}, set()
         if workers.in_this_process or self.fitter.base.costly:
             for trial, job in zip(trials, jobs, strict=True):

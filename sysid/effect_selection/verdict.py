@@ -119,6 +119,7 @@ class Verdict:
             else is of the log put right.
         invalid: why the model does not hold for the log, in words; empty if it does.
         is_provisional: whether the time was over before the search was.
+        is_of_changes: whether effects are what changed since other logs.
     """
 
     ending: Ending
@@ -138,6 +139,7 @@ class Verdict:
     written: tuple[Written, ...] = ()
     invalid: str = ""
     is_provisional: bool = False
+    is_of_changes: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -210,6 +212,7 @@ def judge(
         written=tuple(Written(w.name, w.what, w.remedy) for w in written),
         invalid=found.invalid,
         is_provisional=not found.is_complete,
+        is_of_changes=last.model.is_of_changes,
     )
     ending, strokes = _ending(verdict, last), _single_strokes(verdict, last)
     return dataclasses.replace(verdict, ending=ending, single_strokes=strokes)

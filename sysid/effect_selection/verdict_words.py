@@ -33,6 +33,41 @@ _QUANTITIES = {"N": "force", "N m": "torque", "m": "position", "rad": "position"
 
 
 @dataclass(frozen=True)
+class _Subject:
+    """What effects are in sentences: what a model lacks, or what has changed.
+
+    Attributes:
+        which: "(shows nothing) that the model lacks".
+        are: before effects that are confirmed.
+        also: before others.
+        something: of a residual that no effect is confirmed for.
+        unknown: the same, where none is suggested either.
+    """
+
+    which: str
+    are: str
+    also: str
+    something: str
+    unknown: str
+
+
+_LACKS = _Subject(
+    "that the model lacks",
+    "The model lacks",
+    "It also lacks",
+    "The model lacks something, and no effect is confirmed.",
+    "The model lacks something that no effect {tried} explains.",
+)
+_CHANGED = _Subject(
+    "that has changed since the reference",
+    "Changed since the reference:",
+    "Also changed:",
+    "Something has changed since the reference, and no effect is confirmed.",
+    "What is left is more than noise, and no change {tried} explains it.",
+)
+
+
+@dataclass(frozen=True)
 class KindLine:
     """Effects of one kind and one standing.
 
@@ -214,12 +249,13 @@ def error_in_words(errors: HeldOut) -> str:
 
 def _nothing(verdict: Verdict, errors: HeldOut) -> str:
     """Returns that nothing is missing, and how much would have been found."""
+    which = _subject(verdict).which
     if verdict.ending == "too short":
-        text = "This log is too short to decide: it shows nothing that the model lacks"
+        text = f"This log is too short to decide: it shows nothing {which}"
     elif verdict.is_provisional:
-        return "So far nothing was found that the model lacks."
+        return f"So far nothing was found {which}."
     else:
-        text = "This log shows nothing that the model lacks: the residual is noise"
+        text = f"This log shows nothing {which}: the residual is noise"
         if errors.model_error is not None:
             text += " and what the model states of its own error"
     kinds = by_kind([limit.effect for limit in verdict.limits])
@@ -233,19 +269,24 @@ def _named(verdict: Verdict) -> list[str]:
     for each in kind_lines(verdict):
         words[each.status].append(each.words)
     confirmed, sets, suggested = words.values()
-    said = [f"The model lacks {enumeration(confirmed)}."] if confirmed else []
-    lacks = "It also lacks" if confirmed else "The model lacks"
+    subject = _subject(verdict)
+    said = [f"{subject.are} {enumeration(confirmed)}."] if confirmed else []
+    lacks = subject.also if confirmed else subject.are
     if len(sets) > 1:
         said.append(f"{lacks} one of each of these sets: {'; '.join(sets)}.")
     elif sets:
         said.append(f"{lacks} {sets[0]}.")
     tried = "tried so far" if verdict.is_provisional else "of the library"
     if suggested and not said:
-        said = ["The model lacks something, and no effect is confirmed."]
+        said = [subject.something]
     if suggested:
         which = enumeration(_first(suggested))
         said.append(f"Suggested, for a second recording to confirm: {which}.")
-    return said or [f"The model lacks something that no effect {tried} explains."]
+    return said or [subject.unknown.format(tried=tried)]
+
+
+def _subject(verdict: Verdict) -> _Subject:
+    return _CHANGED if verdict.is_of_changes else _LACKS
 
 
 def _left(verdict: Verdict) -> list[str]:

@@ -95,6 +95,7 @@ class LogModel(abc.ABC):
             of the task, "rest" for an arm at rest; "" for any.
         shown_elsewhere: classes of effects that other kinds of logs show: one of its
             own need not, for a verdict that nothing is missing.
+        is_of_changes: whether effects are what changed since other logs.
         assumptions: that a check of the data reports.
         rows_in_use: of each episode's table, by the episode's name; empty: all rows.
     """
@@ -108,6 +109,7 @@ class LogModel(abc.ABC):
     has_commands: ClassVar[bool] = False
     setting: ClassVar[str] = ""
     shown_elsewhere: ClassVar[tuple[type[Effect], ...]] = ()
+    is_of_changes: ClassVar[bool] = False
     assumptions: tuple[Assumption, ...] = ()
     rows_in_use: Mapping[str, NDArray[np.int64]] = {}
     _effects: tuple[Effect, ...] = ()

@@ -1,6 +1,6 @@
 """Reports that open offline: one HTML page with figures and their script inside."""
 
-from sysid.report.closing import closing_page
+from sysid.report.closing import changes_page, closing_page
 from sysid.report.page import report_page
 
-__all__ = ["closing_page", "report_page"]
+__all__ = ["changes_page", "closing_page", "report_page"]

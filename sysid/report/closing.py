@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sysid.data_checks import DataFinding
+from sysid.effect_selection.change_words import changes_mapping
+from sysid.effect_selection.changes import Changes, Course
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.output import to_mapping
 from sysid.report import plots
@@ -25,10 +27,37 @@ def closing_page(
         origin: its provenance, as in `result.json`.
         findings: of the check of the data.
     """
+    return _page(closed, to_mapping(closed), origin, findings)
+
+
+def changes_page(
+    changes: Changes,
+    origin: Mapping[str, Any],
+    findings: Sequence[DataFinding] = (),
+) -> str:
+    """Returns the report of what has changed as one self-contained HTML page.
+
+    Args:
+        changes: what was found.
+        origin: its provenance, as in `result.json`.
+        findings: of the check of the data.
+    """
+    result = changes_mapping(changes)
+    return _page(changes.closed, result, origin, findings, changes.courses)
+
+
+def _page(
+    closed: ClosedLoop,
+    result: Mapping[str, Any],
+    origin: Mapping[str, Any],
+    findings: Sequence[DataFinding],
+    courses: Sequence[Course] = (),
+) -> str:
     found = loss_map(closed.errors, closed.last.linearisation.huber_delta)
     return render(
         "closing.html.j2",
-        result=to_mapping(closed),
+        result=result,
+        courses=plots.course_plot(courses) if courses else None,
         verdict=closed.verdict,
         kinds=kind_rows(closed.verdict),
         limits=limit_rows(closed.verdict.limits),

@@ -14,6 +14,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from sysid.effect_selection.changes import Course
 from sysid.effect_selection.forward_selection import Gain
 from sysid.models.measurements import Channel
 from sysid.report.loss_map import LossMap, place
@@ -195,6 +196,25 @@ def candidate_plot(begin: Sequence[Gain], end: Sequence[Gain], least: float) -> 
     figure.update_yaxes(tickfont={"size": 10}, automargin=True)
     _finish(figure, 460)
     return Plot(figure)
+
+
+def course_plot(courses: Sequence[Course]) -> Plot:
+    """Returns how large each change is in each log, with 95 % intervals."""
+    sized = [[v for v in course.values if v.null is not None] for course in courses]
+    titles = [f"{value.name} [{value.unit}]" for value in sized[0]]
+    figure = make_subplots(len(titles), 1, shared_xaxes=True, subplot_titles=titles)
+    logs = [course.episode for course in courses]
+    for line, values in enumerate(zip(*sized, strict=True), start=1):
+        middle = np.array([value.value for value in values])
+        low, high = np.array([value.interval for value in values]).T
+        bars = {"array": high - middle, "arrayminus": middle - low}
+        trace = go.Scatter(
+            x=logs, y=middle, error_y=bars, mode="markers+lines", showlegend=False
+        )
+        figure.add_trace(trace, row=line, col=1)
+        figure.add_hline(0.0, row=line, col=1, line={"color": "#d0d0d0", "width": 1})
+    _finish(figure, 160 * len(titles) + 80)
+    return Plot(figure, "Fitted to the references and each log by itself; bars: 95 %.")
 
 
 def _channel_view(errors: HeldOut, number: int) -> dict[str, Any]:

@@ -6,6 +6,9 @@ effect of the library is tested on what it explains of data that were not fitted
 that pass are added one by one. Prints what is missing, its parameters, and the error
 before and after. Writes the scenario with the effects, `result.json`, and a report
 that opens offline. After Ctrl-C the same command resumes.
+
+With --reference, those logs make the model, their effects included, and the verdict is
+on what has changed since: by how much, since when, and what has not.
 """
 
 import argparse
@@ -16,18 +19,21 @@ from pathlib import Path
 
 from drake_disasm.common import options, program
 from drake_disasm.common.cluster import executor_for
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, write_json, write_text
 from drake_disasm.logs import Log
 from drake_disasm.scenario import dump_scenario, load_scenario
 from drake_disasm_cli import common, data_arguments
 from sysid.data_checks import DataFinding
+from sysid.effect_selection.change_words import changes_mapping, changes_text
+from sysid.effect_selection.changes import Changes, find_changes
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.effect_selection.output import to_mapping
 from sysid.identification.split import split_episodes
 from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.measurements import episode_names
-from sysid.report import closing_page
+from sysid.report import changes_page, closing_page
 from sysid.scenario_parameters import read_requests
 from sysid.workers import Workers
 
@@ -35,6 +41,7 @@ _EXAMPLES = """examples:
   drake-disasm close-loop --log out/log --scenario removal --out out/closed
   drake-disasm close-loop --log out/readings --out out/sensor     a static_wrench log
   drake-disasm close-loop --log out/arm_1 out/arm_2 --held-out arm_2 --out out/arm
+  drake-disasm close-loop --reference out/march --log out/april --out out/changed
 """
 
 
@@ -43,6 +50,15 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = program.argument_parser("drake-disasm close-loop", __doc__, _EXAMPLES)
     add = parser.add_argument
     common.add_log_argument(add)
+    add(
+        "--reference",
+        nargs="+",
+        default=[],
+        type=Path,
+        metavar="DIR",
+        help="logs of the same robot as it was before: the verdict is on what has "
+        "changed since (default: on what the model lacks)",
+    )
     _add_model_arguments(add)
     data_arguments.add_data_arguments(add)
     add(
@@ -101,7 +117,9 @@ _RESIDUAL_MODEL = "residual_model.npz"
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
-    logs = common.named_logs(args.log)
+    references = common.named_logs(args.reference) if args.reference else []
+    logs = [*references, *common.named_logs(args.log)]
+    _refuse_combinations(args)
     if args.held_out:  # names, which are wrong more often than anything takes time
         split_episodes(episode_names(logs), args.held_out)
     model = _model(args, logs)
@@ -113,6 +131,18 @@ def main(arguments: Sequence[str]) -> int:
         Workers(args.workers, executor=executor, progress=progress) as workers,
     ):
         model, findings = data_arguments.checked(logs, model, args, workers)
+        if references:
+            changes = find_changes(
+                model,
+                _newer(model, references),
+                workers=workers,
+                progress=progress,
+                folder=fits,
+                time_budget=60.0 * args.time_budget,
+            )
+            _write_changes(args.out, changes, findings, origin)
+            _finish(args.out, fits, changes.closed, changes_text(changes))
+            return 0
         share = model.held_out_share
         train, test = split_episodes(model.measurements.names, args.held_out or share)
         closed = close_loop(
@@ -127,11 +157,44 @@ def main(arguments: Sequence[str]) -> int:
             learn_residual=args.residual_model,
         )
     _write(args.out, closed, findings, origin)
+    _finish(args.out, fits, closed, closed.text)
+    return 0
+
+
+def _finish(folder: Path, fits: Path, closed: ClosedLoop, text: str) -> None:
+    """Removes fits that no run goes on from, and prints the verdict."""
     if not closed.is_provisional:
         shutil.rmtree(fits, ignore_errors=True)
-    print(closed.text)
-    print(f"report: {args.out / 'report.html'}")
-    return 0
+    print(text)
+    print(f"report: {folder / 'report.html'}")
+
+
+def _refuse_combinations(args: argparse.Namespace) -> None:
+    """Refuses options that mean nothing beside --reference.
+
+    Raises:
+        DisasmError: one of them is given.
+    """
+    if not args.reference:
+        return
+    for option in ("held_out", "parameters", "residual_model"):
+        if getattr(args, option):
+            name = f"--{option.replace('_', '-')}"
+            raise DisasmError(f"{name}: not with --reference; leave one of them out")
+    twice = {path.resolve() for path in args.reference} & {
+        path.resolve() for path in args.log
+    }
+    if twice:
+        raise DisasmError(
+            f"{min(twice)}: is a reference, and a log to compare with it; name it once"
+        )
+
+
+def _newer(model: LogModel, references: Sequence[Log]) -> list[int]:
+    """Returns the numbers of the episodes that are no references."""
+    known = set(episode_names(references))
+    names = model.measurements.names
+    return [i for i, name in enumerate(names) if name not in known]
 
 
 def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
@@ -143,6 +206,20 @@ def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
         fixed=True,
     )
     return model_of(logs, choice)
+
+
+def _write_changes(
+    folder: Path,
+    changes: Changes,
+    findings: Sequence[DataFinding],
+    origin: dict[str, object],
+) -> None:
+    make_folder(folder)
+    of_data = {"data_findings": [finding.to_mapping() for finding in findings]}
+    mapping = changes_mapping(changes) | of_data | {"provenance": origin}
+    write_json(folder / "result.json", mapping)
+    write_text(folder / "reference.html", closing_page(changes.reference, origin))
+    write_text(folder / "report.html", changes_page(changes, origin, findings))
 
 
 def _write(

@@ -1,0 +1,91 @@
+"""What has changed since reference logs, in plain English and as plain data."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from drake_disasm.effects import amplitudes
+from sysid.effect_selection.changes import Changes, Course
+from sysid.effect_selection.detection import DetectionLimit
+from sysid.effect_selection.effect_names import effect_class, in_words
+from sysid.effect_selection.onsets import Onset
+from sysid.effect_selection.output import to_mapping
+
+
+def changes_text(changes: Changes) -> str:
+    """Returns the changes in lines: the verdict, since when, how they go on, limits."""
+    closed = changes.closed
+    lines = [f"reference: {changes.reference.sentence}", closed.text]
+    lines += [_onset_text(each, changes) for each in changes.onsets]
+    if changes.courses:
+        lines.append("in each log:")
+        lines += [_course_text(each) for each in changes.courses]
+    if unchanged := _limits_text(closed.verdict.limits):
+        lines.append(f"all else has changed by less than: {unchanged}")
+    return "\n".join(lines)
+
+
+def changes_mapping(changes: Changes) -> dict[str, Any]:
+    """Returns everything that a program may want to know of changes."""
+    return {
+        **to_mapping(changes.closed),
+        "text": changes_text(changes),
+        "reference": to_mapping(changes.reference),
+        "onsets": [dataclasses.asdict(each) for each in changes.onsets],
+        "courses": [
+            {
+                "episode": course.episode,
+                "parameters": {
+                    v.name: {
+                        "value": v.value,
+                        "unit": v.unit,
+                        "interval_95": list(v.interval),
+                    }
+                    for v in course.values
+                },
+            }
+            for course in changes.courses
+        ],
+    }
+
+
+def _onset_text(onset: Onset, changes: Changes) -> str:
+    """Returns since when an effect acts: its block of rows, and of which log."""
+    name = changes.closed.last.model.measurements.names[onset.episode]
+    begins = "begins" if onset.is_new else "changes again"
+    end = onset.row + onset.block_rows
+    return f"  {onset.effect} {begins} at row {onset.row} to {end} of {name}"
+
+
+def _course_text(course: Course) -> str:
+    sized = [v for v in course.values if v.null is not None]
+    values = [
+        f"{v.name} {v.value:.3g} ({v.interval[0]:.3g} to {v.interval[1]:.3g}) {v.unit}"
+        for v in sized
+    ]
+    return f"  {course.episode}: {'; '.join(values)}"
+
+
+def _limits_text(limits: Sequence[DetectionLimit]) -> str:
+    """Returns by how much each kind could have changed unseen, over all joints.
+
+    By the first of its amplitudes, in the shape that shows best.
+    """
+    best: dict[str, dict[str, float]] = {}
+    units: dict[str, str] = {}
+    for each in limits:
+        kind = each.effect.partition(".")[0]
+        known = effect_class(kind)
+        is_first = known is not None and each.field == amplitudes(known)[0]
+        if is_first and each.amplitude is not None:
+            own = best.setdefault(kind, {})
+            own[each.effect] = min(own.get(each.effect, np.inf), abs(each.amplitude))
+            units[kind] = "" if each.unit == "1" else f" {each.unit}"
+    said = []
+    for kind, of_joints in best.items():
+        low, high = min(of_joints.values()), max(of_joints.values())
+        size = f"{low:.2g}" if low == high else f"{low:.2g} to {high:.2g}"
+        said.append(f"{in_words(kind)} {size}{units[kind]}")
+    return "; ".join(said)

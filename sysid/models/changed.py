@@ -1,0 +1,231 @@
+"""Logs of which some are references: effects are changes, and act in the others."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import Effect
+from sysid.models.base import Array, LogModel
+from sysid.models.effects import field_of
+from sysid.models.validity import Validity
+from sysid.parameters import Parameter
+
+#: Before the name of a parameter of an effect that the references show, too.
+_KNOWN = "reference "
+#: What is the same of the model inside.
+_AS_INNER = (
+    *("affine", "makes_contact", "setting", "effect_types", "shown_elsewhere"),
+    *("held_out_share", "assumptions", "rows_in_use"),
+)
+
+
+class ChangedModel(LogModel):
+    """What references and newer logs have in common, and what changed in between.
+
+    Parameters of the references' model, its effects included, are fitted to all logs.
+    Effects that are added act in the newer logs alone: a change of friction is an
+    effect of friction besides that of the references, in units of the same parameter.
+
+    Attributes:
+        known: of the references' rows.
+        newer: of the others; its effects are those of `known` and the changes.
+    """
+
+    is_of_changes = True
+
+    def __init__(
+        self,
+        model: LogModel,
+        newer: Sequence[int],
+        values: Mapping[str, float] | None = None,
+    ) -> None:
+        """Splits a model.
+
+        Args:
+            model: of all logs, with the effects that references show.
+            newer: numbers of the episodes that are no references.
+            values: of the model's parameters, by name, from which fits begin; nominal
+                ones where there is none.
+
+        Raises:
+            DisasmError: all episodes are newer, or none is.
+        """
+        self.measurements = model.measurements
+        is_newer = np.isin(model.measurements.episode, newer)
+        if is_newer.all() or not is_newer.any():
+            raise DisasmError("give at least one reference, and one log to compare")
+        self.known, self.newer = model.of_rows(~is_newer), model.of_rows(is_newer)
+        self.parameters = tuple(_own(p, values or {}) for p in model.parameters)
+        self.__dict__.update({name: getattr(model, name) for name in _AS_INNER})
+        self._own_count = len(model.parameters)
+
+    def with_effects(
+        self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
+    ) -> Self:
+        """See LogModel: the effects are changes, and may be of either sign."""
+        changed = super().with_effects(effects, [_both_ways(p) for p in parameters])
+        before = self.known.effects
+        inner = [_moved(p, len(before)) for p in changed.parameters if field_of(p)]
+        unchanged = self.newer.replace(
+            _effects=before, parameters=self.known.parameters
+        )
+        newer = unchanged.with_effects([*before, *effects], inner)
+        return changed.replace(newer=newer)
+
+    def simulate(self, theta: Array, rows: slice) -> Array:
+        """See LogModel; rows of newer logs come after all others."""
+        theta = self.with_frozen(theta)
+        count = self.known.measurements.rows
+        if rows.stop <= count:
+            return self.known.simulate(theta[: self._own_count], rows)
+        own = slice(rows.start - count, rows.stop - count)
+        return self.newer.simulate(theta, own)
+
+    def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
+        """See LogModel."""
+        theta = self.with_frozen(theta)
+        found = []
+        for model, begin in self._parts():
+            own = slice(
+                max(rows.start - begin, 0),
+                min(rows.stop - begin, model.measurements.rows),
+            )
+            if own.start < own.stop:
+                at = slice(
+                    begin + own.start - rows.start, begin + own.stop - rows.start
+                )
+                values = theta[: len(model.parameters)]
+                found.append(model.read(values, own, simulated[at]))
+        return np.concatenate(found)
+
+    def predict(self, theta: Array, rows: slice) -> Array:
+        """See LogModel; `rows` may be of both parts."""
+        parts = [
+            self.simulate(
+                theta, slice(max(c.start, rows.start), min(c.stop, rows.stop))
+            )
+            for c in self.chunks()
+            if c.start < rows.stop and rows.start < c.stop
+        ]
+        return self.read(theta, rows, np.concatenate(parts))
+
+    def chunks(self) -> list[slice]:
+        """See LogModel."""
+        return [
+            slice(begin + chunk.start, begin + chunk.stop)
+            for model, begin in self._parts()
+            for chunk in model.chunks()
+        ]
+
+    def _parts(self) -> list[tuple[LogModel, int]]:
+        """Returns both models, with the number of their first row."""
+        return [(self.known, 0), (self.newer, self.known.measurements.rows)]
+
+    def select_rows(self, mask: NDArray[np.bool_]) -> Self:
+        """See LogModel."""
+        count = self.known.measurements.rows
+        return self.replace(
+            known=self.known.of_rows(mask[:count]),
+            newer=self.newer.of_rows(mask[count:]),
+        )
+
+    def begun(self, theta: Array) -> Self:
+        """See LogModel."""
+        full = self.with_frozen(theta)
+        known = self.known.begun(full[: self._own_count])
+        newer = self.newer.begun(full)
+        if known is self.known and newer is self.newer:
+            return self
+        return self.replace(known=known, newer=newer)
+
+    def varying(self) -> Self:
+        """See LogModel."""
+        return self.replace(known=self.known.varying(), newer=self.newer.varying())
+
+    def surrogate(self) -> Self:
+        """See LogModel."""
+        known, newer = self.known.surrogate(), self.newer.surrogate()
+        if known is self.known and newer is self.newer:
+            return self
+        return self.replace(known=known, newer=newer)
+
+    @property
+    def costly(self) -> bool:
+        """See LogModel."""
+        return self.newer.costly
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """See LogModel."""
+        return self.newer.joints
+
+    @property
+    def duration(self) -> float:
+        """See LogModel."""
+        return self.newer.duration
+
+    @property
+    def travel(self) -> dict[str, float]:
+        """See LogModel: a change is shown by the newer logs' motion."""
+        return dict(self.newer.travel)
+
+    @property
+    def one_way(self) -> tuple[str, ...]:
+        """See LogModel."""
+        return self.newer.one_way
+
+    @property
+    def filter_rows(self) -> int:
+        """See LogModel."""
+        return max(self.known.filter_rows, self.newer.filter_rows)
+
+    @property
+    def piece(self) -> NDArray[np.int64]:
+        """See LogModel."""
+        known, newer = self.known.piece, self.newer.piece
+        return np.concatenate([known, known.max(initial=-1) + 1 + newer])
+
+    @property
+    def noise_groups(self) -> tuple[str, ...]:
+        """See LogModel."""
+        return self.newer.noise_groups
+
+    def applicable_effects(self, library: Sequence[type[Effect]]) -> list[Effect]:
+        """See LogModel."""
+        return self.newer.applicable_effects(library)
+
+    def covariates(self, channel: int) -> dict[str, Array]:
+        """See LogModel."""
+        known, newer = self.known.covariates(channel), self.newer.covariates(channel)
+        return {name: np.concatenate([known[name], newer[name]]) for name in newer}
+
+    def validity(self, theta: Array) -> Validity | None:
+        """See LogModel."""
+        return self.newer.validity(self.with_frozen(theta))
+
+
+def _own(parameter: Parameter, values: Mapping[str, float]) -> Parameter:
+    """Returns a parameter of the references' model as one that no effect owns."""
+    value = values.get(parameter.name, parameter.nominal)
+    within = float(np.clip(value, parameter.low, parameter.high))
+    if not field_of(parameter):
+        return dataclasses.replace(parameter, nominal=within)
+    name = f"{_KNOWN}{parameter.name}"
+    return dataclasses.replace(parameter, name=name, path="", nominal=within)
+
+
+def _both_ways(parameter: Parameter) -> Parameter:
+    """Returns an amplitude that may fall as far as it may rise."""
+    if parameter.is_shape or parameter.log_scale:
+        return parameter
+    return dataclasses.replace(parameter, low=min(parameter.low, -parameter.high))
+
+
+def _moved(parameter: Parameter, count: int) -> Parameter:
+    """Returns a field of an effect that comes after others."""
+    head, number, field = parameter.path.split(".")
+    return dataclasses.replace(parameter, path=f"{head}.{int(number) + count}.{field}")
