@@ -12,12 +12,47 @@ from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effect_class, in_words
 from sysid.effect_selection.onsets import Onset
 from sysid.effect_selection.output import to_mapping
+from sysid.effect_selection.verdict_words import (
+    effect_lines,
+    error_in_words,
+    named_effects,
+)
+
+
+def changes_sentence(changes: Changes) -> str:
+    """Returns what has changed in a few sentences, and what is left."""
+    closed, verdict = changes.closed, changes.closed.verdict
+    newer = closed.errors.of_episodes(changes.newer)
+    said = ["Provisional, the time was over:"] if closed.is_provisional else []
+    if verdict.names:
+        said += named_effects(verdict)
+        what = "these changes" if len(verdict.names) > 1 else "this change"
+        error = error_in_words(newer)
+        said.append(f"With {what} the held-out error of the new logs {error}.")
+        if changes.leaves_more:
+            said.append("That is still more than the references'.")
+        return " ".join(said)
+    if changes.leaves_more:
+        said.append(
+            "Something has changed since the reference, which no effect of the library "
+            "explains."
+        )
+    else:
+        said.append("Nothing has changed since the reference that these logs show.")
+    known = np.setdiff1d(np.arange(len(closed.errors.names)), changes.newer)
+    of_known = error_in_words(closed.errors.of_episodes(known.tolist()))
+    said.append(
+        f"The held-out error of the new logs {error_in_words(newer)}; that of the "
+        f"references {of_known}."
+    )
+    return " ".join(said)
 
 
 def changes_text(changes: Changes) -> str:
     """Returns the changes in lines: the verdict, since when, how they go on, limits."""
     closed = changes.closed
-    lines = [f"reference: {changes.reference.sentence}", closed.text]
+    lines = [f"reference: {changes.reference.sentence}", changes_sentence(changes)]
+    lines += effect_lines(closed.verdict)
     lines += [_onset_text(each, changes) for each in changes.onsets]
     if changes.courses:
         lines.append("in each log:")
@@ -31,6 +66,7 @@ def changes_mapping(changes: Changes) -> dict[str, Any]:
     """Returns everything that a program may want to know of changes."""
     return {
         **to_mapping(changes.closed),
+        "sentence": changes_sentence(changes),
         "text": changes_text(changes),
         "reference": to_mapping(changes.reference),
         "onsets": [dataclasses.asdict(each) for each in changes.onsets],

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import ttest_ind
 
 from drake_disasm.common.progress import Progress
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
@@ -42,14 +43,35 @@ class Changes:
     Attributes:
         reference: what the references' model lacks.
         closed: what changed since: its effects act in the newer logs alone.
+        newer: numbers of the newer episodes.
         onsets: of those that begin within a log.
         courses: of each newer log, where there are several.
     """
 
     reference: ClosedLoop
     closed: ClosedLoop
+    newer: tuple[int, ...]
     onsets: tuple[Onset, ...]
     courses: tuple[Course, ...]
+
+    @property
+    def leaves_more(self) -> bool:
+        """Whether newer logs are explained worse than the references, changes included.
+
+        By the losses of their blocks (Welch's test of the logarithms, one-sided).
+        """
+        account, last = self.closed.search.account, self.closed.last
+        equations = account.equations
+        losses = np.log(np.maximum(equations.losses / equations.rows, 1e-300))
+        is_newer = np.isin(equations.episode, self.newer)
+        after, before = losses[is_newer], losses[~is_newer]
+        if min(len(after), len(before)) < 2:
+            return False
+        test = ttest_ind(after, before, equal_var=False, alternative="greater")
+        is_larger = np.exp(after.mean() - before.mean()) > (
+            last.settings.max_objective_at_noise**2
+        )
+        return bool(is_larger and test.pvalue < last.settings.alpha)
 
 
 def find_changes(
@@ -82,6 +104,7 @@ def find_changes(
     known = [i for i in range(len(names)) if i not in newer]
     reference = close_loop(
         model.of_episodes(known) if known else model,
+        test=(),
         settings=settings,
         workers=workers,
         progress=progress,
@@ -91,6 +114,7 @@ def find_changes(
     changed = ChangedModel(*_extended(model, reference, newer))
     closed = close_loop(
         changed,
+        test=(),
         settings=settings,
         workers=workers,
         progress=progress,
@@ -100,7 +124,8 @@ def find_changes(
     account = closed.search.account
     of_newer = np.isin(account.system.grams.episode, newer)
     found = onsets(account, of_newer)
-    return Changes(reference, closed, found, _courses(changed, closed, newer, workers))
+    course = _courses(changed, closed, newer, workers)
+    return Changes(reference, closed, tuple(newer), found, course)
 
 
 def _extended(

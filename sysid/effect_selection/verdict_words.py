@@ -62,8 +62,8 @@ _CHANGED = _Subject(
     "that has changed since the reference",
     "Changed since the reference:",
     "Also changed:",
-    "Something has changed since the reference, and no effect is confirmed.",
-    "What is left is more than noise, and no change {tried} explains it.",
+    "Something seems to have changed since the reference, and no effect is confirmed.",
+    "Nothing has changed since the reference that an effect {tried} explains.",
 )
 
 
@@ -162,7 +162,7 @@ def verdict_sentence(verdict: Verdict, errors: HeldOut) -> str:
         said.append(f"Rows are not what the kind of the log says: {each}. As it is:")
     if verdict.ending in ("none", "too short"):
         return " ".join([*said, _nothing(verdict, errors)])
-    said += _named(verdict)
+    said += named_effects(verdict)
     if left := "; ".join(_left(verdict)):
         said.append(f"Left unexplained: {left}.")
     these = "these effects" if len(verdict.names) > 1 else "this effect"
@@ -178,16 +178,7 @@ def verdict_text(verdict: Verdict, errors: HeldOut) -> str:
 
     The errors are those of each channel. Arguments are as of `verdict_sentence`.
     """
-    lines, effects = [verdict_sentence(verdict, errors)], kind_lines(verdict)
-    width = max((len(each.title) for each in effects), default=0)
-    for each in effects:
-        line = f"  {each.title:<{width}}  {each.status}  {each.details}"
-        lines.append(line.rstrip())
-    tied = [each.experiments for each in effects if each.rivals]
-    first = _once([tests[0] for tests in tied])  # of each, and more if they are few
-    if tests := _once([*first, *(test for tests in tied for test in tests)]):
-        record = "; ".join(tests[: max(len(first), _SHOWN)])
-        lines.append(f"to separate rivals{_strokes(verdict)}, record: {record}")
+    lines = [verdict_sentence(verdict, errors), *effect_lines(verdict)]
     if verdict.ending in ("none", "too short") and (hidden := verdict.undetectable):
         record = "; ".join(_once(list(hidden.values()))[:_SHOWN])
         lines.append(f"not detectable: {', '.join(hidden)}; record: {record}")
@@ -200,6 +191,21 @@ def verdict_text(verdict: Verdict, errors: HeldOut) -> str:
     if verdict.residual_model is not None:
         lines.append(f"besides: {verdict.residual_model.text}")
     return "\n".join(lines)
+
+
+def effect_lines(verdict: Verdict) -> list[str]:
+    """Returns a line for each kind of effect, and what to record to separate rivals."""
+    effects, lines = kind_lines(verdict), []
+    width = max((len(each.title) for each in effects), default=0)
+    for each in effects:
+        line = f"  {each.title:<{width}}  {each.status}  {each.details}"
+        lines.append(line.rstrip())
+    tied = [each.experiments for each in effects if each.rivals]
+    first = _once([tests[0] for tests in tied])  # of each, and more if they are few
+    if tests := _once([*first, *(test for tests in tied for test in tests)]):
+        record = "; ".join(tests[: max(len(first), _SHOWN)])
+        lines.append(f"to separate rivals{_strokes(verdict)}, record: {record}")
+    return lines
 
 
 def not_told_apart(verdict: Verdict) -> str:
@@ -263,7 +269,7 @@ def _nothing(verdict: Verdict, errors: HeldOut) -> str:
     return f"{text}; {seen} would have been found if large." if kinds else f"{text}."
 
 
-def _named(verdict: Verdict) -> list[str]:
+def named_effects(verdict: Verdict) -> list[str]:
     """Returns sentences of what is confirmed, of sets, and of what is suggested."""
     words: dict[str, list[str]] = {"confirmed": [], "ambiguous": [], "suggested": []}
     for each in kind_lines(verdict):

@@ -1,6 +1,9 @@
 """Errors before and after, on rows that were not fitted."""
 
+import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +57,19 @@ class HeldOut:
         """
         one_unit = len({channel.unit for channel in self.channels}) == 1
         return one_unit and self.relative(self.before) <= 1.0
+
+    def of_episodes(self, numbers: Sequence[int]) -> Self:
+        """Returns the rows of some episodes."""
+        mask = np.isin(self.episode, numbers)
+        error = self.model_error
+        return dataclasses.replace(
+            self,
+            measured=self.measured[mask],
+            before=self.before[mask],
+            after=self.after[mask],
+            episode=self.episode[mask],
+            model_error=None if error is None else error[mask],
+        )
 
     def rms(self, predicted: Array) -> Array:
         """Returns the rms error (channels,) of a prediction, SI."""
