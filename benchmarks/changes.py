@@ -123,7 +123,7 @@ def answer(urdf: Path, kind: str, number: int) -> Answer:
         log = simulated(Path(folder, "newer"), urdf, own, seed + 1, added, since)
         put_in = {"kind": kind, "size": size, "hidden": repr(added), "since": since}
         try:
-            found = find_changes(JointMotionModel([known, log]), [1])
+            found = find_changes(JointMotionModel([known, log]), 1)
         except DisasmError as error:
             return put_in | no_verdict("refused", str(error))
     return put_in | _said(found, size, added)
@@ -143,7 +143,7 @@ def _said(found: Changes, size: str, added: Sequence[Effect]) -> Answer:
         "truth": truth,
         "value": values.get(size),
         "covers": bool(low <= truth <= high),
-        "onsets": [[each.effect, each.row] for each in found.onsets],
+        "onset": found.onset.row if found.onset else None,
         "leaves_more": found.leaves_more,
     }
 

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from drake_disasm.effects import amplitudes
-from sysid.effect_selection.changes import Changes, Course
+from sysid.effect_selection.changes import Changes, Course, Onset
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effect_class, in_words
-from sysid.effect_selection.onsets import Onset
 from sysid.effect_selection.output import to_mapping
 from sysid.effect_selection.verdict_words import (
     effect_lines,
@@ -39,8 +38,7 @@ def changes_sentence(changes: Changes) -> str:
         )
     else:
         said.append("Nothing has changed since the reference that these logs show.")
-    known = np.setdiff1d(np.arange(len(closed.errors.names)), changes.newer)
-    of_known = error_in_words(closed.errors.of_episodes(known.tolist()))
+    of_known = error_in_words(closed.errors.of_episodes(range(changes.known)))
     said.append(
         f"The held-out error of the new logs {error_in_words(newer)}; that of the "
         f"references {of_known}."
@@ -53,7 +51,8 @@ def changes_text(changes: Changes) -> str:
     closed = changes.closed
     lines = [f"reference: {changes.reference.sentence}", changes_sentence(changes)]
     lines += effect_lines(closed.verdict)
-    lines += [_onset_text(each, changes) for each in changes.onsets]
+    if changes.onset:
+        lines.append(_onset_text(changes.onset))
     if changes.courses:
         lines.append("in each log:")
         lines += [_course_text(each) for each in changes.courses]
@@ -69,7 +68,7 @@ def changes_mapping(changes: Changes) -> dict[str, Any]:
         "sentence": changes_sentence(changes),
         "text": changes_text(changes),
         "reference": to_mapping(changes.reference),
-        "onsets": [dataclasses.asdict(each) for each in changes.onsets],
+        "onset": dataclasses.asdict(changes.onset) if changes.onset else None,
         "courses": [
             {
                 "episode": course.episode,
@@ -87,12 +86,10 @@ def changes_mapping(changes: Changes) -> dict[str, Any]:
     }
 
 
-def _onset_text(onset: Onset, changes: Changes) -> str:
-    """Returns since when an effect acts: its block of rows, and of which log."""
-    name = changes.closed.last.model.measurements.names[onset.episode]
-    begins = "begins" if onset.is_new else "changes again"
-    end = onset.row + onset.block_rows
-    return f"  {onset.effect} {begins} at row {onset.row} to {end} of {name}"
+def _onset_text(onset: Onset) -> str:
+    """Returns since when the changes act."""
+    last = onset.row + onset.rows - 1
+    return f"since rows {onset.row} to {last} of {onset.episode}"
 
 
 def _course_text(course: Course) -> str:

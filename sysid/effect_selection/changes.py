@@ -2,16 +2,17 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import ttest_ind
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.progress import Progress
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
-from sysid.effect_selection.onsets import Onset, onsets
+from sysid.effect_selection.onsets import onset_block
 from sysid.effect_selection.verdict import ParameterValue, parameter_values
 from sysid.fitting.candidates import Candidate, extended
 from sysid.fitting.fitter import Fitter
@@ -21,6 +22,21 @@ from sysid.models.changed import ChangedModel
 from sysid.workers import Workers
 
 _OF_REFERENCES = 0.5  # of the time
+
+
+@dataclass(frozen=True)
+class Onset:
+    """Where in newer logs changes begin.
+
+    Attributes:
+        episode: its name.
+        row: of the episode's rows that are fitted, from 0; known to `rows`.
+        rows: number of rows, from that one on, within which it is.
+    """
+
+    episode: str
+    row: int
+    rows: int
 
 
 @dataclass(frozen=True)
@@ -42,17 +58,22 @@ class Changes:
 
     Attributes:
         reference: what the references' model lacks.
-        closed: what changed since: its effects act in the newer logs alone.
-        newer: numbers of the newer episodes.
-        onsets: of those that begin within a log.
+        closed: what changed since: its effects act in newer rows alone.
+        known: number of episodes that are references; they come first.
+        onset: where the changes begin; None: with the first newer log.
         courses: of each newer log, where there are several.
     """
 
     reference: ClosedLoop
     closed: ClosedLoop
-    newer: tuple[int, ...]
-    onsets: tuple[Onset, ...]
+    known: int
+    onset: Onset | None
     courses: tuple[Course, ...]
+
+    @property
+    def newer(self) -> list[int]:
+        """Numbers of the episodes that are no references."""
+        return list(range(self.known, len(self.closed.errors.names)))
 
     @property
     def leaves_more(self) -> bool:
@@ -60,23 +81,21 @@ class Changes:
 
         By the losses of their blocks (Welch's test of the logarithms, one-sided).
         """
-        account, last = self.closed.search.account, self.closed.last
+        account, limits = self.closed.search.account, self.closed.last.settings
         equations = account.equations
         losses = np.log(np.maximum(equations.losses / equations.rows, 1e-300))
-        is_newer = np.isin(equations.episode, self.newer)
+        is_newer = equations.episode >= self.known
         after, before = losses[is_newer], losses[~is_newer]
         if min(len(after), len(before)) < 2:
             return False
-        test = ttest_ind(after, before, equal_var=False, alternative="greater")
-        is_larger = np.exp(after.mean() - before.mean()) > (
-            last.settings.max_objective_at_noise**2
-        )
-        return bool(is_larger and test.pvalue < last.settings.alpha)
+        p = ttest_ind(after, before, equal_var=False, alternative="greater").pvalue
+        ratio = np.exp(after.mean() - before.mean())
+        return bool(ratio > limits.max_objective_at_noise**2 and p < limits.alpha)
 
 
 def find_changes(
     model: LogModel,
-    newer: Sequence[int],
+    known: int,
     *,
     settings: SelectionSettings = DEFAULT_SETTINGS,
     workers: Workers | None = None,
@@ -88,101 +107,103 @@ def find_changes(
 
     The loop is closed on the references; their effects are then part of the model, and
     are fitted together with its parameters to all logs. Effects of the library are
-    added to the newer logs alone.
+    added to the newer rows alone: from the first newer log on, or, if that explains
+    more, from a block of rows on.
 
     Args:
         model: of all logs, without effects.
-        newer: numbers of the episodes that are no references.
+        known: number of its episodes, the first ones, that are references.
         settings, workers, progress: see `close_loop`.
         folder: of caches of fits, see `close_loop`.
-        time_budget: for both searches [s].
+        time_budget: for all searches [s].
 
     Raises:
         DisasmError: there is no reference, or no newer log; see also `close_loop`.
     """
-    names = model.measurements.names
-    known = [i for i in range(len(names)) if i not in newer]
-    reference = close_loop(
-        model.of_episodes(known) if known else model,
-        test=(),
-        settings=settings,
-        workers=workers,
-        progress=progress,
-        folder=folder / "reference" if folder else None,
-        time_budget=_OF_REFERENCES * time_budget,
-    )
-    changed = ChangedModel(*_extended(model, reference, newer))
-    closed = close_loop(
-        changed,
-        test=(),
-        settings=settings,
-        workers=workers,
-        progress=progress,
-        folder=folder / "changes" if folder else None,
-        time_budget=(1.0 - _OF_REFERENCES) * time_budget,
-    )
-    account = closed.search.account
-    of_newer = np.isin(account.system.grams.episode, newer)
-    found = onsets(account, of_newer)
-    course = _courses(changed, closed, newer, workers)
-    return Changes(reference, closed, tuple(newer), found, course)
+    names, episode = model.measurements.names, model.measurements.episode
+    if not 0 < known < len(names):
+        raise DisasmError("give at least one reference, and one log to compare")
+    deadline = time.monotonic() + time_budget
+
+    def _closed(what: LogModel, name: str, budget: float) -> ClosedLoop:
+        return close_loop(
+            what,
+            test=(),
+            settings=settings,
+            workers=workers,
+            progress=progress,
+            folder=folder / name if folder else None,
+            time_budget=budget,
+        )
+
+    first = model.of_episodes(range(known))
+    reference = _closed(first, "reference", _OF_REFERENCES * time_budget)
+    whole = _with_effects_of(model, reference)
+
+    def _closed_since(row: int) -> ClosedLoop:
+        is_newer = np.arange(len(episode)) >= row
+        changed = ChangedModel(whole, is_newer, reference.last.values)
+        budget = max(deadline - time.monotonic(), 0.0)
+        return _closed(changed, f"since_{row}", budget)
+
+    closed, onset = _closed_since(int(np.argmax(episode >= known))), None
+    if (begin := _onset_row(closed, known)) is not None:
+        later = _closed_since(begin[0])
+        if _loss(later) < _loss(closed):
+            closed = later
+            own = begin[0] - int(np.argmax(episode == episode[begin[0]]))
+            onset = Onset(names[int(episode[begin[0]])], own, begin[1])
+    return Changes(reference, closed, known, onset, _courses(closed, known, workers))
 
 
-def _extended(
-    model: LogModel, reference: ClosedLoop, newer: Sequence[int]
-) -> tuple[LogModel, Sequence[int], dict[str, float]]:
-    """Returns the model with the references' effects, and where fits of it begin.
+def _with_effects_of(model: LogModel, reference: ClosedLoop) -> LogModel:
+    """Returns the model with the references' effects, in the shapes that they have."""
+    whole, _ = extended(model, _at_values(reference))
+    return whole
 
-    Shapes are as in the references: sizes alone are fitted again.
-    """
-    last = reference.last
-    effects = last.model.effects_at(last.model.with_frozen(last.theta))
-    own = (
-        [
-            dataclasses.replace(candidate, effect=effect)
-            for candidate, effect in zip(
-                last.effects, effects[-len(last.effects) :], strict=True
-            )
-        ]
-        if last.effects
-        else []
-    )
-    whole, _ = extended(model, own)
-    return whole, newer, last.values
+
+def _at_values(closed: ClosedLoop) -> list[Candidate]:
+    """Returns the effects of a closed loop at their values."""
+    last = closed.last
+    count = len(last.effects)
+    values = last.model.effects_at(last.model.with_frozen(last.theta))
+    return [
+        dataclasses.replace(candidate, effect=effect)
+        for candidate, effect in zip(
+            last.effects, values[len(values) - count :], strict=True
+        )
+    ]
+
+
+def _onset_row(closed: ClosedLoop, known: int) -> tuple[int, int] | None:
+    """Returns the row at which something else changes, and how many rows it may be."""
+    grams = closed.search.account.system.grams
+    if closed.is_provisional or grams.rows.sum() != closed.last.model.measurements.rows:
+        return None
+    block = onset_block(closed.search.account, grams.episode >= known)
+    if block is None:
+        return None
+    return int(grams.rows[:block].sum()), int(grams.rows[block])
+
+
+def _loss(closed: ClosedLoop) -> float:
+    """Returns the held-out error of all channels, as the mean of its logarithm."""
+    return float(np.mean(np.log(closed.errors.rms(closed.errors.after))))
 
 
 def _courses(
-    changed: ChangedModel,
-    closed: ClosedLoop,
-    newer: Sequence[int],
-    workers: Workers | None,
+    closed: ClosedLoop, known: int, workers: Workers | None
 ) -> tuple[Course, ...]:
     """Returns how large the changes are in each newer log, if there are several."""
-    effects = closed.last.effects
-    if len(newer) < 2 or not effects:
+    model, effects = closed.last.model, tuple(_at_values(closed))
+    names = model.measurements.names
+    if len(names) - known < 2 or not effects:
         return ()
-    names = changed.measurements.names
-    known = [i for i in range(len(names)) if i not in newer]
+    delta, settings = closed.last.linearisation.huber_delta, closed.last.settings
     found = []
-    for number in newer:
-        model = changed.of_episodes([*known, number])
-        delta = closed.last.linearisation.huber_delta
-        fitter = Fitter.of(
-            model, workers or Workers(), delta, closed.last.settings, None
-        )
-        fit = fitter.fit(_at_values(effects, closed))
+    for number in range(known, len(names)):
+        own = closed.first.model.of_episodes([*range(known), number])
+        fit = Fitter.of(own, workers or Workers(), delta, settings).fit(effects)
         values = parameter_values(fit, len(closed.first.theta))
         found.append(Course(names[number], values))
     return tuple(found)
-
-
-def _at_values(
-    effects: Sequence[Candidate], closed: ClosedLoop
-) -> tuple[Candidate, ...]:
-    """Returns effects with the shapes that all newer logs have."""
-    model = closed.last.model
-    values = model.effects_at(model.with_frozen(closed.last.theta))
-    return tuple(
-        dataclasses.replace(candidate, effect=effect)
-        for candidate, effect in zip(effects, values, strict=True)
-    )

@@ -14,8 +14,8 @@ from sysid.models.effects import field_of
 from sysid.models.validity import Validity
 from sysid.parameters import Parameter
 
-#: Before the name of a parameter of an effect that the references show, too.
-_KNOWN = "reference "
+#: Before the names of an effect's parameters: both may have an effect of one name.
+_KNOWN, _CHANGE = "reference", "change"
 #: What is the same of the model inside.
 _AS_INNER = (
     *("affine", "makes_contact", "setting", "effect_types", "shown_elsewhere"),
@@ -40,22 +40,21 @@ class ChangedModel(LogModel):
     def __init__(
         self,
         model: LogModel,
-        newer: Sequence[int],
+        is_newer: NDArray[np.bool_],
         values: Mapping[str, float] | None = None,
     ) -> None:
         """Splits a model.
 
         Args:
             model: of all logs, with the effects that references show.
-            newer: numbers of the episodes that are no references.
+            is_newer: (rows,) which rows are no references; they come last.
             values: of the model's parameters, by name, from which fits begin; nominal
                 ones where there is none.
 
         Raises:
-            DisasmError: all episodes are newer, or none is.
+            DisasmError: all rows are newer, or none is.
         """
         self.measurements = model.measurements
-        is_newer = np.isin(model.measurements.episode, newer)
         if is_newer.all() or not is_newer.any():
             raise DisasmError("give at least one reference, and one log to compare")
         self.known, self.newer = model.of_rows(~is_newer), model.of_rows(is_newer)
@@ -214,7 +213,7 @@ def _own(parameter: Parameter, values: Mapping[str, float]) -> Parameter:
     within = float(np.clip(value, parameter.low, parameter.high))
     if not field_of(parameter):
         return dataclasses.replace(parameter, nominal=within)
-    name = f"{_KNOWN}{parameter.name}"
+    name = f"{_KNOWN} {parameter.name}"
     return dataclasses.replace(parameter, name=name, path="", nominal=within)
 
 
@@ -228,4 +227,5 @@ def _both_ways(parameter: Parameter) -> Parameter:
 def _moved(parameter: Parameter, count: int) -> Parameter:
     """Returns a field of an effect that comes after others."""
     head, number, field = parameter.path.split(".")
-    return dataclasses.replace(parameter, path=f"{head}.{int(number) + count}.{field}")
+    path = f"{head}.{int(number) + count}.{field}"
+    return dataclasses.replace(parameter, name=f"{_CHANGE} {parameter.name}", path=path)

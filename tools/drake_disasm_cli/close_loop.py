@@ -134,7 +134,7 @@ def main(arguments: Sequence[str]) -> int:
         if references:
             changes = find_changes(
                 model,
-                _newer(model, references),
+                len(episode_names(references)),
                 workers=workers,
                 progress=progress,
                 folder=fits,
@@ -188,13 +188,6 @@ def _refuse_combinations(args: argparse.Namespace) -> None:
         raise DisasmError(
             f"{min(twice)}: is a reference, and a log to compare with it; name it once"
         )
-
-
-def _newer(model: LogModel, references: Sequence[Log]) -> list[int]:
-    """Returns the numbers of the episodes that are no references."""
-    known = set(episode_names(references))
-    names = model.measurements.names
-    return [i for i, name in enumerate(names) if name not in known]
 
 
 def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:

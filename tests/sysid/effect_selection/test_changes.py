@@ -1,0 +1,83 @@
+"""What has changed since reference logs, on simulated logs of a small arm."""
+
+import numpy as np
+import pytest
+
+from drake_disasm.effects import (
+    FlangePayload,
+    JointCoulombFriction,
+    JointViscousFriction,
+    TorqueOffset,
+)
+from sysid.effect_selection.change_words import changes_mapping, changes_text
+from sysid.effect_selection.changes import Changes, find_changes
+from sysid.models.joint_motion import JointMotionModel
+from tests.sysid.models.two_logs import two_logs
+
+_FRICTION = [
+    JointCoulombFriction("shoulder", 1.0),
+    JointViscousFriction("shoulder", 0.3),
+    JointCoulombFriction("elbow", 0.8),
+    JointViscousFriction("elbow", 0.2),
+]
+
+
+def changes(folder, added, since=0) -> Changes:
+    logs = two_logs(folder, _FRICTION, added, since)
+    return find_changes(JointMotionModel(logs), 1)
+
+
+def values(found: Changes) -> dict[str, tuple[float, tuple[float, float]]]:
+    return {v.name: (v.value, v.interval) for v in found.closed.verdict.values}
+
+
+def test_nothing_changed(tmp_path):
+    found = changes(tmp_path, [])
+    assert found.closed.verdict.names == ()
+    assert not found.leaves_more
+    assert "Nothing has changed" in changes_text(found)
+    limits = {x.effect: x.amplitude for x in found.closed.verdict.limits}
+    assert limits["JointCoulombFriction.elbow"] < 0.1
+
+
+def test_a_payload_is_weighed(tmp_path):
+    found = changes(tmp_path, [FlangePayload(1.0, 0.02, 0.0, 0.02)])
+    assert found.closed.verdict.confirmed == ("FlangePayload",)
+    _, (low, high) = values(found)["FlangePayload.mass"]
+    assert low <= 1.0 <= high
+
+
+def test_a_friction_that_fell_is_told_by_how_much(tmp_path):
+    found = changes(tmp_path, [JointCoulombFriction("elbow", -0.3)])
+    assert found.closed.verdict.confirmed == ("JointCoulombFriction.elbow",)
+    value, (low, high) = values(found)["JointCoulombFriction.elbow.size"]
+    assert value == pytest.approx(-0.3, abs=0.02)
+    assert low <= -0.3 <= high
+    assert found.onset is None
+
+
+def test_an_offset_that_jumps_within_the_log_has_a_row(tmp_path):
+    found = changes(tmp_path, [TorqueOffset("shoulder", 0.5)], since=350)
+    assert found.closed.verdict.names == ("TorqueOffset.shoulder",)
+    assert found.onset is not None
+    assert abs(found.onset.row - 350) <= 2 * found.onset.rows
+    value, _ = values(found)["TorqueOffset.shoulder.size"]
+    assert value == pytest.approx(0.5, abs=0.05)
+    assert f"since rows {found.onset.row}" in changes_text(found)
+
+
+def test_a_change_of_each_log_has_a_course(tmp_path):
+    first = two_logs(tmp_path / "a", _FRICTION, [TorqueOffset("elbow", 0.2)])
+    second = two_logs(tmp_path / "b", _FRICTION, [TorqueOffset("elbow", 0.4)])
+    model = JointMotionModel([*first, second[1]])
+    found = find_changes(model, 1)
+    sizes = [
+        value.value
+        for course in found.courses
+        for value in course.values
+        if value.name == "TorqueOffset.elbow.size"
+    ]
+    assert sizes == pytest.approx([0.2, 0.4], abs=0.02)
+    plain = changes_mapping(found)
+    assert [each["episode"] for each in plain["courses"]] == ["log_1/episode_0000"] * 2
+    assert np.isfinite(plain["errors"]["relative"]["after"])
