@@ -99,6 +99,7 @@ from drake_disasm.effects.arm.joint_coupling import JointCoupling
 from drake_disasm.effects.arm.time_shift import ArmDelay, JointDelay
 from drake_disasm.effects.arm.base_tilt import ArmTilt
 from drake_disasm.effects.arm.flange_payload import FlangePayload
+from drake_disasm.effects.arm.link_payload import LinkPayload
 from drake_disasm.effects.arm.joint_elasticity import JointElasticity
 from drake_disasm.effects.arm.joint_backlash import JointBacklash
 from drake_disasm.effects.arm.encoder_error import EncoderError
@@ -151,6 +152,7 @@ __all__ = [
     "JointSpring",
     "JointStribeckFriction",
     "JointViscousFriction",
+    "LinkPayload",
     "MotionEffect",
     "MotionLag",
     "PayloadError",

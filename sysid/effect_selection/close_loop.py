@@ -1,6 +1,7 @@
 """From a model of a log to the effect that the model lacks."""
 
 import dataclasses
+import functools
 import math
 import time
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ from sysid.data_checks.finding import refuse
 from sysid.effect_selection.bookkeeping import best_hypothesis
 from sysid.effect_selection.data_sufficiency import refuse_few_rows, refuse_rest
 from sysid.effect_selection.search import SearchResult, search
+from sysid.effect_selection.urdf_difference import UrdfDifference, urdf_difference
 from sysid.effect_selection.verdict import Verdict, judge
 from sysid.effect_selection.verdict_words import (
     not_told_apart,
@@ -84,6 +86,11 @@ class ClosedLoop:
         """What follows from the parameters, with units: the weight of a load, say."""
         return self.last.model.describe(self.last.theta)
 
+    @functools.cached_property
+    def urdf_difference(self) -> UrdfDifference | None:
+        """How rigid bodies that were identified differ from the URDF's."""
+        return urdf_difference(self.last)
+
     @property
     def sentence(self) -> str:
         """The verdict in plain English."""
@@ -104,6 +111,8 @@ class ClosedLoop:
         if self.derived:
             values = (f"{n} {v:.3g} {unit}" for n, (v, unit) in self.derived.items())
             text += f"\nderived: {', '.join(values)}"
+        if self.urdf_difference is not None:
+            text += f"\n{self.urdf_difference.sentence}"
         if not self.is_provisional:
             return text
         count = len(self.search.untested)

@@ -17,10 +17,11 @@ from sysid.residuals.residual_model import ResidualModel
 def to_mapping(closed: ClosedLoop) -> dict[str, Any]:
     """Returns everything that a program may want to know of a closed loop."""
     before, after = (diagnose(fit) for fit in (closed.first, closed.last))
-    found = closed.search
+    found, urdf = closed.search, closed.urdf_difference
     return {
         **_verdict(closed.verdict),
         "model_parameters": _of_model(closed.last),
+        "urdf_difference": urdf.to_mapping() if urdf else None,
         "derived": {
             name: {"value": value, "unit": unit}
             for name, (value, unit) in closed.derived.items()

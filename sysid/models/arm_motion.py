@@ -18,6 +18,7 @@ from drake_disasm.effects import (
     FlangePayload,
     JointElasticity,
     JointMemoryEffect,
+    LinkPayload,
 )
 from drake_disasm.logs import Episode
 from sysid.models.base import Array
@@ -30,6 +31,7 @@ IN_TORQUES = (
     ArmTorqueEffect,
     DelayEffect,
     FlangePayload,
+    LinkPayload,
     ArmTilt,
     JointElasticity,
     JointMemoryEffect,
@@ -47,6 +49,7 @@ _BY_SAMPLE = (
     "dry_v",
     "Y",
     "Y_payload",
+    "Y_links",
     "Y_tilt",
     "tilt",
 )
@@ -66,6 +69,7 @@ class ArmMotion:
             which the joint came.
         Y: (n, joints, b) regressor of the base parameters.
         Y_payload: (n, joints, 10) of a body in the frame of the last link.
+        Y_links: (n, joints, joints, 10) of one in the frame of each joint's link.
         Y_tilt: (n, joints, b, 2) derivative of Y by a tilt [rx, ry] of the base.
         tilt: (n, joints, 2) the same of the torques by the nominal parameters.
         nominal: (b,) base parameters by the URDF.
@@ -83,6 +87,7 @@ class ArmMotion:
     dry_v: Array
     Y: Array
     Y_payload: Array
+    Y_links: Array
     Y_tilt: Array
     tilt: Array
     nominal: Array
@@ -123,6 +128,7 @@ class ArmMotion:
             v,
             Y[:, :, base.independent],
             Y[:, :, arm.last_link],
+            Y[:, :, arm.moved_links],
             Y_tilt[:, :, base.independent],
             np.einsum("njkt,k->njt", Y_tilt, arm.inertia),
             base.beta(arm.inertia),
@@ -181,6 +187,9 @@ class ArmMotion:
         for effect in effects:
             if isinstance(effect, FlangePayload):
                 load = load + self.Y_payload @ effect.inertial
+            elif isinstance(effect, LinkPayload):
+                at = self.joints.index(effect.joint)
+                load = load + self.Y_links[:, :, at] @ effect.inertial
             elif isinstance(effect, ArmTilt) and not effect.is_null:
                 by_base = np.einsum("njbt,b->njt", self.Y_tilt, beta - self.nominal)
                 load = load + (self.tilt + by_base) @ [effect.rx, effect.ry]

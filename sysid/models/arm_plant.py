@@ -66,6 +66,18 @@ class ArmPlant:
         names = zip(joints, self.columns, strict=True)
         return frozenset(name for name, column in names if column in slide)
 
+    def moved(self, joints: Sequence[str]) -> list[int]:
+        """Returns the number of the link that each joint moves."""
+        all_joints = [self.plant.get_joint(i) for i in self.plant.GetJointIndices()]
+        children = {
+            joint.velocity_start(): joint.child_body().index()
+            for joint in all_joints
+            if joint.num_velocities() == 1
+        }
+        numbers = {body.index(): number for number, body in enumerate(self.bodies)}
+        pairs = zip(joints, self.columns, strict=True)
+        return [numbers[children[column]] for _, column in pairs]
+
     @property
     def last_body(self) -> int:
         """The number of the link that is farthest from the base."""

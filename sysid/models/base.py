@@ -222,6 +222,13 @@ class LogModel(abc.ABC):
 
     # Which parameters vary.
 
+    def with_known_links(self) -> Self:
+        """Returns the same model with bodies on any link among its effects.
+
+        For a comparison with references, or with a URDF; itself if it has no links.
+        """
+        return self
+
     def freeze(self, values: Mapping[str, float]) -> Self:
         """Returns the same model with some parameters fixed at values, by name."""
         of_effects = [p for p in self.parameters if field_of(p)]

@@ -57,7 +57,10 @@ class ChangedModel(LogModel):
         self.measurements = model.measurements
         if is_newer.all() or not is_newer.any():
             raise DisasmError("give at least one reference, and one log to compare")
-        self.known, self.newer = model.of_rows(~is_newer), model.of_rows(is_newer)
+        self.known, self.newer = (
+            model.of_rows(~is_newer),
+            model.of_rows(is_newer).with_known_links(),
+        )
         self.parameters = tuple(_own(p, values or {}) for p in model.parameters)
         self.__dict__.update({name: getattr(model, name) for name in _AS_INNER})
         self._own_count = len(model.parameters)

@@ -41,6 +41,7 @@ class ModelChoice:
         coarse: whether transitions may begin in coarse time steps.
         noise: standard deviations of channels, by name, instead of the model's, SI.
         fixed: whether a twin may have no parameter to vary.
+        trust_urdf: whether the rigid bodies of an arm are the URDF's.
     """
 
     objective: str | None = None
@@ -50,6 +51,7 @@ class ModelChoice:
     coarse: bool = True
     noise: tuple[tuple[str, float], ...] = ()
     fixed: bool = False
+    trust_urdf: bool = False
 
 
 def model_of(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
@@ -74,6 +76,13 @@ def model_of(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
         "joint_response": _joint_response,
     }
     model = make.get(kind, _twin)(logs, choice)
+    if choice.trust_urdf:
+        if not isinstance(model, JointMotionModel):
+            raise DisasmError(
+                f"{logs[0].folder}: a log of kind '{kind}' has no rigid bodies to "
+                "identify; `trust_urdf` is for joint_motion and joint_torque_static"
+            )
+        model = model.trusting_urdf()
     return _with_noise(model, dict(choice.noise))
 
 

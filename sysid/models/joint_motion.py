@@ -17,8 +17,9 @@ from drake_disasm.effects import (
     ArmTilt,
     DelayEffect,
     Effect,
-    FlangePayload,
+    LinkPayload,
 )
+from drake_disasm.effects.arm.payload import Payload
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
@@ -39,7 +40,7 @@ from sysid.models.rate_factors import (
     rate_text,
     right_rates,
 )
-from sysid.models.regressor import ArmDynamics, BaseSet, base_set
+from sysid.models.regressor import INERTIAL, ArmDynamics, BaseSet, base_set
 from sysid.models.signed_order import SignedOrder
 from sysid.parameters import Parameter
 
@@ -69,6 +70,7 @@ class JointMotionModel(LogModel):
     of_base: ClassVar[str] = "not a base parameter of this arm"
     effect_types = IN_TORQUES
     residual_effect: ClassVar[type[Effect] | None] = ArmResidualModel
+    _knows_links = False
 
     def __init__(
         self,
@@ -179,11 +181,62 @@ class JointMotionModel(LogModel):
         return {joint: inputs_of(samples, joint) for joint in samples.joints}
 
     def applicable_effects(self, library: Sequence[type[Effect]]) -> list[Effect]:
-        """See LogModel; nothing is known of how an axis without a URDF is mounted."""
+        """See LogModel; nothing is known of how an axis without a URDF is mounted.
+
+        Bodies on links are what base parameters are, where those are not known.
+        """
         found = super().applicable_effects(library)
-        if self._inertia is None:
-            return found
-        return [e for e in found if not isinstance(e, ArmTilt | FlangePayload)]
+        if self._inertia is not None:
+            unknown: tuple[type[Effect], ...] = (ArmTilt, Payload)
+        elif not self._knows_links:
+            unknown = (LinkPayload,)
+        else:
+            unknown = ()
+        last = self.joints[-1]  # its link is the flange's
+        return [
+            e
+            for e in found
+            if not isinstance(e, unknown)
+            if not (isinstance(e, LinkPayload) and e.joint == last)
+        ]
+
+    def with_known_links(self) -> Self:
+        """Returns the same model with bodies on any link among its effects."""
+        return self.replace(_knows_links=True)
+
+    def trusting_urdf(self) -> Self:
+        """Returns the same model with the rigid bodies of the URDF.
+
+        Raises:
+            DisasmError: it is of one axis, which no URDF describes.
+        """
+        if self._inertia is not None:
+            raise DisasmError("an axis without a URDF has no links to trust; give one")
+        return self.only(()).with_known_links()
+
+    @property
+    def identifies_links(self) -> bool:
+        """Whether all base parameters of a URDF's links are among the parameters."""
+        return self._own_parameters is None and self._inertia is None
+
+    @property
+    def base_regressor(self) -> Array:
+        """Y (n, joints, b) of the base parameters, which come first."""
+        return self._motion.Y
+
+    @property
+    def links_in_base(self) -> dict[str, Array]:
+        """How inertial parameters of each link (10,) add to the base parameters.
+
+        (b, 10) by the link's name, from the base on.
+        """
+        arm = self._arm_under(np.array(self._gravity))
+        base, count = self._base_set(arm), len(INERTIAL)
+        into = np.zeros((len(base.independent), count * len(arm.links)))
+        into[np.arange(len(base.independent)), base.independent] = 1.0
+        into[:, base.dependent] = base.K
+        parts = np.split(into, len(arm.links), axis=1)
+        return dict(zip(arm.links, parts, strict=True))
 
     @property
     def urdf(self) -> str:

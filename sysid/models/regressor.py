@@ -42,6 +42,7 @@ class ArmDynamics:
         inertia: nominal pi.
         prismatic: names of the joints that slide; others turn.
         last_link: where in pi the link is that is farthest from the base.
+        moved_links: (joints, 10) where in pi the link is that each joint moves.
 
     Args:
         urdf: a path, or `package://`.
@@ -76,6 +77,8 @@ class ArmDynamics:
         )
         last = len(INERTIAL) * arm.last_body
         self.last_link = slice(last, last + len(INERTIAL))
+        own = len(INERTIAL) * np.array(arm.moved(joints))
+        self.moved_links = own[:, None] + np.arange(len(INERTIAL))
 
     @property
     def names(self) -> tuple[str, ...]:

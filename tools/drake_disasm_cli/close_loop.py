@@ -41,6 +41,7 @@ _EXAMPLES = """examples:
   drake-disasm close-loop --log out/log --scenario removal --out out/closed
   drake-disasm close-loop --log out/readings --out out/sensor     a static_wrench log
   drake-disasm close-loop --log out/arm_1 out/arm_2 --held-out arm_2 --out out/arm
+  drake-disasm close-loop --log out/arm_1 --trust urdf --out out/differs
   drake-disasm close-loop --reference out/march --log out/april --out out/changed
 """
 
@@ -99,6 +100,13 @@ def _add_model_arguments(add: Callable[..., object]) -> None:
         help="parameters of the scenario that are fitted together with the effects, as "
         "named by `drake-disasm identify` (default: none for transitions, else the "
         "model's own)",
+    )
+    add(
+        "--trust",
+        choices=("urdf",),
+        help="take the URDF's masses and inertias for right, and ask what differs: a "
+        "body on a link, a tilted base, friction, offsets, scales of torques (default: "
+        "all base parameters are identified)",
     )
     add(
         "--huber",
@@ -197,6 +205,7 @@ def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
         requests=tuple(read_requests(args.parameters)) if args.parameters else (),
         urdf=args.urdf,
         fixed=True,
+        trust_urdf=args.trust == "urdf",
     )
     return model_of(logs, choice)
 

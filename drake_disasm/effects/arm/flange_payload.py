@@ -2,18 +2,14 @@
 
 import dataclasses
 
-import numpy as np
-
-from drake_disasm.effects.base import ArmEffect
+from drake_disasm.effects.arm.payload import Payload
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
-
-_LIGHTEST = 0.1  # kg, below which a payload's own inertia is bounded
 
 
 @register_effect
 @dataclasses.dataclass
-class FlangePayload(ArmEffect):
+class FlangePayload(Payload):
     """A payload on the arm's last link that the arm's model lacks.
 
     Equation: tau = Y_F(q, v, vd) pi, with Y_F the arm's regressor of a body in the
@@ -34,20 +30,3 @@ class FlangePayload(ArmEffect):
 
     noun = "a payload on the flange"
     experiment = "rests in several poses, with and without what hangs there"
-
-    @property
-    def first_moment(self) -> np.ndarray:
-        """(3,) mass times centre of mass, in F [kg m]."""
-        return np.array([self.cx, self.cy, self.cz])
-
-    @property
-    def inertia(self) -> np.ndarray:
-        """(3, 3) about Fo, in F [kg m^2]."""
-        c = self.first_moment
-        return (c @ c * np.eye(3) - np.outer(c, c)) / max(self.mass, _LIGHTEST)
-
-    @property
-    def inertial(self) -> np.ndarray:
-        """(10,) [m, cx, cy, cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz] about Fo, in F."""
-        upper = self.inertia[np.triu_indices(3)]
-        return np.concatenate([[self.mass], self.first_moment, upper])
