@@ -1,0 +1,1 @@
+"""What closing the loop identified, written back into robot descriptions."""
