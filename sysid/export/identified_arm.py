@@ -21,6 +21,7 @@ from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.export.consistent_inertia import ConsistentInertia, ball, consistent_inertia
 from sysid.fitting.fit import Fit
 from sysid.identification.uncertainty import block_length
+from sysid.models.base import LogModel
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.regressor import INERTIAL, ArmDynamics, BaseSet
 
@@ -98,16 +99,14 @@ class IdentifiedArm:
             DisasmError: the log is of another kind, the arm has no URDF, its base
                 parameters were not all identified, or no physical arm has them.
         """
-        model = exportable_model(closed)
+        model = exportable(closed.last.model)
         arm, base = model.rigid_bodies()
         flange = arm.links[arm.last_link.start // len(INERTIAL)]
         count, theta = len(base.independent), closed.last.theta
         payload, beta = _payload(model.effects_at(theta), arm, base)
         beta = beta + theta[:count]
         covariance = _covariance(closed.last)
-        bodies = consistent_inertia(
-            base, arm.inertia, beta, covariance[:count, :count]
-        )
+        bodies = consistent_inertia(base, arm.inertia, beta, covariance[:count, :count])
         if not bodies.is_exact:
             theta = _moved(closed.last, covariance, bodies.beta - beta)
         effects = model.effects_at(theta)
@@ -142,13 +141,12 @@ class IdentifiedArm:
         ]
 
 
-def exportable_model(closed: ClosedLoop) -> JointMotionModel:
-    """Returns the model of a closed loop, if a robot's file can hold it.
+def exportable(model: LogModel) -> JointMotionModel:
+    """Returns a model, if a robot's file can hold what it identifies.
 
     Raises:
         DisasmError: it can't.
     """
-    model = closed.last.model
     if not isinstance(model, JointMotionModel):
         raise DisasmError(
             "export: the log has no joint torques, from which a robot's inertias and "
@@ -222,4 +220,3 @@ def _moved(fit: Fit, covariance: Array, change: Array) -> Array:
     bounds = [(p.low, p.high) for p in fit.model.parameters]
     low, high = np.array(bounds).T
     return np.clip(fit.theta + covariance[:, :count] @ step, low, high)
-

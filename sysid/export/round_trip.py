@@ -1,7 +1,6 @@
 """Whether a file that was written gives the torques that the verdict predicts."""
 
 import re
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.resources import package_map
 from drake_disasm.effects import ArmEffect, FlangePayload
 from sysid.export.identified_arm import DRY, HELD, IdentifiedArm
+from sysid.export.xml_edits import parsed
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.arm_plant import weld_root
 from sysid.models.joint_motion import JointMotionModel
@@ -91,7 +91,9 @@ class HeldOutRows:
     before: Array
 
     @classmethod
-    def of(cls, model: JointMotionModel, arm: IdentifiedArm, theta: Array) -> "HeldOutRows":
+    def of(
+        cls, model: JointMotionModel, arm: IdentifiedArm, theta: Array
+    ) -> "HeldOutRows":
         """Returns the rows that a model was not fitted to; all, if there are none.
 
         Args:
@@ -112,7 +114,9 @@ class HeldOutRows:
         )
         return cls(motion, of_bodies, with_dry - of_bodies, whole, before)
 
-    def compare(self, read: Reader, friction: Mapping[str, float], arm: IdentifiedArm) -> RoundTrip:
+    def compare(
+        self, read: Reader, friction: Mapping[str, float], arm: IdentifiedArm
+    ) -> RoundTrip:
         """Returns how a file compares.
 
         Args:
@@ -183,16 +187,19 @@ class DrakeReader:
             for i in range(plant.num_actuators())
         ]
         driven = {actuator.joint().name() for actuator in actuators}
-        return np.array([0.0 if j in driven else n.rotor for j, n in arm.joints.items()])
+        return np.array(
+            [0.0 if j in driven else n.rotor for j, n in arm.joints.items()]
+        )
 
 
-def urdf_friction(text: str) -> dict[str, float]:
-    """Returns dry friction of each joint of a URDF, by its name."""
+def written_friction(text: str) -> dict[str, float]:
+    """Returns dry friction of each joint of a URDF or SDF, by its name."""
     friction = {}
-    for joint in ElementTree.fromstring(text).iter("joint"):
-        dynamics = joint.find("dynamics")
-        if dynamics is not None:
-            friction[joint.get("name", "")] = float(dynamics.get("friction", "0"))
+    for joint in parsed(text).iter("joint"):
+        name = joint.get("name", "")
+        for dynamics in joint.iter("dynamics"):
+            in_element = dynamics.findtext("friction")
+            friction[name] = float(in_element or dynamics.get("friction", "0"))
     return friction
 
 

@@ -97,7 +97,9 @@ def number(value: float) -> str:
 
 def _of(elements: Mapping[str, Element], name: str, file: str) -> Element:
     if name not in elements:
-        raise DisasmError(f"{file}: has no element named '{name}', which was identified")
+        raise DisasmError(
+            f"{file}: has no element named '{name}', which was identified"
+        )
     return elements[name]
 
 
@@ -155,7 +157,9 @@ def _set_rotor(edits: XmlEdits, joint: str, reflected: float) -> None:
             edits.add_child(edits.root, text)
             _declare_drake(edits)
         return
-    gear, rotor = (actuator.first(f"drake:{n}") for n in ("gear_ratio", "rotor_inertia"))
+    gear, rotor = (
+        actuator.first(f"drake:{n}") for n in ("gear_ratio", "rotor_inertia")
+    )
     ratio = 1.0 if gear is None else float(gear.attributes.get("value", "1"))
     inertia = number(reflected / ratio**2)
     if rotor is not None:

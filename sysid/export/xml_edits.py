@@ -1,6 +1,7 @@
 """Changes to an XML file that leave all its other bytes as they are."""
 
 import re
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Self
@@ -9,6 +10,18 @@ from xml.parsers import expat
 from drake_disasm.common.errors import DisasmError
 
 _DEEPEST = 64  # elements in elements: no robot's file has more
+
+
+_PREFIX = re.compile(r"(</?[A-Za-z]\w*):")
+
+
+def parsed(text: str) -> ElementTree.Element:
+    """Returns the elements of an XML text, `drake:rotor_inertia` as `drake_rotor_...`.
+
+    Robots' files often do not declare the prefixes that they use.
+    """
+    body = re.sub(r"^\s*<\?xml.*?\?>", "", text, flags=re.S)
+    return ElementTree.fromstring(_PREFIX.sub(r"\1_", body))
 
 
 @dataclass
@@ -74,7 +87,9 @@ class XmlEdits:
         head = self._data[element.start : element.head_end]
         added = b""
         for name, value in values.items():
-            pattern = rb"(\s" + re.escape(name.encode()) + rb"\s*=\s*)(\"[^\"]*\"|'[^']*')"
+            pattern = (
+                rb"(\s" + re.escape(name.encode()) + rb"\s*=\s*)(\"[^\"]*\"|'[^']*')"
+            )
             match = re.search(pattern, head)
             if match:
                 at = element.start + match.start(2)

@@ -17,6 +17,7 @@ def closing_page(
     closed: ClosedLoop,
     origin: Mapping[str, Any],
     findings: Sequence[DataFinding] = (),
+    exported: Mapping[str, Any] | None = None,
 ) -> str:
     """Returns the report of a closed loop as one self-contained HTML page.
 
@@ -24,6 +25,7 @@ def closing_page(
         closed: what was found.
         origin: its provenance, as in `result.json`.
         findings: of the check of the data.
+        exported: robots' files that were written, as in `result.json`.
     """
     found = loss_map(closed.errors, closed.last.linearisation.huber_delta)
     return render(
@@ -40,6 +42,7 @@ def closing_page(
         drawn=_plots(closed, found),
         origin=origin,
         findings=findings,
+        exported=exported,
     )
 
 

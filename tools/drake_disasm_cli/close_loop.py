@@ -5,7 +5,8 @@ of a force/torque sensor at rest, or joint torques of an arm. The model is fitte
 effect of the library is tested on what it explains of data that were not fitted; those
 that pass are added one by one. Prints what is missing, its parameters, and the error
 before and after. Writes the scenario with the effects, `result.json`, and a report
-that opens offline. After Ctrl-C the same command resumes.
+that opens offline; `--export` writes a robot's files. After Ctrl-C the same command
+resumes.
 """
 
 import argparse
@@ -16,6 +17,7 @@ from pathlib import Path
 
 from drake_disasm.common import options, program
 from drake_disasm.common.cluster import executor_for
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, write_json, write_text
 from drake_disasm.logs import Log
 from drake_disasm.scenario import dump_scenario, load_scenario
@@ -23,6 +25,7 @@ from drake_disasm_cli import common, data_arguments
 from sysid.data_checks import DataFinding
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.effect_selection.output import to_mapping
+from sysid.export import FORMATS, Exports, make_exports, refuse_export
 from sysid.identification.split import split_episodes
 from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
@@ -35,6 +38,7 @@ _EXAMPLES = """examples:
   drake-disasm close-loop --log out/log --scenario removal --out out/closed
   drake-disasm close-loop --log out/readings --out out/sensor     a static_wrench log
   drake-disasm close-loop --log out/arm_1 out/arm_2 --held-out arm_2 --out out/arm
+  drake-disasm close-loop --log out/arm_1 --export urdf sdf --out out/arm
 """
 
 
@@ -58,6 +62,15 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         action="store_true",
         help="learn what the effects leave, too: it lowers the error within the range "
         "of the log, and explains nothing",
+    )
+    add(
+        "--export",
+        nargs="+",
+        default=[],
+        choices=sorted(FORMATS),
+        metavar="FORMAT",
+        help="write the arm of a log of joint torques, as identified: urdf, sdf, mjcf "
+        "(with MuJoCo)",
     )
     common.add_import_argument(parser)
     common.add_executor_arguments(parser)
@@ -105,6 +118,8 @@ def main(arguments: Sequence[str]) -> int:
     if args.held_out:  # names, which are wrong more often than anything takes time
         split_episodes(episode_names(logs), args.held_out)
     model = _model(args, logs)
+    if args.export:
+        refuse_export(model, args.export)
     origin = program.provenance("drake-disasm close-loop", arguments, 0)
     fits = args.out / "fits"
     with (
@@ -126,12 +141,29 @@ def main(arguments: Sequence[str]) -> int:
             time_budget=60.0 * args.time_budget,
             learn_residual=args.residual_model,
         )
-    _write(args.out, closed, findings, origin)
+    exports, refusal = _exports(closed, args.export)
+    _write(args.out, closed, findings, origin, exports)
     if not closed.is_provisional:
         shutil.rmtree(fits, ignore_errors=True)
     print(closed.text)
     print(f"report: {args.out / 'report.html'}")
+    if refusal is not None:
+        raise refusal
+    if exports is not None:
+        print(f"exported: {', '.join(exports.files)}")
     return 0
+
+
+def _exports(
+    closed: ClosedLoop, formats: Sequence[str]
+) -> tuple[Exports | None, DisasmError | None]:
+    """Returns a robot's files, or why there are none: the verdict is written anyway."""
+    if not formats:
+        return None, None
+    try:
+        return make_exports(closed, formats), None
+    except DisasmError as error:
+        return None, error
 
 
 def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
@@ -150,6 +182,7 @@ def _write(
     closed: ClosedLoop,
     findings: Sequence[DataFinding],
     origin: dict[str, object],
+    exports: Exports | None,
 ) -> None:
     make_folder(folder)
     learned = closed.verdict.residual_model
@@ -159,6 +192,10 @@ def _write(
     if scenario is not None:
         write_text(folder / "scenario.yaml", dump_scenario(scenario))
     of_data = {"data_findings": [finding.to_mapping() for finding in findings]}
-    mapping = to_mapping(closed) | of_data | {"provenance": origin}
-    write_json(folder / "result.json", mapping)
-    write_text(folder / "report.html", closing_page(closed, origin, findings))
+    exported = None if exports is None else exports.to_mapping()
+    of_run = {"provenance": origin, "export": exported}
+    write_json(folder / "result.json", to_mapping(closed) | of_data | of_run)
+    page = closing_page(closed, origin, findings, exported)
+    write_text(folder / "report.html", page)
+    if exports is not None:
+        exports.write(folder)
