@@ -15,8 +15,9 @@ identification: a convex programming approach").
 The unknowns are X = L^-1 P L^-T with P0 = L L^T: the nominal body is X = 1.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +54,7 @@ _JOINT_LEVEL = 0.95
 #: A body whose X has a smaller eigenvalue is at the edge: its mass is in a plane.
 _EDGE = 1e-9
 _NEWTON_STEPS = 6
+_UNDETERMINED = 1e-9  # of the largest eigenvalue of a correlation
 _INFEASIBLE = SolutionResult.kInfeasibleConstraints
 _LEAST_COLUMN = 1e-9  # of the largest: a link with less has no effect on any torque
 
@@ -85,7 +87,11 @@ class ConsistentInertia:
 
 
 def consistent_inertia(
-    base: BaseSet, nominal: Array, beta: Array, covariance: Array
+    B: Array,
+    nominal: Array,
+    beta: Array,
+    covariance: Array,
+    held: Mapping[int, float] = MappingProxyType({}),
 ) -> ConsistentInertia:
     """Returns the physical bodies closest to nominal ones that have base parameters.
 
@@ -93,19 +99,21 @@ def consistent_inertia(
     units of their covariance.
 
     Args:
-        base: which combinations of pi are known.
+        B: (b, parameters) which combinations of pi are known, see `base_matrix`.
         nominal: pi of all links.
         beta: (b,) identified base parameters.
         covariance: (b, b) of their error.
+        held: values of elements of pi that are known, by their number.
 
     Raises:
         DisasmError: no physical arm is within the joint interval of 95 %.
     """
-    bodies = _Bodies.of(base, nominal)
-    limit = float(chi2.ppf(_JOINT_LEVEL, len(beta)))
+    bodies = _Bodies.of(B, nominal, held)
+    W = whitening(covariance)
+    limit = float(chi2.ppf(_JOINT_LEVEL, max(1, len(W))))
     x, distance = bodies.exact(beta), 0.0
     if x is None:
-        x, distance = _closest(bodies, beta, covariance, limit)
+        x, distance = _closest(bodies, beta, W, limit)
     if distance > limit:
         raise DisasmError(
             "export: no physical inertia gives the identified base parameters; the "
@@ -115,21 +123,20 @@ def consistent_inertia(
         )
     pi = bodies.inertia(x)
     return ConsistentInertia(
-        pi, base.beta(pi), distance, limit, bodies.divergence(x), bodies.changed(x)
+        pi, B @ pi, distance, limit, bodies.divergence(x), bodies.changed(x)
     )
 
 
 def _closest(
-    bodies: "_Bodies", beta: Array, covariance: Array, limit: float
+    bodies: "_Bodies", beta: Array, W: Array, limit: float
 ) -> tuple[Array, float]:
     """Returns unknowns close to base parameters, and the squared distance.
 
     The closest to the nominal bodies of those that are tried and within the limit.
     """
     for weight in _WEIGHTS:
-        x = bodies.closest(beta, covariance, weight)
-        off = bodies.beta(x) - beta
-        distance = float(off @ np.linalg.solve(covariance, off))
+        x = bodies.closest(beta, W, weight)
+        distance = float(np.sum((W @ (bodies.beta(x) - beta)) ** 2))
         if distance <= limit:
             break
     return x, distance
@@ -145,6 +152,7 @@ class _Bodies:
         roots: (links, 4, 4) L of each.
         A: (b, 10 links) base parameters by the lower triangles of X.
         rest: (b,) what the other links give.
+        held, values: (h, 10 links) and (h,) elements of pi that are known.
     """
 
     nominal: Array
@@ -152,11 +160,12 @@ class _Bodies:
     roots: Array
     A: Array
     rest: Array
+    held: Array
+    values: Array
 
     @classmethod
-    def of(cls, base: BaseSet, nominal: Array) -> "_Bodies":
+    def of(cls, B: Array, nominal: Array, held: Mapping[int, float]) -> "_Bodies":
         """Returns the unknowns of an arm."""
-        B = _matrix(base, len(nominal))
         columns = np.linalg.norm(B, axis=0).reshape(-1, _SIZE).max(axis=1)
         moves = columns > _LEAST_COLUMN * columns.max()
         has_mass = nominal[::_SIZE] > 0.0
@@ -165,13 +174,15 @@ class _Bodies:
             nominal.reshape(-1, _SIZE)[moves] = ball(_BALL_MASS)
         links = tuple(int(i) for i in np.flatnonzero(moves & has_mass))
         roots = np.stack([_root(nominal.reshape(-1, _SIZE)[i]) for i in links])
-        blocks = [
-            B[:, i * _SIZE : (i + 1) * _SIZE] @ _to_inertial(L)
-            for i, L in zip(links, roots, strict=True)
-        ]
+        to_pi = np.zeros((len(nominal), _SIZE * len(links)))
+        for number, (i, L) in enumerate(zip(links, roots, strict=True)):
+            own = slice(number * _SIZE, (number + 1) * _SIZE)
+            to_pi[i * _SIZE : (i + 1) * _SIZE, own] = _to_inertial(L)
         kept = nominal.copy()
         kept.reshape(-1, _SIZE)[list(links)] = 0.0
-        return cls(nominal, links, roots, np.concatenate(blocks, axis=1), B @ kept)
+        values = np.array(list(held.values()))
+        rows = to_pi[np.array(list(held), dtype=np.int64)]
+        return cls(nominal, links, roots, B @ to_pi, B @ kept, rows, values)
 
     def beta(self, x: Array) -> Array:
         """Returns the base parameters (b,) of unknowns."""
@@ -198,9 +209,10 @@ class _Bodies:
 
     def exact(self, beta: Array) -> Array | None:
         """Returns unknowns with exactly these base parameters; None: there are none."""
-        b = beta - self.rest
-        size = np.linalg.norm(self.A, axis=1)
-        A, b = self.A / size[:, None], b / size
+        A, b = _scaled(
+            np.vstack([self.A, self.held]),
+            np.concatenate([beta - self.rest, self.values]),
+        )
         program = MathematicalProgram()
         x = self._unknowns(program)
         program.AddLinearEqualityConstraint(A, b, x)
@@ -212,30 +224,30 @@ class _Bodies:
         value = value + np.linalg.lstsq(A, b - A @ value, rcond=None)[0]
         return _polished(value, null_space(A)) if _is_physical(value) else None
 
-    def closest(self, beta: Array, covariance: Array, weight: float) -> Array:
+    def closest(self, beta: Array, W: Array, weight: float) -> Array:
         """Returns the unknowns closest to base parameters by their covariance.
 
         Args:
             beta: (b,) base parameters.
-            covariance: (b, b) of their error.
+            W: (k, b) with W^T W the inverse of their covariance.
             weight: of the divergence from the nominal bodies.
         """
-        root = np.linalg.cholesky(covariance)
-        A = np.linalg.solve(root, self.A)
-        b = np.linalg.solve(root, beta - self.rest)
+        A, b = W @ self.A, W @ (beta - self.rest)
         program = MathematicalProgram()
         x = self._unknowns(program)
         # The size of the cost is what solvers' tolerances refer to.
         at_nominal = np.tile(np.eye(4)[_LOWER4], len(self.links))
         scale = max(1.0, float(np.linalg.norm(A @ at_nominal - b)))
         program.Add2NormSquaredCost(A / scale, b / scale, x)
+        if len(self.held):
+            program.AddLinearEqualityConstraint(*_scaled(self.held, self.values), x)
         self._add_divergence(program, x, weight / scale**2)
         result = _solved(program)
         value = None if result is None else result.GetSolution(x)
         if value is None or not _is_physical(value):
             raise DisasmError(
-                "export: no physical inertia was found near the identified base "
-                "parameters; check units and signs of the torques"
+                "export: no physical inertia gives the identified base parameters, or "
+                "any near by; check signs, units and motor constants of the torques"
             )
         return np.asarray(value)
 
@@ -250,7 +262,7 @@ class _Bodies:
             X = np.empty((4, 4), dtype=object)
             X[_LOWER4] = own
             X.T[_LOWER4] = own
-            program.AddLinearCost(weight * np.trace(X))
+            program.AddLinearCost(weight * sum(np.diagonal(X)))
             cost, t, _ = program.AddMaximizeLogDeterminantCost(X)
             if weight != 1.0:
                 program.RemoveCost(cost)
@@ -294,6 +306,12 @@ def _polished(x: Array, N: Array) -> Array:
     return x
 
 
+def _scaled(A: Array, b: Array) -> tuple[Array, Array]:
+    """Returns equations A x = b whose rows have the length of one."""
+    size = np.linalg.norm(A, axis=1)
+    return A / size[:, None], b / size
+
+
 def _is_physical(x: Array) -> bool:
     return bool(np.linalg.eigvalsh(_matrices(x)).min() > _EDGE)
 
@@ -305,8 +323,25 @@ def _matrices(x: Array) -> Array:
     return X + np.tril(X, -1).swapaxes(1, 2)
 
 
-def _matrix(base: BaseSet, size: int) -> Array:
-    """Returns B (b, parameters) with beta = B pi."""
+def whitening(covariance: Array) -> Array:
+    """Returns W (k, b) with W^T W the inverse of a covariance (b, b).
+
+    Directions in which that is zero, since the motion determines nothing there, have no
+    weight: k is the rank.
+    """
+    size = np.sqrt(np.maximum(np.diagonal(covariance), 1e-300))
+    values, axes = np.linalg.eigh(covariance / np.outer(size, size))
+    kept = values > _UNDETERMINED * values.max()
+    return np.asarray((axes[:, kept] / np.sqrt(values[kept])).T / size)
+
+
+def base_matrix(base: BaseSet, size: int) -> Array:
+    """Returns B (b, parameters) with beta = B pi.
+
+    Args:
+        base: of the arm.
+        size: how many inertial parameters the arm has.
+    """
     B = np.zeros((len(base.independent), size))
     B[np.arange(len(base.independent)), base.independent] = 1.0
     B[:, base.dependent] = base.K
@@ -372,4 +407,4 @@ def _root(inertial: Array) -> Array:
     P[:3, :3] = second + m * np.outer(c, c)
     P[:3, 3] = P[3, :3] = m * c
     P[3, 3] = m
-    return np.linalg.cholesky(P)
+    return np.asarray(np.linalg.cholesky(P))

@@ -18,7 +18,13 @@ from drake_disasm.effects import (
     RotorInertia,
 )
 from sysid.effect_selection.close_loop import ClosedLoop
-from sysid.export.consistent_inertia import ConsistentInertia, ball, consistent_inertia
+from sysid.export.consistent_inertia import (
+    ConsistentInertia,
+    ball,
+    base_matrix,
+    consistent_inertia,
+    whitening,
+)
 from sysid.fitting.fit import Fit
 from sysid.identification.uncertainty import block_length
 from sysid.models.base import LogModel
@@ -103,14 +109,15 @@ class IdentifiedArm:
         arm, base = model.rigid_bodies()
         flange = arm.links[arm.last_link.start // len(INERTIAL)]
         count, theta = len(base.independent), closed.last.theta
-        payload, beta = _payload(model.effects_at(theta), arm, base)
-        beta = beta + theta[:count]
+        effects = model.effects_at(theta)
         covariance = _covariance(closed.last)
-        bodies = consistent_inertia(base, arm.inertia, beta, covariance[:count, :count])
+        within = covariance[:count, :count]
+        bodies, beta = _bodies(arm, base, theta[:count], within, effects)
         if not bodies.is_exact:
             theta = _moved(closed.last, covariance, bodies.beta - beta)
         effects = model.effects_at(theta)
-        link = None if payload is None else Link(PAYLOAD, payload)
+        payload = bodies.inertia[len(arm.inertia) :]
+        link = Link(PAYLOAD, payload) if len(payload) else None
         joints = {joint: _numbers(joint, effects) for joint in model.joints}
         return cls(
             model.urdf,
@@ -128,8 +135,8 @@ class IdentifiedArm:
     @property
     def links(self) -> list[Link]:
         """The links that differ from the file's."""
-        parts = np.split(self.bodies.inertia, len(self.arm.links))
-        return [Link(self.arm.links[i], parts[i]) for i in self.bodies.changed]
+        parts, names = self.bodies.inertia.reshape(-1, len(INERTIAL)), self.arm.links
+        return [Link(names[i], parts[i]) for i in self.bodies.changed if i < len(names)]
 
     @property
     def left_out(self) -> list[ArmEffect]:
@@ -164,23 +171,30 @@ def exportable(model: LogModel) -> JointMotionModel:
     return model
 
 
-def _payload(
-    effects: Sequence[Effect], arm: ArmDynamics, base: BaseSet
-) -> tuple[Array | None, Array]:
-    """Returns the payload's body, and what it leaves for the links' base parameters.
+def _bodies(
+    arm: ArmDynamics,
+    base: BaseSet,
+    beta: Array,
+    covariance: Array,
+    effects: Sequence[Effect],
+) -> tuple[ConsistentInertia, Array]:
+    """Returns the links' bodies, and a payload's, and the base parameters of all.
 
-    The effect's inertia is a point's. The file gets a ball of the same mass and first
-    moment, and the links what the torques have less of than the ball.
+    The effect's payload is a point with a mass. The body has the same mass and first
+    moment, and what it has of inertia the last link has less.
     """
-    carried = [e for e in effects if isinstance(e, FlangePayload) and not e.is_null]
-    pi = np.zeros_like(arm.inertia)
-    pi[arm.last_link] = sum((e.inertial for e in carried), np.zeros(len(INERTIAL)))
-    mass, moment = pi[arm.last_link][0], pi[arm.last_link][1:4]
-    if mass < _LIGHTEST:
-        return None, base.beta(pi)
-    body = ball(mass, moment / mass)
-    pi[arm.last_link] -= body
-    return body, base.beta(pi)
+    pi, B = np.zeros_like(arm.inertia), base_matrix(base, len(arm.inertia))
+    for effect in effects:
+        if isinstance(effect, FlangePayload) and not effect.is_null:
+            pi[arm.last_link] += effect.inertial
+    beta = beta + B @ pi
+    body = pi[arm.last_link]
+    if body[0] < _LIGHTEST:
+        return consistent_inertia(B, arm.inertia, beta, covariance), beta
+    held = {len(pi) + i: float(body[i]) for i in range(4)}
+    nominal = np.concatenate([arm.inertia, ball(body[0], body[1:4] / body[0])])
+    B = np.hstack([B, B[:, arm.last_link]])
+    return consistent_inertia(B, nominal, beta, covariance, held), beta
 
 
 def _numbers(joint: str, effects: Sequence[Effect]) -> JointNumbers:
@@ -196,10 +210,13 @@ def _covariance(fit: Fit) -> Array:
     """Returns the covariance (p, p) of a fit's parameters, SI.
 
     By Gauss-Newton, with the power that the residual has in each channel, times the
-    rows over which it is correlated. Shape parameters are held: their rows are zero.
+    rows over which it is correlated. Shape parameters and a payload, which is not told
+    from the last link, are held: their rows are zero.
     """
     linear, parameters = fit.linearisation, fit.model.parameters
-    free = np.flatnonzero([not p.is_shape for p in parameters])
+    payload = f"{FlangePayload.__name__}."
+    is_free = [not (p.is_shape or p.name.startswith(payload)) for p in parameters]
+    free = np.flatnonzero(is_free)
     J, w, r = linear.jacobian[..., free], linear.weights, linear.residual
     flat = J.reshape(-1, len(free))
     H = np.linalg.pinv(flat.T @ (w.reshape(-1, 1) * flat), hermitian=True)
@@ -216,7 +233,8 @@ def _covariance(fit: Fit) -> Array:
 def _moved(fit: Fit, covariance: Array, change: Array) -> Array:
     """Returns the most likely parameters (p,) with base parameters changed."""
     count = len(change)
-    step = np.linalg.solve(covariance[:count, :count], change)
+    W = whitening(covariance[:count, :count])
+    step = W.T @ (W @ change)
     bounds = [(p.low, p.high) for p in fit.model.parameters]
     low, high = np.array(bounds).T
     return np.clip(fit.theta + covariance[:, :count] @ step, low, high)

@@ -12,7 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import JacobianWrtVariable, MultibodyForces
+from pydrake.multibody.tree import (
+    JacobianWrtVariable,
+    ModelInstanceIndex,
+    MultibodyForces,
+)
 from pydrake.systems.framework import (
     BasicVector,
     Context,
@@ -105,8 +109,8 @@ def add_identified_effects(
     builder.Connect(actuation, readings.GetInputPort("actuation"))
     delayed = builder.AddSystem(ReadingDelays(joints.names, effects, _period(plant)))
     builder.Connect(readings.get_output_port(), delayed.get_input_port())
-    outputs = (delayed.GetOutputPort(n) for n in ("position", "velocity", "torque"))
-    return IdentifiedEffects(torques, *outputs, joints.names)
+    q, v, tau = (delayed.GetOutputPort(n) for n in ("position", "velocity", "torque"))
+    return IdentifiedEffects(torques, q, v, tau, joints.names)
 
 
 def _effects(closed: ClosedLoop | Scenario) -> list[ArmEffect]:
@@ -143,6 +147,7 @@ class _Joints:
         names: in the order of the plant's velocities.
         q, v: where each is in the plant's positions and velocities.
         u: where each is in the plant's actuation.
+        instances: the models that they are in.
         damping: that the plant simulates.
         rotor: reflected inertia that the plant simulates.
     """
@@ -151,15 +156,15 @@ class _Joints:
     q: list[int]
     v: list[int]
     u: list[int]
+    instances: list[ModelInstanceIndex]
     damping: Array
     rotor: Array
 
     @classmethod
     def of(cls, plant: MultibodyPlant) -> "_Joints":
         """Returns the joints with an actuator and one degree of freedom."""
-        actuators = [
-            plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices()
-        ]
+        indices = plant.GetJointActuatorIndices()
+        actuators = [plant.get_joint_actuator(index) for index in indices]
         actuators = [a for a in actuators if a.joint().num_velocities() == 1]
         actuators.sort(key=lambda a: a.joint().velocity_start())
         joints = [actuator.joint() for actuator in actuators]
@@ -168,6 +173,9 @@ class _Joints:
             [joint.position_start() for joint in joints],
             [joint.velocity_start() for joint in joints],
             [actuator.input_start() for actuator in actuators],
+            list(
+                {int(j.model_instance()): j.model_instance() for j in joints}.values()
+            ),
             np.array([joint.default_damping() for joint in joints]),
             np.array(
                 [
@@ -186,8 +194,9 @@ def _refuse(
         kind, joint = type(effect).__name__, getattr(effect, "joint", None)
         if joint is not None and joint not in joints.names:
             raise DisasmError(
-                f"{kind}: the plant has no actuator at a joint '{joint}'; give it one by "
-                f"AddJointActuator before Finalize ({closest(joint, list(joints.names))})"
+                f"{kind}: the plant has no actuator at a joint '{joint}' "
+                f"({closest(joint, list(joints.names))}); add one by AddJointActuator "
+                "before Finalize"
             )
         if not isinstance(effect, _CARRIED):
             raise DisasmError(
@@ -294,8 +303,8 @@ class JointEffectTorques(_OfState):
         for effect in self._by_motion:
             added = added + _at_once(effect, samples)
         memories = self._remembered(context, samples.q)
-        for effect, memory in zip(self._remembering, memories, strict=True):
-            added[samples.joints.index(effect.joint)] += effect.torque(memory)
+        for friction, memory in zip(self._remembering, memories, strict=True):
+            added[samples.joints.index(friction.joint)] += friction.torque(memory)
         return np.asarray(added)
 
     def _calc(self, context: Context, output: BasicVector) -> None:
@@ -309,9 +318,14 @@ class JointEffectTorques(_OfState):
         """Returns the forces (velocities,) of the change of gravity by a tilt."""
         plant, world = self._plant, self._plant.world_frame()
         J = plant.CalcJacobianCenterOfMassTranslationalVelocity(
-            self._of_plant, JacobianWrtVariable.kV, world, world
+            self._of_plant,
+            self._joints.instances,
+            JacobianWrtVariable.kV,
+            world,
+            world,
         )
-        return np.asarray(plant.CalcTotalMass(self._of_plant) * self._dg @ J)
+        mass = plant.CalcTotalMass(self._of_plant, self._joints.instances)
+        return np.asarray(mass * self._dg @ J)
 
     def _remembered(self, context: Context, q: Array) -> list[Array]:
         """Returns what each effect with a memory remembers at positions (joints,)."""
@@ -385,8 +399,9 @@ class JointReadings(_OfState):
 class ReadingDelays(LeafSystem):
     """Readings of joints, each as late as it was identified to be.
 
-    A positive delay is the torque's, a negative one the motion's. Readings are sampled
-    every period, and interpolated between two; those that are not late pass through.
+    A positive delay is the torque's, a negative one the motion's. Readings that are late
+    are sampled every period, interpolated between two samples, and held; the others
+    pass through.
 
     @system
     name: ReadingDelays
@@ -413,7 +428,8 @@ class ReadingDelays(LeafSystem):
         of_motion, of_torque = np.maximum(-late, 0.0), np.maximum(late, 0.0)
         self._steps = np.concatenate([of_motion, of_motion, of_torque]) / period
         count = len(self._steps)
-        self._kept = int(np.ceil(self._steps.max(initial=0.0)))
+        most = float(self._steps.max(initial=0.0))
+        self._kept = int(np.ceil(most)) + 1 if most else 0
         self._readings = self.DeclareVectorInputPort("readings", count)
         self._past = self.DeclareDiscreteState(self._kept * count)
         if self._kept:
@@ -429,21 +445,24 @@ class ReadingDelays(LeafSystem):
                 ),
             )
 
-    def _table(self, context: Context) -> Array:
-        """Returns readings (1 + kept, 3 joints): now, and of the periods before."""
-        past = context.get_discrete_state(self._past).value()
-        now = self._readings.Eval(context)
-        return np.vstack([now, past.reshape(self._kept, len(now))])
-
     def _read(self, context: Context) -> Array:
-        table, columns = self._table(context), np.arange(len(self._steps))
+        now = self._readings.Eval(context)
+        if not self._kept:
+            return np.asarray(now)
+        table, columns = self._samples(context), np.arange(len(self._steps))
         whole = np.floor(self._steps).astype(int)
-        share, older = self._steps - whole, np.minimum(whole + 1, self._kept)
-        at = (1.0 - share) * table[whole, columns] + share * table[older, columns]
-        return np.asarray(at)
+        share, older = self._steps - whole, np.minimum(whole + 1, self._kept - 1)
+        late = (1.0 - share) * table[whole, columns] + share * table[older, columns]
+        return np.where(self._steps > 0.0, late, now)
+
+    def _samples(self, context: Context) -> Array:
+        """Returns the readings (kept, 3 joints) of the last periods, newest first."""
+        past = context.get_discrete_state(self._past).value()
+        return np.asarray(past.reshape(self._kept, -1))
 
     def _sample(self, context: Context, values: DiscreteValues) -> None:
-        values.set_value(self._past, self._table(context)[:-1].reshape(-1))
+        now, past = self._readings.Eval(context), self._samples(context)
+        values.set_value(self._past, np.vstack([now, past[:-1]]).reshape(-1))
 
     def _begin(self, context: Context, values: DiscreteValues) -> None:
         now = self._readings.Eval(context)

@@ -117,11 +117,8 @@ class MujocoReader:
         """Returns torques (n, joints), without dry friction."""
         data, tau = self._data, np.empty_like(q)
         for i in range(len(q)):
-            data.qpos[self._q], data.qvel[self._v], data.qacc[self._v] = (
-                q[i],
-                v[i],
-                vd[i],
-            )
+            data.qpos[self._q], data.qvel[self._v] = q[i], v[i]
+            data.qacc[self._v] = vd[i]
             self._mujoco.mj_inverse(self._model, data)
             tau[i] = data.qfrc_inverse[self._v]
         return tau

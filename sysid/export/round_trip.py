@@ -13,7 +13,7 @@ from pydrake.multibody.tree import JointActuatorIndex, MultibodyForces
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.resources import package_map
-from drake_disasm.effects import ArmEffect, FlangePayload
+from drake_disasm.effects import ArmEffect
 from sysid.export.identified_arm import DRY, HELD, IdentifiedArm
 from sysid.export.xml_edits import parsed
 from sysid.models.arm_motion import ArmMotion
@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 #: sign, frame or order of a single link gives more.
 LARGEST_DIFFERENCE = 1e-3
 _MOST_ROWS = 5000
+_MESH = r"(<mesh[^>]*?\bfilename=[\"'])"
+_RELATIVE = r"(?!\w+://|/)"
 
 #: Gives the torques (n, joints) of states q, v, vd (n, joints), by a file.
 Reader = Callable[[Array, Array, Array], Array]
@@ -64,10 +66,9 @@ class RoundTrip:
         """
         if not self.share <= LARGEST_DIFFERENCE:
             raise DisasmError(
-                f"export: {name}, read again, differs by {100 * self.share:.2g} % of the "
-                f"torque from what was identified ({100 * LARGEST_DIFFERENCE:g} % at "
-                "most), and is not written; leave this format out, and report it with "
-                "the URDF"
+                f"export: {name}, read again, differs by {100 * self.share:.2g} % of "
+                f"the torque from what was identified ({100 * LARGEST_DIFFERENCE:g} % "
+                "at most), and is not written; leave this format out"
             )
 
 
@@ -105,10 +106,10 @@ class HeldOutRows:
         count = len(model.motion.time)
         rows = slice(None, None, -(-count // _MOST_ROWS))
         motion, beta = model.motion.rows(rows), arm.theta[: len(arm.bodies.beta)]
-        held = [e for e in arm.effects if isinstance(e, HELD)]
+        held: list[ArmEffect] = [e for e in arm.effects if isinstance(e, HELD)]
         smooth = [e for e in held if not isinstance(e, DRY)]
-        of_bodies = motion.torques(beta, _on_arm(smooth))
-        with_dry = motion.torques(beta, _on_arm(held))
+        of_bodies = motion.torques(beta, smooth)
+        with_dry = motion.torques(beta, held)
         whole, before = (
             model.predict(each, slice(0, count))[rows] for each in (arm.theta, theta)
         )
@@ -187,9 +188,8 @@ class DrakeReader:
             for i in range(plant.num_actuators())
         ]
         driven = {actuator.joint().name() for actuator in actuators}
-        return np.array(
-            [0.0 if j in driven else n.rotor for j, n in arm.joints.items()]
-        )
+        rotors = {joint: numbers.rotor for joint, numbers in arm.joints.items()}
+        return np.array([0.0 if j in driven else rotors[j] for j in arm.joints])
 
 
 def written_friction(text: str) -> dict[str, float]:
@@ -198,25 +198,16 @@ def written_friction(text: str) -> dict[str, float]:
     for joint in parsed(text).iter("joint"):
         name = joint.get("name", "")
         for dynamics in joint.iter("dynamics"):
-            in_element = dynamics.findtext("friction")
-            friction[name] = float(in_element or dynamics.get("friction", "0"))
+            text_of_sdf = dynamics.findtext("friction")
+            friction[name] = float(text_of_sdf or dynamics.get("friction") or 0.0)
     return friction
 
 
 def absolute_meshes(text: str, folder: Path) -> str:
-    """Returns a robot's file with meshes that are named relative to a folder."""
-
-    def absolute(match: re.Match[str]) -> str:
-        name = match[2]
-        is_relative = "://" not in name and not name.startswith("/")
-        return match[1] + (str(folder / name) if is_relative else name) + match[3]
-
-    text = re.sub(r"(<mesh[^>]*?\bfilename=\")([^\"]*)(\")", absolute, text)
-    return re.sub(r"(<uri>)([^<]*)(</uri>)", absolute, text)
-
-
-def _on_arm(effects: list[ArmEffect]) -> list[ArmEffect]:
-    return [e for e in effects if isinstance(e, ArmEffect)]
+    """Returns a robot's file whose relative names of meshes are those of a folder."""
+    start = f"{folder.resolve()}/".replace("\\", r"\\")
+    text = re.sub(_MESH + _RELATIVE, rf"\g<1>{start}", text)
+    return re.sub("(<uri>)" + _RELATIVE, rf"\g<1>{start}", text)
 
 
 def _rms(values: Array) -> float:

@@ -81,7 +81,7 @@ def _mass(link: Node) -> float:
 
 def _link(link: Node, joint: Node | None) -> dict[str, object]:
     name = _name(link)
-    values = {
+    values: dict[str, object] = {
         "name": name,
         "joint": None if joint is None else _name(joint),
         "pose": f"{_ZEROS} {_ZEROS}",

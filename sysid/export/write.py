@@ -1,4 +1,4 @@
-"""Robots' files of what closing the loop identified, checked before they are written."""
+"""Robots' files of what closing the loop identified, checked by reading them again."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -37,7 +37,7 @@ _NOTES = """# {stem}: what was identified, and what the files hold
 |---|---|---|
 {trips}
 
-All effects together make torques of {torque:.3g} (rms). What no file holds makes {left_out:.3g} of it.
+All torques have {torque:.3g} rms. What no file holds makes {left_out:.3g} of them.
 
 ## What the files do not hold
 
@@ -59,9 +59,9 @@ MJCF has no meshes.
 """
 _EXACT = "The bodies are physical and have exactly the identified base parameters."
 _MOVED = (
-    "No physical arm has exactly the identified base parameters. Those of the files are "
-    "within the joint 95 % interval: {ratio:.2f} of the way to its edge. This moves the "
-    "predicted torques by {moved:.3g} (rms)."
+    "No physical arm has exactly the identified base parameters. Those of the files "
+    "are within the joint 95 % interval, at {ratio:.2f} of the way to its edge. This "
+    "moves the predicted torques by {moved:.3g} rms."
 )
 
 

@@ -4,7 +4,6 @@ import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Self
 from xml.parsers import expat
 
 from drake_disasm.common.errors import DisasmError
