@@ -1,5 +1,6 @@
 """What closing the loop identified of an arm, as the numbers that a file can hold."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
@@ -117,7 +118,7 @@ class IdentifiedArm:
             theta = _moved(closed.last, covariance, bodies.beta - beta)
         effects = model.effects_at(theta)
         payload = bodies.inertia[len(arm.inertia) :]
-        link = Link(PAYLOAD, payload) if len(payload) else None
+        link = Link(_free_name(arm.links), payload) if len(payload) else None
         joints = {joint: _numbers(joint, effects) for joint in model.joints}
         return cls(
             model.urdf,
@@ -195,6 +196,12 @@ def _bodies(
     nominal = np.concatenate([arm.inertia, ball(body[0], body[1:4] / body[0])])
     B = np.hstack([B, B[:, arm.last_link]])
     return consistent_inertia(B, nominal, beta, covariance, held), beta
+
+
+def _free_name(links: Sequence[str]) -> str:
+    """Returns a name for a payload that no link has: a file may be exported again."""
+    names = (f"{PAYLOAD}{number or ''}" for number in itertools.count())
+    return next(name for name in names if name not in links)
 
 
 def _numbers(joint: str, effects: Sequence[Effect]) -> JointNumbers:

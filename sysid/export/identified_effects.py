@@ -399,9 +399,9 @@ class JointReadings(_OfState):
 class ReadingDelays(LeafSystem):
     """Readings of joints, each as late as it was identified to be.
 
-    A positive delay is the torque's, a negative one the motion's. Readings that are late
-    are sampled every period, interpolated between two samples, and held; the others
-    pass through.
+    A positive delay is the torque's, a negative one the motion's. Late readings are
+    sampled every period, interpolated between two samples, and held; the others pass
+    through.
 
     @system
     name: ReadingDelays
@@ -452,7 +452,8 @@ class ReadingDelays(LeafSystem):
         table, columns = self._samples(context), np.arange(len(self._steps))
         whole = np.floor(self._steps).astype(int)
         share, older = self._steps - whole, np.minimum(whole + 1, self._kept - 1)
-        late = (1.0 - share) * table[whole, columns] + share * table[older, columns]
+        before, after = table[older, columns], table[whole, columns]
+        late = (1.0 - share) * after + share * before
         return np.where(self._steps > 0.0, late, now)
 
     def _samples(self, context: Context) -> Array:

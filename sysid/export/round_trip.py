@@ -13,6 +13,7 @@ from pydrake.multibody.tree import JointActuatorIndex, MultibodyForces
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.resources import package_map
+from drake_disasm.common.text import clipped
 from drake_disasm.effects import ArmEffect
 from sysid.export.identified_arm import DRY, HELD, IdentifiedArm
 from sysid.export.xml_edits import parsed
@@ -155,7 +156,15 @@ class DrakeReader:
         plant.mutable_gravity_field().set_gravity_vector(arm.gravity)
         parser = Parser(plant)
         parser.package_map().AddMap(package_map())
-        (instance,) = parser.AddModelsFromString(absolute_meshes(text, folder), kind)
+        try:
+            models = parser.AddModelsFromString(absolute_meshes(text, folder), kind)
+        except RuntimeError as error:
+            reason = " ".join(str(error).split())
+            raise DisasmError(
+                f"export: the {kind} can't be read again by Drake, and is not written: "
+                f"{clipped(reason)}; leave {kind} out"
+            ) from None
+        (instance,) = models
         bodies = [plant.get_body(i) for i in plant.GetBodyIndices(instance)]
         weld_root(plant, bodies)
         plant.Finalize()

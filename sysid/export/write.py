@@ -126,7 +126,8 @@ def make_exports(closed: ClosedLoop, formats: Sequence[str]) -> Exports:
     rows = HeldOutRows.of(model, arm, closed.last.theta)
     source = model_path(arm.urdf)
     stem = f"{source.stem}_identified"
-    urdf = urdf_bytes(arm)
+    written = urdf_bytes(arm)
+    urdf = written.decode(errors="replace")  # names of links are in ASCII
     files, trips = {}, {}
     for kind in dict.fromkeys(formats):
         name = stem + FORMATS[kind]
@@ -134,17 +135,17 @@ def make_exports(closed: ClosedLoop, formats: Sequence[str]) -> Exports:
         read, friction = _reader(kind, text, arm, source.parent)
         trips[kind] = rows.compare(read, friction, arm)
         trips[kind].refuse_difference(name)
-        files[name] = urdf if kind == "urdf" else text.encode()
+        files[name] = written if kind == "urdf" else text.encode()
     scenario = model.scenario_at(arm.theta)
     files[f"{stem}_effects.yaml"] = dump_scenario(scenario).encode()
     files[NOTES] = _notes(arm, stem, trips).encode()
     return Exports(files, trips, arm)
 
 
-_TEXTS: dict[str, Callable[[bytes, IdentifiedArm, Path], str]] = {
-    "urdf": lambda urdf, arm, source: urdf.decode(),
-    "sdf": lambda urdf, arm, source: sdf_text(urdf.decode(), source.name),
-    "mjcf": lambda urdf, arm, source: mjcf_text(urdf.decode(), arm, source.name),
+_TEXTS: dict[str, Callable[[str, IdentifiedArm, Path], str]] = {
+    "urdf": lambda urdf, arm, source: urdf,
+    "sdf": lambda urdf, arm, source: sdf_text(urdf, source.name),
+    "mjcf": lambda urdf, arm, source: mjcf_text(urdf, arm, source.name),
 }
 
 
