@@ -15,7 +15,7 @@ identification: a convex programming approach").
 The unknowns are X = L^-1 P L^-T with P0 = L L^T: the nominal body is X = 1.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -53,7 +53,8 @@ _WEIGHTS = (10.0, 1.0, 0.1, 0.01)
 _JOINT_LEVEL = 0.95
 #: A body whose X has a smaller eigenvalue is at the edge: its mass is in a plane.
 _EDGE = 1e-9
-_NEWTON_STEPS = 6
+_NEWTON_STEPS = 200
+_FULL_STEP, _CONVERGED = 0.25, 1e-9  # decrements
 _UNDETERMINED = 1e-9  # of the largest eigenvalue of a correlation
 _INFEASIBLE = SolutionResult.kInfeasibleConstraints
 _LEAST_COLUMN = 1e-9  # of the largest: a link with less has no effect on any torque
@@ -208,21 +209,29 @@ class _Bodies:
         return tuple(i for i, size in zip(self.links, off, strict=True) if size > _EDGE)
 
     def exact(self, beta: Array) -> Array | None:
-        """Returns unknowns with exactly these base parameters; None: there are none."""
+        """Returns unknowns with exactly these base parameters; None: there are none.
+
+        A semidefinite program finds bodies as far as possible from the edge of what is
+        physical, or that there are none; Newton's steps go on from there.
+        """
         A, b = _scaled(
             np.vstack([self.A, self.held]),
             np.concatenate([beta - self.rest, self.values]),
         )
         program = MathematicalProgram()
         x = self._unknowns(program)
+        least = program.NewContinuousVariables(1, "least")
         program.AddLinearEqualityConstraint(A, b, x)
-        self._add_divergence(program, x, 1.0)
+        for X in _symbols(x):
+            program.AddPositiveSemidefiniteConstraint(X - least[0] * np.eye(4))
+        program.AddBoundingBoxConstraint(-np.inf, 1.0, least)  # as of the nominal
+        program.AddLinearCost(-least[0])
         result = _solved(program)
         if result is None:
             return None
         value = result.GetSolution(x)
         value = value + np.linalg.lstsq(A, b - A @ value, rcond=None)[0]
-        return _polished(value, null_space(A)) if _is_physical(value) else None
+        return _nearest(value, null_space(A)) if _is_physical(value) else None
 
     def closest(self, beta: Array, W: Array, weight: float) -> Array:
         """Returns the unknowns closest to base parameters by their covariance.
@@ -258,10 +267,7 @@ class _Bodies:
         self, program: MathematicalProgram, x: Array, weight: float
     ) -> None:
         """Adds the log-det divergence to the cost, and that bodies are physical."""
-        for own in x.reshape(-1, _SIZE):
-            X = np.empty((4, 4), dtype=object)
-            X[_LOWER4] = own
-            X.T[_LOWER4] = own
+        for X in _symbols(x):
             program.AddLinearCost(weight * sum(np.diagonal(X)))
             cost, t, _ = program.AddMaximizeLogDeterminantCost(X)
             if weight != 1.0:
@@ -281,10 +287,20 @@ def _solved(program: MathematicalProgram) -> MathematicalProgramResult | None:
     return None
 
 
-def _polished(x: Array, N: Array) -> Array:
-    """Returns the unknowns of least divergence by Newton's steps from near by.
+def _symbols(x: Array) -> Iterator[Array]:
+    """Yields X (4, 4) of each link, of variables of a program."""
+    for own in x.reshape(-1, _SIZE):
+        X = np.empty((4, 4), dtype=object)
+        X[_LOWER4] = own
+        X.T[_LOWER4] = own
+        yield X
 
-    An interior-point solver leaves a relative error of some 1e-5.
+
+def _nearest(x: Array, N: Array) -> Array:
+    """Returns the unknowns of least log-det divergence, by Newton's method.
+
+    The divergence is self-concordant: damped steps of 1 / (1 + decrement) stay physical
+    and converge (Boyd and Vandenberghe 2004, "Convex optimization", 9.6).
 
     Args:
         x: physical, with the base parameters.
@@ -298,11 +314,12 @@ def _polished(x: Array, N: Array) -> Array:
             gradients.append(np.einsum("kij,ji->k", basis, np.eye(4) - inverse))
             turned = inverse @ basis
             blocks.append(np.einsum("aij,bji->ab", turned, turned))
-        H, g = block_diag(*blocks), np.concatenate(gradients)
-        step = -N @ np.linalg.solve(N.T @ H @ N, N.T @ g)
-        if not _is_physical(x + step):
+        gradient = N.T @ np.concatenate(gradients)
+        step = -np.linalg.solve(N.T @ block_diag(*blocks) @ N, gradient)
+        decrement = np.sqrt(max(0.0, -gradient @ step))
+        x = x + N @ step / (1.0 + decrement * (decrement > _FULL_STEP))
+        if decrement < _CONVERGED:
             break
-        x = x + step
     return x
 
 

@@ -40,11 +40,12 @@ def two_links(path: Path) -> str:
 
 
 def changed(pi: np.ndarray, size: float, seed: int = 0) -> np.ndarray:
-    """Returns physical bodies that differ from those of pi."""
+    """Returns physical bodies that differ from those of pi by a share."""
     generator, parts = np.random.default_rng(seed), pi.reshape(-1, 10).copy()
-    for part in parts:
+    for part in (each for each in parts if each[0] > 0.0):
         turn = np.eye(4) + size * generator.normal(size=(4, 4))
-        part[:] = inertial_of(turn @ pseudo_inertia(part) @ turn.T)
+        root = np.linalg.cholesky(pseudo_inertia(part)) @ turn
+        part[:] = inertial_of(root @ root.T)
     return parts.reshape(-1)
 
 
