@@ -222,8 +222,10 @@ class _Bodies:
         x = self._unknowns(program)
         least = program.NewContinuousVariables(1, "least")
         program.AddLinearEqualityConstraint(A, b, x)
-        for X in _symbols(x):
-            program.AddPositiveSemidefiniteConstraint(X - least[0] * np.eye(4))
+        with np.errstate(all="ignore"):  # symbols are NaN on the way
+            shifted = [X - least[0] * np.eye(4) for X in _symbols(x)]
+        for each in shifted:
+            program.AddPositiveSemidefiniteConstraint(each)
         program.AddBoundingBoxConstraint(-np.inf, 1.0, least)  # as of the nominal
         program.AddLinearCost(-least[0])
         result = _solved(program)

@@ -23,11 +23,12 @@ from sysid.models.joint_motion import JointMotionModel
 
 Array = NDArray[np.float64]
 
-#: Of the torques' rms, by which a file may differ from the verdict. Rounding gives
+#: Of a joint's torque, rms, by which a file may differ from the verdict. Rounding gives
 #: 1e-12; a tenth of a percent is below what torque sensors are linear to, and a wrong
 #: sign, frame or order of a single link gives more.
 LARGEST_DIFFERENCE = 1e-3
 _MOST_ROWS = 5000
+_SMALL = 1e-3  # of all torques: a joint with less is compared with that
 _MESH = r"(<mesh[^>]*?\bfilename=[\"'])"
 _RELATIVE = r"(?!\w+://|/)"
 
@@ -37,27 +38,24 @@ Reader = Callable[[Array, Array, Array], Array]
 
 @dataclass(frozen=True)
 class RoundTrip:
-    """How a file compares with the verdict on held-out rows, in rms.
+    """How a file compares with the verdict on held-out rows, in rms over all joints.
 
     Attributes:
-        torque: of the verdict's prediction, over all joints.
+        torque: of the verdict's prediction.
         difference: of what the file gives from what the verdict gives for the effects
             that a file holds.
         left_out: of what the verdict gives by effects, filters and shifts in time that
             no file holds.
         moved: by how much the prediction changed since no physical arm has exactly the
             identified base parameters.
+        share: difference over torque of the joint where that is worst.
     """
 
     torque: float
     difference: float
     left_out: float
     moved: float
-
-    @property
-    def share(self) -> float:
-        """Of the torque, by which the file differs."""
-        return self.difference / self.torque
+    share: float
 
     def refuse_difference(self, name: str) -> None:
         """Refuses a file that is not what was identified.
@@ -133,11 +131,14 @@ class HeldOutRows:
         added = [w if s == 0.0 else 0.0 for w, s in zip(written, sizes, strict=True)]
         tau = tau + self.dry * share + np.sign(self.motion.v) * added
         expected = self.held + self.dry
+        off, torque = _by_joint(tau - expected), _by_joint(self.whole)
+        worst = np.max(off / np.maximum(torque, _SMALL * _rms(self.whole)))
         return RoundTrip(
             _rms(self.whole),
             _rms(tau - expected),
             _rms(self.whole - expected),
             _rms(self.whole - self.before),
+            float(worst),
         )
 
 
@@ -217,6 +218,11 @@ def absolute_meshes(text: str, folder: Path) -> str:
     start = f"{folder.resolve()}/".replace("\\", r"\\")
     text = re.sub(_MESH + _RELATIVE, rf"\g<1>{start}", text)
     return re.sub("(<uri>)" + _RELATIVE, rf"\g<1>{start}", text)
+
+
+def _by_joint(values: Array) -> Array:
+    """Returns the rms (joints,) of torques (n, joints)."""
+    return np.asarray(np.sqrt(np.mean(values**2, axis=0)))
 
 
 def _rms(values: Array) -> float:

@@ -33,7 +33,7 @@ _NOTES = """# {stem}: what was identified, and what the files hold
 
 {exactness}
 
-| file | read by | differs from the verdict, % of the torque |
+| file | read by | differs from the verdict, % of the torque of the worst joint |
 |---|---|---|
 {trips}
 
@@ -54,8 +54,10 @@ scenario = load_scenario("{stem}_effects.yaml")
 add_identified_effects(builder, plant, scenario)  # a plant of {stem}, finalized
 ```
 
-Meshes are named as in the original file: relative names need the file in its folder.
-MJCF has no meshes.
+Damping, friction and rotors are zero where none was identified, whatever the original
+file has. Inertia of a rotor that the motion does not separate from a link's is in the
+link. Meshes are named as in the original file: relative names need the file in its
+folder. MJCF has no meshes.
 """
 _EXACT = "The bodies are physical and have exactly the identified base parameters."
 _MOVED = (
@@ -93,8 +95,7 @@ class Exports:
             "distance_in_joint_interval": _ratio(self.arm),
             "divergence": bodies.divergence,
             "round_trips": {
-                kind: {**dataclasses.asdict(trip), "share": trip.share}
-                for kind, trip in self.trips.items()
+                kind: dataclasses.asdict(trip) for kind, trip in self.trips.items()
             },
         }
 
