@@ -41,6 +41,7 @@ FLOORS = {
         {"fitting"},
         {"residuals"},
         {"effect_selection"},
+        {"export"},
         {"validation", "report", "experiment_design", "studies"},
     ),
 }

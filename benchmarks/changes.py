@@ -6,6 +6,7 @@ row. In the newer log hangs a tool, or a camera; or a joint's friction is 30 % h
 or its torque offset jumps within the log, or nothing has changed.
 """
 
+import functools
 import tempfile
 from collections.abc import Sequence
 from functools import partial
@@ -29,6 +30,7 @@ from drake_disasm.logs import Log, LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.changes import Changes, find_changes
 from sysid.models.joint_motion import JointMotionModel
+from sysid.models.regressor import ArmDynamics
 
 _SEED = 59_000
 _RATE, _DURATION = 100.0, 15.0  # Hz, s
@@ -51,6 +53,15 @@ def motion(joints: int, random: np.random.Generator) -> tuple[Array, ...]:
     v = (w[:, None, None] * (a * np.cos(phase) - b * np.sin(phase))).sum(axis=0)
     vd = (-(w[:, None, None] ** 2) * (a * np.sin(phase) + b * np.cos(phase))).sum(0)
     return time, q + random.uniform(-0.5, 0.5, joints), v, vd
+
+
+@functools.cache
+def noise_of(urdf: Path) -> Array:
+    """Returns the noise (joints,) of an arm's torques, the same in all its logs."""
+    joints = _joints(urdf)
+    _, *states = motion(len(joints), np.random.default_rng(_SEED))
+    tau = ArmDynamics(str(urdf), joints).torques(*states)
+    return np.asarray(_NOISE * np.sqrt(np.mean(tau**2, axis=0)))
 
 
 def friction(joints: Sequence[str], random: np.random.Generator) -> list[Effect]:
@@ -106,7 +117,7 @@ def simulated(
     noise = random.normal(size=q.shape)
     for i in range(1, len(noise)):
         noise[i] = _RHO * noise[i - 1] + np.sqrt(1.0 - _RHO**2) * noise[i]
-    columns["tau"] = tau + _NOISE * np.sqrt(np.mean(parts[0] ** 2, axis=0)) * noise
+    columns["tau"] = tau + noise_of(urdf) * noise
     with LogWriter(folder, header) as writer:
         writer.write_episode(flat_columns("joint_motion", columns))
     return read_log(folder)

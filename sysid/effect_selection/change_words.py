@@ -33,8 +33,8 @@ def changes_sentence(changes: Changes) -> str:
         return " ".join(said)
     if changes.leaves_more:
         said.append(
-            "Something has changed since the reference, which no effect of the library "
-            "explains."
+            "The new logs are explained less well than the references, and no change "
+            "of the library explains why: the noise, or something else, is larger."
         )
     else:
         said.append("Nothing has changed since the reference that these logs show.")

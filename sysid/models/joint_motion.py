@@ -93,7 +93,8 @@ class JointMotionModel(LogModel):
         episodes = self._motions(logs)
         header = logs[0].header
         self._urdf = arm_urdf(logs, urdf)
-        self._gravity = tuple(UniformGravityFieldElement().gravity_vector())
+        x, y, z = UniformGravityFieldElement().gravity_vector().tolist()
+        self._gravity = (x, y, z)
         arm = ArmDynamics(self._urdf, header.joints)
         base = self._base_set(arm)
         self._inertia = None
@@ -237,6 +238,41 @@ class JointMotionModel(LogModel):
         into[:, base.dependent] = base.K
         parts = np.split(into, len(arm.links), axis=1)
         return dict(zip(arm.links, parts, strict=True))
+
+    @property
+    def gravity(self) -> tuple[float, float, float]:
+        """In the frame of the arm's base [m/s^2]."""
+        return self._gravity
+
+    @property
+    def motion(self) -> ArmMotion:
+        """Of the rows that the model predicts."""
+        return self._motion
+
+    @property
+    def has_urdf(self) -> bool:
+        """Whether the arm is a user's, and not a body that stands for an axis."""
+        return self._inertia is None
+
+    @property
+    def has_free_bodies(self) -> bool:
+        """Whether all base parameters vary: none was frozen."""
+        return self._own_parameters is None
+
+    def rigid_bodies(self) -> tuple[ArmDynamics, BaseSet]:
+        """Returns the arm's nominal bodies, and which combinations of them vary."""
+        arm = self._arm_under(np.array(self._gravity))
+        return arm, self._base_set(arm)
+
+    def unfitted(self) -> Self:
+        """Returns the model of all rows that this one leaves out; itself if none.
+
+        For predictions alone: its measurements are this one's.
+        """
+        mask = ~self._taken
+        if not mask.any():
+            return self
+        return self.replace(_motion=self._whole.rows(mask), _taken=mask)
 
     @property
     def urdf(self) -> str:

@@ -19,6 +19,7 @@ def closing_page(
     closed: ClosedLoop,
     origin: Mapping[str, Any],
     findings: Sequence[DataFinding] = (),
+    exported: Mapping[str, Any] | None = None,
 ) -> str:
     """Returns the report of a closed loop as one self-contained HTML page.
 
@@ -26,8 +27,10 @@ def closing_page(
         closed: what was found.
         origin: its provenance, as in `result.json`.
         findings: of the check of the data.
+        exported: robots' files that were written, as in `result.json`.
     """
-    return _page(closed, to_mapping(closed), origin, findings)
+    result = to_mapping(closed) | {"export": exported}
+    return _page(closed, result, origin, findings)
 
 
 def changes_page(
@@ -69,6 +72,7 @@ def _page(
         drawn=_plots(closed, found),
         origin=origin,
         findings=findings,
+        exported=result.get("export"),
     )
 
 

@@ -17,6 +17,7 @@ from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
 from tests.sysid.effect_selection.blind import static_log
 from tests.sysid.report.pages import own_part
+from tests.tools.inputs import write_slide_log
 from tests.tools.programs import assert_one_line, interrupt, run_program
 
 
@@ -37,6 +38,24 @@ def test_the_tool_writes_a_scenario_and_a_report(tmp_path):
     assert mapping["effects"] == ["SensorMounting"] == mapping["ambiguous"]
     assert mapping["text"] in result.stdout
     assert "Measured against predicted" in own_part((out / "report.html").read_text())
+
+
+def test_the_arm_is_written_back_into_its_urdf(tmp_path):
+    log, out = write_slide_log(tmp_path / "log"), tmp_path / "out"
+    result = run("--log", log, "--export", "urdf", "sdf", "--out", out, "--workers", 1)
+    assert result.returncode == 0, result.stderr
+    assert "exported: slide_identified.urdf, slide_identified.sdf" in result.stdout
+    mapping = json.loads((out / "result.json").read_text())["export"]
+    assert all((out / name).is_file() for name in mapping["files"])
+    assert mapping["round_trips"]["urdf"]["share"] < 1e-6
+    assert "Robot's files" in own_part((out / "report.html").read_text())
+
+
+def test_readings_at_rest_have_no_arm_to_export(tmp_path):
+    log, out = static_log(tmp_path, [], 0.0, seed=0).folder, tmp_path / "out"
+    result = run("--log", log, "--export", "urdf", "--out", out)
+    assert_one_line(result, ["export", "no joint torques", "joint_motion"])
+    assert not out.exists()
 
 
 def _spoilt(source: Log, folder: Path, **columns: np.ndarray) -> Path:

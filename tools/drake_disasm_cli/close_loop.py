@@ -5,7 +5,8 @@ of a force/torque sensor at rest, or joint torques of an arm. The model is fitte
 effect of the library is tested on what it explains of data that were not fitted; those
 that pass are added one by one. Prints what is missing, its parameters, and the error
 before and after. Writes the scenario with the effects, `result.json`, and a report
-that opens offline. After Ctrl-C the same command resumes.
+that opens offline; `--export` writes a robot's files. After Ctrl-C the same command
+resumes.
 
 With --reference, those logs make the model, their effects included, and the verdict is
 on what has changed since: by how much, since when, and what has not.
@@ -16,6 +17,7 @@ import math
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from drake_disasm.common import options, program
 from drake_disasm.common.cluster import executor_for
@@ -29,6 +31,7 @@ from sysid.effect_selection.change_words import changes_mapping, changes_text
 from sysid.effect_selection.changes import Changes, find_changes
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.effect_selection.output import to_mapping
+from sysid.export import FORMATS, Exports, make_exports, refuse_export
 from sysid.identification.split import split_episodes
 from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
@@ -42,6 +45,7 @@ _EXAMPLES = """examples:
   drake-disasm close-loop --log out/readings --out out/sensor     a static_wrench log
   drake-disasm close-loop --log out/arm_1 out/arm_2 --held-out arm_2 --out out/arm
   drake-disasm close-loop --log out/arm_1 --trust urdf --out out/differs
+  drake-disasm close-loop --log out/arm_1 --export urdf sdf --out out/arm
   drake-disasm close-loop --reference out/march --log out/april --out out/changed
 """
 
@@ -75,6 +79,15 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         action="store_true",
         help="learn what the effects leave, too: it lowers the error within the range "
         "of the log, and explains nothing",
+    )
+    add(
+        "--export",
+        nargs="+",
+        default=[],
+        choices=sorted(FORMATS),
+        metavar="FORMAT",
+        help="write the arm of a log of joint torques, as identified: urdf, sdf, mjcf "
+        "(with MuJoCo)",
     )
     common.add_import_argument(parser)
     common.add_executor_arguments(parser)
@@ -120,59 +133,72 @@ def _add_model_arguments(add: Callable[..., object]) -> None:
 
 #: The learned functions, beside the scenario that names them.
 _RESIDUAL_MODEL = "residual_model.npz"
+#: Finished fits, for a run that is stopped.
+_FITS = "fits"
 
 
 def main(arguments: Sequence[str]) -> int:
     """Runs the program; returns its exit status."""
     args = parse(arguments)
+    _refuse_combinations(args)
     references = common.named_logs(args.reference) if args.reference else []
     logs = [*references, *common.named_logs(args.log)]
-    _refuse_combinations(args)
     if args.held_out:  # names, which are wrong more often than anything takes time
         split_episodes(episode_names(logs), args.held_out)
     model = _model(args, logs)
+    if args.export:
+        refuse_export(model, args.export)
     origin = program.provenance("drake-disasm close-loop", arguments, 0)
-    fits = args.out / "fits"
     with (
         program.ProgressBar(unit="run") as progress,
         executor_for(args.executor, args.scheduler) as (executor, _),
         Workers(args.workers, executor=executor, progress=progress) as workers,
     ):
         model, findings = data_arguments.checked(logs, model, args, workers)
+        shared: dict[str, Any] = {
+            "workers": workers,
+            "progress": progress,
+            "folder": args.out / _FITS,
+            "time_budget": 60.0 * args.time_budget,
+        }
         if references:
-            changes = find_changes(
-                model,
-                len(episode_names(references)),
-                workers=workers,
-                progress=progress,
-                folder=fits,
-                time_budget=60.0 * args.time_budget,
-            )
-            _write_changes(args.out, changes, findings, origin)
-            _finish(args.out, fits, changes.closed, changes_text(changes))
-            return 0
-        share = model.held_out_share
-        train, test = split_episodes(model.measurements.names, args.held_out or share)
-        closed = close_loop(
-            model,
-            train=train,
-            test=test,
-            huber_delta=args.huber_delta,
-            workers=workers,
-            progress=progress,
-            folder=fits,
-            time_budget=60.0 * args.time_budget,
-            learn_residual=args.residual_model,
-        )
-    _write(args.out, closed, findings, origin)
-    _finish(args.out, fits, closed, closed.text)
+            changes = find_changes(model, len(episode_names(references)), **shared)
+        else:
+            closed = _closed(model, args, shared)
+    if references:
+        _write_changes(args.out, changes, findings, origin)
+        _finish(args.out, changes.closed, changes_text(changes))
+        return 0
+    exports, refusal = _exports(closed, args.export)
+    _write(args.out, closed, findings, origin, exports)
+    _finish(args.out, closed, closed.text)
+    if refusal is not None:
+        raise refusal
+    if exports is not None:
+        print(f"exported: {', '.join(exports.files)}")
     return 0
 
 
-def _finish(folder: Path, fits: Path, closed: ClosedLoop, text: str) -> None:
+def _closed(
+    model: LogModel, args: argparse.Namespace, shared: dict[str, Any]
+) -> ClosedLoop:
+    """Returns the closed loop of the episodes that are not held out."""
+    share = model.held_out_share
+    train, test = split_episodes(model.measurements.names, args.held_out or share)
+    return close_loop(
+        model,
+        train=train,
+        test=test,
+        huber_delta=args.huber_delta,
+        learn_residual=args.residual_model,
+        **shared,
+    )
+
+
+def _finish(folder: Path, closed: ClosedLoop, text: str) -> None:
     """Removes fits that no run goes on from, and prints the verdict."""
     if not closed.is_provisional:
-        shutil.rmtree(fits, ignore_errors=True)
+        shutil.rmtree(folder / _FITS, ignore_errors=True)
     print(text)
     print(f"report: {folder / 'report.html'}")
 
@@ -185,7 +211,7 @@ def _refuse_combinations(args: argparse.Namespace) -> None:
     """
     if not args.reference:
         return
-    for option in ("held_out", "parameters", "residual_model"):
+    for option in ("held_out", "parameters", "residual_model", "trust", "export"):
         if getattr(args, option):
             name = f"--{option.replace('_', '-')}"
             raise DisasmError(f"{name}: not with --reference; leave one of them out")
@@ -196,6 +222,18 @@ def _refuse_combinations(args: argparse.Namespace) -> None:
         raise DisasmError(
             f"{min(twice)}: is a reference, and a log to compare with it; name it once"
         )
+
+
+def _exports(
+    closed: ClosedLoop, formats: Sequence[str]
+) -> tuple[Exports | None, DisasmError | None]:
+    """Returns a robot's files, or why there are none: the verdict is written anyway."""
+    if not formats:
+        return None, None
+    try:
+        return make_exports(closed, formats), None
+    except DisasmError as error:
+        return None, error
 
 
 def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
@@ -229,6 +267,7 @@ def _write(
     closed: ClosedLoop,
     findings: Sequence[DataFinding],
     origin: dict[str, object],
+    exports: Exports | None,
 ) -> None:
     make_folder(folder)
     learned = closed.verdict.residual_model
@@ -238,6 +277,10 @@ def _write(
     if scenario is not None:
         write_text(folder / "scenario.yaml", dump_scenario(scenario))
     of_data = {"data_findings": [finding.to_mapping() for finding in findings]}
-    mapping = to_mapping(closed) | of_data | {"provenance": origin}
-    write_json(folder / "result.json", mapping)
-    write_text(folder / "report.html", closing_page(closed, origin, findings))
+    exported = None if exports is None else exports.to_mapping()
+    of_run = {"provenance": origin, "export": exported}
+    write_json(folder / "result.json", to_mapping(closed) | of_data | of_run)
+    page = closing_page(closed, origin, findings, exported)
+    write_text(folder / "report.html", page)
+    if exports is not None:
+        exports.write(folder)
