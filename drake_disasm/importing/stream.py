@@ -34,6 +34,7 @@ class Stream:
         labels: what metadata call a channel, where that is not its name.
         left_out: why a part of the recording is no channel, by its name.
         sequence: (n,) numbers of a topic's messages, of which some may be lost.
+        notes: what its reader took for granted, or could not read.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Stream:
     labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
     left_out: Mapping[str, str] = dataclasses.field(default_factory=dict)
     sequence: Array | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def names(self) -> list[str]:
