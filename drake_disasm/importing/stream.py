@@ -54,6 +54,12 @@ class Stream:
         return list(self.channels)
 
     @property
+    def is_unnamed(self) -> bool:
+        """Whether it is a table without names: its columns are numbered."""
+        numbers = [f"column_{i}" for i in range(len(self.names) + len(self.left_out))]
+        return not self.name and {*self.names, *self.left_out} == {*numbers}
+
+    @property
     def rows(self) -> int:
         """How many rows it has."""
         return len(next(iter(self.channels.values()), ()))
