@@ -312,15 +312,11 @@ def _as_known(
     order, reasons = matched(joints, listed)
     if len(order) == len(joints) and not reasons:
         return [first[i] for i in order], joints, [listed[i] for i in order]
-    others = [
-        f"'{joint}' is number {i + 1} of `joints`, and {order[0] + 1} of the recording's"
-        for i, joint in enumerate(joints)
-        if (order := matched([joint], listed)[0]) not in ([], [i])
-    ]
     if known.in_order and len(first) == len(joints):
-        if not others:
+        elsewhere = _elsewhere(joints, listed)
+        if not elsewhere:
             return first, joints, listed
-        reasons = [*reasons, *others]
+        reasons = [*reasons, *elsewhere]
     names = ", ".join("_".join(name) for name in listed[:9])
     raise _AmbiguousError(
         (reasons or [f"the recording's joints ({names}) are not {', '.join(joints)}"])[
@@ -328,6 +324,17 @@ def _as_known(
         ]
         + "; give `joints`, the URDF's names in the order of the recording's, or a map"
     )
+
+
+def _elsewhere(joints: Sequence[str], listed: Sequence[Tokens]) -> list[str]:
+    """Returns which joints have their names in another place of the recording's."""
+    places = {joint: matched([joint], listed)[0] for joint in joints}
+    return [
+        f"'{joint}' is number {i + 1} of `joints`, and {places[joint][0] + 1} of the "
+        "recording's"
+        for i, joint in enumerate(joints)
+        if places[joint] not in ([], [i])
+    ]
 
 
 def _column(labels: Sequence[Label]) -> Column:

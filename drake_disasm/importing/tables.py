@@ -60,9 +60,7 @@ def read_csv(path: Path) -> list[Stream]:
             raise DisasmError(f"{path}: has no rows")
         comment = rows.comment_above(head.rows)
         names = head.names or _names_above(comment, delimiter, head.width)
-        lines = _Lines(
-            itertools.chain(first[head.rows :], rows), delimiter, len(names)
-        )
+        lines = _Lines(itertools.chain(first[head.rows :], rows), delimiter, len(names))
         texts = _cells(path, lines, delimiter, names)
         columns = [
             _column(each, delimiter != ",", lambda i: rows.line_of(head.rows + i))
@@ -119,6 +117,13 @@ class TableColumn:
             f"{self.first[0]}"
         )
 
+    @property
+    def wrong_words(self) -> str:
+        """What it has that is no number."""
+        is_are = "is no number" if self.wrong == 1 else "are no numbers"
+        cells = ", ".join(self.first) + (", ..." if self.wrong > 3 else "")
+        return f"{_counted(self.wrong, 'cell')} {is_are}: {cells}"
+
 
 def streams_of_columns(
     path: Path,
@@ -148,13 +153,7 @@ def streams_of_columns(
     said = list(notes)
     if head.skipped:
         said.append(f"{_counted(head.skipped, 'line')} above the table skipped")
-    for name, column in kept.items():
-        if column.wrong:
-            is_are = "is no number" if column.wrong == 1 else "are no numbers"
-            cells = ", ".join(column.first) + (", ..." if column.wrong > 3 else "")
-            said.append(
-                f"{clipped(name)}: {_counted(column.wrong, 'cell')} {is_are}: {cells}"
-            )
+    said += [f"{clipped(n)}: {c.wrong_words}" for n, c in kept.items() if c.wrong]
     streams = _tables(path, {n: c.numbers for n, c in kept.items()}, out)
     labels = {n: label for n, label in head.labels.items() if n in kept}
     first = dataclasses.replace(streams[0], labels=labels, notes=tuple(said))
@@ -341,7 +340,9 @@ def _column(
     if numbers is not None:
         return TableColumn(numbers, filled)
     texts = trimmed.to_pylist()
-    ways = ([i for i, x in enumerate(texts) if x and not is_one(x)] for is_one in _SIGHTS)
+    ways = (
+        [i for i, x in enumerate(texts) if x and not is_one(x)] for is_one in _SIGHTS
+    )
     wrong = min(ways, key=len)
     first = tuple(f"'{clipped(texts[i])}' in line {line_of(i)}" for i in wrong[:3])
     if len(wrong) <= MOST_TEXT * filled:
