@@ -56,6 +56,7 @@ def _stream_lines(
             f"(± {1e3 * late.std():.2g} ms)"
         )
     yield head
+    yield from (f"    {note}" for note in stream.notes)
     for name, value in stream.constants.items():
         yield f"    {name} = {value:.6g} (a constant)"
     for name, values in stream.channels.items():
@@ -166,7 +167,7 @@ def _done_lines(imported: Imported) -> Iterator[str]:
         yield f"noise in the accelerations: at most {words} of their rms (q.{joint})"
     if noisy := done.noisy:
         names = ", ".join(f"q.{joint}" for joint in noisy)
-        yield f"hardly moves, compared with its noise: {names}"
+        yield f"moves, but its acceleration is not above its noise: {names}"
     if done.over_velocity:
         joint, ratio = max(done.over_velocity.items(), key=operator.itemgetter(1))
         yield (

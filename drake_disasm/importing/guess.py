@@ -21,6 +21,7 @@ from drake_disasm.importing.vocabulary import (
     Tokens,
     is_alive,
     labels_of,
+    left_out_of,
     matched,
     named,
     numbered,
@@ -36,6 +37,8 @@ _OF_JOINTS = {
     "joint_response": ("q", "q_commanded", "supply", "enabled"),
 }
 _SCALARS = ("supply", "enabled")
+#: Kinds of log that names alone tell.
+_NAMED = ("joint_response", "static_wrench")
 #: What some kinds need besides positions, in words.
 _NEEDED = {"q_commanded": "commanded joint positions", "tau": "joint torques"}
 
@@ -147,11 +150,30 @@ def guessed_map(source: Source, kind: str, known: Known | None = None) -> FieldM
         NoGuessError: nothing that the kind needs is known by its name.
     """
     known = known or Known()
+    try:
+        return _guessed(source, kind, known)
+    except NoGuessError as error:
+        kinds = [each for each in _NAMED if _has_all(source, each, known)]
+        if not kinds:
+            raise
+        reason = f"{error.reason}; its channels are those of `kind` {kinds[0]}"
+        raise NoGuessError(source.path, reason) from None
+
+
+def _guessed(source: Source, kind: str, known: Known) -> FieldMap:
     if kind in _OF_JOINTS:
         return _of_joints(source, known, kind)
     if kind in ("static_wrench", "contact"):
         return _sensor(source, known, kind)
     raise NoGuessError(source.path, f"a map of kind {kind} is not guessed")
+
+
+def _has_all(source: Source, kind: str, known: Known) -> bool:
+    """Whether a recording has what a kind of log needs."""
+    try:
+        return bool(_guessed(source, kind, known))
+    except DisasmError:
+        return False
 
 
 def _of_joints(source: Source, known: Known, kind: str) -> FieldMap:
@@ -168,10 +190,12 @@ def _of_joints(source: Source, known: Known, kind: str) -> FieldMap:
         if "q" in found and (stream is None or len(found) > len(columns)):
             stream, columns, joints = each, found, names
     if stream is None:
-        raise NoGuessError(source.path, _why_no_positions(known, reasons))
+        raise NoGuessError(source.path, _why_no_positions(source, known, reasons))
     for name, words in _NEEDED.items():
         if KINDS[kind].needs(name) and name not in columns:
-            raise NoGuessError(source.path, f"no channel is called as {words} are")
+            why = f"no channel is called as {words} are"
+            why += _left_out(source, name, known)
+            raise NoGuessError(source.path, why)
     time, unit = _time_and_unit(stream, known, source, kind)
     return FieldMap(
         kind=kind,
@@ -189,15 +213,32 @@ class _AmbiguousError(DisasmError):
     """Names of a stream's joints say no order."""
 
 
-def _why_no_positions(known: Known, reasons: Sequence[str]) -> str:
+def _why_no_positions(source: Source, known: Known, reasons: Sequence[str]) -> str:
     if reasons:
         return reasons[0]
+    if any(stream.is_unnamed and not stream.labels for stream in source.streams):
+        return (
+            "has no line of names above its rows: its columns are column_0, column_1, "
+            "..., of which a map says what each is"
+        )
+    if left := _left_out(source, "q", known):
+        return f"no channel is called as joint positions are{left}"
     if known.preset:
         names = ", ".join(known.preset.names["q"][:3])
         return (
             f"preset '{known.preset.name}' does not fit: no channel is called {names}"
         )
     return "no channel is called as joint positions are"
+
+
+def _left_out(source: Source, quantity: str, known: Known) -> str:
+    """Returns what is no channel though its name says a quantity, in words; or ""."""
+    found = [
+        words
+        for stream in source.streams
+        for words in left_out_of(stream, quantity, known.names)
+    ]
+    return f": {'; '.join(found[:3])}" if found else ""
 
 
 def _columns_of(
@@ -271,8 +312,11 @@ def _as_known(
     order, reasons = matched(joints, listed)
     if len(order) == len(joints) and not reasons:
         return [first[i] for i in order], joints, [listed[i] for i in order]
-    if known.in_order and len(first) == len(joints) and not order:
-        return first, joints, listed
+    if known.in_order and len(first) == len(joints):
+        elsewhere = _elsewhere(joints, listed)
+        if not elsewhere:
+            return first, joints, listed
+        reasons = [*reasons, *elsewhere]
     names = ", ".join("_".join(name) for name in listed[:9])
     raise _AmbiguousError(
         (reasons or [f"the recording's joints ({names}) are not {', '.join(joints)}"])[
@@ -280,6 +324,17 @@ def _as_known(
         ]
         + "; give `joints`, the URDF's names in the order of the recording's, or a map"
     )
+
+
+def _elsewhere(joints: Sequence[str], listed: Sequence[Tokens]) -> list[str]:
+    """Returns which joints have their names in another place of the recording's."""
+    places = {joint: matched([joint], listed)[0] for joint in joints}
+    return [
+        f"'{joint}' is number {i + 1} of `joints`, and {places[joint][0] + 1} of the "
+        "recording's"
+        for i, joint in enumerate(joints)
+        if places[joint] not in ([], [i])
+    ]
 
 
 def _column(labels: Sequence[Label]) -> Column:
@@ -304,8 +359,9 @@ def time_label(stream: Stream, known: Known) -> str | None:
         if name in labels:
             return labels[name]
         behind = [c for text, c in labels.items() if text.endswith(f".{name}")]
-        if len(behind) == 1:  # of a structure
-            return behind[0]
+        times = [stream.channels[c] for c in behind]
+        if times and all(np.array_equal(time, times[0], True) for time in times):
+            return behind[-1]  # of the first structure
     return None
 
 
@@ -326,7 +382,8 @@ def _time_and_unit(
     if name is None:
         raise NoGuessError(
             source.path,
-            "no channel is called as time is (give the rows a second by `rate`)",
+            "no channel is called as time is (give the rows a second by `rate`)"
+            + _left_out(source, "time", known),
         )
     said = next(x.unit for x in labels_of(stream) if x.channel == name)
     unit = said or (known.preset.time_unit if known.preset else "")
@@ -338,6 +395,7 @@ def unit_of_times(values: np.ndarray, at_rest: bool = False) -> str:
 
     Of readings at rest, that in which they take from half a minute to eight hours.
     """
+    values = values[np.isfinite(values)]
     steps = np.diff(values) if len(values) > 1 else np.zeros(1)
     size, most = (np.sum(steps), 3e4) if at_rest else (np.median(steps), 0.5)
     for unit, factor in (("s", 1.0), ("ms", 1e3), ("us", 1e6)):

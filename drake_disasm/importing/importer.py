@@ -222,6 +222,8 @@ def origin(
         for each in imported.recordings
         for name, shift in each.shifts.items()
     }
+    if notes := [note for source in sources for note in source.notes]:
+        found["notes"] = notes
     if shifts:
         found["shifts"] = {n: _finite(values) for n, values in shifts.items()}
     stamps = {e.name: e.evened.words() for e in imported.recordings if e.evened}

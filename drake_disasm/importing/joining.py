@@ -39,7 +39,11 @@ def joined(sources: Sequence[Source], way: str, known: Known) -> Source:
         raise DisasmError("`join`: give the files that are columns of one recording")
     tables = [_table(source) for source in sources]
     by_time = way == "time" and known.rate is None
-    parts = _on_time(sources, tables, known) if by_time else _by_rows(sources, tables)
+    interpolated = list[str]()
+    if by_time:
+        parts, interpolated = _on_time(sources, tables, known)
+    else:
+        parts = _by_rows(sources, tables)
     count = collections.Counter(name for part in parts for name in part)
     time = time_label(tables[0], known)
     channels, labels = dict[str, Array](), dict[str, str]()
@@ -62,6 +66,7 @@ def joined(sources: Sequence[Source], way: str, known: Known) -> Source:
         constants={n: c for table in tables for n, c in table.constants.items()},
         labels=labels,
         left_out={n: why for table in tables for n, why in table.left_out.items()},
+        notes=(*_notes(sources, tables), *interpolated),
     )
     return Source(
         sources[0].path,
@@ -95,18 +100,24 @@ def _by_rows(
 
 def _on_time(
     sources: Sequence[Source], tables: Sequence[Stream], known: Known
-) -> list[dict[str, Array]]:
-    """Returns the channels of each table on the first one's times."""
+) -> tuple[list[dict[str, Array]], list[str]]:
+    """Returns the channels of each table on the first one's times, and how."""
     names = [_time_of(s, t, known) for s, t in zip(sources, tables, strict=True)]
     times = [_seconds(t.channels[n]) for t, n in zip(tables, names, strict=True)]
     if all(np.array_equal(time, times[0]) for time in times):
         return [
             {n: v for n, v in table.channels.items() if i == 0 or n != names[i]}
             for i, table in enumerate(tables)
-        ]
+        ], []
     at, (begin, end) = times[0], _common(sources, times)
     kept = (at >= begin) & (at <= end)
     parts = [{n: v[kept] for n, v in tables[0].channels.items()}]
+    rates = [_rate_words(time) for time in times]
+    words = [
+        f"{source.label}, at {rate}, interpolated at the times of "
+        f"{sources[0].label}, at {rates[0]}"
+        for source, rate in zip(sources[1:], rates[1:], strict=True)
+    ]
     for table, time, name in zip(tables[1:], times[1:], names[1:], strict=True):
         parts.append(
             {
@@ -115,7 +126,21 @@ def _on_time(
                 if n != name
             }
         )
-    return parts
+    return parts, words
+
+
+def _rate_words(time: Array) -> str:
+    steps = np.diff(time[np.isfinite(time)])
+    return f"{1.0 / np.median(steps):.4g} Hz" if (steps > 0).any() else "one time"
+
+
+def _notes(sources: Sequence[Source], tables: Sequence[Stream]) -> list[str]:
+    """Returns the notes on each table, the other files' with the file's label."""
+    return [
+        f"{source.label}: {note}" if i else note
+        for i, (source, table) in enumerate(zip(sources, tables, strict=True))
+        for note in table.notes
+    ]
 
 
 def _time_of(source: Source, table: Stream, known: Known) -> str:

@@ -69,7 +69,7 @@ class Preset:
 
     def _labelled(self, stream: Stream, source: Source) -> Stream:
         names = stream.names
-        if stream.name or names != [f"column_{i}" for i in range(len(names))]:
+        if not stream.is_unnamed or stream.left_out:
             return stream
         count = len(self.joints)
         blocks, rest = divmod(len(names) - 1, count)

@@ -1,7 +1,7 @@
 """A recording as rows of a log: mapped, in SI units, on one time line."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,7 @@ from drake_disasm.importing.units import UNITS, factor
 
 Array = NDArray[np.float64]
 
+_OF_OTHERS = "of other channels"
 _MOST_DROPPED = 0.1  # of the rows, unless the user accepts more
 
 
@@ -106,22 +107,51 @@ def recordings_of(
     numbers = source.channel(fields.episode) if fields.episode else np.zeros(len(time))
     # Rests are read when they are reached: their stamps were never even.
     may_even = even and fields.rate is None and not may_be_ordered(fields.kind)
+    foreign = _of_others(stream, own, (fields.time, fields.episode))
     found = []
     for number in np.unique(numbers[np.isfinite(numbers)]):
-        rows = numbers == number
+        rows = (numbers == number) & ~foreign
         label = (
             f"{source.path.name}[{number:g}]" if fields.episode else source.path.name
         )
         part = {name: values[rows] for name, values in columns.items()}
         numbered = None if stream.sequence is None else stream.sequence[rows]
         evening = _Evening(may_even, numbered)
-        found.append(_clean(label, time[rows], part, accept, evening))
+        clean = _clean(label, time[rows], part, accept, evening)
+        if count := int((foreign & (numbers == number)).sum()):
+            dropped = clean.dropped | {_OF_OTHERS: count}
+            clean = dataclasses.replace(clean, dropped=dropped)
+        found.append(clean)
     if not found:
         raise DisasmError(f"{source.path}: '{fields.episode}' numbers no episode")
     others = {n: c for n, c in fields.columns.items() if n not in own}
     features = _features(fields) if shifts and others else None
     rest = dataclasses.replace(fields, columns=others)
     return [_with_others(each, source, rest, features, accept) for each in found]
+
+
+def _of_others(
+    stream: Stream, columns: Mapping[str, Column], clocks: Sequence[str | None]
+) -> NDArray[np.bool_]:
+    """Returns which rows (n,) of a table are those of other channels.
+
+    A program that writes several topics in one table leaves the cells of all others
+    empty in each row.
+
+    Args:
+        stream: the table.
+        columns: of the map.
+        clocks: channels that number the rows of all topics.
+    """
+    mapped = {channel for column in columns.values() for channel in column.channels}
+    own, others = (np.zeros(stream.rows, dtype=bool) for _ in range(2))
+    for name, values in stream.channels.items():
+        is_filled = ~np.isnan(values)
+        if name in mapped:
+            own |= is_filled
+        elif name not in clocks and not is_filled.all():  # one of all rows is of none
+            others |= is_filled
+    return others & ~own
 
 
 def _features(fields: FieldMap) -> Features | None:

@@ -2,12 +2,13 @@
 
 import contextlib
 import datetime
+import itertools
 import math
 import re
 import warnings
 import zipfile
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +17,20 @@ import numpy as np
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.common.text import clipped
+from drake_disasm.importing.heads import PEEKED, Head, head_of, names_of
 from drake_disasm.importing.stream import Stream, readable
-from drake_disasm.importing.tables import streams_of_columns
+from drake_disasm.importing.tables import (
+    TableColumn,
+    past_midnight,
+    streams_of_columns,
+)
 from drake_disasm.logs.schema import MOST_CELLS
 
 _MOST_BYTES = 2**33  # unpacked
 _MOST_ROWS = 2**20  # Excel's own limit
 _MIDNIGHT = datetime.datetime.min
 _UTC = datetime.UTC
+_EMPTY = (None, "")
 
 
 def parted(path: Path) -> tuple[Path, str]:
@@ -33,10 +40,10 @@ def parted(path: Path) -> tuple[Path, str]:
 
 
 def read_xlsx(path: Path, sheet: str = "") -> list[Stream]:
-    """Reads one sheet of a workbook as a table, with the columns' names in its top row.
+    """Reads one sheet of a workbook as a table, of which `head_of` tells the names.
 
     Formulas have the values that were saved with them. Dates become seconds since 1970,
-    times and durations seconds. A column with any other text is left out.
+    times and durations seconds. Any other text is no number.
 
     Args:
         path: of the workbook.
@@ -57,8 +64,8 @@ def read_xlsx(path: Path, sheet: str = "") -> list[Stream]:
             path, read_only=True, data_only=True, keep_links=False
         )
         with contextlib.closing(book):
-            names, columns = _table(path, _rows(path, _chosen(path, book, sheet)))
-    return streams_of_columns(path, names, columns)
+            table = _table(path, _rows(path, _chosen(path, book, sheet)))
+    return streams_of_columns(path, *table)
 
 
 def _chosen(path: Path, book: Any, sheet: str) -> Any:
@@ -89,52 +96,89 @@ def _rows(path: Path, sheet: Any) -> Iterator[tuple[int, Sequence[Any]]]:
         cells += len(row)
         if number > _MOST_ROWS or cells > MOST_CELLS:
             raise DisasmError(f"{path}: has more rows than a sheet may have; cut it")
-        if any(cell not in (None, "") for cell in row):
+        if any(cell not in _EMPTY for cell in row):
             yield number, row
 
 
 def _table(
     path: Path, rows: Iterator[tuple[int, Sequence[Any]]]
-) -> tuple[list[str], list[np.ndarray | None]]:
-    """Returns the columns' names, and their numbers (n,); None for text.
-
-    Names are in the top row, or column_0, ... if that has numbers alone.
+) -> tuple[Sequence[str], list[TableColumn], Head]:
+    """Returns the columns' names, the columns and what stands above them.
 
     Raises:
-        DisasmError: a cell stands beside the table that the top row heads.
+        DisasmError: a cell stands beside the table.
     """
-    _, top = next(rows, (1, ()))
-    held = [i for i, cell in enumerate(top) if cell not in (None, "")]
-    first, end = min(held, default=0), max(held, default=-1) + 1
-    values = [array("d") for _ in range(first, end)]
-    texts = set[int]()
-    names = [
-        f"column_{i}" if cell is None else " ".join(str(cell).split())
-        for i, cell in enumerate(top[first:end])
-    ]
-    if all(_number(cell) is not None for cell in top[first:end]):
-        names = [f"column_{i}" for i in range(end - first)]
-        _append(values, texts, top[first:end])
-    for number, row in rows:
-        if any(cell not in (None, "") for cell in (*row[:first], *row[end:])):
+    first = list(itertools.islice(rows, PEEKED))
+    held = [i for _, row in first for i, cell in enumerate(row) if cell not in _EMPTY]
+    begin = min(held, default=0)
+    head = head_of([_trimmed(row)[begin:] for _, row in first], _is_number, True)
+    end = begin + head.width
+    columns = [_Column() for _ in range(head.width)]
+    for number, row in itertools.chain(first[head.rows :], rows):
+        if any(cell not in _EMPTY for cell in (*row[:begin], *row[end:])):
             raise DisasmError(
-                f"{path}: row {number} has cells beside the {end - first} columns of "
-                "the top row; name each column there, and clear other cells"
+                f"{path}: row {number} has cells beside the {head.width} columns of "
+                "the table; name each column, and clear other cells"
             )
-        _append(values, texts, row[first:end])
-    if not values or not len(values[0]):
+        for column, cell in itertools.zip_longest(columns, row[begin:end]):
+            column.add(number, cell)
+    if not columns or not len(columns[0].values):
         raise DisasmError(f"{path}: has no rows")
-    columns = [None if i in texts else np.array(v) for i, v in enumerate(values)]
-    return names, columns
+    names = head.names or names_of([""] * head.width)
+    return names, [column.done for column in columns], head
 
 
-def _append(values: "list[array[float]]", texts: set[int], row: Sequence[Any]) -> None:
-    """Appends a row to the columns, and notes which of them hold text."""
-    for i, column in enumerate(values):
-        number = _number(row[i]) if i < len(row) else math.nan
-        if number is None:
-            texts.add(i)
-        column.append(math.nan if number is None else number)
+def _trimmed(row: Sequence[Any]) -> Sequence[Any]:
+    """Returns a row up to its last cell that is not empty."""
+    end = max((i for i, cell in enumerate(row) if cell not in _EMPTY), default=-1)
+    return row[: end + 1]
+
+
+class _Column:
+    """The cells of a column, as numbers."""
+
+    def __init__(self) -> None:
+        self.values = array("d")
+        self._filled = self._wrong = self._clocks = 0
+        self._first = list[str]()
+
+    def add(self, number: int, cell: Any) -> None:
+        """Adds the cell of a row of this number."""
+        value = _number(cell)
+        self._filled += cell not in _EMPTY
+        self._clocks += value is not None and isinstance(_parsed(cell), datetime.time)
+        if value is None:
+            self._wrong += 1
+            if len(self._first) < 3:
+                self._first.append(f"'{clipped(str(cell))}' in row {number}")
+        self.values.append(math.nan if value is None else value)
+
+    @property
+    def done(self) -> TableColumn:
+        """The column."""
+        values = np.array(self.values)
+        if self._clocks and self._clocks == np.isfinite(values).sum():
+            values = past_midnight(values)
+        return TableColumn(values, self._filled, self._wrong, tuple(self._first))
+
+
+def _is_number(cell: Any) -> bool:
+    return _number(cell) is not None
+
+
+def _parsed(cell: Any) -> Any:
+    """Returns what a text says, where that is a number, a date or a time of day."""
+    if not isinstance(cell, str):
+        return cell
+    ways: tuple[Callable[[str], Any], ...] = (
+        float,
+        datetime.datetime.fromisoformat,
+        datetime.time.fromisoformat,
+    )
+    for way in ways:
+        with contextlib.suppress(ValueError):
+            return way(cell.replace(",", "."))
+    return cell
 
 
 def _number(cell: Any) -> float | None:
@@ -145,16 +189,10 @@ def _number(cell: Any) -> float | None:
 
     if cell is None or cell == "" or cell in ERROR_CODES:
         return math.nan
-    if isinstance(cell, str):
-        try:
-            return float(cell.replace(",", "."))
-        except ValueError:
-            pass
-        try:
-            cell = datetime.datetime.fromisoformat(cell)
-        except ValueError:
-            return None
-    return _seconds(cell)
+    found = _parsed(cell)
+    if isinstance(found, str):
+        return None
+    return found if isinstance(found, float) else _seconds(found)
 
 
 def _seconds(

@@ -53,6 +53,11 @@ class Source:
         return sheets.parted(self.path)[1] or self.path.stem
 
     @property
+    def notes(self) -> list[str]:
+        """What its reader took for granted, or could not read, after its name."""
+        return [f"{self.path.name}: {n}" for s in self.streams for n in s.notes]
+
+    @property
     def files(self) -> dict[str, str]:
         """The sums of its files, by their paths."""
         return dict(self.parts or ((str(self.path), self.sha256),))

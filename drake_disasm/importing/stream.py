@@ -34,6 +34,7 @@ class Stream:
         labels: what metadata call a channel, where that is not its name.
         left_out: why a part of the recording is no channel, by its name.
         sequence: (n,) numbers of a topic's messages, of which some may be lost.
+        notes: what its reader took for granted, or could not read.
     """
 
     name: str
@@ -45,11 +46,18 @@ class Stream:
     labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
     left_out: Mapping[str, str] = dataclasses.field(default_factory=dict)
     sequence: Array | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def names(self) -> list[str]:
         """Of its channels."""
         return list(self.channels)
+
+    @property
+    def is_unnamed(self) -> bool:
+        """Whether it is a table without names: its columns are numbered."""
+        numbers = [f"column_{i}" for i in range(len(self.names) + len(self.left_out))]
+        return not self.name and {*self.names, *self.left_out} == {*numbers}
 
     @property
     def rows(self) -> int:

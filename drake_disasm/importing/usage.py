@@ -15,6 +15,7 @@ from drake_disasm.importing.vocabulary import (
     NAMES,
     is_alive,
     labels_of,
+    left_out_of,
     named,
     numbered,
     read,
@@ -92,7 +93,9 @@ def _why_not(stream: Stream, name: str, known: Mapping[str, str], kind: str) -> 
         return "not used: it increases in every row, as a time or a count does"
     if quantity is None:
         return f"not used: its name says no quantity of a {kind} log"
-    return f"not used: {quantity} by its name, and not in the map"
+    joint = {x.channel: read(x, NAMES)[1] for x in labels_of(stream)}[name]
+    whose = f" of '{'_'.join(joint)}'" if joint and not joint[0].isdigit() else ""
+    return f"not used: {quantity}{whose} by its name, and not in the map"
 
 
 def check_torques(source: Source, fields: FieldMap) -> None:
@@ -107,10 +110,12 @@ def check_torques(source: Source, fields: FieldMap) -> None:
     by_name = named(stream, "tau", NAMES)
     labels = numbered(stream, NAMES["tau"]) + [x for k in by_name.values() for x in k]
     left = [x.channel for x in labels if x.channel not in used]
-    if left and is_alive(stream, left):
+    out = left_out_of(stream, "tau", NAMES)
+    if out or (left and is_alive(stream, left)):
         raise DisasmError(
-            f"{source.path}: has torques that are not in the map: {_some(left)}; add "
-            "them as tau, or accept it by `accept_left_out`"
+            f"{source.path}: has torques that are not in the map: "
+            f"{_some([*out, *left])}; add them as tau, or accept it by "
+            "`accept_left_out`"
         )
 
 
@@ -121,6 +126,8 @@ def without_torques(source: Source, fields: FieldMap) -> str:
     stream, used = main_stream(source, fields), _used(fields)
     left = [n for n in stream.names if n not in used and is_alive(stream, [n])]
     words = "the log has no torques, without which no effect can be found"
+    if "q_commanded" in _quantities(stream).values():
+        words += "; with commanded positions it may be one of `kind` joint_response"
     if not left:
         return words
     return (

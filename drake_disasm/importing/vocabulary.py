@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from drake_disasm.common.text import clipped
 from drake_disasm.importing.stream import Stream
 from drake_disasm.importing.units import UNITS
 
@@ -27,6 +28,7 @@ NAMES: Names = {
         "tau", "torque", "torques", "effort", "efforts", "joint_torque",
         "joint_torques", "joint_effort", "tau_measured", "actual_torque", "tau_j",
         "msr_trq", "force", "tau_msr", "tau_m", "actual.effort", "feedback.effort",
+        "motor_torque", "motor_torques",
     ),
     "q_commanded": (
         "q_commanded", "q_cmd", "q_desired", "q_des", "q_d", "q_ref", "q_target",
@@ -47,6 +49,15 @@ NAMES: Names = {
         "target_current",
     ),
 }  # fmt: skip
+#: In what a quantity may be, where a unit stands behind its name.
+_DIMENSIONS = {
+    "time": ("time",),
+    "q": ("angle", "length"),
+    "q_commanded": ("angle", "length"),
+    "tau": ("torque", "force"),
+    "v": ("angular velocity", "velocity"),
+    "current": ("current",),
+}
 _AXES = {("x",), ("y",), ("z",), ("w",)}
 _ALONE = ("time", "order")  # nothing stands beside these
 _BEFORE = "interface_values"  # before a joint's name in DynamicJointState
@@ -62,7 +73,7 @@ class Label:
     Attributes:
         channel: its name in the recording.
         text: what metadata call it, without topic, unit and mark of a list.
-        unit: in brackets behind it, or "".
+        unit: behind it, in brackets or after an underscore, or "".
     """
 
     channel: str
@@ -71,9 +82,9 @@ class Label:
 
     @property
     def plain(self) -> str:
-        """In small letters, with dots: "/joint_states/Position[0] [deg]" is
-        "joint_states.position[0]"."""
-        return self.text.lower().replace("/", ".").strip(".")
+        """In small letters, with dots: "/joint_states/Motor position[0] [deg]" is
+        "joint_states.motor_position[0]"."""
+        return "_".join(self.text.lower().replace("/", ".").strip(".").split())
 
     @property
     def tokens(self) -> Tokens:
@@ -85,12 +96,15 @@ class Label:
 
 def labels_of(stream: Stream) -> list[Label]:
     """Returns how the names of a stream's channels read."""
-    found = []
+    texts = dict[str, str]()
     for name in stream.names:
         text = stream.labels.get(name, name).removeprefix(f"{stream.name}:")
-        text, unit = _text_and_unit(re.sub(r"^[-*•]\s+", "", text.strip()))
-        found.append(Label(name, text, unit))
-    return found
+        texts[name] = re.sub(r"^[-*•]\s+", "", text.strip())
+    endings = dict[str, set[str]]()
+    for text in texts.values():
+        head, _, end = text.rpartition("_")
+        endings.setdefault(head, set()).add(end)
+    return [Label(n, *_text_and_unit(text, endings)) for n, text in texts.items()]
 
 
 def tokens_of(text: str) -> Tokens:
@@ -98,11 +112,52 @@ def tokens_of(text: str) -> Tokens:
     return tuple(word for word in re.split(r"[^0-9A-Za-z]+", text) if word)
 
 
-def _text_and_unit(text: str) -> tuple[str, str]:
-    """Returns a name, and the unit in brackets behind it, if it is known."""
+def _text_and_unit(text: str, endings: Mapping[str, set[str]]) -> tuple[str, str]:
+    """Returns a name, and the unit behind it, if it is known.
+
+    In brackets it may be any; after an underscore one that the quantity may be in.
+
+    Args:
+        text: the name.
+        endings: what stands behind the last underscore of names, by what stands before.
+    """
     match = re.fullmatch(r"(.*?)[ _]*[\[(]([^\[\]()]+)[\])]", text)
-    is_unit = match and match[2].strip() in UNITS and not match[2].strip().isdigit()
-    return (match[1], match[2].strip()) if match and is_unit else (text, "")
+    if match and match[2].strip() in UNITS and not match[2].strip().isdigit():
+        return match[1], match[2].strip()
+    head, _, end = text.rpartition("_")
+    unit = _unit_at_end(head, end)
+    # A letter may be a joint's: position_l, position_m.
+    is_joint = len(end) == 1 and not all(
+        _unit_at_end(head, each) for each in endings.get(head, ())
+    )
+    return (head, unit) if unit and not is_joint else (text, "")
+
+
+def _unit_at_end(head: str, end: str) -> str:
+    """Returns the unit that a name ends with, in which its quantity may be, or ""."""
+    quantity = quantity_said(head, NAMES) if end else ""
+    for unit, (dimension, _) in UNITS.items():
+        is_same = end == unit or (len(end) > 1 and end.lower() == unit.lower())
+        if is_same and dimension in _DIMENSIONS.get(quantity, ()):
+            return unit
+    return ""
+
+
+def quantity_said(text: str, names: Names) -> str:
+    """Returns the quantity that a name says, whatever number is behind it; or ""."""
+    bare = re.sub(r"[._\[ ]?\d+\]?$", "", text)
+    parts = (bare, re.split(r"[./]", bare)[-1])
+    found = (read(Label(part, part, ""), names)[0] for part in parts)
+    return next(filter(None, found), "")
+
+
+def left_out_of(stream: Stream, quantity: str, names: Names) -> list[str]:
+    """Returns what is left out of a stream though its name says a quantity, and why."""
+    return [
+        f"'{clipped(name)}' {why}"
+        for name, why in stream.left_out.items()
+        if quantity_said(name.removeprefix(f"{stream.name}:"), names) == quantity
+    ]
 
 
 def numbered(stream: Stream, usual: Sequence[str]) -> list[Label]:
@@ -154,6 +209,9 @@ def read(label: Label, names: Names) -> tuple[str, Tokens]:
     The quantity is at either end of it; of several the longest name counts, of two that
     are as long the one at the beginning.
     """
+    _, dot, member = label.plain.rpartition(".")
+    if dot and member in names.get("time", ()):
+        return "time", ()  # of a structure
     words = label.tokens
     low = tuple(word.lower() for word in words)
     best, length, rest = "", 0.0, words

@@ -53,6 +53,24 @@ def test_a_recording_whose_names_tell_nothing_is_shown(tmp_path: Path) -> None:
     assert_one_line(refused, ["run.csv", "--show", "--save-map"])
 
 
+def test_what_could_not_be_read_is_printed_and_kept(tmp_path: Path) -> None:
+    time = 0.01 * np.arange(600)
+    rows = [f"{t:.2f},{np.sin(t):.6f},{np.cos(t):.6f}" for t in time]
+    rows[9] = "0.09,n/a,1"
+    (tmp_path / "run.csv").write_text("\n".join(["A run", "time,q,tau", *rows]))
+    run = run_program("import-log", tmp_path / "run.csv", "--out", tmp_path / "log")
+    notes = [
+        "1 line above the table skipped",
+        "q: 1 cell is no number: 'n/a' in line 12",
+    ]
+    assert run.stdout.splitlines()[:2] == [f"run.csv: {note}" for note in notes]
+    assert "1 row without numbers left out" in run.stdout
+    origin: Any = read_log(tmp_path / "log").header.provenance["import"]
+    assert origin["notes"] == [f"run.csv: {note}" for note in notes]
+    run = run_program("import-log", tmp_path / "run.csv", "--show")
+    assert all(note in run.stdout for note in notes)
+
+
 def test_a_recording_becomes_a_log(table: Path, tmp_path: Path) -> None:
     run = run_program("import_log", str(table), "--out", str(tmp_path / "log"))
     assert run.returncode == 0, run.stderr

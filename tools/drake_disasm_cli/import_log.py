@@ -181,6 +181,9 @@ def main(arguments: Sequence[str]) -> int:
     if not (args.show or args.out or args.save_map):
         raise DisasmError("--out: give a folder for the log, or --show to look first")
     sources = _sources(args)
+    if not args.show:
+        for note in (note for source in sources for note in source.notes):
+            print(note)
     try:
         fields = _fields(args, sources)
     except NoGuessError as error:

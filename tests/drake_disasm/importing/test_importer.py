@@ -63,6 +63,9 @@ _FIELDS = {
 }
 
 
+_RAW = Processing(cutoff=5.0)
+
+
 def _fields(**columns: Any) -> FieldMap:
     return parse_map(_FIELDS | {"columns": columns})
 
@@ -197,6 +200,24 @@ def test_gaps_part_episodes_and_rows_that_can_t_be_go(tmp_path: Path) -> None:
     assert len(found.episodes) == 2
     assert sum(found.dropped.values()) == 4
     assert np.diff(found.recordings[0].time).min() > 0.004
+
+
+def test_rows_of_another_topic_in_a_table_are_no_lost_rows(tmp_path: Path) -> None:
+    """PlotJuggler leaves the cells of all other topics empty in each row."""
+    time = 0.005 * np.arange(4000)
+    own = np.arange(4000) % 2 == 0
+    q, tau = (np.where(own, wave(time), np.nan) for wave in (np.sin, np.cos))
+    temperature = np.where(own, np.nan, 20.0 + time)
+    columns = {"time": time, "q": q, "tau": tau, "temperature": temperature}
+    source = _csv(tmp_path / "run.csv", list(columns), *columns.values())
+    found = import_recordings([source], guessed_map(source, "joint_motion"), _RAW)
+    assert found.dropped == {"of other channels": 2000}
+    assert found.recordings[0].time[1] == pytest.approx(0.01)
+    columns["temperature"] = 20.0 + time  # in all rows: these are lost
+    source = _csv(tmp_path / "run.csv", list(columns), *columns.values())
+    fields = guessed_map(source, "joint_motion")
+    message = refusal(import_recordings, [source], fields, _RAW)
+    assert "2000 without numbers" in message
 
 
 def test_a_log_says_what_was_done(tmp_path: Path) -> None:

@@ -20,8 +20,9 @@ from drake_disasm.importing.field_map import FieldMap
 from drake_disasm.importing.lerobot import calibrated
 from drake_disasm.importing.presets import PRESETS
 from drake_disasm.importing.source import Source
-from drake_disasm.importing.usage import uses
+from drake_disasm.importing.usage import uses, without_torques
 from drake_disasm.importing.vocabulary import matched, tokens_of
+from drake_disasm.logs.schema import WRENCH
 from tests.refusals import refusal
 
 _TIME = 0.01 * np.arange(400)
@@ -100,6 +101,84 @@ def test_joints_are_matched_by_name_whatever_their_order(tmp_path: Path) -> None
     assert "(b_joint, a_joint) are not x, y; give `joints`" in message
     fields = _guess(source, joints=["x", "y"], in_order=True)
     assert fields.columns["tau"].channels == ("- b_joint_effort", "- a_joint_effort")
+
+
+def test_given_joints_are_in_order_though_some_names_match(tmp_path: Path) -> None:
+    columns = {
+        f"position.{n}": _Q[:, i] for i, n in enumerate(("base", "elbwo", "hand"))
+    }
+    source = _table(tmp_path / "run.csv", t=_TIME, **columns)
+    message = refusal(_guess, source, joints=["base", "elbow", "hand"])
+    assert "give `joints`" in message
+    fields = _guess(source, joints=["base", "elbow", "hand"], in_order=True)
+    assert fields.columns["q"].channels == tuple(columns)
+    assert fields.joints == ("base", "elbow", "hand")
+    message = refusal(_guess, source, joints=["hand", "elbow", "base"], in_order=True)
+    assert "'hand' is number 1 of `joints`, and 3 of the recording's" in message
+
+
+@pytest.mark.parametrize(
+    ("names", "units"),
+    [
+        (("time_ms", "position_deg", "torque_Nm"), ("ms", "deg", "Nm")),
+        (("t_us", "pos_rad", "torque_mnm"), ("us", "rad", "mNm")),
+        (("Time__(s)", "Angle__(deg)", "Motor__torque__(Nm)"), ("s", "deg", "Nm")),
+        (("time", "position_m", "force_N"), ("s", "m", "N")),
+        (("time", "tau_m", "q"), ("s", "", "")),
+        (("time", "q1_deg", "tau1_Nm"), ("s", "deg", "Nm")),
+    ],
+)
+def test_units_at_the_end_of_a_name_are_units(
+    tmp_path: Path, names: tuple[str, ...], units: tuple[str, ...]
+) -> None:
+    source = _table(tmp_path / "run.csv", **dict(zip(names, _Q.T, strict=False)))
+    fields = _guess(source)
+    found = [fields.columns[n].unit for n in ("q", "tau")]
+    assert [fields.time_unit, *found] == list(units) and fields.joints == ("joint_0",)
+
+
+def test_a_letter_beside_others_is_a_joint_s(tmp_path: Path) -> None:
+    names = {"position_l": _Q[:, 0], "position_m": _Q[:, 1]}
+    assert _guess(_table(tmp_path / "run.csv", t=_TIME, **names)).joints == ("l", "m")
+
+
+def test_a_structure_s_time_is_no_position(tmp_path: Path) -> None:
+    def _record(late: float) -> Source:
+        names = {"q.time": _TIME, "q.signals.values": _Q[:, 0]}
+        names |= {"tau.time": _TIME + late, "tau.signals.values": _Q[:, 1]}
+        return _table(tmp_path / "run.csv", **names)
+
+    fields = _guess(_record(0.0), preset=PRESETS["matlab"])
+    assert fields.time == "q.time" and fields.joints == ("joint_0",)
+    assert set(fields.columns) == {"q", "tau"}
+    assert "called as time is" in refusal(_guess, _record(0.5))
+
+
+def test_what_is_left_out_is_named_where_it_is_missed(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    good, bad = [f"{0.01 * i},{i % 7}" for i in range(40)], ["x"] * 40
+    rows = [f"{a},{b}\n" for a, b in zip(good, bad, strict=True)]
+    for names, said in (
+        ("tau1,time,q1", "as joint positions are: 'q1' holds text"),
+        ("q1,tau1,time", "`rate`): 'time' holds text"),
+        ("time,q,q", "as joint positions are: 'q' names 2 columns: rename one"),
+    ):
+        path.write_text(f"{names}\n" + "".join(rows))
+        assert said in refusal(_guess, read_source(path))
+    path.write_text("time,q1,tau1\n" + "".join(rows))
+    source = read_source(path)
+    message = refusal(import_recordings, [source], _guess(source), Processing())
+    assert "torques that are not in the map: 'tau1' holds text" in message
+
+
+def test_the_kind_that_fits_is_said(tmp_path: Path) -> None:
+    names = ["order", "qw", "qx", "qy", "qz", *WRENCH]
+    columns = {name: np.arange(5.0) + k for k, name in enumerate(names)}
+    message = refusal(_guess, _table(tmp_path / "run.csv", **columns))
+    assert "its channels are those of `kind` static_wrench" in message
+    columns = {"t": _TIME, "q": _Q[:, 0], "goal_position": _Q[:, 1]}
+    source = _table(tmp_path / "run.csv", **columns)
+    assert "`kind` joint_response" in without_torques(source, _guess(source))
 
 
 def test_names_that_match_twice_are_refused(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from scipy.io import savemat
 
 from drake_disasm.fakes.bag import FakeBag
-from drake_disasm.importing import bags
+from drake_disasm.importing import bags, guessed_map
 from drake_disasm.importing.source import read_source
 from tests.refusals import refusal
 
@@ -61,6 +61,84 @@ def test_csv_without_names_and_with_flags_and_holes(tmp_path: Path) -> None:
     source = read_source(path)
     np.testing.assert_array_equal(source.channel("on"), [1.0, np.nan])
     assert "no channel 'om'; it has on" in refusal(source.channel, "om")
+
+
+def test_a_cell_that_is_no_number_is_missing(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    cells = ["n/a", *map(str, range(19)), ""]
+    rows = [f"{i},{cell},{cell}" for i, cell in enumerate(cells)]
+    path.write_text("t,q,tau\n# a comment\n\n" + "\n".join(rows[::-1]) + "\n")
+    [stream] = read_source(path).streams
+    assert np.isnan(stream.channels["q"]).sum() == 2
+    assert stream.notes == tuple(
+        f"{name}: 1 cell is no number: 'n/a' in line 24" for name in ("q", "tau")
+    )
+
+
+@pytest.mark.parametrize("kind", ["number", "date", "clock"])
+def test_more_than_a_tenth_of_such_cells_are_text(tmp_path: Path, kind: str) -> None:
+    way = {"number": "{}", "date": "2024-05-01 12:00:{:02}", "clock": "12:00:{:02}"}
+    path, cells = tmp_path / "run.csv", [way[kind].format(i) for i in range(18)]
+    for wrong, is_text in ((2, False), (3, True)):
+        rows = [*cells, *["NULL"] * wrong]
+        path.write_text("q,t\n" + "".join(f"1,{cell}\n" for cell in rows))
+        [stream] = read_source(path).streams
+        assert ("t" in stream.left_out) == is_text
+        assert np.isnan(stream.channels.get("t", [np.nan] * 2)).sum() == 2
+    assert (
+        stream.left_out["t"] == "holds text in 3 of 21 cells, such as 'NULL' in line 20"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "labels", "skipped"),
+    [
+        ("A bench;;\nDate;2026-01-01;\nt;q;n\n0;1;2\n1;2;3\n", {}, 2),
+        ("Bench 3, by me\nt,q,n\ns,deg,-\n0,1,2\n1,2,3\n", {"t": "t [s]"}, 1),
+        ("t\tq\tn\ns\tdeg\t\n0,0\t1,0\t2\n1\t2\t3\n", {"t": "t [s]"}, 0),
+        ("t,q,n,\n0,1,2,\n1,2,3,\n", {}, 0),
+        ("t,q,n\nn/a,n/a,n/a\n" + "0,1,2\n1,2,3\n" * 5, {}, 0),
+    ],
+)
+def test_names_are_above_the_numbers(
+    tmp_path: Path, text: str, labels: dict[str, str], skipped: int
+) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(text)
+    [stream] = read_source(path).streams
+    assert stream.names == ["t", "q", "n"]
+    assert {n: v for n, v in stream.labels.items() if n == "t"} == labels
+    assert [note for note in stream.notes if "above" in note] == [
+        f"{skipped} line{'s' * (skipped > 1)} above the table skipped"
+    ] * bool(skipped)
+    assert stream.channels["q"][-2:].tolist() == [1.0, 2.0]
+
+
+def test_a_first_row_of_numbers_is_no_header(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("0,0,base,elbow,0.5,1.5,3\n0,8,base,elbow,0.6,1.6,4\n")
+    [stream] = read_source(path).streams
+    assert stream.is_unnamed and stream.channels["column_4"].tolist() == [0.5, 0.6]
+    assert set(stream.left_out) == {"column_2", "column_3"}
+    message = refusal(guessed_map, read_source(path), "joint_motion")
+    assert "has no line of names" in message and "a map says what each is" in message
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+def test_encodings(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "run.txt"
+    path.write_text("t [s]\tq [°]\n0,5\t1\n1\t2,5\n", encoding=encoding)
+    [stream] = read_source(path).streams
+    assert stream.channels["q [°]"].tolist() == [1.0, 2.5]
+    is_noted = stream.notes == ("read as Windows-1252: no UTF-8",)
+    assert is_noted == (encoding == "cp1252")
+
+
+def test_times_of_day_go_on_at_midnight(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("t;q\n23:59:59,500;1\n0:00:00,250;2\n0:00:01;3\n")
+    times = read_source(path).channel("t")
+    np.testing.assert_allclose(times - times[0], [0.0, 0.75, 1.5], atol=1e-9)
 
 
 def test_dates_and_times_are_seconds_since_1970(tmp_path: Path) -> None:

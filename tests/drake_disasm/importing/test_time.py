@@ -160,6 +160,8 @@ def test_files_are_joined_as_columns(tmp_path: Path) -> None:
         tau = source.channel("tau")
         np.testing.assert_allclose(tau, np.cos(time[: len(tau)]), atol=1e-5)
         assert set(source.files) == {str(first.path), str(other.path)}
+        is_said = [n.endswith("times of a, at 100 Hz") for n in source.notes]
+        assert is_said == [True] * (other is slow)
     by_rows = joined([first, same], "rows", Known())
     assert by_rows.streams[0].names == ["t", "q", "b.t", "tau"]
     named = {"t": time, "elbow": np.sin(time)}
