@@ -260,6 +260,38 @@ def test_spikes_are_placed(arm_log):
     assert found.what.startswith("tau.1: 2 of 800 rows")
 
 
+def _slower(log: Log) -> Log:
+    """Returns a log whose torques a filter has rounded, over five rows."""
+    weights = np.full(5, 0.2)
+
+    def blur(columns):
+        for name in ("tau.0", "tau.1"):
+            columns[name][2:-2] = np.convolve(columns[name], weights, "valid")
+
+    return damaged(log, blur)
+
+
+def test_rounded_friction_at_a_reversal_is_no_spike(arm_log):
+    strong = changed("tau.1", slice(None), lambda v: v + 2.0 * np.sign(_v(arm_log)))
+    log = _slower(damaged(arm_log, strong))
+    assert "spikes" not in findings(log)
+
+
+def test_a_spike_at_a_reversal_is_placed(arm_log):
+    reversal = int(np.flatnonzero(np.diff(np.sign(_v(arm_log))))[3])
+    log = damaged(arm_log, changed("tau.1", [reversal], lambda v: v + 5.0))
+    assert findings(log)["spikes"].rows == {"log/episode_0000": (reversal,)}
+
+
+def test_a_spike_of_the_acceleration_is_placed(arm_log):
+    log = damaged(arm_log, changed("vd.1", [350], lambda v: v + 3000.0))
+    assert 350 in findings(log)["spikes"].rows["log/episode_0000"]
+
+
+def _v(log: Log) -> np.ndarray:
+    return log.episodes[0]["v"][:, 1]
+
+
 def test_spikes_of_a_sensor_are_placed(twin_log):
     add = changed("wrench.fx", [4, 9, 16], lambda v: v + 5.0)
     log = damaged(twin_log, both(add, changed("ft_sensor.fx", [4, 9, 16], _minus)), 2)
