@@ -36,7 +36,7 @@ def dead_channels(
         f"the log is constant in {', '.join(dead)} over all {model.measurements.rows} "
         "rows: is the sensor alive?"
     )
-    remedy = "record it anew, or leave its channels out"
+    remedy = "record it anew; if it was imported, look at the channels in the map"
     return [DataFinding("constant", what, remedy, Severity.REFUSE)]
 
 

@@ -1,11 +1,12 @@
 """Torques that are none of their joints', of a log that has no finding."""
 
 import numpy as np
-from damaged_logs import damaged
+from damaged_logs import damaged, scaled
 
 from drake_disasm.logs import Log
-from sysid.data_checks import check_data
+from sysid.data_checks import check_data, refuse
 from sysid.models.from_logs import ModelChoice, model_of
+from tests.refusals import refused
 
 
 def _texts(log: Log, **columns: np.ndarray) -> dict[str, str]:
@@ -19,6 +20,18 @@ def test_amperes_are_told_by_gravity(arm_log: Log) -> None:
     tau = arm_log.episodes[0]["tau"]
     found = _texts(arm_log, **{"tau.0": tau[:, 0] / 12.0, "tau.1": tau[:, 1] / 15.0})
     assert "motor currents" in found["units"]
+
+
+def test_a_factor_of_all_joints_torques_is_refused(arm_log: Log) -> None:
+    log = damaged(arm_log, scaled(1e3, "tau"))
+    found = check_data([log], model_of([log], ModelChoice(fixed=True)))
+    with refused("at all joints that tell", "`scale: 0.001` of tau in the map"):
+        refuse(found)
+
+
+def test_a_factor_of_one_joint_s_torque_may_be_a_placeholder_s(arm_log: Log) -> None:
+    log = damaged(arm_log, scaled(1e3, "tau.0"))
+    refuse(check_data([log], model_of([log], ModelChoice(fixed=True))))
 
 
 def test_another_joint_s_channel_is_told(arm_log: Log) -> None:
