@@ -1,6 +1,8 @@
 """Each kind of finding: a damage that it names, of logs that have no finding."""
 
+import dataclasses
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -155,6 +157,58 @@ def test_a_quantum_that_is_fine_or_declared_is_none(twin_log):
     chosen.scenario.ft_sensor.quantum[:3] = [0.5] * 3
     found = check_data([log], chosen)
     assert not [finding for finding in found if finding.kind == "quantum"]
+
+
+def imported(log: Log, **said: Any) -> Log:
+    """Returns a log with what an import says of it."""
+    header = dataclasses.replace(log.header, provenance={"import": said})
+    return dataclasses.replace(log, header=header)
+
+
+def test_what_an_import_saw_repeated_is_placed(arm_log):
+    """A filter ripples where a sensor stops, so the log repeats nothing."""
+    held = {"episode_0000": {"tau.1": [[2.0, 2.5, False], [4.0, 4.1, False]]}}
+    found = only(imported(arm_log, held=held), "stuck")
+    assert found.rows == {"log/episode_0000": (*range(200, 251), *range(400, 411))}
+    assert "tau.1 repeats a value" in found.what
+
+
+@pytest.mark.parametrize("held", [3, {"episode_0000": {"tau.1": [["x", {}, 1], 2]}}])
+def test_a_provenance_that_says_something_else_says_nothing(arm_log, held):
+    assert findings(imported(arm_log, held=held)) == {}
+
+
+# Motions that are none, and encoders that wrap.
+
+
+def test_an_arm_that_stands_is_refused(arm_log):
+    def stand(columns):
+        for name in ("q.0", "q.1", "v.0", "v.1", "vd.0", "vd.1"):
+            columns[name][:] = 0.5 if name[0] == "q" else 0.0
+
+    found = findings(damaged(arm_log, stand))["still"]
+    with refused("no joint moves", "record a motion"):
+        refuse([found])
+
+
+def test_a_motion_that_is_noise_is_named(arm_log):
+    done = {"noise_in_accelerations": {}}
+    found = only(imported(arm_log, processing=done), "still")
+    assert found.severity is Severity.WARN
+    done = {"noise_in_accelerations": {"q.1": 0.01}}
+    assert findings(imported(arm_log, processing=done)) == {}
+
+
+def test_an_encoder_that_wraps_is_placed(arm_log):
+    q = arm_log.episodes[0]["q"][:, 0]
+    turned = changed("q.0", slice(None), lambda v: (v + np.pi - 0.3) % (2 * np.pi))
+    wrapped = changed("q.0", slice(None), lambda v: np.where(v > 0.3, v - 2 * np.pi, v))
+    assert "derivatives" not in findings(damaged(arm_log, turned))
+    found = findings(damaged(arm_log, wrapped))["derivatives"]
+    assert "q.0 jumps by a whole turn" in found.what
+    [rows] = found.rows.values()
+    jumps = np.flatnonzero(np.diff(q > 0.3)) + 1
+    assert set(rows) == set(jumps.tolist())
 
 
 # Time, and rest.
