@@ -12,12 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.importing.signals import quantum
+
 Array = NDArray[np.float64]
 
 #: Rows: a value that is repeated less often may be chance of a quantum.
 FEWEST = 10
 #: Of other rows, and values: where more are repeated, a channel is coarse, not stuck.
 COARSE = 0.2
+_ONE_STEP = 1.5  # quanta: less is one, rounded
 _MEASURED = ("tau", "wrench", "ft_sensor")  # a robot may stand, and command nothing
 
 
@@ -58,10 +61,11 @@ def held_rows(
         coarse: share of other rows that may repeat the one before, and of values
             that may be repeated so often.
     """
-    held = [_in_long_runs(own, fewest) for own in values]
+    everything = np.concatenate(values)
+    step = quantum(everything)
+    held = [_in_long_runs(own, fewest, step) for own in values]
     again = [np.diff(own, prepend=np.nan) == 0.0 for own in values]
     flagged, repeated = np.concatenate(held), np.concatenate(again)
-    everything = np.concatenate(values)
     long = flagged[~repeated].mean()  # of all runs, by their first rows
     is_stuck = flagged.any() and not flagged.all() and long <= coarse
     if not is_stuck or repeated[~flagged].mean() > coarse:
@@ -111,11 +115,22 @@ def held_of(provenance: Mapping[str, Any], episode: str, column: str) -> list[He
     ]
 
 
-def _in_long_runs(values: Array, fewest: int) -> NDArray[np.bool_]:
-    """Returns which rows (n,) belong to a long run of one value."""
+def _in_long_runs(values: Array, fewest: int, step: float) -> NDArray[np.bool_]:
+    """Returns which rows (n,) belong to a long run of one value.
+
+    A value that is reached and left by one quantum is that of a coarse channel which
+    hardly changes, as at rest.
+
+    Args:
+        values: (n,).
+        fewest: rows of a run.
+        step: the channel's quantum; 0 for none.
+    """
     begin = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
     length = np.diff(np.append(begin, len(values)))
-    return np.repeat(length >= fewest, length)
+    jumps = np.abs(np.diff(values[begin])) > _ONE_STEP * step
+    is_held = np.append(jumps, False) | np.append(False, jumps)
+    return np.repeat((length >= fewest) & is_held, length)
 
 
 def _runs(values: Array) -> list[tuple[int, int]]:

@@ -40,6 +40,16 @@ def test_a_coarse_or_constant_channel_holds_nothing(step: float) -> None:
     assert not held_rows([np.round(TAU / step)])[0].any()
 
 
+def test_a_coarse_channel_at_rest_holds_nothing() -> None:
+    moves = np.clip(TIME - 0.5, 0.0, 1.0) ** 2
+    own = np.round(moves * (TAU - 3.0) / 0.01) * 0.01
+    assert np.all(own[:50] == own[0]) and own[49] != own[80]
+    assert not held_rows([own])[0].any()
+    own[1500:1530] = own[1530] + 0.05
+    [mask] = held_rows([own])
+    np.testing.assert_array_equal(np.flatnonzero(mask), np.arange(1500, 1530))
+
+
 def _log(folder: Path, **columns: np.ndarray):
     np.savez(folder / "run.npz", time=TIME, **columns)
     source = read_source(folder / "run.npz")
