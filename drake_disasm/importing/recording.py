@@ -274,7 +274,8 @@ def _unwrapped(
         time, columns: as recorded.
         rows: numbers of those that hold numbers.
     """
-    found, wraps = dict(columns), {}
+    found = dict(columns)
+    wraps: dict[str, int] = {}
     for name in set(_POSITIONS) & set(columns):
         turned, counts = unwrapped(time[rows], columns[name][rows])
         found[name] = columns[name].copy()

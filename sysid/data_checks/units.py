@@ -68,8 +68,9 @@ def _of_all_joints(
     A URDF's inertias may be placeholders, but these are not off by one unit's factor
     at each joint of which gravity tells the scale.
     """
-    is_known = isinstance(expected, FittedExpectation)
-    scales = gravity_scales(values, expected, settings) if is_known else {}
+    scales = {}
+    if isinstance(expected, FittedExpectation):
+        scales = gravity_scales(values, expected, settings)
     for factor in (_THOUSAND, 1.0 / _THOUSAND):
         off = [abs(np.log(scale / factor)) for scale in scales.values()]
         if wrong and off and max(off) < np.log(settings.unit_band):
