@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from drake_disasm.importing.field_map import FieldMap
 from drake_disasm.importing.guess import Known, time_label, unit_of_times
 from drake_disasm.importing.importer import Imported, lone_joint
+from drake_disasm.importing.recording import Recording
 from drake_disasm.importing.signals import clock_of, quantum
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stream import Stream
@@ -127,12 +128,29 @@ def summary(imported: Imported) -> str:
                 else "not compared: `urdf` tells what its sensor should read"
             )
             lines.append(f"{each.name}: the clock of {name} is {words}")
+        lines += _raw_lines(each)
     if done := imported.done:
         lines += _done_lines(imported)
         steps = ", ".join(f"{n} {s:.3g}" for n, s in list(done.quanta.items())[:8])
         if steps:
             lines.append(f"rounded, which is noise of a third of that: {steps}")
     return "\n".join(lines)
+
+
+def _raw_lines(recording: Recording) -> Iterator[str]:
+    """Yields what stands in the rows as recorded: wraps, and values that repeat."""
+    if wraps := recording.wraps:
+        words = ", ".join(f"{name} {count} times" for name, count in wraps.items())
+        yield f"{recording.name}: jumps of a whole turn taken out: {words}"
+    for name, held in recording.held.items():
+        seconds = sum(each.end - each.begin for each in held)
+        at_end = all(each.at_end for each in held)
+        why = "saturated" if at_end else "did the sensor stop"
+        value = "its end value" if at_end else "a value"
+        yield (
+            f"{recording.name}: {name} repeats {value} for {seconds:.3g} s in all, "
+            f"first from {held[0].begin - recording.time[0]:.4g} s on: {why}?"
+        )
 
 
 def joint_words(fields: FieldMap) -> str:

@@ -40,12 +40,14 @@ class Imported:
         episodes: columns of each.
         period: of the rows [s], or None.
         done: signal processing, of joint motion; None of other kinds.
+        spans: the recording of each episode, with the times of its first and last row.
     """
 
     recordings: tuple[Recording, ...]
     episodes: tuple[dict[str, Array], ...]
     period: float | None
     done: Done | None
+    spans: tuple[tuple[Recording, float, float], ...] = ()
 
     @property
     def dropped(self) -> dict[str, int]:
@@ -56,6 +58,23 @@ class Imported:
         if self.done and self.done.short:
             found[_SHORT] = self.done.short
         return dict(found)
+
+    @property
+    def held(self) -> dict[str, dict[str, list[list[Any]]]]:
+        """Where channels repeat a value, as plain data: see `repeats.held_of`."""
+        smeared = 0.5 / self.done.cutoff if self.done else 0.0
+        found = {}
+        for number, (each, first, last) in enumerate(self.spans):
+            parts = {
+                name: [part.within(first, last, smeared) for part in held]
+                for name, held in each.held.items()
+            }
+            found[f"episode_{number:04d}"] = {
+                name: [list(dataclasses.astuple(h)) for h in held if h]
+                for name, held in sorted(parts.items())
+                if any(held)
+            }
+        return {name: parts for name, parts in found.items() if parts}
 
     @property
     def rows(self) -> int:
@@ -99,13 +118,19 @@ def import_recordings(
         period = (
             clock_of(found[0].time).period if fields.kind == "transitions" else None
         )
-        return Imported(tuple(found), episodes, period, None)
+        spans = tuple(_span(each, each.time) for each in found)
+        return Imported(tuple(found), episodes, period, None, spans)
     parts, done = process(found, processing)
     rows = sum(len(each.time) for each in found)
     check_share(found[0].name, {_SHORT: done.short}, rows, accept)
     period = float(np.median(np.diff(parts[0].columns["time"])))
     episodes = tuple(_from_its_begin(part) for part in parts)
-    return Imported(tuple(found), episodes, period, done)
+    spans = tuple(_span(part.recording, part.columns["time"]) for part in parts)
+    return Imported(tuple(found), episodes, period, done, spans)
+
+
+def _span(recording: Recording, time: Array) -> tuple[Recording, float, float]:
+    return recording, float(time[0]), float(time[-1])
 
 
 def _check_needed(fields: FieldMap) -> None:
@@ -229,6 +254,10 @@ def origin(
     stamps = {e.name: e.evened.words() for e in imported.recordings if e.evened}
     if stamps:
         found["stamps"] = stamps
+    wraps = {e.name: e.wraps for e in imported.recordings if e.wraps}
+    for name, values in (("wraps", wraps), ("held", imported.held)):
+        if values:
+            found[name] = values
     if imported.done:
         found["processing"] = processing_origin(imported.done)
     return found
@@ -265,9 +294,7 @@ def low_pass_of(header: LogHeader) -> LowPass | None:
     """
     cutoff: Any
     every: Any
-    done: Any = header.provenance
-    for key in ("import", "processing"):
-        done = done.get(key) if isinstance(done, Mapping) else None
+    done = _processing_in(header)
     if not isinstance(done, Mapping) or done.get("filter") != _FILTER:
         return None
     cutoff, every = done.get("cutoff_Hz"), done.get("decimation")
@@ -276,3 +303,17 @@ def low_pass_of(header: LogHeader) -> LowPass | None:
         return None
     is_possible = every > 0 and 0.0 < cutoff < 0.5 * every / header.period
     return LowPass(float(cutoff), header.period / every) if is_possible else None
+
+
+def is_noise(header: LogHeader) -> bool:
+    """Whether an import saw no joint of a log move clearly more than its noise."""
+    done = _processing_in(header)
+    return isinstance(done, Mapping) and done.get("noise_in_accelerations") == {}
+
+
+def _processing_in(header: LogHeader) -> Any:
+    """Returns `processing_origin` of a log; None, or anything, if it states none."""
+    done: Any = header.provenance
+    for key in ("import", "processing"):
+        done = done.get(key) if isinstance(done, Mapping) else None
+    return done

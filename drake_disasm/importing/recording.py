@@ -22,6 +22,7 @@ from drake_disasm.importing.orientations import (
     frame_poses,
     quaternions,
 )
+from drake_disasm.importing.repeats import Held, held_stretches
 from drake_disasm.importing.shift import (
     MOST_JOINTS,
     UNKNOWN,
@@ -32,7 +33,7 @@ from drake_disasm.importing.shift import (
     link_features,
     motion_features,
 )
-from drake_disasm.importing.signals import clock_of, resample
+from drake_disasm.importing.signals import clock_of, resample, unwrapped
 from drake_disasm.importing.source import Source
 from drake_disasm.importing.stamps import Evened, evened
 from drake_disasm.importing.stream import CLOSEST, LARGEST, Stream
@@ -41,6 +42,7 @@ from drake_disasm.importing.units import UNITS, factor
 Array = NDArray[np.float64]
 
 _OF_OTHERS = "of other channels"
+_POSITIONS = ("q", "q_commanded")
 _MOST_DROPPED = 0.1  # of the rows, unless the user accepts more
 
 
@@ -55,6 +57,8 @@ class Recording:
         dropped: how many rows were left out, by the reason.
         shifts: of other streams' clocks, by the stream's name.
         evened: what was done to stamps of arrival; None of others.
+        held: stretches over which a measured channel repeats a value, by "tau.0".
+        wraps: jumps of a whole turn that were taken out of positions, by "q.0".
     """
 
     name: str
@@ -63,6 +67,8 @@ class Recording:
     dropped: dict[str, int] = dataclasses.field(default_factory=dict)
     shifts: dict[str, Shift] = dataclasses.field(default_factory=dict)
     evened: Evened | None = None
+    held: dict[str, tuple[Held, ...]] = dataclasses.field(default_factory=dict)
+    wraps: dict[str, int] = dataclasses.field(default_factory=dict)
 
     def between(self, begin: float, end: float) -> "Recording":
         """Returns the rows between two times since its begin [s].
@@ -258,6 +264,7 @@ def _clean(
     order = np.flatnonzero(whole)
     if not accept:
         _check_fine(name, time[order])
+    columns, wraps = _unwrapped(time, columns, order)
     found = None
     if evening.wanted and "q" in columns:
         numbers = None if evening.sequence is None else evening.sequence[order]
@@ -265,11 +272,7 @@ def _clean(
     if found:
         time = time.copy()
         time[order] = found.time
-    closest = CLOSEST * clock_of(time[order]).period
-    greatest = np.maximum.accumulate(time[order])
-    later = np.diff(time[order], prepend=-np.inf) > 0.0
-    later[1:] &= time[order][1:] - greatest[:-1] > closest
-    kept = order[later]
+    kept = order[_later(time[order])]
     dropped = {
         "without numbers": len(time) - len(order),
         "at the time of an earlier row, or before": len(order) - len(kept),
@@ -279,7 +282,36 @@ def _clean(
     if len(kept) < 2:
         raise DisasmError(f"{name}: no two rows hold numbers at times that increase")
     rows = {n: values[kept] for n, values in columns.items()}
-    return Recording(name, time[kept], rows, dropped, evened=found)
+    held = held_stretches(time[kept], rows)
+    return Recording(name, time[kept], rows, dropped, {}, found, held, wraps)
+
+
+def _later(time: Array) -> NDArray[np.bool_]:
+    """Returns which times (n,) are after all that come before."""
+    closest = CLOSEST * clock_of(time).period
+    greatest = np.maximum.accumulate(time)
+    later = np.diff(time, prepend=-np.inf) > 0.0
+    later[1:] &= time[1:] - greatest[:-1] > closest
+    return np.asarray(later)
+
+
+def _unwrapped(
+    time: Array, columns: dict[str, Array], rows: NDArray[np.int64]
+) -> tuple[dict[str, Array], dict[str, int]]:
+    """Returns columns with positions that are continuous, and the jumps taken out.
+
+    Args:
+        time, columns: as recorded.
+        rows: numbers of those that hold numbers.
+    """
+    found = dict(columns)
+    wraps: dict[str, int] = {}
+    for name in set(_POSITIONS) & set(columns):
+        turned, counts = unwrapped(time[rows], columns[name][rows])
+        found[name] = columns[name].copy()
+        found[name][rows] = turned
+        wraps |= {f"{name}.{n}": int(c) for n, c in enumerate(counts) if c}
+    return found, wraps
 
 
 def check_share(name: str, dropped: dict[str, int], rows: int, accept: bool) -> None:
@@ -382,6 +414,21 @@ def _joined(
         name: resample(time, values, recording.time[inside])
         for name, values in other.columns.items()
     }
-    time = recording.time[inside]
-    name, even = recording.name, recording.evened
-    return Recording(name, time, columns, dropped, known, even)
+    late = {
+        name: tuple(
+            dataclasses.replace(
+                each, begin=each.begin + seconds, end=each.end + seconds
+            )
+            for each in held
+        )
+        for name, held in other.held.items()
+    }
+    return dataclasses.replace(
+        recording,
+        time=recording.time[inside],
+        columns=columns,
+        dropped=dropped,
+        shifts=known,
+        held=recording.held | late,
+        wraps=recording.wraps | other.wraps,
+    )

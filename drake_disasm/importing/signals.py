@@ -24,6 +24,7 @@ _ROWS_PER_PERIOD = 10.0  # of the cut-off, after decimation
 _JITTER = 0.01  # of the period: below it rows are taken as evenly spaced
 _FINE = 16  # points of the continuous kernel between taps
 _COUNTED = 10.5  # quanta: steps up to there must be multiples
+_FASTER = 2.0  # times the largest step: a joint's speed does not double within a row
 _GAP = 5.0  # periods without a row: a longer one ends a stretch
 
 
@@ -91,6 +92,28 @@ def resample(time: Array, values: Array, at: Array) -> Array:
         at: (m,) within `time` [s].
     """
     return np.asarray(make_interp_spline(time, values, k=min(3, len(time) - 1))(at))
+
+
+def unwrapped(time: Array, q: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Returns positions (n, k) without jumps of whole turns, and how many (k,).
+
+    An encoder wraps if, jumps taken out, its joint moves in all its steps by less than
+    a quarter turn, and there about as fast as elsewhere. Others are left as they are.
+
+    Args:
+        time: (n,) [s]; steps over gaps are not looked at.
+        q: (n, k) [rad].
+    """
+    if len(time) < 2:
+        return q, np.zeros(q.shape[1], dtype=np.int64)
+    turned = np.unwrap(q, axis=0)
+    steps, jumps = np.abs(np.diff(turned, axis=0)), np.abs(np.diff(q, axis=0)) > np.pi
+    near = (np.diff(time) <= _GAP * clock_of(time).period)[:, None]
+    usual = np.max(steps, axis=0, initial=0.0, where=near & ~jumps)
+    there = np.max(steps, axis=0, initial=0.0, where=near & jumps)
+    wraps = (usual < 0.5 * np.pi) & (there <= _FASTER * usual)
+    counts = np.sum(near & jumps, axis=0) * wraps
+    return np.where(counts > 0, turned, q), counts
 
 
 def longest_stretch(time: Array) -> slice:

@@ -14,7 +14,11 @@ from sysid.data_checks.constancy import (
 )
 from sysid.data_checks.contradictions import contradicting_rows
 from sysid.data_checks.delays import delay_findings
-from sysid.data_checks.derivatives import derivative_findings, limit_findings
+from sysid.data_checks.derivatives import (
+    derivative_findings,
+    limit_findings,
+    stillness_findings,
+)
 from sysid.data_checks.expectation import expectation_of
 from sysid.data_checks.finding import DataFinding, Severity
 from sysid.data_checks.processing import processing_findings
@@ -47,6 +51,7 @@ _OF_LOGS = (
     clock_findings,
     kind_findings,
     derivative_findings,
+    stillness_findings,
     stuck_findings,
     processing_findings,
     log_unit_findings,

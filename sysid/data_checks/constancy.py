@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.importing.repeats import held_of, held_rows, is_saturated
 from sysid.data_checks.expectation import Expectation, FittedExpectation
 from sysid.data_checks.finding import DataFinding, Severity, rows_of
 from sysid.data_checks.settings import DEFAULT_DATA_SETTINGS, DataSettings
@@ -36,7 +37,7 @@ def dead_channels(
         f"the log is constant in {', '.join(dead)} over all {model.measurements.rows} "
         "rows: is the sensor alive?"
     )
-    remedy = "record it anew, or leave its channels out"
+    remedy = "record it anew; if it was imported, look at the channels in the map"
     return [DataFinding("constant", what, remedy, Severity.REFUSE)]
 
 
@@ -107,34 +108,49 @@ def _by(change: float, unit: str) -> str:
 
 
 def stuck_findings(subject: Subject) -> list[DataFinding]:
-    """Finds rows over which a force, torque or reading repeats one value."""
+    """Finds rows over which a force, torque or reading repeats one value.
+
+    By what an import has seen in the rows as recorded, or by the log itself.
+    """
     found = []
     for name in _columns(subject):
-        values = subject.column(name)
-        if np.ptp(values) == 0.0:
+        masks, at_end = _recorded_repeats(subject, name) or _repeats(subject, name)
+        rows = rows_of(masks)
+        if not rows:
             continue
-        columns = {n: e.columns[name] for n, e in subject.named()}
-        masks = {n: _repeats(v, subject.settings) for n, v in columns.items()}
-        flagged = np.concatenate(list(masks.values()))
-        again = [np.diff(v, prepend=np.nan) == 0.0 for v in columns.values()]
-        others = np.concatenate(again)[~flagged]
-        share = others.mean() if len(others) else 1.0
-        if not flagged.any() or share > subject.settings.stuck_share:
-            continue
-        held = values[flagged]
-        at_end = np.isin(held, (values.min(), values.max())).all()
         what = f"{name} repeats {'its end value' if at_end else 'a value'}: "
         what += "is it saturated?" if at_end else "did the sensor stop?"
         remedy = "record it anew, or leave the rows out: `drop_flagged_rows`"
-        found.append(DataFinding("stuck", what, remedy, rows=rows_of(masks)))
+        found.append(DataFinding("stuck", what, remedy, rows=rows))
     return found
 
 
-def _repeats(values: Array, settings: DataSettings) -> NDArray[np.bool_]:
-    """Returns which rows (n,) belong to a long run of one value."""
-    begin = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-    length = np.diff(np.append(begin, len(values)))
-    return np.repeat(length >= settings.stuck_rows, length)
+_Masks = dict[str, NDArray[np.bool_]]
+
+
+def _recorded_repeats(subject: Subject, name: str) -> tuple[_Masks, bool] | None:
+    """Returns masks (rows,) by the episode, and whether all of it is an end value."""
+    masks, at_end = {}, []
+    for (episode, table), log in zip(subject.named(), subject.log_of, strict=True):
+        held = held_of(log.header.provenance, table.name, name)
+        masks[episode] = np.zeros(table.rows, dtype=bool)
+        for part in held:
+            at_end.append(part.at_end)
+            masks[episode] |= (table["time"] >= part.begin) & (
+                table["time"] <= part.end
+            )
+    return (masks, all(at_end)) if at_end else None
+
+
+def _repeats(subject: Subject, name: str) -> tuple[_Masks, bool]:
+    """Returns the same of rows that repeat a value in the log."""
+    names, columns = zip(
+        *((n, e.columns[name]) for n, e in subject.named()), strict=True
+    )
+    settings, values = subject.settings, np.concatenate(columns)
+    masks = held_rows(columns, settings.stuck_rows, settings.stuck_share)
+    at_end = is_saturated(values, np.concatenate(masks))
+    return dict(zip(names, masks, strict=True)), at_end
 
 
 def quantum_findings(subject: Subject, expected: Expectation) -> list[DataFinding]:

@@ -3,8 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_disasm.importing.importer import is_noise
+from drake_disasm.importing.signals import unwrapped
 from drake_disasm.logs import Episode
-from sysid.data_checks.finding import DataFinding, rows_of
+from sysid.data_checks.finding import DataFinding, Severity, rows_of
 from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject
 from sysid.models.arm_plant import ArmPlant
@@ -15,6 +17,7 @@ _PAIRS = (
     ("q", "v", "velocities", "positions"),
     ("v", "vd", "accelerations", "velocities"),
 )
+_ROUNDED = 1e-12  # rad or m: what a filter leaves of a constant
 _REMEDY = (
     "leave them out: `drop_flagged_rows`; look at the clock there, and at the ends of "
     "a filter"
@@ -38,7 +41,41 @@ def derivative_findings(subject: Subject) -> list[DataFinding]:
         if rows := rows_of(masks):
             what = f"{rates} are not the derivatives of the {columns} at these rows"
             found.append(DataFinding("derivatives", what, _REMEDY, rows=rows))
-    return found
+    return found + _wraps(subject)
+
+
+def _wraps(subject: Subject) -> list[DataFinding]:
+    """Finds jumps of whole turns in positions: an encoder that wraps."""
+    turned = {n: unwrapped(e["time"], e["q"]) for n, e in subject.named()}
+    counts = np.sum([count for _, count in turned.values()], axis=0)
+    if not counts.any():
+        return []
+    masks = {
+        name: np.abs(np.diff(turned[name][0] - e["q"], axis=0, prepend=0.0)).max(axis=1)
+        > np.pi
+        for name, e in subject.named()
+    }
+    names = ", ".join(f"q.{number}" for number in np.flatnonzero(counts))
+    what = f"{names} jumps by a whole turn: derivatives of it are wrong there"
+    remedy = "import the recording anew, which makes positions continuous"
+    return [DataFinding("derivatives", what, remedy, rows=rows_of(masks))]
+
+
+def stillness_findings(subject: Subject) -> list[DataFinding]:
+    """Finds a motion in which no joint moves, or clearly more than its noise.
+
+    What that noise was, a filter hides; the import knows it.
+    """
+    if subject.kind != "joint_motion":
+        return []
+    remedy = "record a motion; of readings at rest make a joint_torque_static log"
+    if all(np.ptp(e["q"], axis=0).max() < _ROUNDED for e in subject.episodes):
+        what = "no joint moves: the log says nothing of inertia and friction"
+        return [DataFinding("still", what, remedy, Severity.REFUSE)]
+    if not all(is_noise(log.header) for log in subject.logs):
+        return []
+    what = "no joint moves clearly more than its noise, as the import saw it"
+    return [DataFinding("still", what, remedy)]
 
 
 def limit_findings(subject: Subject) -> list[DataFinding]:

@@ -23,6 +23,7 @@ KINDS: Mapping[str, str] = {
     "processing": "wrench is not ft_sensor processed",
     "quantum": "a channel comes in steps coarser than its noise",
     "spikes": "single rows far from their neighbours",
+    "still": "no joint of a motion moves, or clearly more than its noise",
     "stuck": "a channel repeats a value over many rows",
     "time": "time jumps, stands, or is not in step with the period",
     "units": "a quantity that is not SI",

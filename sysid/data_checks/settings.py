@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from drake_disasm.importing.repeats import COARSE, FEWEST
 from sysid.models.rate_factors import MOST_TURN
 from sysid.thresholds import threshold
 
@@ -90,10 +91,10 @@ class DataSettings:
         5, "rows", "of fewer, two equal values of a coarse channel are chance"
     )
     stuck_rows: int = threshold(
-        10, "rows", "a value that is repeated less often may be chance of a quantum"
+        FEWEST, "rows", "a value that is repeated less often may be chance of a quantum"
     )
     stuck_share: float = threshold(
-        0.2,
+        COARSE,
         "of the other rows",
         "where more of them repeat the one before, the channel is coarse, not stuck",
     )

@@ -17,9 +17,13 @@ _REMEDY = "look at them, or leave them out: `drop_flagged_rows`"
 
 
 def spike_findings(subject: Subject, expected: Expectation) -> list[DataFinding]:
-    """Finds rows of a column whose error is far from that of the rows around them."""
+    """Finds rows of a column whose error is far from that of the rows around them.
+
+    Where a joint reverses, what was measured has to stand alone more than what is
+    expected: dry friction is expected to jump there, which a filter rounds.
+    """
     measured, settings = subject.model.measurements, subject.settings
-    errors = _errors(subject, expected)
+    columns, errors = _columns(subject, expected)
     found = []
     for number, name in enumerate(subject.column_names):
         alone = _alone(errors[:, number], subject.model.piece)
@@ -32,7 +36,12 @@ def spike_findings(subject: Subject, expected: Expectation) -> list[DataFinding]
         ]
         limit = np.clip(limit, settings.least_spike * usual, settings.spike * usual)
         limit = max(float(limit), settings.spike_noise * max(noise))
-        rows = np.flatnonzero(np.abs(alone) > limit)
+        read, said = (
+            np.abs(_alone(own[:, number], subject.model.piece))
+            for own in (columns, columns - errors)
+        )
+        is_read = (read > said) | ~_reverses(subject, number)
+        rows = np.flatnonzero((np.abs(alone) > limit) & is_read)
         if not usual or not 0 < len(rows) <= settings.most_spikes * measured.rows:
             continue
         what = f"{name}: {len(rows)} of {measured.rows} rows are far from the others"
@@ -41,12 +50,22 @@ def spike_findings(subject: Subject, expected: Expectation) -> list[DataFinding]
     return found
 
 
-def _errors(subject: Subject, expected: Expectation) -> Array:
-    """Returns the errors (rows, channels) in the frame of the table, SI."""
+def _reverses(subject: Subject, channel: int) -> NDArray[np.bool_]:
+    """Returns at which rows (n,) a channel's joint reverses, of the four around too."""
+    v = subject.model.covariates(channel).get("velocity")
+    if v is None:
+        return np.zeros(subject.model.measurements.rows, dtype=bool)
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(v, 2, mode="edge"), 5)
+    return np.asarray((windows.min(axis=1) <= 0.0) & (windows.max(axis=1) >= 0.0))
+
+
+def _columns(subject: Subject, expected: Expectation) -> tuple[Array, Array]:
+    """Returns what was measured (rows, channels) in the table's frame, and errors."""
     measured = subject.model.measurements
     explained = measured.values - expected.all_residuals() * expected.scale
     table = frames_of(subject, np.arange(measured.rows))[0]
-    return table.of(measured.values) - table.of(explained)
+    values = table.of(measured.values)
+    return values, values - table.of(explained)
 
 
 def _alone(r: Array, piece: NDArray[np.int64]) -> Array:

@@ -62,6 +62,11 @@ class Subject:
         """All episodes, in the order of the model's."""
         return [episode for log in self.logs for episode in log.episodes]
 
+    @property
+    def log_of(self) -> list[Log]:
+        """The log of each episode."""
+        return [log for log in self.logs for _ in log.episodes]
+
     def named(self) -> Iterator[tuple[str, Episode]]:
         """Yields each episode with its name in findings."""
         yield from zip(episode_names(self.logs), self.episodes, strict=True)

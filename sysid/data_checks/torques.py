@@ -9,6 +9,7 @@ from sysid.data_checks.expectation import Expectation, FittedExpectation
 from sysid.data_checks.finding import DataFinding
 from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject
+from sysid.data_checks.units import gravity_scales
 from sysid.models.base import Array
 
 _SURROGATES = 39  # of which a channel of its joint is above all but two, 95 %
@@ -39,18 +40,12 @@ def _of_another_scale(
 ) -> list[DataFinding]:
     """Compares torques (n, joints) with what the URDF's masses take.
 
-    Only of joints at which these show beside friction and an offset. All of them must
-    be off in the same way: single links of a URDF may be placeholders.
+    All of them must be off in the same way: single links of a URDF may be placeholders.
     """
-    scales = {}
-    for number, name in enumerate(names):
-        both = np.column_stack([expected.nominal[:, number], values[:, number]])
-        own = expected.friction(number)
-        both = both - own @ np.linalg.lstsq(own, both, rcond=None)[0]
-        norm, size = np.linalg.norm(both, axis=0)
-        product = float(both[:, 0] @ both[:, 1])
-        if abs(product) > settings.unit_correlation * norm * size:
-            scales[name] = abs(product) / norm**2
+    scales = {
+        names[number]: scale
+        for number, scale in gravity_scales(values, expected, settings).items()
+    }
     if not scales:
         return []
     low, high = min(scales.values()), max(scales.values())

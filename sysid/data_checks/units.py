@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from drake_disasm.logs import Episode, rotation_matrices, sensor_wrench
-from sysid.data_checks.expectation import Expectation
+from sysid.data_checks.expectation import Expectation, FittedExpectation
 from sysid.data_checks.finding import DataFinding, Severity
 from sysid.data_checks.frames import frames_of
 from sysid.data_checks.settings import DataSettings
@@ -51,10 +51,56 @@ def predicted_unit_findings(
         own = [i for i, c in enumerate(measured.channels) if c.unit == unit]
         scale = scale_between(nominal[:, own], values[:, own], settings, noise[own])
         wrong = _unit_findings(f"the scale of the {name}", scale, settings)
-        if is_arm:  # a URDF's inertias may be placeholders
-            wrong = _as_warnings(wrong)
+        if is_arm:
+            wrong = _of_all_joints(wrong, values, expected, settings)
         found += wrong
     return found
+
+
+def _of_all_joints(
+    wrong: Sequence[DataFinding],
+    values: Array,
+    expected: Expectation,
+    settings: DataSettings,
+) -> list[DataFinding]:
+    """Returns findings of torques' unit (n, joints): refused if it is all joints'.
+
+    A URDF's inertias may be placeholders, but these are not off by one unit's factor
+    at each joint of which gravity tells the scale.
+    """
+    scales = {}
+    if isinstance(expected, FittedExpectation):
+        scales = gravity_scales(values, expected, settings)
+    for factor in (_THOUSAND, 1.0 / _THOUSAND):
+        off = [abs(np.log(scale / factor)) for scale in scales.values()]
+        if wrong and off and max(off) < np.log(settings.unit_band):
+            what = f"the scale of the torques is {np.median(list(scales.values())):.3g}"
+            remedy = (
+                f"give `scale: {1.0 / factor:g}` of tau in the map of import-log, or "
+                "convert it to SI and write the log again"
+            )
+            what = f"{what} times what it should be at all joints that tell"
+            return [DataFinding("units", what, remedy, Severity.REFUSE)]
+    return _as_warnings(wrong)
+
+
+def gravity_scales(
+    values: Array, expected: FittedExpectation, settings: DataSettings
+) -> dict[int, float]:
+    """Returns torques (n, joints) by those that the URDF's masses take.
+
+    By the joint's number, of those at which these show beside friction and an offset.
+    """
+    scales = {}
+    for number in range(values.shape[1]):
+        both = np.column_stack([expected.nominal[:, number], values[:, number]])
+        own = expected.friction(number)
+        both = both - own @ np.linalg.lstsq(own, both, rcond=None)[0]
+        norm, size = np.linalg.norm(both, axis=0)
+        product = float(both[:, 0] @ both[:, 1])
+        if abs(product) > settings.unit_correlation * norm * size:
+            scales[number] = abs(product) / norm**2
+    return scales
 
 
 def _transitions(subject: Subject) -> list[DataFinding]:
@@ -197,7 +243,8 @@ def _degrees_of_joints(subject: Subject) -> list[DataFinding]:
     if most <= subject.settings.most_turn:
         return []
     what = f"half of the joints are beyond q = {most:.3g}: degrees, or millimetres?"
-    return [_finding(what)]
+    remedy = f"give `unit: deg` (or mm) of q in the map of import-log, or {_REMEDY}"
+    return [DataFinding("units", what, remedy, Severity.REFUSE)]
 
 
 def scale_between(

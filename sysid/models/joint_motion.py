@@ -340,6 +340,16 @@ class JointMotionModel(LogModel):
         """
         return TorqueFits(self._motion, self.measurements.values).signed_order()
 
+    def exchanged_motions(self, most: float) -> tuple[tuple[int, int], float] | None:
+        """Returns the two joints whose motions are exchanged; None if there are none.
+
+        Args:
+            most: share of the error that is left may be, for a change to be one.
+        """
+        fits = TorqueFits(self._motion, self.measurements.values)
+        arm = self._arm_under(np.array(self._gravity))
+        return fits.exchanged_motions(arm.regressor, most)
+
     def bookkeeping(self) -> list[Bookkeeping[Self]]:
         """See LogModel: rates and units first, on which the other ways rest."""
         rates = self._in_degrees() or self._wrong_rates()

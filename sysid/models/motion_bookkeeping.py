@@ -7,6 +7,7 @@ be explained by friction that drives the joint.
 """
 
 import itertools
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +112,44 @@ class TorqueFits:
             ):
                 found[i] = factor
         return found
+
+    def exchanged_motions(
+        self, regressor: Callable[[Array, Array, Array], Array], most: float
+    ) -> tuple[tuple[int, int], float] | None:
+        """Returns the two joints whose motions are exchanged, and the error's share.
+
+        None if no exchange leaves less than a share of the error. Bodies and friction
+        are free, as everywhere here; a regressor is made for every two joints, so that
+        few rows are looked at.
+
+        Args:
+            regressor: of the arm, (rows, joints, b) for q, v and vd.
+            most: share of the error that an exchange may leave.
+        """
+        rows = spread_rows(len(self._thin.time), _FEW_ROWS)
+        thin, tau = self._thin.rows(rows), self._tau[self._taken][rows]
+        joints, lost = tau.shape[1], {}
+        for pair in itertools.combinations(range(joints), 2):
+            order = list(SignedOrder.as_written(joints).exchanged(*pair).order)
+            q, v, vd, dry_v = (
+                x[:, order] for x in (thin.q, thin.v, thin.vd, thin.dry_v)
+            )
+            own = friction_columns(dry_v)
+            lost[pair] = self._error(regressor(q, v, vd), own, tau)
+        if not lost:
+            return None
+        written = self._error(
+            regressor(thin.q, thin.v, thin.vd), friction_columns(thin.dry_v), tau
+        )
+        best = min(lost, key=lambda pair: lost[pair])
+        share = lost[best] / max(written, 1e-300)
+        return (best, share) if share <= most else None
+
+    def _error(self, Y: Array, friction: Array, tau: Array) -> float:
+        """Returns the rms error, held out, of torques (rows, joints) in their scale."""
+        grams = ChannelGrams.of(Y, tau[..., None], friction, positive=2)
+        ones = np.ones((tau.shape[1], 1))
+        return float(np.sqrt(grams.losses(ones, self._scale).sum(axis=1).mean()))
 
     def lost(self, delay: float = 0.0) -> float:
         """Returns what is left of torques that are late [s], to compare ways by."""

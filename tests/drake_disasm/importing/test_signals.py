@@ -61,3 +61,28 @@ def test_rounding_is_recognised() -> None:
     assert signals.quantum(np.round(np.sin(t) / step) * step) == pytest.approx(step)
     assert signals.quantum(np.sin(t)) == 0.0
     assert signals.quantum(np.zeros(10)) == 0.0
+
+
+def _wrap(q: np.ndarray) -> np.ndarray:
+    return (q + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def test_whole_turns_are_taken_out_of_a_joint_that_wraps() -> None:
+    t = 0.01 * np.arange(1000)
+    q = np.column_stack([np.pi + np.sin(t), 0.5 * t, np.sin(3.0 * t)])
+    found, counts = signals.unwrapped(t, _wrap(q))
+    left = found - q
+    np.testing.assert_allclose(left, np.broadcast_to(left[0], q.shape), atol=1e-9)
+    assert counts[0] > 2 and counts[1] == 1 and counts[2] == 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_poses_and_errors_of_an_encoder_are_no_wraps(seed: int) -> None:
+    random, t = np.random.default_rng(seed), 0.01 * np.arange(200)
+    poses = random.uniform(-np.pi, np.pi, (200, 1))
+    spike = np.sin(t)[:, None]
+    spike[50] += 5.0
+    for q in (poses, spike):
+        found, counts = signals.unwrapped(t, q)
+        assert not counts.any()
+        np.testing.assert_array_equal(found, q)

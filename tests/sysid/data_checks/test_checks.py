@@ -1,6 +1,8 @@
 """Each kind of finding: a damage that it names, of logs that have no finding."""
 
+import dataclasses
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -157,6 +159,58 @@ def test_a_quantum_that_is_fine_or_declared_is_none(twin_log):
     assert not [finding for finding in found if finding.kind == "quantum"]
 
 
+def imported(log: Log, **said: Any) -> Log:
+    """Returns a log with what an import says of it."""
+    header = dataclasses.replace(log.header, provenance={"import": said})
+    return dataclasses.replace(log, header=header)
+
+
+def test_what_an_import_saw_repeated_is_placed(arm_log):
+    """A filter ripples where a sensor stops, so the log repeats nothing."""
+    held = {"episode_0000": {"tau.1": [[2.0, 2.5, False], [4.0, 4.1, False]]}}
+    found = only(imported(arm_log, held=held), "stuck")
+    assert found.rows == {"log/episode_0000": (*range(200, 251), *range(400, 411))}
+    assert "tau.1 repeats a value" in found.what
+
+
+@pytest.mark.parametrize("held", [3, {"episode_0000": {"tau.1": [["x", {}, 1], 2]}}])
+def test_a_provenance_that_says_something_else_says_nothing(arm_log, held):
+    assert findings(imported(arm_log, held=held)) == {}
+
+
+# Motions that are none, and encoders that wrap.
+
+
+def test_an_arm_that_stands_is_refused(arm_log):
+    def stand(columns):
+        for name in ("q.0", "q.1", "v.0", "v.1", "vd.0", "vd.1"):
+            columns[name][:] = 0.5 if name[0] == "q" else 0.0
+
+    found = findings(damaged(arm_log, stand))["still"]
+    with refused("no joint moves", "record a motion"):
+        refuse([found])
+
+
+def test_a_motion_that_is_noise_is_named(arm_log):
+    done = {"noise_in_accelerations": {}}
+    found = only(imported(arm_log, processing=done), "still")
+    assert found.severity is Severity.WARN
+    done = {"noise_in_accelerations": {"q.1": 0.01}}
+    assert findings(imported(arm_log, processing=done)) == {}
+
+
+def test_an_encoder_that_wraps_is_placed(arm_log):
+    q = arm_log.episodes[0]["q"][:, 0]
+    turned = changed("q.0", slice(None), lambda v: (v + np.pi - 0.3) % (2 * np.pi))
+    wrapped = changed("q.0", slice(None), lambda v: np.where(v > 0.3, v - 2 * np.pi, v))
+    assert "derivatives" not in findings(damaged(arm_log, turned))
+    found = findings(damaged(arm_log, wrapped))["derivatives"]
+    assert "q.0 jumps by a whole turn" in found.what
+    [rows] = found.rows.values()
+    jumps = np.flatnonzero(np.diff(q > 0.3)) + 1
+    assert set(rows) == set(jumps.tolist())
+
+
 # Time, and rest.
 
 
@@ -258,6 +312,38 @@ def test_spikes_are_placed(arm_log):
     found = only(log, "spikes")
     assert found.rows == {"log/episode_0000": (100, 350)}
     assert found.what.startswith("tau.1: 2 of 800 rows")
+
+
+def _slower(log: Log) -> Log:
+    """Returns a log whose torques a filter has rounded, over five rows."""
+    weights = np.full(5, 0.2)
+
+    def blur(columns):
+        for name in ("tau.0", "tau.1"):
+            columns[name][2:-2] = np.convolve(columns[name], weights, "valid")
+
+    return damaged(log, blur)
+
+
+def test_rounded_friction_at_a_reversal_is_no_spike(arm_log):
+    strong = changed("tau.1", slice(None), lambda v: v + 2.0 * np.sign(_v(arm_log)))
+    log = _slower(damaged(arm_log, strong))
+    assert "spikes" not in findings(log)
+
+
+def test_a_spike_at_a_reversal_is_placed(arm_log):
+    reversal = int(np.flatnonzero(np.diff(np.sign(_v(arm_log))))[3])
+    log = damaged(arm_log, changed("tau.1", [reversal], lambda v: v + 5.0))
+    assert findings(log)["spikes"].rows == {"log/episode_0000": (reversal,)}
+
+
+def test_a_spike_of_the_acceleration_is_placed(arm_log):
+    log = damaged(arm_log, changed("vd.1", [350], lambda v: v + 3000.0))
+    assert 350 in findings(log)["spikes"].rows["log/episode_0000"]
+
+
+def _v(log: Log) -> np.ndarray:
+    return log.episodes[0]["v"][:, 1]
 
 
 def test_spikes_of_a_sensor_are_placed(twin_log):
