@@ -67,6 +67,31 @@ def _spoilt(source: Log, folder: Path, **columns: np.ndarray) -> Path:
     return folder
 
 
+def test_what_has_changed_since_a_reference_is_said(tmp_path):
+    for name in ("march", "april"):
+        (tmp_path / name).mkdir()
+    known = static_log(tmp_path / "march", [], 0.0, seed=1).folder
+    newer = static_log(tmp_path / "april", [SensorMounting], 5.0, seed=2).folder
+    out = tmp_path / "out"
+    result = run("--reference", known, "--log", newer, "--out", out, "--workers", 1)
+    assert result.returncode == 0, result.stderr
+    mapping = json.loads((out / "result.json").read_text())
+    assert mapping["effects"] == ["SensorMounting"]
+    assert mapping["reference"]["ending"] == "none"
+    assert mapping["text"] in result.stdout
+    assert "What has changed" in own_part((out / "report.html").read_text())
+    assert (out / "reference.html").is_file()
+
+
+def test_a_log_is_no_reference_of_its_own(tmp_path):
+    log, out = static_log(tmp_path, [], 0.0, seed=1).folder, tmp_path / "out"
+    result = run("--reference", log, "--log", log, "--out", out)
+    assert_one_line(result, ["is a reference", "name it once"])
+    more = ("--reference", tmp_path / "clean", "--log", log, "--held-out", "log")
+    assert_one_line(run(*more, "--out", out), ["--held-out", "not with --reference"])
+    assert not out.exists()
+
+
 def test_what_is_wrong_with_the_data_is_said_before_the_fit(tmp_path):
     log = read_log(static_log(tmp_path, [], 0.0, seed=0).folder)
     episode = log.episodes[0]

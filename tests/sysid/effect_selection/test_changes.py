@@ -12,7 +12,9 @@ from drake_disasm.effects import (
 from sysid.effect_selection.change_words import changes_mapping, changes_text
 from sysid.effect_selection.changes import Changes, find_changes
 from sysid.models.joint_motion import JointMotionModel
+from sysid.report import changes_page
 from tests.sysid.models.two_logs import two_logs
+from tests.sysid.report.pages import own_part
 
 _FRICTION = [
     JointCoulombFriction("shoulder", 1.0),
@@ -81,3 +83,4 @@ def test_a_change_of_each_log_has_a_course(tmp_path):
     plain = changes_mapping(found)
     assert [each["episode"] for each in plain["courses"]] == ["log_1/episode_0000"] * 2
     assert np.isfinite(plain["errors"]["relative"]["after"])
+    assert "From log to log" in own_part(changes_page(found, {}))
