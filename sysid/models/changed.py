@@ -69,14 +69,21 @@ class ChangedModel(LogModel):
         self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
     ) -> Self:
         """See LogModel: the effects are changes, and may be of either sign."""
-        changed = super().with_effects(effects, [_both_ways(p) for p in parameters])
+        found = super().with_effects(effects, [_both_ways(p) for p in parameters])
+        return found._with_newer()
+
+    def freeze(self, values: Mapping[str, float]) -> Self:
+        """See LogModel."""
+        return super().freeze(values)._with_newer()
+
+    def _with_newer(self) -> Self:
+        """Returns the same with the changes that it has in the newer logs' model."""
         before = self.known.effects
-        inner = [_moved(p, len(before)) for p in changed.parameters if field_of(p)]
+        own = [_moved(p, len(before)) for p in self.parameters if field_of(p)]
         unchanged = self.newer.replace(
             _effects=before, parameters=self.known.parameters
         )
-        newer = unchanged.with_effects([*before, *effects], inner)
-        return changed.replace(newer=newer)
+        return self.replace(newer=unchanged.with_effects([*before, *self.effects], own))
 
     def simulate(self, theta: Array, rows: slice) -> Array:
         """See LogModel; rows of newer logs come after all others."""

@@ -56,6 +56,14 @@ def test_rows_are_predicted_one_by_one_as_together(model):
     assert np.allclose(changed.predict(theta, across), whole[across])
 
 
+def test_frozen_parameters_keep_their_values(model):
+    changed, _ = extended(ChangedModel(model, is_newer(model)), [Candidate.of(ELBOW)])
+    theta = nominal(changed) + 0.01
+    first, last = changed.parameters[0].name, changed.parameters[-1].name
+    held = changed.freeze({first: float(theta[0]), last: float(theta[-1])})
+    assert np.allclose(held.predictions(theta[1:-1]), changed.predictions(theta))
+
+
 def test_a_friction_may_have_fallen(model):
     changed, ((place,),) = extended(
         ChangedModel(model, is_newer(model)), [Candidate.of(ELBOW)]
