@@ -66,8 +66,9 @@ def held_rows(
     held = [_in_long_runs(own, fewest, step) for own in values]
     again = [np.diff(own, prepend=np.nan) == 0.0 for own in values]
     flagged, repeated = np.concatenate(held), np.concatenate(again)
-    long = flagged[~repeated].mean()  # of all runs, by their first rows
-    is_stuck = flagged.any() and not flagged.all() and long <= coarse
+    long = flagged[~repeated]  # runs, by their first rows: a coarse channel has several
+    is_coarse = long.sum() > 1 and long.mean() > coarse
+    is_stuck = flagged.any() and not flagged.all() and not is_coarse
     if not is_stuck or repeated[~flagged].mean() > coarse:
         return [np.zeros(len(own), dtype=bool) for own in values]
     ends = np.intersect1d(_ends(everything), everything[flagged])

@@ -25,7 +25,7 @@ _FRICTION = [
 
 
 def changes(folder, added, since=0) -> Changes:
-    logs = two_logs(folder, _FRICTION, added, since)
+    logs = two_logs(folder, _FRICTION, added, since, rows=500)
     return find_changes(JointMotionModel(logs), 1)
 
 
@@ -42,11 +42,12 @@ def test_nothing_changed(tmp_path):
     assert limits["JointCoulombFriction.elbow"] < 0.1
 
 
+@pytest.mark.slow
 def test_a_payload_is_weighed(tmp_path):
     found = changes(tmp_path, [FlangePayload(1.0, 0.02, 0.0, 0.02)])
     assert found.closed.verdict.confirmed == ("FlangePayload",)
-    _, (low, high) = values(found)["FlangePayload.mass"]
-    assert low <= 1.0 <= high
+    mass, _ = values(found)["FlangePayload.mass"]
+    assert mass == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_friction_that_fell_is_told_by_how_much(tmp_path):
@@ -59,15 +60,16 @@ def test_a_friction_that_fell_is_told_by_how_much(tmp_path):
 
 
 def test_an_offset_that_jumps_within_the_log_has_a_row(tmp_path):
-    found = changes(tmp_path, [TorqueOffset("shoulder", 0.5)], since=350)
+    found = changes(tmp_path, [TorqueOffset("shoulder", 0.5)], since=290)
     assert found.closed.verdict.names == ("TorqueOffset.shoulder",)
     assert found.onset is not None
-    assert abs(found.onset.row - 350) <= 2 * found.onset.rows
+    assert abs(found.onset.row - 290) <= 2 * found.onset.rows
     value, _ = values(found)["TorqueOffset.shoulder.size"]
     assert value == pytest.approx(0.5, abs=0.05)
     assert f"since rows {found.onset.row}" in changes_text(found)
 
 
+@pytest.mark.slow
 def test_a_change_of_each_log_has_a_course(tmp_path):
     first = two_logs(tmp_path / "a", _FRICTION, [TorqueOffset("elbow", 0.2)])
     second = two_logs(tmp_path / "b", _FRICTION, [TorqueOffset("elbow", 0.4)])
