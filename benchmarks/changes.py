@@ -11,11 +11,11 @@ import tempfile
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 from answers import Answer, Count, add_arguments, complete, no_verdict, report, said
 
+from drake_disasm.cell.parsing import movable_joints
 from drake_disasm.common import program
 from drake_disasm.common.arrays import Array
 from drake_disasm.common.errors import DisasmError
@@ -31,6 +31,7 @@ from drake_disasm.scenario import Scenario
 from sysid.effect_selection.changes import Changes, find_changes
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.regressor import ArmDynamics
+from sysid.validation import null_logs
 
 _SEED = 59_000
 _RATE, _DURATION = 100.0, 15.0  # Hz, s
@@ -58,7 +59,7 @@ def motion(joints: int, random: np.random.Generator) -> tuple[Array, ...]:
 @functools.cache
 def noise_of(urdf: Path) -> Array:
     """Returns the noise (joints,) of an arm's torques, the same in all its logs."""
-    joints = _joints(urdf)
+    joints = movable_joints(str(urdf))
     _, *states = motion(len(joints), np.random.default_rng(_SEED))
     tau = ArmDynamics(str(urdf), joints).torques(*states)
     return np.asarray(_NOISE * np.sqrt(np.mean(tau**2, axis=0)))
@@ -99,7 +100,7 @@ def simulated(
 ) -> Log:  # fmt: skip
     """Returns a log with effects, and others since a share of it."""
     random = np.random.default_rng(seed)
-    joints = _joints(urdf)
+    joints = movable_joints(str(urdf))
     time, q, v, vd = motion(len(joints), random)
     columns = {"time": time, "q": q, "v": v, "vd": vd, "tau": np.zeros_like(q)}
     header = LogHeader("joint_motion", "simulated", {}, joints=joints, urdf=str(urdf))
@@ -114,9 +115,7 @@ def simulated(
             parts.append(model.predictions(nominal))
     is_after = np.arange(len(time)) >= since * len(time)
     tau = np.where(is_after[:, None], parts[1], parts[0])
-    noise = random.normal(size=q.shape)
-    for i in range(1, len(noise)):
-        noise[i] = _RHO * noise[i - 1] + np.sqrt(1.0 - _RHO**2) * noise[i]
+    noise = null_logs.autoregressive(_RHO)(random, tau)
     columns["tau"] = tau + noise_of(urdf) * noise
     with LogWriter(folder, header) as writer:
         writer.write_episode(flat_columns("joint_motion", columns))
@@ -126,7 +125,7 @@ def simulated(
 def answer(urdf: Path, kind: str, number: int) -> Answer:
     """Returns what is said of a case, with what was put in."""
     random = np.random.default_rng([_SEED, number])
-    own = friction(_joints(urdf), random)
+    own = friction(movable_joints(str(urdf)), random)
     added, since, size = change(kind, own, random)
     seed = _SEED + 10 * number
     with tempfile.TemporaryDirectory() as folder:
@@ -157,15 +156,6 @@ def _said(found: Changes, size: str, added: Sequence[Effect]) -> Answer:
         "onset": found.onset.row if found.onset else None,
         "leaves_more": found.leaves_more,
     }
-
-
-def _joints(urdf: Path) -> tuple[str, ...]:
-    """Returns the joints of a URDF that turn or slide, in their order."""
-    root = ElementTree.parse(urdf).getroot()
-    moving = ("revolute", "continuous", "prismatic")
-    return tuple(
-        j.get("name", "") for j in root.iter("joint") if j.get("type") in moving
-    )
 
 
 def _counts(arm: str, kind: str, answers: list[Answer]) -> list[Count]:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as t_distribution
 
 from sysid.fitting.fit import Array, Fit
 from sysid.models.joint_motion import JointMotionModel
@@ -13,7 +12,6 @@ from sysid.parameters import Scaling
 
 _RANK = 1e-6  # of the largest singular value: below it the log does not tell
 _EXPLAINS = 0.5  # of the difference: a body that explains less is not named
-_LEVEL = 0.975
 
 
 @dataclass(frozen=True)
@@ -111,14 +109,18 @@ def urdf_difference(fit: Fit) -> UrdfDifference | None:
         fit: of joint torques, with or without effects.
     """
     model = fit.model
-    if not isinstance(model, JointMotionModel) or not model.identifies_links:
+    if not isinstance(model, JointMotionModel):
         return None
-    count = len(model.base_regressor[0, 0])
+    if not (model.has_urdf and model.has_free_bodies):
+        return None
+    count = model.motion.Y.shape[2]
     own = model.parameters[:count]
     urdf = np.array([p.nominal for p in own])
-    identified, parts = fit.theta[:count], _fold_values(fit)[:, :count]
-    half = _half_of(len(parts)) * parts.std(axis=0)
-    Y = model.base_regressor.reshape(-1, count)
+    identified = fit.theta[:count]
+    slope = Scaling(model.parameters).slope(fit.theta)[:count]
+    root = fit.half_interval_factor * slope
+    C = fit.covariance[:count, :count] * np.outer(root, root)
+    Y = model.motion.Y.reshape(-1, count)
     G = Y.T @ Y / Y.shape[0]
     difference = identified - urdf
     power = float(np.mean(model.measurements.values**2))
@@ -128,22 +130,23 @@ def urdf_difference(fit: Fit) -> UrdfDifference | None:
         tuple(p.unit for p in own),
         urdf,
         identified,
-        half,
-        _body(model, G, difference, parts - urdf),
+        np.sqrt(np.diagonal(C)),
+        _body(model, G, difference, C),
     )
 
 
-def _fold_values(fit: Fit) -> Array:
-    """Returns the parameters (F, p) fitted to all folds but one, each in turn."""
-    folds = fit.equations.folds(fit.settings.folds)
-    columns = np.arange(len(fit.theta))
-    steps = folds.without_each(columns)
-    slope = Scaling(fit.model.parameters).slope(fit.theta)
-    return np.asarray(fit.theta + steps * slope)
+def links_in_base(model: JointMotionModel) -> dict[str, Array]:
+    """Returns what inertial parameters (10,) of each link add to the base parameters.
+
+    (b, 10) by the link's name, from the base on.
+    """
+    arm, base = model.rigid_bodies()
+    parts = np.split(base.matrix(len(arm.inertia)), len(arm.links), axis=1)
+    return dict(zip(arm.links, parts, strict=True))
 
 
 def _body(
-    model: JointMotionModel, G: Array, difference: Array, parts: Array
+    model: JointMotionModel, G: Array, difference: Array, C: Array
 ) -> AddedBody | None:
     """Returns the body on one link that explains most of a difference (b,).
 
@@ -151,11 +154,11 @@ def _body(
         model: whose links they are.
         G: (b, b) mean Y^T Y over the readings.
         difference: of the base parameters.
-        parts: (F, b) the same without each fold.
+        C: (b, b) covariance of the base parameters, in half 95 % intervals.
     """
-    total, half = float(difference @ G @ difference), _half_of(len(parts))
+    total = float(difference @ G @ difference)
     found: list[AddedBody] = []
-    for link, into_base in model.links_in_base.items():
+    for link, into_base in links_in_base(model).items():
         power = np.einsum("bi,bc,ci->i", into_base, G, into_base)
         used = power > _RANK * power.max(initial=1e-300)
         P = into_base[:, used] / np.sqrt(power[used])
@@ -164,8 +167,7 @@ def _body(
         back = np.linalg.solve(P.T @ G @ P, P.T @ G) / np.sqrt(power[used])[:, None]
         x = back @ difference
         left = difference - into_base[:, used] @ x
-        masses = parts @ back[0]
-        off = half * float(masses.std())
+        off = float(np.sqrt(back[0] @ C @ back[0]))
         moment = x[1 : 1 + int(used[1:4].sum())]
         found.append(
             AddedBody(
@@ -178,9 +180,3 @@ def _body(
     # Of links that are welded to each other, the outermost: the flange.
     best = max(reversed(found), key=lambda each: round(each.share, 6), default=None)
     return best if best is not None and best.share >= _EXPLAINS else None
-
-
-def _half_of(folds: int) -> float:
-    """Returns half a 95 % interval of a jackknife, by the values' spread."""
-    nu = max(folds - 1, 1)
-    return float(t_distribution.ppf(_LEVEL, nu) * np.sqrt(nu))

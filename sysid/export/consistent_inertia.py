@@ -32,7 +32,7 @@ from scipy.linalg import block_diag, null_space
 from scipy.stats import chi2
 
 from drake_disasm.common.errors import DisasmError
-from sysid.models.regressor import INERTIAL, BaseSet
+from sysid.models.regressor import INERTIAL
 
 Array = NDArray[np.float64]
 
@@ -100,7 +100,7 @@ def consistent_inertia(
     units of their covariance.
 
     Args:
-        B: (b, parameters) which combinations of pi are known, see `base_matrix`.
+        B: (b, parameters) which combinations of pi are known, see `BaseSet.matrix`.
         nominal: pi of all links.
         beta: (b,) identified base parameters.
         covariance: (b, b) of their error.
@@ -352,19 +352,6 @@ def whitening(covariance: Array) -> Array:
     values, axes = np.linalg.eigh(covariance / np.outer(size, size))
     kept = values > _UNDETERMINED * values.max()
     return np.asarray((axes[:, kept] / np.sqrt(values[kept])).T / size)
-
-
-def base_matrix(base: BaseSet, size: int) -> Array:
-    """Returns B (b, parameters) with beta = B pi.
-
-    Args:
-        base: of the arm.
-        size: how many inertial parameters the arm has.
-    """
-    B = np.zeros((len(base.independent), size))
-    B[np.arange(len(base.independent)), base.independent] = 1.0
-    B[:, base.dependent] = base.K
-    return B
 
 
 def _to_inertial(L: Array) -> Array:

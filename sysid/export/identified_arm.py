@@ -22,7 +22,6 @@ from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.export.consistent_inertia import (
     ConsistentInertia,
     ball,
-    base_matrix,
     consistent_inertia,
     whitening,
 )
@@ -184,7 +183,7 @@ def _bodies(
     The effect's payload is a point with a mass. The body has the same mass and first
     moment, and what it has of inertia the last link has less.
     """
-    pi, B = np.zeros_like(arm.inertia), base_matrix(base, len(arm.inertia))
+    pi, B = np.zeros_like(arm.inertia), base.matrix(len(arm.inertia))
     for effect in effects:
         if isinstance(effect, FlangePayload) and not effect.is_null:
             pi[arm.last_link] += effect.inertial

@@ -270,14 +270,10 @@ class NormalEquations:
         as long as a block is longer than that lasts, and for coefficients that take up
         noise; Student's t has `degrees_of_freedom`.
         """
-        x = self.without_each(columns)
+        kept = np.append(columns, -1)
+        x = self._of_others(self.blocks[:, kept][:, :, kept])[:, :-1]
         away = x - x.mean(axis=0)
         return np.asarray((1.0 - 1.0 / len(x)) * away.T @ away)
-
-    def without_each(self, columns: Columns) -> Array:
-        """Returns the coefficients (B, k) of columns fitted to all blocks but each."""
-        kept = np.append(columns, -1)
-        return self._of_others(self.blocks[:, kept][:, :, kept])[:, :-1]
 
     def errors_beside(self, base: Columns) -> Array:
         """Returns the standard error (P,) of each column, fitted with a base alone.

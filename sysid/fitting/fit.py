@@ -145,10 +145,19 @@ class Fit:
         """
         if not len(self.theta):
             return np.zeros(0)
+        return self.half_interval_factor * np.sqrt(np.diagonal(self.covariance))
+
+    @property
+    def covariance(self) -> Array:
+        """Of the parameters (p, p) in the unit box, see `NormalEquations`."""
         folds = self.equations.folds(self.settings.folds)
-        variance = np.diagonal(folds.covariance(np.arange(len(self.theta))))
-        half = t_distribution.ppf(0.975, folds.degrees_of_freedom)
-        return np.asarray(half * np.sqrt(variance))
+        return folds.covariance(np.arange(len(self.theta)))
+
+    @property
+    def half_interval_factor(self) -> float:
+        """Half a 95 % interval in standard errors: Student's t."""
+        folds = self.equations.folds(self.settings.folds)
+        return float(t_distribution.ppf(0.975, folds.degrees_of_freedom))
 
     @property
     def held_out_losses(self) -> Array:

@@ -49,7 +49,6 @@ _BY_SAMPLE = (
     "dry_v",
     "Y",
     "Y_payload",
-    "Y_links",
     "Y_tilt",
     "tilt",
 )
@@ -69,10 +68,10 @@ class ArmMotion:
             which the joint came.
         Y: (n, joints, b) regressor of the base parameters.
         Y_payload: (n, joints, 10) of a body in the frame of the last link.
-        Y_links: (n, joints, joints, 10) of one in the frame of each joint's link.
         Y_tilt: (n, joints, b, 2) derivative of Y by a tilt [rx, ry] of the base.
         tilt: (n, joints, 2) the same of the torques by the nominal parameters.
         nominal: (b,) base parameters by the URDF.
+        links: (joints, b, 10) what a body on each joint's link adds to them.
         linked: of all samples of the log.
         paths: of all samples of the log.
     """
@@ -87,10 +86,10 @@ class ArmMotion:
     dry_v: Array
     Y: Array
     Y_payload: Array
-    Y_links: Array
     Y_tilt: Array
     tilt: Array
     nominal: Array
+    links: Array
     linked: LinkTorques
     paths: PathMemory
 
@@ -128,10 +127,10 @@ class ArmMotion:
             v,
             Y[:, :, base.independent],
             Y[:, :, arm.last_link],
-            Y[:, :, arm.moved_links],
             Y_tilt[:, :, base.independent],
             np.einsum("njkt,k->njt", Y_tilt, arm.inertia),
             base.beta(arm.inertia),
+            np.moveaxis(base.matrix(len(arm.inertia))[:, arm.moved_links], 1, 0),
             LinkTorques(
                 arm.urdf,
                 joints,
@@ -189,7 +188,7 @@ class ArmMotion:
                 load = load + self.Y_payload @ effect.inertial
             elif isinstance(effect, LinkPayload):
                 at = self.joints.index(effect.joint)
-                load = load + self.Y_links[:, :, at] @ effect.inertial
+                load = load + self.Y @ (self.links[at] @ effect.inertial)
             elif isinstance(effect, ArmTilt) and not effect.is_null:
                 by_base = np.einsum("njbt,b->njt", self.Y_tilt, beta - self.nominal)
                 load = load + (self.tilt + by_base) @ [effect.rx, effect.ry]

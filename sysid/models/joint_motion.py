@@ -40,7 +40,7 @@ from sysid.models.rate_factors import (
     rate_text,
     right_rates,
 )
-from sysid.models.regressor import INERTIAL, ArmDynamics, BaseSet, base_set
+from sysid.models.regressor import ArmDynamics, BaseSet, base_set
 from sysid.models.signed_order import SignedOrder
 from sysid.parameters import Parameter
 
@@ -214,30 +214,6 @@ class JointMotionModel(LogModel):
         if self._inertia is not None:
             raise DisasmError("an axis without a URDF has no links to trust; give one")
         return self.only(()).with_known_links()
-
-    @property
-    def identifies_links(self) -> bool:
-        """Whether all base parameters of a URDF's links are among the parameters."""
-        return self._own_parameters is None and self._inertia is None
-
-    @property
-    def base_regressor(self) -> Array:
-        """Y (n, joints, b) of the base parameters, which come first."""
-        return self._motion.Y
-
-    @property
-    def links_in_base(self) -> dict[str, Array]:
-        """How inertial parameters of each link (10,) add to the base parameters.
-
-        (b, 10) by the link's name, from the base on.
-        """
-        arm = self._arm_under(np.array(self._gravity))
-        base, count = self._base_set(arm), len(INERTIAL)
-        into = np.zeros((len(base.independent), count * len(arm.links)))
-        into[np.arange(len(base.independent)), base.independent] = 1.0
-        into[:, base.dependent] = base.K
-        parts = np.split(into, len(arm.links), axis=1)
-        return dict(zip(arm.links, parts, strict=True))
 
     @property
     def gravity(self) -> tuple[float, float, float]:

@@ -253,6 +253,13 @@ class BaseSet:
         """Returns the base parameters of inertial parameters."""
         return pi[self.independent] + self.K @ pi[self.dependent]
 
+    def matrix(self, size: int) -> Array:
+        """Returns B (b, size) with beta = B pi, of `size` inertial parameters."""
+        B = np.zeros((len(self.independent), size))
+        B[np.arange(len(self.independent)), self.independent] = 1.0
+        B[:, self.dependent] = self.K
+        return B
+
     def label(self, number: int, names: Sequence[str]) -> str:
         """Returns what a base parameter is a sum of."""
         parts = [names[self.independent[number]]]

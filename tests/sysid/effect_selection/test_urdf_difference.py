@@ -7,7 +7,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import FlangePayload, JointViscousFriction, LinkPayload
 from drake_disasm.logs import read_log, write_static_wrench
 from sysid.effect_selection.close_loop import close_loop
-from sysid.effect_selection.urdf_difference import urdf_difference
+from sysid.effect_selection.urdf_difference import links_in_base, urdf_difference
 from sysid.fitting.candidates import Candidate, extended
 from sysid.fitting.fitter import Fitter
 from sysid.fitting.settings import DEFAULT_SETTINGS
@@ -64,7 +64,7 @@ def test_a_body_on_an_inner_link_acts_as_one_in_the_urdf(loaded):
     theta = np.array([p.nominal for p in more.parameters])
     free = JointMotionModel([loaded])
     beta = np.array([p.nominal for p in free.parameters])
-    beta = beta + free.links_in_base["upper"] @ body.inertial
+    beta = beta + links_in_base(free)["upper"] @ body.inertial
     assert np.allclose(more.predictions(theta), free.predictions(beta), atol=1e-9)
 
 

@@ -7,7 +7,6 @@ import pytest
 
 from sysid.export.consistent_inertia import (
     ball,
-    base_matrix,
     consistent_inertia,
     inertial_of,
     pseudo_inertia,
@@ -21,7 +20,7 @@ from tests.sysid.export.arms import IIWA, IIWA_JOINTS, changed
 def iiwa() -> tuple[ArmDynamics, np.ndarray]:
     arm = ArmDynamics(IIWA, IIWA_JOINTS)
     base = base_set(arm.random_regressor())
-    return arm, base_matrix(base, len(arm.inertia))
+    return arm, base.matrix(len(arm.inertia))
 
 
 def eigenvalues(pi: np.ndarray) -> np.ndarray:
