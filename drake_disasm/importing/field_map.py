@@ -95,11 +95,6 @@ class Column:
             DisasmError: a constant is not in the recording, or a unit is not known.
         """
         units = self._units(where)
-        if self.unit == "A" and not self.scales:
-            raise DisasmError(
-                f"{where}: is a motor's current; give `scale`, the motor constants "
-                "[N m/A] by joint, in the map"
-            )
         found = []
         scales = self.scales or (1.0,) * len(self.channels)
         for scale, unit in zip(scales, units, strict=True):
@@ -173,12 +168,16 @@ class FieldMap:
     drive: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Checks columns against the kind, and fills in the usual form of rotations.
+        """Checks columns against the kind, and fills in what they leave open.
+
+        Torques in amperes without motor constants are `current`; rotations have their
+        usual form.
 
         Raises:
             DisasmError: a column that the kind does not have, or of another size.
         """
-        formed = {n: _formed(self.kind, n, c) for n, c in self.columns.items()}
+        columns = _with_currents(self.kind, self.columns)
+        formed = {n: _formed(self.kind, n, c) for n, c in columns.items()}
         object.__setattr__(self, "columns", formed)
         for name, column in self.columns.items():
             wanted = width_of(self.kind, name, len(self.joints), column.form)
@@ -252,6 +251,23 @@ def quantity_of(kind: str, name: str) -> Quantity:
             f"map: a {kind} log has no column {shown(name)}; it has {', '.join(known)}"
         )
     return found
+
+
+def _with_currents(kind: str, columns: Mapping[str, Column]) -> Mapping[str, Column]:
+    """Returns columns in which currents without motor constants are no torques.
+
+    Raises:
+        DisasmError: the kind of log has no currents.
+    """
+    tau = columns.get("tau")
+    if tau is None or tau.unit != "A" or set(tau.scales) - {1.0, -1.0}:
+        return columns
+    if "current" in columns or KINDS[kind].quantity("current") is None:
+        raise DisasmError(
+            "map: tau: is a motor's current; give `scale`, the motor constants [N m/A] "
+            "by joint, in the map"
+        )
+    return {("current" if n == "tau" else n): c for n, c in columns.items()}
 
 
 def _formed(kind: str, name: str, column: Column) -> Column:

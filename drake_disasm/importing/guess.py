@@ -32,11 +32,12 @@ from drake_disasm.logs.schema import KINDS, WRENCH
 _EPISODE = ("episode_index", "episode", "trial", "run")
 #: What is looked for, by the kind of log.
 _OF_JOINTS = {
-    "joint_motion": ("q", "tau"),
+    "joint_motion": ("q", "tau", "current"),
     "joint_torque_static": ("q", "tau"),
     "joint_response": ("q", "q_commanded", "supply", "enabled"),
 }
 _SCALARS = ("supply", "enabled")
+_TORQUES = ("tau", "current")  # the first, if both are there
 #: Kinds of log that names alone tell.
 _NAMED = ("joint_response", "static_wrench")
 #: What some kinds need besides positions, in words.
@@ -256,8 +257,11 @@ def _columns_of(
             by_name = named(stream, quantity, names)
             both = [by_name.get(key, []) for key in keys]
             own = [x[0] for x in both] if all(len(x) == 1 for x in both) else []
-        if own and (quantity != "tau" or is_alive(stream, [x.channel for x in own])):
+        channels = [x.channel for x in own]
+        if own and (quantity not in _TORQUES or is_alive(stream, channels)):
             found[quantity] = own
+    if "tau" in found:
+        found.pop("current", None)
     columns = {q: _column(x) for q, x in found.items()}
     if preset := known.preset:
         columns = {q: preset.adapted(q, c, stream) for q, c in columns.items()}

@@ -43,7 +43,7 @@ def plot_import(imported: Imported, path: Path) -> None:
 
 
 def _draw_stretch(axis: Any, imported: Imported) -> None:
-    name = "tau" if "tau" in imported.episodes[0] else "q"
+    name = next(n for n in ("tau", "current", "q") if n in imported.episodes[0])
     recording, done = imported.recordings[0], imported.done
     assert done is not None
     episode = imported.episodes[0]

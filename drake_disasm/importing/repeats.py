@@ -21,7 +21,8 @@ FEWEST = 10
 #: Of other rows, and values: where more are repeated, a channel is coarse, not stuck.
 COARSE = 0.2
 _ONE_STEP = 1.5  # quanta: less is one, rounded
-_MEASURED = ("tau", "wrench", "ft_sensor")  # a robot may stand, and command nothing
+#: Quantities; a robot may stand, and command nothing.
+_MEASURED = ("tau", "current", "wrench", "ft_sensor")
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ _MADE = "velocities and accelerations are made from the positions"
 _WHY = {
     "v": _MADE,
     "vd": _MADE,
-    "current": "a motor's current; as `tau` it needs a scale, in N m/A",
+    "current": "a motor's current; name it as `current` in the map",
     "time": "another time",
     "order": "another order",
 }
@@ -104,7 +104,7 @@ def check_torques(source: Source, fields: FieldMap) -> None:
     Raises:
         DisasmError: names them.
     """
-    if fields.kind != "joint_motion" or "tau" in fields.columns:
+    if not _lacks_torques(fields):
         return
     used, stream = _used(fields), main_stream(source, fields)
     by_name = named(stream, "tau", NAMES)
@@ -121,7 +121,7 @@ def check_torques(source: Source, fields: FieldMap) -> None:
 
 def without_torques(source: Source, fields: FieldMap) -> str:
     """Returns what a log of joint motion without torques is not good for, or ""."""
-    if fields.kind != "joint_motion" or "tau" in fields.columns:
+    if not _lacks_torques(fields):
         return ""
     stream, used = main_stream(source, fields), _used(fields)
     left = [n for n in stream.names if n not in used and is_alive(stream, [n])]
@@ -133,6 +133,13 @@ def without_torques(source: Source, fields: FieldMap) -> str:
     return (
         f"{words}; not used: {_some(left)}; if these are torques, save the map by "
         "`save_map` and name them there as tau"
+    )
+
+
+def _lacks_torques(fields: FieldMap) -> bool:
+    """Returns whether a map of a joint's motion has neither torques nor currents."""
+    return fields.kind == "joint_motion" and not {"tau", "current"} & set(
+        fields.columns
     )
 
 

@@ -337,6 +337,12 @@ JOINT_MOTION = Kind(
             "joint torques, positive about the joint's axis, exerted on its child "
             "link (N for a prismatic joint)",
         ),
+        _joints(
+            "current",
+            "A",
+            "motor currents, instead of `tau` where motor constants are not known; "
+            "positive as the torque is",
+        ),
         _EXTRA,
     ),
     keys={

@@ -525,11 +525,12 @@ class JointMotionModel(LogModel):
 
 def _refuse_missing(episodes: Sequence[Episode]) -> None:
     for episode in episodes:
+        remedy = (
+            "inverse dynamics needs q, v, vd and tau; map q and tau in import-log, "
+            "which makes v and vd"
+        )
+        if "current" in episode:
+            remedy = "its motor currents are torques by `motor_constants`; give them"
         for quantity in _NEEDED:
             if quantity not in episode:
-                raise refusal(
-                    episode.path,
-                    f"no columns '{quantity}.*'",
-                    "inverse dynamics needs q, v, vd and tau; map q and tau in "
-                    "import-log, which makes v and vd",
-                )
+                raise refusal(episode.path, f"no columns '{quantity}.*'", remedy)

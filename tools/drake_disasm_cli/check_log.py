@@ -57,7 +57,8 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     logs = common.named_logs(args.log)
     print("\n".join(line for log in logs for line in _of_log(log)))
-    model = _model(args, logs)
+    logs, constants = data_arguments.in_torques(logs, args)
+    model = data_arguments.with_constants(_model(args, logs), constants)
     with (
         program.ProgressBar(unit="run") as progress,
         Workers(args.workers, progress=progress) as workers,

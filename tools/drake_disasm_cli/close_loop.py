@@ -13,6 +13,7 @@ on what has changed since: by how much, since when, and what has not.
 """
 
 import argparse
+import dataclasses
 import math
 import shutil
 from collections.abc import Callable, Sequence
@@ -36,6 +37,7 @@ from sysid.identification.split import split_episodes
 from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.measurements import episode_names
+from sysid.motor_constants import MotorConstants
 from sysid.report import changes_page, closing_page
 from sysid.scenario_parameters import read_requests
 from sysid.workers import Workers
@@ -47,6 +49,8 @@ _EXAMPLES = """examples:
   drake-disasm close-loop --log out/arm_1 --trust urdf --out out/differs
   drake-disasm close-loop --log out/arm_1 --export urdf sdf --out out/arm
   drake-disasm close-loop --reference out/march --log out/april --out out/changed
+  drake-disasm close-loop --reference out/free --log out/loaded --known-payload 2.8 \\
+      --out out/weighed                                 both with motor currents
 """
 
 
@@ -63,6 +67,13 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         metavar="DIR",
         help="logs of the same robot as it was before: the verdict is on what has "
         "changed since (default: on what the model lacks)",
+    )
+    add(
+        "--known-payload",
+        type=options.above_zero,
+        metavar="KG",
+        help="of logs with motor currents: mass that the new logs carry at the flange "
+        "and the references do not; it identifies the motor constants",
     )
     _add_model_arguments(add)
     data_arguments.add_data_arguments(add)
@@ -143,9 +154,10 @@ def main(arguments: Sequence[str]) -> int:
     _refuse_combinations(args)
     references = common.named_logs(args.reference) if args.reference else []
     logs = [*references, *common.named_logs(args.log)]
+    logs, constants = data_arguments.in_torques(logs, args, len(references))
     if args.held_out:  # names, which are wrong more often than anything takes time
         split_episodes(episode_names(logs), args.held_out)
-    model = _model(args, logs)
+    model = data_arguments.with_constants(_model(args, logs), constants)
     if args.export:
         refuse_export(model, args.export)
     origin = program.provenance("drake-disasm close-loop", arguments, 0)
@@ -165,18 +177,43 @@ def main(arguments: Sequence[str]) -> int:
             changes = find_changes(model, len(episode_names(references)), **shared)
         else:
             closed = _closed(model, args, shared)
+    run = _Run(origin, findings, constants)
     if references:
-        _write_changes(args.out, changes, findings, origin)
-        _finish(args.out, changes.closed, changes_text(changes))
+        _write_changes(args.out, changes, run)
+        _finish(args.out, changes.closed, changes_text(changes), run)
         return 0
     exports, refusal = _exports(closed, args.export)
-    _write(args.out, closed, findings, origin, exports)
-    _finish(args.out, closed, closed.text)
+    _write(args.out, closed, run, exports)
+    _finish(args.out, closed, closed.text, run)
     if refusal is not None:
         raise refusal
     if exports is not None:
         print(f"exported: {', '.join(exports.files)}")
     return 0
+
+
+@dataclasses.dataclass(frozen=True)
+class _Run:
+    """What a verdict came from.
+
+    Attributes:
+        origin: provenance.
+        findings: of the check of the data.
+        constants: by which motor currents are torques, if they are.
+    """
+
+    origin: dict[str, object]
+    findings: Sequence[DataFinding]
+    constants: MotorConstants | None
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Returns it as plain data."""
+        constants = self.constants
+        return {
+            "data_findings": [finding.to_mapping() for finding in self.findings],
+            "motor_constants": constants.to_mapping() if constants else None,
+            "provenance": self.origin,
+        }
 
 
 def _closed(
@@ -195,11 +232,13 @@ def _closed(
     )
 
 
-def _finish(folder: Path, closed: ClosedLoop, text: str) -> None:
+def _finish(folder: Path, closed: ClosedLoop, text: str, run: _Run) -> None:
     """Removes fits that no run goes on from, and prints the verdict."""
     if not closed.is_provisional:
         shutil.rmtree(folder / _FITS, ignore_errors=True)
     print(text)
+    if run.constants is not None:
+        print(run.constants.text)
     print(f"report: {folder / 'report.html'}")
 
 
@@ -248,26 +287,17 @@ def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
     return model_of(logs, choice)
 
 
-def _write_changes(
-    folder: Path,
-    changes: Changes,
-    findings: Sequence[DataFinding],
-    origin: dict[str, object],
-) -> None:
+def _write_changes(folder: Path, changes: Changes, run: _Run) -> None:
     make_folder(folder)
-    of_data = {"data_findings": [finding.to_mapping() for finding in findings]}
-    mapping = changes_mapping(changes) | of_data | {"provenance": origin}
-    write_json(folder / "result.json", mapping)
-    write_text(folder / "reference.html", closing_page(changes.reference, origin))
-    write_text(folder / "report.html", changes_page(changes, origin, findings))
+    write_json(folder / "result.json", changes_mapping(changes) | run.to_mapping())
+    reference = closing_page(changes.reference, run.origin)
+    write_text(folder / "reference.html", reference)
+    page = changes_page(changes, run.origin, run.findings)
+    write_text(folder / "report.html", page)
 
 
 def _write(
-    folder: Path,
-    closed: ClosedLoop,
-    findings: Sequence[DataFinding],
-    origin: dict[str, object],
-    exports: Exports | None,
+    folder: Path, closed: ClosedLoop, run: _Run, exports: Exports | None
 ) -> None:
     make_folder(folder)
     learned = closed.verdict.residual_model
@@ -276,11 +306,10 @@ def _write(
     scenario = closed.scenario_with_residual_model(_RESIDUAL_MODEL)
     if scenario is not None:
         write_text(folder / "scenario.yaml", dump_scenario(scenario))
-    of_data = {"data_findings": [finding.to_mapping() for finding in findings]}
     exported = None if exports is None else exports.to_mapping()
-    of_run = {"provenance": origin, "export": exported}
-    write_json(folder / "result.json", to_mapping(closed) | of_data | of_run)
-    page = closing_page(closed, origin, findings, exported)
+    mapping = to_mapping(closed) | run.to_mapping() | {"export": exported}
+    write_json(folder / "result.json", mapping)
+    page = closing_page(closed, run.origin, run.findings, exported)
     write_text(folder / "report.html", page)
     if exports is not None:
         exports.write(folder)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from drake_disasm.common import program
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.logs import Log
 from sysid.data_checks import (
     ACCEPTABLE,
@@ -15,6 +16,13 @@ from sysid.data_checks import (
     without_flagged_rows,
 )
 from sysid.models import LogModel
+from sysid.motor_constants import (
+    MotorConstants,
+    constants_by_payload,
+    constants_by_urdf,
+    given_constants,
+    has_currents,
+)
 from sysid.workers import Workers
 
 #: What findings recommend, for programs that do not have it themselves.
@@ -55,6 +63,73 @@ def add_nominal_arguments(add: Callable[..., Any]) -> None:
         help="the nominal model (default: the scenario that the log states)",
     )
     add("--urdf", metavar="FILE", help="the arm of a log of joints")
+    add_motor_constants_argument(add)
+
+
+def add_motor_constants_argument(add: Callable[..., Any]) -> None:
+    """Adds --motor-constants."""
+    add(
+        "--motor-constants",
+        nargs="+",
+        metavar="K|urdf",
+        help="of a log with motor currents: torque by current [N m/A] of each joint; "
+        "or urdf, to identify them by the URDF's masses",
+    )
+
+
+def in_torques(
+    logs: Sequence[Log], args: argparse.Namespace, references: int = 0
+) -> tuple[Sequence[Log], MotorConstants | None]:
+    """Returns logs whose currents are torques, and by which motor constants.
+
+    Args:
+        logs: of one kind.
+        args: with --motor-constants and --urdf, and perhaps --known-payload.
+        references: number of logs without the known payload, which come first.
+
+    Raises:
+        DisasmError: a log with currents does not say how, or one with torques does.
+    """
+    payload = getattr(args, "known_payload", None)
+    wanted = [("--motor-constants", args.motor_constants), ("--known-payload", payload)]
+    given = [option for option, value in wanted if value is not None]
+    if not has_currents(logs):
+        if given:
+            raise DisasmError(
+                f"{given[0]}: {logs[0].folder} has no motor currents in place of "
+                "torques; leave it out"
+            )
+        return logs, None
+    if len(given) != 1:
+        raise DisasmError(
+            f"{logs[0].folder}: has motor currents and no torques; give "
+            "--motor-constants, by joint or as urdf, or close-loop's --known-payload "
+            "with --reference logs that lack it"
+        )
+    if payload is not None:
+        constants = constants_by_payload(logs, references, payload, args.urdf)
+    elif args.motor_constants == ["urdf"]:
+        constants = constants_by_urdf(logs, args.urdf)
+    else:
+        values = [_motor_constant(text) for text in args.motor_constants]
+        constants = given_constants(logs[0].header.joints, values)
+    return constants.torques(logs), constants
+
+
+def _motor_constant(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise DisasmError(
+            f"--motor-constants {text}: give numbers in N m/A, or urdf"
+        ) from None
+
+
+def with_constants(model: LogModel, constants: MotorConstants | None) -> LogModel:
+    """Returns a model that says what its torques rest on."""
+    if constants is None:
+        return model
+    return model.replace(assumptions=(*model.assumptions, constants.assumption))
 
 
 def checked(

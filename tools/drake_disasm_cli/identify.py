@@ -101,6 +101,7 @@ def _add_input_arguments(add: Callable[..., object]) -> None:
         "state (default), or whole episodes by rollout",
     )
     add("--urdf", metavar="FILE", help="the arm of a log of joints")
+    data_arguments.add_motor_constants_argument(add)
     add(
         "--noise",
         action="append",
@@ -191,7 +192,8 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     logs = common.named_logs(args.log)
     split_episodes(episode_names(logs), _held_out(args))  # names, before any work
-    model = model_of(logs, _choice(args))
+    logs, constants = data_arguments.in_torques(logs, args)
+    model = data_arguments.with_constants(model_of(logs, _choice(args)), constants)
     settings = _settings(args)
     origin = program.provenance("drake-disasm identify", arguments, args.seed) | _data(
         logs

@@ -263,8 +263,9 @@ def test_a_ur_s_table_without_names_has_its_controller_s_constants(
     )
     source = _ur(path, blocks=3)
     fields = _guess(source, preset=preset)
-    message = refusal(import_recordings, [source], fields, Processing())
-    assert "is a motor's current; give `scale`" in message
+    assert "tau" not in fields.columns and fields.columns["current"].unit == "A"
+    [episode] = import_recordings([source], fields, Processing()).episodes
+    assert "current" in episode and "tau" not in episode
     message = refusal(_ur, path, swap=True)
     assert "preset 'rtde' does not fit: column 7 is not the velocity" in message
 
@@ -309,7 +310,7 @@ def test_every_channel_has_a_use_or_a_reason(tmp_path: Path) -> None:
     found = uses(source, "joint_motion", _guess(source))
     assert found["t"] == "time" and found["q_0"] == "q, joint_0"
     assert "made from the positions" in found["dq_0"]
-    assert "N m/A" in found["i_0"] and "says nothing" in found["lamp"]
+    assert "`current`" in found["i_0"] and "says nothing" in found["lamp"]
     assert "as a time or a count" in found["n"]
     assert uses(source, "joint_motion")["q_0"].startswith("not used: q by its name")
 
