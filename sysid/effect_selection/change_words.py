@@ -8,10 +8,12 @@ import numpy as np
 
 from drake_disasm.effects import amplitudes
 from sysid.effect_selection.changes import Changes, Course, Onset
+from sysid.effect_selection.contradictions import Contradiction
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effect_class, in_words
 from sysid.effect_selection.output import to_mapping
 from sysid.effect_selection.verdict_words import (
+    contradiction_parts,
     effect_lines,
     error_in_words,
     named_effects,
@@ -23,6 +25,7 @@ def changes_sentence(changes: Changes) -> str:
     closed, verdict = changes.closed, changes.closed.verdict
     newer = closed.errors.of_episodes(changes.newer)
     said = ["Provisional, the time was over:"] if closed.is_provisional else []
+    said += map(_difference_text, changes.reference.verdict.contradictions)
     if verdict.names:
         said += named_effects(verdict)
         what = "these changes" if len(verdict.names) > 1 else "this change"
@@ -84,6 +87,15 @@ def changes_mapping(changes: Changes) -> dict[str, Any]:
             for course in changes.courses
         ],
     }
+
+
+def _difference_text(found: Contradiction) -> str:
+    """Returns which references already differ, and by what."""
+    one, other, kind = contradiction_parts(found)
+    return (
+        f"The references already differ, {one} from {other} by {kind}: name those "
+        "alone that are of one state."
+    )
 
 
 def _onset_text(onset: Onset) -> str:

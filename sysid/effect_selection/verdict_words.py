@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drake_disasm.common.prefixes import prefixed_unit
+from sysid.effect_selection.contradictions import Contradiction
 from sysid.effect_selection.effect_names import (
     by_kind,
     effects_in_words,
@@ -295,17 +296,23 @@ def _subject(verdict: Verdict) -> _Subject:
     return _CHANGED if verdict.is_of_changes else _LACKS
 
 
+def contradiction_parts(found: Contradiction) -> tuple[str, str, str]:
+    """Returns an episode, which others it contradicts, and by what, in words."""
+    one, *others = found.episodes
+    kind = in_words(found.effect.partition("[")[0])
+    return one, enumeration(others) or "the other episodes", kind
+
+
 def _left(verdict: Verdict) -> list[str]:
     """Returns what the effects leave, clause by clause."""
     clauses: list[str] = []
     if verdict.correlated and not (verdict.confirmed or verdict.ambiguous):
         channels = enumeration(_first(verdict.correlated))
         clauses.append(f"the residual of {channels} is correlated from row to row")
-    for against in verdict.contradictions:
-        one, *others = against.episodes
-        kind = in_words(against.effect.partition("[")[0])
-        other = enumeration(others) or "the other episodes"
-        clauses.append(f"{one} contradicts {other} by {kind}")
+    clauses += [
+        "{} contradicts {} by {}".format(*contradiction_parts(each))
+        for each in verdict.contradictions
+    ]
     if verdict.excess:
         clauses.append(f"the residual is {verdict.excess:.2g} times the noise")
     texts: dict[str, list[str]] = {}

@@ -50,6 +50,15 @@ def test_a_payload_is_weighed(tmp_path):
     assert mass == pytest.approx(1.0, abs=0.02)
 
 
+def test_references_that_differ_are_named(tmp_path):
+    added = [TorqueOffset("elbow", 0.5)]
+    [first, second] = two_logs(tmp_path / "a", _FRICTION, added, rows=300)
+    [_, newer] = two_logs(tmp_path / "b", _FRICTION, added, rows=300)
+    text = changes_text(find_changes(JointMotionModel([first, second, newer]), 2))
+    assert "The references already differ" in text
+    assert "from log_1/episode_0000 by an offset of the torque" in text
+
+
 def test_a_friction_that_fell_is_told_by_how_much(tmp_path):
     found = changes(tmp_path, [JointCoulombFriction("elbow", -0.3)])
     assert found.closed.verdict.confirmed == ("JointCoulombFriction.elbow",)
