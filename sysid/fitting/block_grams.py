@@ -287,7 +287,8 @@ class NormalEquations:
         left = others - np.swapaxes(K, 1, 2) @ along
         power = np.maximum(np.einsum("bii->bi", left)[:, :-1], 1e-300)
         x = -left[:, :-1, -1] / power
-        return np.sqrt((len(x) - 1.0) * x.var(axis=0))
+        with np.errstate(over="ignore"):  # unbounded, of a column in one block alone
+            return np.sqrt((len(x) - 1.0) * x.var(axis=0))
 
     @staticmethod
     def _of_others(own: Array) -> Array:
