@@ -1,7 +1,7 @@
 """Robots' files of arms that closing the loop identified, read again.
 
-The KUKA LWR 4+ and the UR10e of ../shared/data, and a simulated iiwa with friction and a
-tool that its URDF does not state. Writes each arm's files, and the difference of its
+The KUKA LWR 4+ and the UR10e of ../shared/data, and a simulated iiwa with friction and
+a tool that its URDF does not state. Writes each arm's files, and the difference of its
 URDF to the original, into --out.
 """
 

@@ -1,9 +1,9 @@
 """Motor constants that are identified: of a real arm, and whether intervals hold.
 
 With --real, those of the UR10e of ../shared/data, whose second recording carries
-2.805 kg, beside the two sets that its authors state and the controller's. Without, those
-of simulated arms: each with a payload and constants of its own, friction that the URDF
-does not state, and noise that is correlated from row to row.
+2.805 kg, beside the two sets that its authors state and the controller's. Without,
+those of simulated arms: each with a payload and constants of its own, friction that the
+URDF does not state, and noise that is correlated from row to row.
 """
 
 import dataclasses
@@ -137,13 +137,13 @@ def answer(urdf: Path, number: int) -> Answer:
     rubs = friction(joints, random)
     [payload], _, _ = change("tool", rubs, random)
     assert isinstance(payload, FlangePayload)
-    true = np.exp(random.uniform(np.log(1.0), np.log(20.0), len(joints)))
+    true = np.exp(random.uniform(np.log(1.0), np.log(20.0), len(joints))).tolist()
     seed = _SEED + 10 * number
     with tempfile.TemporaryDirectory() as folder:
         known = simulated(Path(folder, "reference"), urdf, rubs, seed)
         log = simulated(Path(folder, "newer"), urdf, rubs, seed + 1, [payload])
     logs = [in_currents(each, true) for each in (known, log)]
-    found: Answer = {"mass": payload.mass, "true": true.tolist()}
+    found: Answer = {"mass": payload.mass, "true": true}
     for name, identify in (
         ("payload", partial(constants_by_payload, logs, 1, payload.mass)),
         ("urdf", partial(constants_by_urdf, logs[:1])),
@@ -171,10 +171,9 @@ def _counts(arm: str, basis: str, answers: list[Answer]) -> list[Count]:
         )
     ]
     known = [each for each in joints if each["interval"]]
-    inside = [each["interval"][0] < each["true"] < each["interval"][1] for each in known]
-    close = [
-        each["interval"][1] - each["interval"][0] < 0.2 * each["true"] for each in known
-    ]
+    bounds = [(*each["interval"], each["true"]) for each in known]
+    inside = [low < true < high for low, high, true in bounds]
+    close = [high - low < 0.2 * true for low, high, true in bounds]
     name = f"{arm}, by {'a known payload' if basis == 'payload' else 'the URDF'}"
     return [
         Count(name, "constant is identified", len(known), joints),

@@ -123,28 +123,17 @@ def find_changes(
     names, episode = model.measurements.names, model.measurements.episode
     if not 0 < known < len(names):
         raise DisasmError("give at least one reference, and one log to compare")
-    deadline = time.monotonic() + time_budget
-
-    def _closed(what: LogModel, name: str, budget: float) -> ClosedLoop:
-        return close_loop(
-            what,
-            test=(),
-            settings=settings,
-            workers=workers,
-            progress=progress,
-            folder=folder / name if folder else None,
-            time_budget=budget,
-        )
-
+    search = _Search(
+        settings, workers, progress, folder, time.monotonic() + time_budget
+    )
     first = model.of_episodes(range(known))
-    reference = _closed(first, "reference", _OF_REFERENCES * time_budget)
+    reference = search.closed(first, "reference", _OF_REFERENCES)
     whole = _with_effects_of(model, reference)
 
     def _closed_since(row: int) -> ClosedLoop:
         is_newer = np.arange(len(episode)) >= row
         changed = ChangedModel(whole, is_newer, reference.last.values)
-        budget = max(deadline - time.monotonic(), 0.0)
-        return _closed(changed, f"since_{row}", budget)
+        return search.closed(changed, f"since_{row}")
 
     closed, onset = _closed_since(int(np.argmax(episode >= known))), None
     if (begin := _onset_row(closed, known)) is not None:
@@ -154,6 +143,34 @@ def find_changes(
             own = begin[0] - int(np.argmax(episode == episode[begin[0]]))
             onset = Onset(names[int(episode[begin[0]])], own, begin[1])
     return Changes(reference, closed, known, onset, _courses(closed, known, workers))
+
+
+@dataclass(frozen=True)
+class _Search:
+    """How loops are closed, and until when.
+
+    Attributes:
+        settings, workers, progress, folder: see `find_changes`.
+        deadline: of all [s], monotonic.
+    """
+
+    settings: SelectionSettings
+    workers: Workers | None
+    progress: Progress | None
+    folder: Path | None
+    deadline: float
+
+    def closed(self, model: LogModel, name: str, share: float = 1.0) -> ClosedLoop:
+        """Closes the loop on all rows of a model, within a share of the time left."""
+        return close_loop(
+            model,
+            test=(),
+            settings=self.settings,
+            workers=self.workers,
+            progress=self.progress,
+            folder=self.folder / name if self.folder else None,
+            time_budget=share * max(self.deadline - time.monotonic(), 0.0),
+        )
 
 
 def _with_effects_of(model: LogModel, reference: ClosedLoop) -> LogModel:

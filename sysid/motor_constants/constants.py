@@ -168,7 +168,7 @@ def identified_constants(
             "torque beside friction; give them by `motor_constants`"
         )
     stand_in = float(np.exp(-np.log(inverse[known]).mean()))
-    values = [float(1.0 / a) if k else stand_in for a, k in zip(inverse, known)]
+    values = np.where(known, 1.0 / inverse, stand_in).tolist()
     intervals = [
         (float(1.0 / (a + r)), float(1.0 / (a - r))) if k else None
         for a, r, k in zip(inverse, reach, known, strict=True)

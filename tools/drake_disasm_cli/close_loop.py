@@ -153,8 +153,8 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     _refuse_combinations(args)
     references = common.named_logs(args.reference) if args.reference else []
-    logs = [*references, *common.named_logs(args.log)]
-    logs, constants = data_arguments.in_torques(logs, args, len(references))
+    read = (*references, *common.named_logs(args.log))
+    logs, constants = data_arguments.in_torques(read, args, len(references))
     if args.held_out:  # names, which are wrong more often than anything takes time
         split_episodes(episode_names(logs), args.held_out)
     model = data_arguments.with_constants(_model(args, logs), constants)

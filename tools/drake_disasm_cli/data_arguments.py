@@ -79,7 +79,7 @@ def add_motor_constants_argument(add: Callable[..., Any]) -> None:
 
 def in_torques(
     logs: Sequence[Log], args: argparse.Namespace, references: int = 0
-) -> tuple[Sequence[Log], MotorConstants | None]:
+) -> tuple[tuple[Log, ...], MotorConstants | None]:
     """Returns logs whose currents are torques, and by which motor constants.
 
     Args:
@@ -99,7 +99,7 @@ def in_torques(
                 f"{given[0]}: {logs[0].folder} has no motor currents in place of "
                 "torques; leave it out"
             )
-        return logs, None
+        return tuple(logs), None
     if len(given) != 1:
         raise DisasmError(
             f"{logs[0].folder}: has motor currents and no torques; give "

@@ -36,9 +36,7 @@ def in_currents(logs, constants=_TRUE):
     """Returns logs with currents in place of torques."""
 
     def _episode(episode):
-        columns = {
-            n: v for n, v in episode.columns.items() if not n.startswith("tau.")
-        }
+        columns = {n: v for n, v in episode.columns.items() if not n.startswith("tau.")}
         tau = episode["tau"]
         columns |= {f"current.{i}": tau[:, i] / k for i, k in enumerate(constants)}
         return dataclasses.replace(episode, columns=MappingProxyType(columns))
@@ -58,9 +56,7 @@ def logs(tmp_path_factory):
 
 def test_a_known_payload_gives_the_constants(logs):
     found = constants_by_payload(logs, 1, _PAYLOAD.mass)
-    for value, interval, true in zip(
-        found.values, found.intervals, _TRUE, strict=True
-    ):
+    for value, interval, true in zip(found.values, found.intervals, _TRUE, strict=True):
         assert value == pytest.approx(true, rel=0.02)
         assert interval[0] < true < interval[1] < 1.1 * true
     wrong = constants_by_payload(logs, 1, 2.0 * _PAYLOAD.mass)
