@@ -35,7 +35,7 @@ FLOORS = {
         {"parameters", "confidence", "deadline", "optimise", "thresholds"},
         {"scenario_parameters"},
         {"models"},
-        {"workers"},
+        {"workers", "motor_constants"},
         {"objective"},
         {"identification", "data_checks"},
         {"fitting"},
