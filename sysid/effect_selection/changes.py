@@ -130,6 +130,10 @@ def find_changes(
     reference = search.closed(first, "reference", _OF_REFERENCES)
     whole = _with_effects_of(model, reference)
 
+    # As much of the newer logs' loss as if the references were as long.
+    share = float(np.mean(episode >= known))
+    search = search.for_gain(2.0 * share * settings.min_gain)
+
     def _closed_since(row: int) -> ClosedLoop:
         is_newer = np.arange(len(episode)) >= row
         changed = ChangedModel(whole, is_newer, reference.last.values)
@@ -159,6 +163,11 @@ class _Search:
     progress: Progress | None
     folder: Path | None
     deadline: float
+
+    def for_gain(self, min_gain: float) -> "_Search":
+        """Returns the same for effects that gain so much of the loss of all rows."""
+        settings = dataclasses.replace(self.settings, min_gain=min_gain)
+        return dataclasses.replace(self, settings=settings)
 
     def closed(self, model: LogModel, name: str, share: float = 1.0) -> ClosedLoop:
         """Closes the loop on all rows of a model, within a share of the time left."""

@@ -1,5 +1,7 @@
 """What has changed since reference logs, on simulated logs of a small arm."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -61,11 +63,19 @@ def test_references_that_differ_are_named(tmp_path):
 
 def test_a_friction_that_fell_is_told_by_how_much(tmp_path):
     found = changes(tmp_path, [JointCoulombFriction("elbow", -0.3)])
-    assert found.closed.verdict.confirmed == ("JointCoulombFriction.elbow",)
+    assert found.closed.verdict.names == ("JointCoulombFriction.elbow",)
     value, (low, high) = values(found)["JointCoulombFriction.elbow.size"]
     assert value == pytest.approx(-0.3, abs=0.02)
     assert low <= -0.3 <= high
     assert found.onset is None
+
+
+def test_many_references_hide_no_change(tmp_path):
+    logs = two_logs(tmp_path, _FRICTION, [JointCoulombFriction("elbow", 0.02)])
+    names = [f"reference_{n}" for n in range(5)]
+    references = [dataclasses.replace(logs[0], folder=tmp_path / n) for n in names]
+    found = find_changes(JointMotionModel([*references, logs[1]]), 5)
+    assert found.closed.verdict.names == ("JointCoulombFriction.elbow",)
 
 
 def test_an_offset_that_jumps_within_the_log_has_a_row(tmp_path):
