@@ -17,7 +17,7 @@ import functools
 import itertools
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from drake_disasm.learning.experiment import read_result, seed_folder
 from drake_disasm.learning.hyperparameters import Hyperparameters, override
@@ -53,7 +53,6 @@ from sysid.studies.mismatches import MISMATCHES
 _SCENARIO = "chapter3"
 _STATION = "cell"  # which stands for the robot
 _LOG_SEED = 500_000  # not one of any training
-_TIME_BUDGET = 1200.0  # s, of closing the loop
 #: What lets an agent without a base policy learn: with the thesis's numbers alone DDPG
 #: seldom does (docs/explanation/learning.md).
 _LAYER_NORM = ("layer_norm=true",)
@@ -105,6 +104,7 @@ class TwinTransferStudy(Study):
     # The thesis's DDPG takes up to 225 where a groove is rolled, 262 against a chain.
     seeds, episodes, validation = 10, 300, 2
     has_robot = True
+    time_budget: ClassVar[float] = 1200.0  # s, of closing the loop
 
     def stages(self, folder: Path) -> Iterator[Stage]:
         """Yields the robots' logs and twins, trainings, tests, trainings there."""
@@ -126,7 +126,7 @@ class TwinTransferStudy(Study):
             robot=with_effects(nominal, MISMATCHES[mismatch].effects),
             station=_STATION,
             seed=_LOG_SEED,
-            time_budget=_TIME_BUDGET,
+            time_budget=self.time_budget,
         )
 
     @functools.cached_property

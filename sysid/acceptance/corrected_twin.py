@@ -1,0 +1,166 @@
+"""The corrected twin: what closing the loop wrote, as scenarios to run a policy on."""
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import read_json
+from drake_disasm.effects import Effect, amplitudes, find_effect
+from drake_disasm.mdp import STATE_NAMES
+from drake_disasm.scenario import Scenario, load_scenario, with_values
+from drake_disasm.scenario.randomisation import refuse_broken_ranges
+from drake_disasm.scenario.schema import Range
+
+_REMEDY = "run `drake-disasm close-loop` on transitions of the cell, and give its --out"
+_VERDICT: dict[str, Any] = {
+    "ending": "",
+    "sentence": "",
+    "provisional": False,
+    "suggested": [""],
+    "ties": {},
+    "parameters": {},
+    "invalid": "",
+    "misfits": [""],
+    "contradictions": [{"effect": ""}],
+    "left_in_channels": [{"channel": ""}],
+    "left_over": [{"channel": ""}],
+    "residual_model": None,
+    "errors": {"channels": {}},
+}
+_PARAMETER = {"value": 0.0, "unit": "", "interval_95": [0.0], "is_at_bound": False}
+
+
+@dataclass(frozen=True)
+class CorrectedTwin:
+    """The twin with the effects of a verdict.
+
+    Attributes:
+        scenario: at the verdict's values.
+        verdict: `result.json` of `close-loop`.
+    """
+
+    scenario: Scenario
+    verdict: Mapping[str, Any]
+
+    @classmethod
+    def read(cls, folder: Path) -> "CorrectedTwin":
+        """Returns the corrected twin in the output folder of `close-loop`.
+
+        Raises:
+            DisasmError: the folder holds no verdict, a damaged one, or one on another
+                kind of log than transitions.
+        """
+        path = folder / "result.json"
+        if not path.is_file():
+            raise DisasmError(f"{folder}: has no result.json; {_REMEDY}")
+        if "reference" in read_json(path, _REMEDY, {}):
+            raise DisasmError(
+                f"{path}: says what has changed since a reference, and is no model of "
+                f"the cell; {_REMEDY} without --reference"
+            )
+        verdict = read_json(path, _REMEDY, _VERDICT)
+        example = {"parameters": dict.fromkeys(verdict["parameters"], _PARAMETER)}
+        read_json(path, _REMEDY, example)
+        channels = verdict["errors"]["channels"]
+        if list(channels) != list(STATE_NAMES):
+            names = ", ".join(list(channels)[:3])
+            raise DisasmError(
+                f"{path}: is of another kind of log (channels {names}, ...); {_REMEDY}"
+            )
+        scenario = folder / "scenario.yaml"
+        if not scenario.is_file():
+            raise DisasmError(f"{folder}: has no scenario.yaml; {_REMEDY}")
+        twin = cls(load_scenario(str(scenario)), verdict)
+        refuse_broken_ranges(twin.over_intervals)
+        return twin
+
+    @property
+    def at_values(self) -> Scenario:
+        """At the verdict's values, with nothing drawn."""
+        return dataclasses.replace(self.scenario, randomisation=[])
+
+    @property
+    def over_intervals(self) -> Scenario:
+        """With the verdict's parameters drawn from their intervals."""
+        return with_intervals(self.scenario, self.verdict["parameters"])
+
+    @property
+    def nominal(self) -> Scenario:
+        """Without the verdict's effects, as it was before the loop was closed."""
+        effects = [e for e in self.scenario.effects if not self._is_learned(e)]
+        scenario = dataclasses.replace(self.at_values, effects=effects)
+        names = [n for n in self.verdict["parameters"] if _is_amplitude(n)]
+        return with_values(scenario, dict.fromkeys(names, 0.0))
+
+    @property
+    def reservations(self) -> list[str]:
+        """What the verdict leaves open, as clauses after "a model that"."""
+        return list(_reservations(self.verdict))
+
+    @property
+    def rivals(self) -> dict[str, list[str]]:
+        """Effects that explain the log as well as one of the verdict's, by its name."""
+        ties = self.verdict["ties"]
+        return {name: list(others) for name, others in ties.items() if others}
+
+    def _is_learned(self, effect: Effect) -> bool:
+        """Returns whether an effect is the residual model."""
+        learned = self.verdict["residual_model"]
+        return bool(learned) and type(effect).__name__ == learned["effect"]
+
+
+def with_intervals(scenario: Scenario, parameters: Mapping[str, Any]) -> Scenario:
+    """Returns a scenario whose effects are drawn from their 95 % intervals.
+
+    Each parameter is drawn by itself, uniformly: of parameters that are correlated the
+    draws hold combinations that the log excludes, and so ask more of a policy.
+
+    Args:
+        scenario: with the effects.
+        parameters: by name, each with its `interval_95`, as in `result.json`.
+    """
+    present = {type(effect).__name__ for effect in scenario.effects}
+    ranges = [
+        Range(name, *each["interval_95"])
+        for name, each in parameters.items()
+        if name.partition(".")[0] in present
+        and each["interval_95"][0] < each["interval_95"][1]
+    ]
+    known = {each.parameter for each in ranges}
+    kept = [each for each in scenario.randomisation if each.parameter not in known]
+    return dataclasses.replace(scenario, randomisation=[*kept, *ranges])
+
+
+def _is_amplitude(name: str) -> bool:
+    """Returns whether a verdict's parameter is one that is zero without its effect."""
+    kind = find_effect(name.partition(".")[0])
+    return name.rpartition(".")[2] in amplitudes(kind)
+
+
+def _reservations(verdict: Mapping[str, Any]) -> Iterator[str]:
+    if verdict["provisional"]:
+        yield "is provisional: the time was over before the search was"
+    if verdict["ending"] == "too short":
+        yield "rests on a log that is too short to decide"
+    elif verdict["ending"] in ("unexplained", "refused"):
+        yield f"explains nothing for sure (ending: {verdict['ending']})"
+    if verdict["invalid"]:
+        yield f"does not hold for its log ({verdict['invalid']})"
+    if verdict["misfits"]:
+        yield f"has rows against it ({'; '.join(verdict['misfits'])})"
+    if verdict["contradictions"]:
+        kinds = {each["effect"] for each in verdict["contradictions"]}
+        yield f"episodes of its log contradict ({', '.join(sorted(kinds))})"
+    left = [*verdict["left_in_channels"], *verdict["left_over"]]
+    if channels := dict.fromkeys(each["channel"] for each in left):
+        yield f"leaves something unexplained in {', '.join(channels)}"
+    if verdict["suggested"]:
+        yield f"has unconfirmed effects in it ({', '.join(verdict['suggested'])})"
+    if verdict["residual_model"]:
+        yield "has a learned part in it that is not physical"
+    at_bound = [n for n, p in verdict["parameters"].items() if p["is_at_bound"]]
+    if at_bound:
+        yield f"has values at their bounds ({', '.join(at_bound)})"
