@@ -26,7 +26,7 @@ from drake_disasm.studies.study import StudyOptions
 from sysid.studies import twin_transfer
 from sysid.studies.closed_twin import ClosedTwin, _refused, with_effects
 from sysid.studies.mismatches import MISMATCHES
-from sysid.studies.twin_transfer import TwinTransferStudy, _name_on_twin, _test_path
+from sysid.studies.twin_transfer import TwinTransferStudy, _name_on_twin, file_of
 from tests.refusals import refused
 
 NOMINAL = load_scenario("chapter3")
@@ -100,14 +100,17 @@ def leave_figures(
     folder: Path, branch: str, seed: int, P: float, successes: int
 ) -> None:
     levels: dict[str, Any] = {"mismatch": "tilted", "agent": "ddpg", "branch": branch}
-    path = _test_path(folder, levels, seed)
-    path.parent.mkdir(parents=True, exist_ok=True)
     figures = {"performance": P, "successes": successes, "episodes": 2}
-    path.write_text(json.dumps(FIGURES | figures))
+    said = {"accepted": seed != 1, "nominal": {"outcome": "SUCCESS"}}
+    for path, content in (
+        (file_of("tests", folder, levels, seed), FIGURES | figures),
+        (file_of("accepted", folder, levels, seed), said),
+    ):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(content))
     own = seed_folder(folder / _name_on_twin(levels), seed)
     own.mkdir(parents=True, exist_ok=True)
-    on_twin = FIGURES | {"successes": int(seed != 1)}  # the second fails there, too
-    result = {"seed": seed, "validation": on_twin, "training": FIGURES}
+    result = {"seed": seed, "validation": FIGURES, "training": FIGURES}
     (own / "result.json").write_text(json.dumps(result | {"first_success": 1}))
 
 
@@ -151,6 +154,7 @@ def test_agents_arrive_and_learn_and_the_report_says_so(
 ) -> None:
     """All of it, on a twin in the robot's place."""
     monkeypatch.setattr(twin_transfer, "_STATION", "twin")
+    monkeypatch.setattr(TwinTransferStudy, "draws", 1)
     monkeypatch.setattr(learning_curve, "plot_learning_curves", lambda *_: None)
     make_robot(tmp_path, "tilted")
     small = StudyOptions(
