@@ -7,8 +7,10 @@ then the policy acts on that robot, the simulated cell. After Ctrl-C the same co
 goes on.
 """
 
+import itertools
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from results import Cell, add_results_argument, markdown, write_result
 
@@ -17,7 +19,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.mdp import Outcome
 from drake_disasm.studies.runner import open_study, read_test, run_study
-from drake_disasm.studies.study import Level, StudyOptions
+from drake_disasm.studies.study import StudyOptions
 from sysid.studies.policy_acceptance import read_acceptance
 from sysid.studies.twin_transfer import TwinTransferStudy, file_of
 
@@ -30,7 +32,7 @@ _LEVELS = {
 _FIRST_SEED = 100  # no other study has it
 _EPISODES = 120  # of each training: not all policies have learned then
 _COLUMNS = (
-    *("robot", "trained on", "judged by", "verdict", "policies"),
+    *("robot", "trained on twin", "judged by twin", "twin says", "policies"),
     *("succeed on the robot", "95 % interval [%]", "episodes there that succeed"),
 )
 _EXAMPLES = """examples:
@@ -45,61 +47,73 @@ class SampleStudy(TwinTransferStudy):
     time_budget = 600.0
 
 
-def sample(
-    study: TwinTransferStudy, folder: Path
-) -> Iterator[tuple[dict[str, Level], bool, bool, int, int]]:
-    """Yields each policy that a robot has met.
+class Met(NamedTuple):
+    """A policy that a robot has met.
 
-    With its levels, whether the corrected and the nominal twin accept it, and how many
-    of its episodes on the robot succeed, of how many.
+    Attributes:
+        robot: its mismatch.
+        branch: "nominal" or "closed", the twin on which the policy was trained.
+        corrected, nominal: whether each twin accepts it.
+        successes, episodes: on the robot.
     """
+
+    robot: str
+    branch: str
+    corrected: bool
+    nominal: bool
+    successes: int
+    episodes: int
+
+
+def sample(study: TwinTransferStudy, folder: Path) -> Iterator[Met]:
+    """Yields each policy that a robot has met."""
     for levels in study.combinations():
         for seed in study.options.seeds:
             said = read_acceptance(file_of("accepted", folder, levels, seed))
             test = read_test(file_of("tests", folder, levels, seed))
             if said and test:
-                nominal = said["nominal"]["outcome"] == Outcome.SUCCESS.name
-                figures = test["successes"], test["episodes"]
-                yield levels, said["accepted"], nominal, *figures
+                yield Met(
+                    str(levels["mismatch"]),
+                    str(levels["branch"]),
+                    said["accepted"],
+                    said["nominal"]["outcome"] == Outcome.SUCCESS.name,
+                    int(test["successes"]),
+                    int(test["episodes"]),
+                )
 
 
-def rows(study: TwinTransferStudy, folder: Path) -> list[list[Cell]]:
-    """Returns the table: all robots together by each twin's word, then each robot.
+def row(
+    robot: str, branch: str, twin: str, said: str, met: Sequence[Met]
+) -> list[Cell]:
+    """Returns the line of policies of which a twin says the same.
 
     A policy succeeds on the robot if all its episodes there do.
     """
+    right = sum(m.successes == m.episodes for m in met)
+    low, high = (100.0 * end for end in wilson_interval(right, len(met)))
+    shares = f"{sum(m.successes for m in met)} of {sum(m.episodes for m in met)}"
+    interval = f"{low:.0f} to {high:.0f}"
+    return [robot, branch, twin, said, len(met), right, interval, shares]
+
+
+def rows(study: TwinTransferStudy, folder: Path) -> list[list[Cell]]:
+    """Returns the table: all robots by each twin's word, then robot by robot."""
     every = list(sample(study, folder))
     if not every:
-        raise DisasmError(f"{folder}: no policy has met a robot yet; run it without --count")
-    lines = list[list[Cell]]()
-
-    def add(robot: str, branch: str, twin: str, is_accepted: bool) -> None:
-        """Adds the line of what a twin says of some policies, if it says so of any."""
-        met = [
-            (successes, episodes)
-            for levels, corrected, nominal, successes, episodes in every
-            if robot in ("all", levels["mismatch"])
-            and branch in ("any twin", f"the {levels['branch']} twin")
-            and (corrected if twin == "corrected" else nominal) is is_accepted
-        ]
-        if not met:
-            return
-        right = sum(s == n for s, n in met)
-        low, high = (100.0 * end for end in wilson_interval(right, len(met)))
-        said = "accepted" if is_accepted else "refused"
-        shares = f"{sum(s for s, _ in met)} of {sum(n for _, n in met)}"
-        lines.append(
-            [robot, branch, f"the {twin} twin", said, len(met), right]
-            + [f"{low:.0f} to {high:.0f}", shares]
-        )
-
-    for twin in ("corrected", "nominal"):
-        for is_accepted in (True, False):
-            add("all", "any twin", twin, is_accepted)
-    for robot in study.levels["mismatch"]:
-        for branch in study.levels["branch"]:
-            for is_accepted in (True, False):
-                add(str(robot), f"the {branch} twin", "corrected", is_accepted)
+        raise DisasmError(f"{folder}: no policy has met a robot; leave out --count")
+    lines = []
+    for said, is_accepted in (("accepted", True), ("refused", False)):
+        for twin in ("corrected", "nominal"):
+            met = [m for m in every if getattr(m, twin) is is_accepted]
+            if met:
+                lines.append(row("all", "either", twin, said, met))
+    for robot, branch, said in itertools.product(
+        study.levels["mismatch"], study.levels["branch"], ("accepted", "refused")
+    ):
+        met = [m for m in every if (m.robot, m.branch) == (robot, branch)]
+        met = [m for m in met if m.corrected is (said == "accepted")]
+        if met:
+            lines.append(row(str(robot), str(branch), "corrected", said, met))
     return lines
 
 

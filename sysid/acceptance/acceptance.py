@@ -2,8 +2,8 @@
 
 A policy is accepted if it does the task at the verdict's values and in each of N draws
 over the verdict's 95 % intervals, within the limits of force and torque: exceeding one
-ends an episode. N successes of N say that at least 0.05^(1/N) of all draws succeed, with
-95 % confidence (Clopper and Pearson, 1934, one-sided): 90 % for the 29 of `DRAWS`.
+ends an episode. N successes of N say that at least 0.05^(1/N) of all draws succeed,
+with 95 % confidence (Clopper and Pearson, 1934, one-sided): 90 % for the 29 of `DRAWS`.
 """
 
 import dataclasses
@@ -19,7 +19,7 @@ from scipy.stats import binomtest, mannwhitneyu
 from drake_disasm.common.progress import Progress, ignore_progress
 from drake_disasm.policies import resolve_policy
 from sysid.acceptance.corrected_twin import CorrectedTwin
-from sysid.acceptance.trials import Trial, TrialJob, run_trials
+from sysid.acceptance.trials import Trial, TrialJob, run_trials, try_twin
 
 #: The fewest whose success in all shows 90 % at 95 % confidence: 0.9^29 < 0.05.
 DRAWS = 29
@@ -167,6 +167,8 @@ def accept(
     jobs = []
     for name in names:
         resolve_policy(name, values)  # whatever is wrong is said before anything runs
+    try_twin(values)
+    for name in names:
         jobs += [TrialJob(name, "draw", drawn, seed + i) for i in range(draws)]
         jobs += [TrialJob(name, "values", values, seed)]
         jobs += [TrialJob(name, "nominal", nominal, seed)]

@@ -1,5 +1,6 @@
 """The corrected twin: what closing the loop wrote, as scenarios to run a policy on."""
 
+import copy
 import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ _VERDICT: dict[str, Any] = {
     "residual_model": None,
     "errors": {"channels": {}},
 }
-_PARAMETER = {"value": 0.0, "unit": "", "interval_95": [0.0], "is_at_bound": False}
+_PARAMETER = {"interval_95": [0.0], "is_at_bound": False}
 
 
 @dataclass(frozen=True)
@@ -134,6 +135,17 @@ def with_intervals(scenario: Scenario, parameters: Mapping[str, Any]) -> Scenari
     return dataclasses.replace(scenario, randomisation=[*kept, *ranges])
 
 
+def refused_verdict(reason: str) -> dict[str, Any]:
+    """Returns the verdict, as in `result.json`, on a log that close-loop refuses."""
+    lists = [key for key, example in _VERDICT.items() if isinstance(example, list)]
+    return (
+        copy.deepcopy(_VERDICT)
+        | {key: list[Any]() for key in lists}
+        | {"ending": "refused", "sentence": f"refused: {reason}"}
+        | {"errors": {"channels": {name: {} for name in STATE_NAMES}}}
+    )
+
+
 def _is_amplitude(name: str) -> bool:
     """Returns whether a verdict's parameter is one that is zero without its effect."""
     kind = find_effect(name.partition(".")[0])
@@ -142,7 +154,7 @@ def _is_amplitude(name: str) -> bool:
 
 def _reservations(verdict: Mapping[str, Any]) -> Iterator[str]:
     if verdict["provisional"]:
-        yield "is provisional: the time was over before the search was"
+        yield "is provisional (the time was over before the search was)"
     if verdict["ending"] == "too short":
         yield "rests on a log that is too short to decide"
     elif verdict["ending"] in ("unexplained", "refused"):

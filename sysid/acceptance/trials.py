@@ -110,6 +110,15 @@ def run_trials(
             yield done, trial
 
 
+def try_twin(scenario: Scenario) -> None:
+    """Begins an episode of a twin; what is wrong with it is said here, and once.
+
+    Raises:
+        DisasmError: the twin can't have an effect, or can't begin.
+    """
+    TaskSimulation(scenario, "twin").reset(0)
+
+
 def run_trial(job: TrialJob, progress: Progress) -> Trial:
     """Runs a trial; what the policy raises passes through."""
 
@@ -118,8 +127,7 @@ def run_trial(job: TrialJob, progress: Progress) -> Trial:
         progress(ProgressUpdate("trying policies", 0, 1))
 
     with warnings.catch_warnings():
-        if job.twin == "draw":  # the same is said of the verdict's values
-            warnings.simplefilter("ignore", LoadAtStartWarning)
+        warnings.simplefilter("ignore", LoadAtStartWarning)  # `try_twin` says so once
         policy = resolve_policy(job.policy, job.scenario)
         simulation = TaskSimulation(job.scenario, "twin", policy)
         done = run_episode(simulation, job.seed, progress=told, is_judged=True)

@@ -8,19 +8,25 @@ import numpy as np
 from sysid.acceptance.acceptance import Acceptance
 from sysid.acceptance.corrected_twin import CorrectedTwin
 
+_LINE = (
+    "{twin_says:9}  {at_values:6}  {draws:5}  {at_least:>8}  {nominal:7}  "
+    "{mean_force:6.2f}  {peak_force:6.2f}  {mean_torque:6.3f}  {peak_torque:6.3f}  "
+    "{duration:4.1f}"
+)
+
 
 def conclusion(judged: Sequence[Acceptance], twin: CorrectedTwin) -> str:
     """Returns which policy to take, or that there is none, and under which model."""
     best, accepted = judged[0], sum(each.is_accepted for each in judged)
-    if not accepted:
-        return (
-            "refused: the corrected twin accepts no policy; train several seeds on its "
-            "scenario.yaml"
-        )
     under = "; ".join(twin.reservations)
     model = f", under a model that {under}" if under else ""
+    if not accepted:
+        return (
+            f"refused: the corrected twin accepts no policy{model}. Train several "
+            "seeds on its scenario.yaml"
+        )
     count = f" ({accepted} of {len(judged)} are accepted)" if len(judged) > 1 else ""
-    return f"accepted{model}: take {best.policy}{count}"
+    return f"accepted: take {best.policy}{count}{model}"
 
 
 def remarks(judged: Sequence[Acceptance], twin: CorrectedTwin) -> list[str]:
@@ -28,8 +34,8 @@ def remarks(judged: Sequence[Acceptance], twin: CorrectedTwin) -> list[str]:
     draws = len(judged[0].draws)
     low = 100.0 * 0.05 ** (1.0 / draws)
     said = [
-        f"{draws} of {draws} draws show that at least {low:.0f} % of all draws succeed "
-        "(95 % confidence); parameters are drawn independently of each other"
+        f"success in {draws} of {draws} draws shows that at least {low:.0f} % of all "
+        "draws succeed (95 % confidence); parameters are drawn independently"
     ]
     if not twin.over_intervals.randomisation:
         said.append("the verdict has no interval to draw from: draws differ in noise")
@@ -56,14 +62,8 @@ def as_text(judged: Sequence[Acceptance], twin: CorrectedTwin) -> str:
         f"  [N]   of {limits.f_max:g}  [N m]    of {limits.t_max:g}   [s]",
     ]
     for each in judged:
-        figures = figures_of(each)
-        lines.append(
-            f"{each.policy:{width}}  {figures['twin_says']:9}  "
-            f"{figures['values']:6}  {figures['draws']:5}  {figures['at_least']:>8}  "
-            f"{figures['nominal']:7}  {figures['mean_force']:6.2f}  "
-            f"{figures['peak_force']:6.2f}  {figures['mean_torque']:6.3f}  "
-            f"{figures['peak_torque']:6.3f}  {figures['duration']:4.1f}"
-        )
+        cells = _LINE.format(**figures_of(each))
+        lines.append(f"{each.policy:{width}}  {cells}")
     lines += [f"{each.policy}: {each.reason}" for each in judged if each.reason]
     return "\n".join([*lines, *remarks(judged, twin), conclusion(judged, twin)])
 
@@ -73,7 +73,7 @@ def figures_of(judged: Acceptance) -> dict[str, Any]:
     trials = judged.trials
     return {
         "twin_says": "accepted" if judged.is_accepted else "refused",
-        "values": "yes" if judged.values.succeeded else "no",
+        "at_values": "yes" if judged.values.succeeded else "no",
         "draws": f"{judged.successes}/{len(judged.draws)}",
         "at_least": f"{100.0 * judged.success_low:.0f} %",
         "nominal": "yes" if judged.nominal.succeeded else "no",

@@ -12,12 +12,11 @@ from drake_disasm.common.files import make_folder, read_json, write_json, write_
 from drake_disasm.common.progress import Progress
 from drake_disasm.effects import Effect
 from drake_disasm.logs import Log, read_log
-from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
-from sysid.acceptance.corrected_twin import with_intervals
+from sysid.acceptance.corrected_twin import refused_verdict, with_intervals
 from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.output import to_mapping
 from sysid.identification.identify import identify
@@ -86,7 +85,7 @@ class ClosedTwin:
                 time_budget=self.time_budget,
             )
         except DisasmError as error:
-            scenario, result = self.nominal, _refused(str(error))
+            scenario, result = self.nominal, refused_verdict(str(error))
         else:
             scenario, result = closed.scenario or self.nominal, to_mapping(closed)
         self._write("scenario", scenario)
@@ -132,21 +131,6 @@ class ClosedTwin:
 
     def _write(self, name: str, scenario: Scenario) -> None:
         write_text(self.folder / f"{name}.yaml", dump_scenario(scenario))
-
-
-def _refused(reason: str) -> dict[str, Any]:
-    """Returns the verdict on a log that closing the loop refuses."""
-    nothing = ("suggested", "misfits", "contradictions", "left_in_channels")
-    return dict.fromkeys((*nothing, "left_over"), list[Any]()) | {
-        "ending": "refused",
-        "sentence": f"refused: {reason}",
-        "provisional": False,
-        "parameters": {},
-        "ties": {},
-        "invalid": "",
-        "residual_model": None,
-        "errors": {"channels": dict.fromkeys(STATE_NAMES)},
-    }
 
 
 def with_effects(scenario: Scenario, effects: tuple[Effect, ...]) -> Scenario:

@@ -27,7 +27,8 @@ EXIT_REFUSED = 3
 _EPISODES = "episodes"  # that are finished, for a run that is stopped
 _EXAMPLES = """examples:
   drake-disasm accept --policy admittance --closed out/closed
-  drake-disasm accept --policy out/first/seed_000/policy.npz straight --closed out/closed
+  drake-disasm accept --policy out/first/seed_000/policy.npz straight \\
+      --closed out/closed
   drake-disasm accept --policy my_policy.py:Mine --closed out/closed --draws 59
 """
 

@@ -23,8 +23,9 @@ from drake_disasm.studies.report import write_report
 from drake_disasm.studies.results import mean_of, paired_difference
 from drake_disasm.studies.runner import run_study
 from drake_disasm.studies.study import StudyOptions
+from sysid.acceptance.corrected_twin import refused_verdict
 from sysid.studies import twin_transfer
-from sysid.studies.closed_twin import ClosedTwin, _refused, with_effects
+from sysid.studies.closed_twin import ClosedTwin, with_effects
 from sysid.studies.mismatches import MISMATCHES
 from sysid.studies.twin_transfer import TwinTransferStudy, _name_on_twin, file_of
 from tests.refusals import refused
@@ -54,7 +55,7 @@ def make_robot(folder: Path, name: str) -> None:
         scenario = with_effects(NOMINAL, (GroovePose(rz=rz),) if rz else ())
         write_text(folder / f"{twin}.yaml", dump_scenario(scenario))
     value = {"value": 0.05, "unit": "rad", "interval_95": [0.04, 0.06]}
-    result = _refused("") | {
+    result = refused_verdict("") | {
         "ending": "explained",
         "sentence": "The model lacks a groove that is turned.",
         "provisional": True,
