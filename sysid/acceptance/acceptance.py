@@ -45,8 +45,8 @@ class Separation:
     @property
     def text(self) -> str:
         """In words."""
-        size = "large" if self.auc > 0.5 else "small"
-        return f"where {self.parameter} is {size} (AUC {self.auc:.2f}, p {self.p:.2g})"
+        side = "high" if self.auc > 0.5 else "low"
+        return f"where {self.parameter} is {side} (AUC {self.auc:.2f}, p {self.p:.2g})"
 
 
 @dataclass(frozen=True)

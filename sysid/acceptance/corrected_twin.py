@@ -93,7 +93,8 @@ class CorrectedTwin:
         """Without the verdict's effects, as it was before the loop was closed."""
         effects = [e for e in self.scenario.effects if not self._is_learned(e)]
         scenario = dataclasses.replace(self.at_values, effects=effects)
-        names = [n for n in self.verdict["parameters"] if _is_amplitude(n)]
+        present = _kinds(scenario)
+        names = [n for n in self.verdict["parameters"] if _is_amplitude(n, present)]
         return with_values(scenario, dict.fromkeys(names, 0.0))
 
     @property
@@ -123,7 +124,7 @@ def with_intervals(scenario: Scenario, parameters: Mapping[str, Any]) -> Scenari
         scenario: with the effects.
         parameters: by name, each with its `interval_95`, as in `result.json`.
     """
-    present = {type(effect).__name__ for effect in scenario.effects}
+    present = _kinds(scenario)
     ranges = [
         Range(name, *each["interval_95"])
         for name, each in parameters.items()
@@ -146,10 +147,19 @@ def refused_verdict(reason: str) -> dict[str, Any]:
     )
 
 
-def _is_amplitude(name: str) -> bool:
-    """Returns whether a verdict's parameter is one that is zero without its effect."""
-    kind = find_effect(name.partition(".")[0])
-    return name.rpartition(".")[2] in amplitudes(kind)
+def _kinds(scenario: Scenario) -> set[str]:
+    return {type(effect).__name__ for effect in scenario.effects}
+
+
+def _is_amplitude(name: str, present: set[str]) -> bool:
+    """Returns whether a parameter is one that is zero without its effect.
+
+    Args:
+        name: of a verdict's parameter.
+        present: kinds of effects that the scenario has.
+    """
+    kind, field = name.partition(".")[0], name.rpartition(".")[2]
+    return kind in present and field in amplitudes(find_effect(kind))
 
 
 def _reservations(verdict: Mapping[str, Any]) -> Iterator[str]:

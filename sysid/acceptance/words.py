@@ -44,10 +44,14 @@ def remarks(judged: Sequence[Acceptance], twin: CorrectedTwin) -> list[str]:
             f"the verdict has rivals, on which no policy was tried: {name} or "
             f"{' or '.join(others)}"
         )
-    unlike = [each for each in judged if each.nominal.succeeded != each.is_accepted]
-    for each in unlike:
-        verb = "accepts" if each.nominal.succeeded else "refuses"
-        said.append(f"{each.policy}: the nominal twin {verb} it")
+    for nominal, verbs in ((True, "accepts refuses"), (False, "refuses accepts")):
+        unlike = [each for each in judged if each.nominal.succeeded is nominal]
+        names = [each.policy for each in unlike if each.is_accepted is not nominal]
+        if names:
+            verb, other = verbs.split()
+            said.append(
+                f"the nominal twin {verb} {', '.join(names)}: the corrected one {other}"
+            )
     return said
 
 

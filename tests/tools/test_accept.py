@@ -40,7 +40,7 @@ def test_a_refused_one_is_status_3_and_the_reason(tmp_path: Path) -> None:
     )  # fmt: skip
     assert done.returncode == 3, done.stderr
     assert "step limit at the verdict's values" in done.stdout
-    assert "the nominal twin accepts it" in done.stdout
+    assert "the nominal twin accepts straight" in done.stdout
     assert json.loads((out / "result.json").read_text())["accepted"] is False
 
 

@@ -53,7 +53,7 @@ def test_the_parameter_that_separates_failures_is_named() -> None:
     a, b = random.uniform(size=(2, DRAWS))
     found = with_drawn(a < 0.25, a=a, b=b).separation
     assert found is not None
-    assert found.parameter == "a" and found.auc == 0.0 and "small" in found.text
+    assert found.parameter == "a" and found.auc == 0.0 and "low" in found.text
     chance = with_drawn(random.permutation(a < 0.25), a=a, b=b)
     assert chance.separation is None
     assert with_drawn(np.ones(DRAWS, bool), a=a).separation is None  # nothing differs
