@@ -44,8 +44,8 @@ class ClosedTwin:
       log/               of the robot, `admittance` with some exploration
       identified.yaml    the nominal twin with what identification makes of the log
       intervals.yaml     the corrected twin, its values drawn from their intervals
-      scenario.yaml, result.json    the corrected twin and its verdict, as
-                                    `drake-disasm close-loop` writes them; the last
+      scenario.yaml      the corrected twin, as `drake-disasm close-loop` writes it
+      result.json        its verdict, as that writes it; written last
 
     A log that closing the loop refuses leaves the nominal twin.
 

@@ -23,7 +23,7 @@ from drake_disasm.studies.report import write_report
 from drake_disasm.studies.results import mean_of, paired_difference
 from drake_disasm.studies.runner import run_study
 from drake_disasm.studies.study import StudyOptions
-from sysid.acceptance.corrected_twin import refused_verdict
+from sysid.acceptance.corrected_twin import CorrectedTwin, refused_verdict
 from sysid.studies import twin_transfer
 from sysid.studies.closed_twin import ClosedTwin, with_effects
 from sysid.studies.mismatches import MISMATCHES
@@ -222,4 +222,6 @@ def test_a_robots_log_gives_twins_that_know_it(tmp_path: Path) -> None:
     effects = robot.twin("closed").effects
     assert any(type(effect) is GroovePose for effect in effects)
     assert robot.twin("intervals").randomisation
+    accepting = CorrectedTwin.read(robot.folder)
+    assert accepting.scenario.effects == effects and accepting.over_intervals
     assert robot.twin("identified").contact.model == "impact"
