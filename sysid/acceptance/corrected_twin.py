@@ -31,6 +31,8 @@ _VERDICT: dict[str, Any] = {
     "residual_model": None,
     "errors": {"channels": {}},
 }
+#: What else makes a verdict one that explains its log but partly.
+_PARTLY = ("invalid", "misfits", "contradictions", "suggested")
 _PARAMETER = {"interval_95": [0.0], "is_at_bound": False}
 
 
@@ -179,6 +181,8 @@ def _reservations(verdict: Mapping[str, Any]) -> Iterator[str]:
     left = [*verdict["left_in_channels"], *verdict["left_over"]]
     if channels := dict.fromkeys(each["channel"] for each in left):
         yield f"leaves something unexplained in {', '.join(channels)}"
+    elif verdict["ending"] == "partly" and not any(verdict[key] for key in _PARTLY):
+        yield "leaves more than noise unexplained"
     if verdict["suggested"]:
         yield f"has unconfirmed effects in it ({', '.join(verdict['suggested'])})"
     if verdict["residual_model"]:

@@ -33,10 +33,12 @@ def remarks(judged: Sequence[Acceptance], twin: CorrectedTwin) -> list[str]:
     """Returns what to know besides: bounds, rivals, and what the nominal twin says."""
     draws = len(judged[0].draws)
     low = 100.0 * 0.05 ** (1.0 / draws)
-    said = [
-        f"success in {draws} of {draws} draws shows that at least {low:.0f} % of all "
-        "draws succeed (95 % confidence); parameters are drawn independently"
-    ]
+    said = ["each parameter is drawn by itself, also where the log ties it to others"]
+    if judged[0].is_accepted:
+        said.append(
+            f"success in {draws} of {draws} draws shows that at least {low:.0f} % of "
+            "all draws succeed (95 % confidence)"
+        )
     if not twin.over_intervals.randomisation:
         said.append("the verdict has no interval to draw from: draws differ in noise")
     for name, others in twin.rivals.items():

@@ -55,6 +55,8 @@ def test_intervals_become_ranges_of_the_effects_that_are_there() -> None:
         ({"provisional": True}, "time was over"),
         ({"ending": "too short"}, "too short"),
         ({"ending": "unexplained"}, "nothing for sure"),
+        ({"ending": "partly"}, "more than noise"),  # by the size of what is left
+        ({"ending": "partly", "suggested": ["SensorDrift"]}, "SensorDrift"),
         ({"invalid": "the arm lags"}, "the arm lags"),
         ({"misfits": ["rows 3 to 5 touch"]}, "rows 3 to 5"),
         ({"contradictions": [{"effect": "SensorBias"}]}, "SensorBias"),
