@@ -142,7 +142,9 @@ def main(arguments: Sequence[str]) -> int:
     table = rows(study, args.out)
     print(markdown(_COLUMNS, table))
     title = "Do policies that the corrected twin accepts succeed on the robot?"
-    write_result(args.results, title, _COLUMNS, table, _PROGRAM, arguments)
+    repeatable = [word for word in arguments if word != "--count"]
+    note = "A policy succeeds on the robot, the simulated cell, if both its episodes do."
+    write_result(args.results, title, _COLUMNS, table, _PROGRAM, repeatable, note)
     return 0
 
 
