@@ -143,7 +143,7 @@ def main(arguments: Sequence[str]) -> int:
     print(markdown(_COLUMNS, table))
     title = "Do policies that the corrected twin accepts succeed on the robot?"
     repeatable = [word for word in arguments if word != "--count"]
-    note = "A policy succeeds on the robot, the simulated cell, if both its episodes do."
+    note = "A policy succeeds on the robot (the simulated cell) if both episodes do."
     write_result(args.results, title, _COLUMNS, table, _PROGRAM, repeatable, note)
     return 0
 
