@@ -23,9 +23,9 @@ from sysid.residuals.held_out import HeldOut
 
 Array = NDArray[np.float64]
 
-_BEFORE, _AFTER, _MEASURED = "#9aa4ae", "#c03030", "#202020"
-_PASSES, _FAILS, _MARK = "#2060a0", "#c8d0d8", "#d98c00"
-_ENDS = (("before", _BEFORE), ("after", _AFTER))
+_BEFORE, AFTER, _MEASURED = "#9aa4ae", "#c03030", "#202020"
+PASSES, _FAILS, _MARK = "#2060a0", "#c8d0d8", "#d98c00"
+_ENDS = (("before", _BEFORE), ("after", AFTER))
 _SHOWN_VALUES = 48_000  # of a series over all channels: what keeps a page small
 _SHOWN_POINTS = 60_000  # of residuals against covariates, over all panels
 _FAR_OFF = 5.0  # times what was measured, beyond which a prediction is not shown whole
@@ -81,7 +81,7 @@ def fit_plot(errors: HeldOut, costly: Sequence[tuple[int, int]] = ()) -> Plot:
         figure.add_vline(x=begin, line={"color": "#d0d0d0", "width": 1})
     figure.update_xaxes(title_text=axis, row=2, col=1)
     titles = [_channel_view(errors, number) for number in range(len(errors.channels))]
-    _finish(figure, 620, titles)
+    finish(figure, 620, titles)
     figure.update_layout(hovermode="x")
     return Plot(figure, _thinned_text(count, len(time)), by_channel=True)
 
@@ -100,7 +100,7 @@ def error_plot(errors: HeldOut) -> Plot:
         figure.add_trace(bars)
     figure.add_hline(y=1.0, line={"color": _MEASURED, "dash": "dash", "width": 1})
     figure.update_yaxes(title_text="rms error / noise", rangemode="tozero")
-    _finish(figure, 320)
+    finish(figure, 320)
     caption = "Over the rows above; the whiskers are 95 % intervals."
     if errors.model_error is not None:
         caption += " The unit is the noise of each row with the model's own error."
@@ -125,7 +125,7 @@ def loss_plot(found: LossMap, channels: Sequence[Channel]) -> Plot:
         figure.add_trace(heat, row=line, col=1)
     figure.update_yaxes(autorange="reversed")
     figure.update_xaxes(type="category", nticks=20)
-    _finish(figure, 160 + 36 * max(4, len(names)))
+    finish(figure, 160 + 36 * max(4, len(names)))
     return Plot(figure)
 
 
@@ -160,7 +160,7 @@ def dependence_plot(
         line, column = divmod(number, _COLUMNS)
         figure.update_xaxes(title_text=name, row=line + 1, col=column + 1)
     titles = [{"yaxis.title.text": f"error of {c.name} / noise"} for c in channels]
-    _finish(figure, 60 + 260 * lines, titles)
+    finish(figure, 60 + 260 * lines, titles)
     return Plot(
         figure,
         "Points: residuals of fitted rows"
@@ -185,7 +185,7 @@ def candidate_plot(begin: Sequence[Gain], end: Sequence[Gain], least: float) -> 
             y=[gain.text for gain in best],
             x=[max(100.0 * gain.share, 0.0) for gain in best],
             orientation="h", showlegend=False,
-            marker_color=[_PASSES if g.share >= least else _FAILS for g in best],
+            marker_color=[PASSES if g.share >= least else _FAILS for g in best],
             hovertext=[
                 f"{100.0 * float(np.mean(g.of_blocks > 0.0)):.0f} % of the folds better"
                 for g in best
@@ -194,7 +194,7 @@ def candidate_plot(begin: Sequence[Gain], end: Sequence[Gain], least: float) -> 
         figure.add_trace(bars, row=1, col=column)
     figure.update_xaxes(title_text="share of the held-out loss explained, %")
     figure.update_yaxes(tickfont={"size": 10}, automargin=True)
-    _finish(figure, 460)
+    finish(figure, 460)
     return Plot(figure)
 
 
@@ -213,7 +213,7 @@ def course_plot(courses: Sequence[Course]) -> Plot:
         )
         figure.add_trace(trace, row=line, col=1)
         figure.add_hline(0.0, row=line, col=1, line={"color": "#d0d0d0", "width": 1})
-    _finish(figure, 160 * len(titles) + 80)
+    finish(figure, 160 * len(titles) + 80)
     return Plot(figure, "Fitted to the references and each log by itself; bars: 95 %.")
 
 
@@ -360,7 +360,7 @@ def _small(values: Any) -> NDArray[np.float32]:
     return np.asarray(values, dtype=np.float32)
 
 
-def _finish(
+def finish(
     figure: go.Figure, height: int, titles: Sequence[Mapping[str, Any]] = ()
 ) -> None:
     """Sets what all figures have in common, and the axes' views of each channel."""

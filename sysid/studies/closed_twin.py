@@ -4,6 +4,7 @@ import dataclasses
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from drake_disasm.batch.twin import with_impact
 from drake_disasm.common.errors import DisasmError
@@ -13,10 +14,11 @@ from drake_disasm.effects import Effect
 from drake_disasm.logs import Log, read_log
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
-from drake_disasm.scenario.schema import Range
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
-from sysid.effect_selection.close_loop import ClosedLoop, close_loop
+from sysid.acceptance.corrected_twin import refused_verdict, with_intervals
+from sysid.effect_selection.close_loop import close_loop
+from sysid.effect_selection.output import to_mapping
 from sysid.identification.identify import identify
 from sysid.identification.settings import SearchSettings, Settings
 from sysid.models.from_logs import ModelChoice, model_of
@@ -31,11 +33,7 @@ _PARAMETERS = (
     "contact.impact.exponent",
 )
 _EVALUATIONS = 200
-_RESULT = {
-    "found": "",
-    "is_provisional": False,
-    "values": [{"name": "", "value": 0.0, "interval": [0.0]}],
-}
+_RESULT: dict[str, Any] = {"sentence": "", "provisional": False, "parameters": {}}
 
 
 @dataclass(frozen=True)
@@ -45,9 +43,11 @@ class ClosedTwin:
     folder/
       log/               of the robot, `admittance` with some exploration
       identified.yaml    the nominal twin with what identification makes of the log
-      closed.yaml        the nominal twin with the effects that are found in it
-      intervals.yaml     the same, their values drawn from their intervals
-      result.json        what was found; written last
+      intervals.yaml     the corrected twin, its values drawn from their intervals
+      scenario.yaml      the corrected twin, as `drake-disasm close-loop` writes it
+      result.json        its verdict, as that writes it; written last
+
+    A log that closing the loop refuses leaves the nominal twin.
 
     Attributes:
         folder: for all of it.
@@ -85,23 +85,18 @@ class ClosedTwin:
                 time_budget=self.time_budget,
             )
         except DisasmError as error:
-            self._write("closed", self.nominal)
-            self._write("intervals", self.nominal)
-            self._write_result(f"refused: {error}", False, [])
-            return
-        scenario = closed.scenario or self.nominal
-        self._write("closed", scenario)
-        self._write("intervals", with_intervals(scenario, closed))
-        values = [
-            {"name": value.name, "value": value.value, "interval": list(value.interval)}
-            for value in closed.verdict.values
-        ]
-        self._write_result(closed.sentence, closed.is_provisional, values)
+            scenario, result = self.nominal, refused_verdict(str(error))
+        else:
+            scenario, result = closed.scenario or self.nominal, to_mapping(closed)
+        self._write("scenario", scenario)
+        self._write("intervals", with_intervals(scenario, result["parameters"]))
+        write_json(self.folder / "result.json", result)
         shutil.rmtree(fits, ignore_errors=True)
 
     def twin(self, name: str) -> Scenario:
-        """Returns one of the twins, by the name of its file; see the class."""
-        return load_scenario(str(self.folder / f"{name}.yaml"))
+        """Returns one of the twins: "identified", "closed" or "intervals"."""
+        file = "scenario" if name == "closed" else name
+        return load_scenario(str(self.folder / f"{file}.yaml"))
 
     @property
     def found(self) -> tuple[str, list[str]]:
@@ -109,12 +104,10 @@ class ClosedTwin:
         result = read_json(
             self.folder / "result.json", "delete it, and resume the study", _RESULT
         )
-        values = [
-            "{name} {value:.4g} ({interval[0]:.4g} to {interval[1]:.4g})".format(**each)
-            for each in result["values"]
-        ]
-        provisional = "provisional: " if result["is_provisional"] else ""
-        return f"{provisional}{result['found']}", values
+        form = "{} {value:.4g} ({interval_95[0]:.4g} to {interval_95[1]:.4g})"
+        values = [form.format(n, **own) for n, own in result["parameters"].items()]
+        provisional = "provisional: " if result["provisional"] else ""
+        return f"{provisional}{result['sentence']}", values
 
     def _recorded(self, progress: Progress) -> Log:
         folder, marker = self.folder / "log", self.folder / "recorded"
@@ -138,33 +131,6 @@ class ClosedTwin:
 
     def _write(self, name: str, scenario: Scenario) -> None:
         write_text(self.folder / f"{name}.yaml", dump_scenario(scenario))
-
-    def _write_result(
-        self, sentence: str, is_provisional: bool, values: list[dict[str, object]]
-    ) -> None:
-        write_json(
-            self.folder / "result.json",
-            {"found": sentence, "is_provisional": is_provisional, "values": values},
-        )
-
-
-def with_intervals(scenario: Scenario, closed: ClosedLoop) -> Scenario:
-    """Returns a scenario whose effects are drawn from their 95 % intervals.
-
-    Args:
-        scenario: with the effects.
-        closed: what closing the loop found.
-    """
-    present = {type(effect).__name__ for effect in scenario.effects}
-    ranges = [
-        Range(value.name, *value.interval)
-        for value in closed.verdict.values
-        if value.name.partition(".")[0] in present
-        and value.interval[0] < value.interval[1]
-    ]
-    known = {each.parameter for each in ranges}
-    kept = [each for each in scenario.randomisation if each.parameter not in known]
-    return dataclasses.replace(scenario, randomisation=[*kept, *ranges])
 
 
 def with_effects(scenario: Scenario, effects: tuple[Effect, ...]) -> Scenario:

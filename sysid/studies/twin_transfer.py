@@ -8,6 +8,7 @@ no twin. The cell stands for the robot, and is simulated, too::
     folder/
       robots/MISMATCH/                 a log of the robot, and twins from it
       mismatch_M__agent_A__branch_B/   trainings on a twin; "any" for a common one
+      accepted/MISMATCH/AGENT__BRANCH/ what the corrected twin says, a file per seed
       tests/MISMATCH/AGENT__BRANCH/    greedy episodes on the robot, a file per seed
       robot__mismatch_M__.../          with --robot-episodes: learning there
 """
@@ -15,9 +16,9 @@ no twin. The cell stands for the robot, and is simulated, too::
 import dataclasses
 import functools
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 from drake_disasm.learning.experiment import read_result, seed_folder
 from drake_disasm.learning.hyperparameters import Hyperparameters, override
@@ -26,7 +27,7 @@ from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.training import Purpose, seed_for
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.scenario.schema import Range
-from drake_disasm.studies.runner import finished, read_test
+from drake_disasm.studies.runner import SeedResult, finished, read_test
 from drake_disasm.studies.study import (
     Factor,
     Level,
@@ -39,6 +40,7 @@ from drake_disasm.studies.study import (
     agent_config,
     folder_name,
 )
+from sysid.acceptance import DRAWS
 from sysid.studies.branch_tables import (
     BranchTables,
     first_success_cell,
@@ -49,11 +51,11 @@ from sysid.studies.branch_tables import (
 )
 from sysid.studies.closed_twin import ClosedTwin, with_effects
 from sysid.studies.mismatches import MISMATCHES
+from sysid.studies.policy_acceptance import PolicyAcceptance, read_acceptance
 
 _SCENARIO = "chapter3"
 _STATION = "cell"  # which stands for the robot
 _LOG_SEED = 500_000  # not one of any training
-_TIME_BUDGET = 1200.0  # s, of closing the loop
 #: What lets an agent without a base policy learn: with the thesis's numbers alone DDPG
 #: seldom does (docs/explanation/learning.md).
 _LAYER_NORM = ("layer_norm=true",)
@@ -105,12 +107,15 @@ class TwinTransferStudy(Study):
     # The thesis's DDPG takes up to 225 where a groove is rolled, 262 against a chain.
     seeds, episodes, validation = 10, 300, 2
     has_robot = True
+    time_budget: ClassVar[float] = 1200.0  # s, of closing the loop
+    draws: ClassVar[int] = DRAWS  # over a verdict's intervals, of each policy
 
     def stages(self, folder: Path) -> Iterator[Stage]:
         """Yields the robots' logs and twins, trainings, tests, trainings there."""
         robots = [self._robot(str(name), folder) for name in self.levels["mismatch"]]
         yield Stage(preparations=robots)
         yield Stage(self._trainings(folder), self.options.seeds)
+        yield Stage(preparations=self._acceptances(folder))
         yield Stage(tests=self._tests(folder))
         if self.options.robot_episodes:
             there = [
@@ -126,7 +131,7 @@ class TwinTransferStudy(Study):
             robot=with_effects(nominal, MISMATCHES[mismatch].effects),
             station=_STATION,
             seed=_LOG_SEED,
-            time_budget=_TIME_BUDGET,
+            time_budget=self.time_budget,
         )
 
     @functools.cached_property
@@ -200,25 +205,40 @@ class TwinTransferStudy(Study):
         """Returns those of them whose agents are trained on a twin."""
         return [each for each in self._ready(folder) if each["branch"] != _UNTRAINED]
 
-    def _tests(self, folder: Path) -> list[PolicyTest]:
-        tests = []
+    def _trained(
+        self, folder: Path
+    ) -> Iterator[tuple[dict[str, Level], ClosedTwin, SeedResult]]:
+        """Yields each policy from a twin with its levels, for each robot in turn."""
         for levels in self._from_twins(folder):
             training = self.treatment(levels, folder)
-            robot = self._robot(str(levels["mismatch"]), folder).robot
+            robot = self._robot(str(levels["mismatch"]), folder)
             for result in finished([training], self.options.seeds, folder):
-                count = range(self.validation_episodes)
-                tests.append(
-                    PolicyTest(
-                        _test_path(folder, levels, result.seed),
-                        str(result.folder / "policy.npz"),
-                        robot,
-                        _STATION,
-                        tuple(
-                            seed_for(result.seed, Purpose.VALIDATION, i) for i in count
-                        ),
-                    )
-                )
-        return tests
+                yield levels, robot, result
+
+    def _acceptances(self, folder: Path) -> list[PolicyAcceptance]:
+        return [
+            PolicyAcceptance(
+                file_of("accepted", folder, levels, result.seed),
+                result.folder / "policy.npz",
+                robot.folder,
+                self._nominal.task,
+                self.draws,
+            )
+            for levels, robot, result in self._trained(folder)
+        ]
+
+    def _tests(self, folder: Path) -> list[PolicyTest]:
+        count = range(self.validation_episodes)
+        return [
+            PolicyTest(
+                file_of("tests", folder, levels, result.seed),
+                str(result.folder / "policy.npz"),
+                robot.robot,
+                _STATION,
+                tuple(seed_for(result.seed, Purpose.VALIDATION, i) for i in count),
+            )
+            for levels, robot, result in self._trained(folder)
+        ]
 
     def tables(self, folder: Path) -> list[Table]:
         """Returns what was found of each robot, what is done there, and who gains."""
@@ -228,7 +248,7 @@ class TwinTransferStudy(Study):
             self._found(folder),
             make.by_branch("Episodes on the robot that succeed", new, success_cell),
             make.by_branch(
-                "The same, of policies that succeed on their own twin",
+                "The same, of policies that the corrected twin accepts",
                 functools.partial(self._accepted, folder=folder),
                 success_cell,
             ),
@@ -295,7 +315,7 @@ class TwinTransferStudy(Study):
     ) -> dict[int, dict[str, Any]]:
         """Returns the figures on arrival at the robot of the seeds that are tested."""
         found = {
-            seed: read_test(_test_path(folder, levels, seed))
+            seed: read_test(file_of("tests", folder, levels, seed))
             for seed in self.options.seeds
         }
         return {seed: test for seed, test in found.items() if test is not None}
@@ -303,13 +323,13 @@ class TwinTransferStudy(Study):
     def _accepted(
         self, levels: dict[str, Level], folder: Path
     ) -> dict[int, dict[str, Any]]:
-        """Returns the same of those whose greedy episode on their own twin succeeds."""
-        own = folder / _name_on_twin(levels)
-        return {
-            seed: figures
-            for seed, figures in self._arrived(levels, folder).items()
-            if _result(seed_folder(own, seed))["validation"]["successes"]
+        """Returns the same of those that the corrected twin accepts."""
+        arrived = self._arrived(levels, folder)
+        said = {
+            seed: read_acceptance(file_of("accepted", folder, levels, seed))
+            for seed in arrived
         }
+        return {s: arrived[s] for s, own in said.items() if own and own["accepted"]}
 
     def _learned(
         self, levels: dict[str, Level], folder: Path
@@ -347,6 +367,20 @@ def _result(seed: Path) -> dict[str, Any]:
     return read_result(seed / "result.json", online=True)
 
 
-def _test_path(folder: Path, levels: dict[str, Level], seed: int) -> Path:
-    own = f"{levels['agent']}__{levels['branch']}"
-    return folder / "tests" / str(levels["mismatch"]) / own / f"seed_{seed:03d}.json"
+def file_of(
+    kind: Literal["accepted", "tests"],
+    folder: Path,
+    levels: Mapping[str, Level],
+    seed: int,
+) -> Path:
+    """Returns the file with what a corrected twin, or a robot, says of a policy.
+
+    Args:
+        kind: whose word it is.
+        folder: of the study.
+        levels: of the policy's training, and the robot that it meets.
+        seed: of the training.
+    """
+    treatment = f"{levels['agent']}__{levels['branch']}"
+    name = f"seed_{seed:03d}.json"
+    return folder / kind / str(levels["mismatch"]) / treatment / name

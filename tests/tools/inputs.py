@@ -1,10 +1,14 @@
-"""Small inputs of the programs: logs, recordings, a policy's file."""
+"""Small inputs of the programs: logs, recordings, a policy's file, a verdict."""
 
+import dataclasses
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from drake_disasm.effects import CommandGain
 from drake_disasm.learning.run import write_episodes
 from drake_disasm.logs import (
     LogHeader,
@@ -20,7 +24,9 @@ from drake_disasm.policies import (
     PolicyDescription,
     save_policy,
 )
+from drake_disasm.scenario import dump_scenario, load_scenario
 from drake_disasm.task.episode import EpisodeSummary
+from sysid.acceptance.corrected_twin import refused_verdict
 
 SLIDE = """<robot name="slide"><link name="bed"/>
   <link name="carriage"><inertial><mass value="95"/>
@@ -104,3 +110,34 @@ def write_trainings(*folders: Path) -> None:
                 for i, outcome in enumerate(outcomes)
             ]
             write_episodes(own / "episodes.csv", episodes)
+
+
+#: A task of 3 mm in 4 steps of 1 mm, for which an arm that falls short is too slow.
+_SHORT = ("task.success=travelled", "task.travel_success=0.003", "task.steps=4")
+
+
+def write_closed(folder: Path, gain: float = -0.1, **changes: Any) -> Path:
+    """Writes what close-loop does for an arm that falls short; returns the folder.
+
+    `straight` does the task up to a `CommandGain.x` of -0.25; the interval is from -0.5
+    to 0.
+
+    Args:
+        folder: of the output.
+        gain: the verdict's value.
+        changes: entries of `result.json` in place of its own; `...` leaves one out.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    scenario = load_scenario("removal", _SHORT)
+    scenario = dataclasses.replace(scenario, effects=[CommandGain(x=gain)])
+    (folder / "scenario.yaml").write_text(dump_scenario(scenario))
+    of_gain = {"value": gain, "unit": "1", "interval_95": [-0.5, 0.0]}
+    result = refused_verdict("") | {
+        "ending": "explained",
+        "sentence": "The model lacks a gain error of the commands.",
+        "ties": {"CommandGain": {}},
+        "parameters": {"CommandGain.x": of_gain | {"is_at_bound": False}},
+    }
+    kept = {k: v for k, v in {**result, **changes}.items() if v is not ...}
+    (folder / "result.json").write_text(json.dumps(kept))
+    return folder

@@ -12,6 +12,7 @@ from drake_disasm_cli.main import SUBCOMMANDS
 from tests.tools.inputs import (
     SLIDE,
     slide_motion,
+    write_closed,
     write_policy,
     write_readings,
     write_slide_log,
@@ -28,13 +29,14 @@ _SMALL = {
     "study": ("--episodes=1", "--validation=1", "--eager", "--seeds=1", *_STEPS),
     "check-log": ("--workers=1",),
     "identify": ("--budget=4", "--workers=1", "--unidentifiable=freeze"),
+    "accept": ("--draws=1", "--workers=1"),
     "close-loop": ("--time-budget=0.01", "--workers=1"),
     "excite": ("--iterations=1", "--duration=4"),
     "play-motion": ("--no-meshcat",),
 }
 #: Examples that need a cluster or devices; fake-cell runs until it is stopped.
 _ELSEWHERE = re.compile(r"--executor dask|--station hardware|^drake-disasm fake-cell")
-_QUICK = ("simulate", "evaluate", "import-log", "check-log", "plot-training")
+_QUICK = ("simulate", "evaluate", "import-log", "check-log", "plot-training", "accept")
 #: A study's own factors, at one level each.
 _LEVELS = {
     "precision": ("--levels", "agent=ddpg", "psi=0"),
@@ -118,7 +120,9 @@ def _log_of_the_twin(folder: Path) -> None:
     ],
 )
 def test_examples_run(name: str, folder: Path) -> None:
-    if name == "evaluate":
+    if name == "accept":
+        write_closed(folder / "out/closed", gain=0.0)
+    if name in ("accept", "evaluate"):
         write_policy(folder / "out/first/seed_000/policy.npz")
     if name in ("check-log", "identify", "close-loop"):
         _log_of_the_twin(folder)

@@ -95,6 +95,17 @@ def _simulated_station(name: str) -> str:
     return name
 
 
+def add_policies_argument(add: Callable[..., Any]) -> None:
+    """Adds --policy, one or more."""
+    add(
+        "--policy",
+        nargs="+",
+        required=True,
+        metavar="NAME",
+        help="scripted or shipped names, .npz files, FILE.py:Class or module:name",
+    )
+
+
 def add_log_argument(add: Callable[..., Any]) -> None:
     """Adds --log, which is required."""
     add(

@@ -57,13 +57,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = program.argument_parser("drake-disasm evaluate", __doc__, _EXAMPLES)
     common.add_scenario_arguments(parser)
     add = parser.add_argument
-    add(
-        "--policy",
-        nargs="+",
-        required=True,
-        metavar="NAME",
-        help="scripted or shipped names, .npz files, FILE.py:Class or module:name",
-    )
+    common.add_policies_argument(add)
     common.add_station_argument(add, "cell", "what the policies act on")
     add(
         "--psi",

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,10 +23,11 @@ from drake_disasm.studies.report import write_report
 from drake_disasm.studies.results import mean_of, paired_difference
 from drake_disasm.studies.runner import run_study
 from drake_disasm.studies.study import StudyOptions
+from sysid.acceptance.corrected_twin import CorrectedTwin, refused_verdict
 from sysid.studies import twin_transfer
-from sysid.studies.closed_twin import ClosedTwin, with_effects, with_intervals
+from sysid.studies.closed_twin import ClosedTwin, with_effects
 from sysid.studies.mismatches import MISMATCHES
-from sysid.studies.twin_transfer import TwinTransferStudy, _name_on_twin, _test_path
+from sysid.studies.twin_transfer import TwinTransferStudy, _name_on_twin, file_of
 from tests.refusals import refused
 
 NOMINAL = load_scenario("chapter3")
@@ -51,12 +51,16 @@ def make_robot(folder: Path, name: str) -> None:
     """Leaves behind what a finished `ClosedTwin` does."""
     folder = folder / "robots" / name
     folder.mkdir(parents=True)
-    for twin, rz in (("identified", 0.0), ("closed", 0.05), ("intervals", 0.06)):
+    for twin, rz in (("identified", 0.0), ("scenario", 0.05), ("intervals", 0.06)):
         scenario = with_effects(NOMINAL, (GroovePose(rz=rz),) if rz else ())
         write_text(folder / f"{twin}.yaml", dump_scenario(scenario))
-    values = [{"name": "GroovePose.rz", "value": 0.05, "interval": [0.04, 0.06]}]
-    found = "The model lacks a groove that is turned."
-    result = {"found": found, "is_provisional": True, "values": values}
+    value = {"value": 0.05, "unit": "rad", "interval_95": [0.04, 0.06]}
+    result = refused_verdict("") | {
+        "ending": "explained",
+        "sentence": "The model lacks a groove that is turned.",
+        "provisional": True,
+        "parameters": {"GroovePose.rz": value | {"is_at_bound": False}},
+    }
     (folder / "result.json").write_text(json.dumps(result))
 
 
@@ -97,14 +101,17 @@ def leave_figures(
     folder: Path, branch: str, seed: int, P: float, successes: int
 ) -> None:
     levels: dict[str, Any] = {"mismatch": "tilted", "agent": "ddpg", "branch": branch}
-    path = _test_path(folder, levels, seed)
-    path.parent.mkdir(parents=True, exist_ok=True)
     figures = {"performance": P, "successes": successes, "episodes": 2}
-    path.write_text(json.dumps(FIGURES | figures))
+    said = {"accepted": seed != 1, "nominal": {"outcome": "SUCCESS"}}
+    for path, content in (
+        (file_of("tests", folder, levels, seed), FIGURES | figures),
+        (file_of("accepted", folder, levels, seed), said),
+    ):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(content))
     own = seed_folder(folder / _name_on_twin(levels), seed)
     own.mkdir(parents=True, exist_ok=True)
-    on_twin = FIGURES | {"successes": int(seed != 1)}  # the second fails there, too
-    result = {"seed": seed, "validation": on_twin, "training": FIGURES}
+    result = {"seed": seed, "validation": FIGURES, "training": FIGURES}
     (own / "result.json").write_text(json.dumps(result | {"first_success": 1}))
 
 
@@ -148,6 +155,7 @@ def test_agents_arrive_and_learn_and_the_report_says_so(
 ) -> None:
     """All of it, on a twin in the robot's place."""
     monkeypatch.setattr(twin_transfer, "_STATION", "twin")
+    monkeypatch.setattr(TwinTransferStudy, "draws", 1)
     monkeypatch.setattr(learning_curve, "plot_learning_curves", lambda *_: None)
     make_robot(tmp_path, "tilted")
     small = StudyOptions(
@@ -196,20 +204,6 @@ def _reward(episode: Any) -> float:
     return float(sum(np.nansum(episode[f"reward.{term}"]) for term in REWARD_TERMS))
 
 
-def test_intervals_become_ranges_of_the_effects_that_were_taken() -> None:
-    values = (
-        SimpleNamespace(name="GroovePose.rz", interval=(0.04, 0.06)),
-        SimpleNamespace(name="SensorBias.fx", interval=(1.0, 2.0)),
-        SimpleNamespace(name="GroovePose.ry", interval=(0.01, 0.01)),
-    )
-    closed: Any = SimpleNamespace(verdict=SimpleNamespace(values=values))
-    twin = with_intervals(with_effects(NOMINAL, (GroovePose(rz=0.05),)), closed)
-    assert [(r.parameter, r.low, r.high) for r in twin.randomisation] == [
-        ("GroovePose.rz", 0.04, 0.06)
-    ]
-    validate(twin)
-
-
 @pytest.mark.slow
 def test_a_robots_log_gives_twins_that_know_it(tmp_path: Path) -> None:
     robot = ClosedTwin(
@@ -228,4 +222,6 @@ def test_a_robots_log_gives_twins_that_know_it(tmp_path: Path) -> None:
     effects = robot.twin("closed").effects
     assert any(type(effect) is GroovePose for effect in effects)
     assert robot.twin("intervals").randomisation
+    accepting = CorrectedTwin.read(robot.folder)
+    assert accepting.scenario.effects == effects and accepting.over_intervals
     assert robot.twin("identified").contact.model == "impact"
