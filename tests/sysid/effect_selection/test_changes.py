@@ -63,7 +63,7 @@ def test_references_that_differ_are_named(tmp_path):
 
 def test_a_friction_that_fell_is_told_by_how_much(tmp_path):
     found = changes(tmp_path, [JointCoulombFriction("elbow", -0.3)])
-    assert found.closed.verdict.names == ("JointCoulombFriction.elbow",)
+    assert found.closed.verdict.confirmed == ("JointCoulombFriction.elbow",)
     value, (low, high) = values(found)["JointCoulombFriction.elbow.size"]
     assert value == pytest.approx(-0.3, abs=0.02)
     assert low <= -0.3 <= high
