@@ -41,7 +41,7 @@ FLOORS = {
         {"fitting"},
         {"residuals"},
         {"effect_selection"},
-        {"export"},
+        {"export", "monitoring"},
         {"validation", "report", "experiment_design", "studies"},
     ),
 }

@@ -1,0 +1,298 @@
+"""What an episode shows of each possible change: amplitudes that explain its residual.
+
+r is the residual of an episode against the reference's model, W the weights, c_k its
+derivative by the amplitude of a change k. The amplitude that explains the residual
+best, by itself, is
+
+    x_k = -c_k' W r / c_k' W c_k.
+
+A change that no effect explains shows in the logarithm of each channel's rms residual.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drake_disasm.effects import registered_effects
+from drake_disasm.logs import Log
+from sysid.effect_selection.effect_names import in_words
+from sysid.fitting.block_grams import solve
+from sysid.fitting.candidates import Candidate, candidates, extended
+from sysid.identification.linearisation import Linearisation, linearise
+from sysid.models import LogModel
+from sysid.models.changed import both_ways, moved_behind
+from sysid.models.effects import field_of
+from sysid.monitoring.reference import Reference, candidates_of, mappings_of
+from sysid.objective import Objective
+from sysid.parameters import Scaling, nominal_values
+
+Array = NDArray[np.float64]
+
+_SHOWN = 1e-6  # of a residual of the noise's size: what a change over its range moves
+_ROUNDING = 1e-9  # of an amplitude's range, and of a logarithm
+_LEAST_POWER = 1e-24  # mean square residual of a channel, in units of the noise
+RESIDUAL = "residual"
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """One number of an episode.
+
+    Attributes:
+        name: of the effect or channel: "TorqueOffset.joint_1", "residual of fx".
+        text: with the effect's shape and amplitude: "TorqueOffset.joint_1.size".
+        unit: SI; "1" for a logarithm.
+        floor: standard deviation below which scatter is rounding.
+    """
+
+    name: str
+    text: str
+    unit: str
+    floor: float
+
+    @property
+    def is_residual(self) -> bool:
+        """Whether it is the logarithm of a channel's rms residual."""
+        return self.name.startswith(f"{RESIDUAL} of ")
+
+    @property
+    def in_words(self) -> str:
+        """What a sentence calls it: "dry friction at elbow"."""
+        if self.is_residual:
+            return f"the {self.name}, which no effect explains"
+        joint = self.name.partition(".")[2]
+        return f"{in_words(self.name)}{f' at {joint}' if joint else ''}"
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Returns it as plain data."""
+        return dataclasses.asdict(self)
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Which numbers are made of each episode.
+
+    Attributes:
+        reference: whose model it is.
+        changes: effects that may act besides the reference's.
+        all: changes' amplitudes, then channels' residuals.
+    """
+
+    reference: Reference
+    changes: tuple[Candidate, ...]
+    all: tuple[Statistic, ...]
+
+    @classmethod
+    def of(cls, reference: Reference, logs: Sequence[Log]) -> "Statistics":
+        """Returns the numbers of all changes that logs of the reference may show."""
+        model = reference.model(logs)
+        changes = tuple(candidates(model, registered_effects()))
+        return cls._of(reference, changes, _changeable(reference, model, changes))
+
+    @classmethod
+    def from_mapping(cls, reference: Reference, raw: dict[str, Any]) -> "Statistics":
+        """Returns what `to_mapping` gave."""
+        known = tuple(Statistic(**each) for each in raw["all"])
+        return cls(reference, candidates_of(raw["changes"]), known)
+
+    @classmethod
+    def _of(
+        cls, reference: Reference, changes: tuple[Candidate, ...], model: LogModel
+    ) -> "Statistics":
+        own, found = iter(model.parameters), []
+        for candidate in changes:
+            for field in candidate.fields:
+                parameter = next(own)
+                floor = _ROUNDING * (parameter.high - parameter.low)
+                text = f"{candidate.text}.{field}"
+                found.append(Statistic(candidate.name, text, parameter.unit, floor))
+        for channel in model.measurements.channels:
+            name = f"{RESIDUAL} of {channel.name}"
+            found.append(Statistic(name, name, "1", _ROUNDING))
+        return cls(reference, changes, tuple(found))
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Returns all but the reference as plain data."""
+        return {
+            "changes": mappings_of(self.changes),
+            "all": [each.to_mapping() for each in self.all],
+        }
+
+    @property
+    def weights(self) -> Array:
+        """Weight (K,) of each: one for each effect, shared by its amplitudes."""
+        names = [each.name for each in self.all]
+        share = np.array([1.0 / names.count(name) for name in names])
+        return np.asarray(share / share.sum())
+
+    @property
+    def floors(self) -> Array:
+        """Standard deviations (K,) below which scatter is rounding."""
+        return np.array([each.floor for each in self.all])
+
+    def of_episode(self, log: Log) -> tuple[Array, int]:
+        """Returns the numbers (K,) of a log of one episode, and how many rows it has.
+
+        NaN where the episode does not show a change.
+
+        Raises:
+            DisasmError: the log is of another robot, or lacks what the model needs.
+        """
+        model = self.reference.model([log])
+        products = self._products(model, with_own=False)
+        return products.numbers(np.ones(1), self._channel_weights(model)), products.rows
+
+    def of_reference(self, logs: Sequence[Log]) -> tuple[Array, list[int]]:
+        """Returns the numbers (n, K) of the reference's episodes, and their rows.
+
+        Of those that the model was fitted to as if it had not been: each is left out
+        of the fit in turn, by one Gauss-Newton step. Of a model fitted to a single
+        episode that one is left out.
+        """
+        parts, is_fitted, weights = [], [], np.ones(1)
+        for log in logs:
+            for episode in log.episodes:
+                one = dataclasses.replace(log, episodes=(episode,))
+                model = self.reference.model([one])
+                parts.append(self._products(model, with_own=True))
+                weights = self._channel_weights(model)
+                is_fitted.append(model.measurements.names[0] in self.reference.fitted)
+        changes = _left_out(parts, is_fitted, weights)
+        pairs = [(p, c) for p, c in zip(parts, changes, strict=True) if c is not None]
+        numbers = [products.numbers(change, weights) for products, change in pairs]
+        table = np.array(numbers).reshape(-1, len(self.all))
+        return table, [products.rows for products, _ in pairs]
+
+    def _channel_weights(self, model: LogModel) -> Array:
+        """Returns the weight (channels,) of each: what the reference left has power 1.
+
+        One where the noise is stated.
+        """
+        power = np.array(self.reference.residual) ** 2
+        if self.reference.noise_is_stated:
+            return np.ones(len(power))
+        labels = np.array(model.noise_groups)
+        pooled = np.array([power[labels == label].mean() for label in labels])
+        return np.asarray(1.0 / np.maximum(pooled, _LEAST_POWER))
+
+    def _products(self, model: LogModel, with_own: bool) -> "_Products":
+        """Returns the products of a model of one episode.
+
+        Args:
+            model: with its effects and parameters.
+            with_own: whether derivatives by these are wanted.
+        """
+        values = np.array([self.reference.values[p.name] for p in model.parameters])
+        model = model.begun(values)
+        changed = _changeable(self.reference, model, self.changes)
+        linear = self._linearised(changed, nominal_values(changed.parameters))
+        slope = Scaling(changed.parameters).slope(nominal_values(changed.parameters))
+        own = np.zeros((*linear.residual.shape, 0))
+        if with_own and len(values):
+            own = self._linearised(model, values).jacobian
+        return _Products.of(own, linear, slope)
+
+    def _linearised(self, model: LogModel, theta: Array) -> Linearisation:
+        """Returns the residual of a model and its derivatives at parameters (p,)."""
+        delta = self.reference.huber_delta
+        objective = Objective(model, huber_delta=delta, surrogate=model.surrogate())
+        return linearise(objective, objective.scaling.to_unit(theta), central=False)
+
+
+@dataclass(frozen=True)
+class _Products:
+    """Products of an episode's columns and residual by channel.
+
+    Attributes:
+        left: (channels, p + 1, p + 1) of derivatives by the model's p parameters and
+            of the residual, which is last.
+        cross: (channels, p + 1, K) of those and the derivatives by changes.
+        power: (channels, K) of these by themselves.
+        slope: (K,) of each amplitude, SI, by the unit of its derivative.
+        rows: of the episode.
+    """
+
+    left: Array
+    cross: Array
+    power: Array
+    slope: Array
+    rows: int
+
+    @classmethod
+    def of(cls, own: Array, linear: Linearisation, slope: Array) -> "_Products":
+        """Returns the products.
+
+        Args:
+            own: (rows, channels, p) derivatives by the model's parameters.
+            linear: of the changes.
+            slope: see the class.
+        """
+        left = np.concatenate([own, linear.residual[..., None]], axis=2)
+        weighted = left * linear.weights[..., None]
+        columns = linear.jacobian
+        return cls(
+            np.einsum("rci,rcj->cij", weighted, left, optimize=True),
+            np.einsum("rci,rck->cik", weighted, columns, optimize=True),
+            np.einsum("rc,rck->ck", linear.weights, columns**2, optimize=True),
+            slope,
+            len(own),
+        )
+
+    def numbers(self, change: Array, weights: Array) -> Array:
+        """Returns the statistics (K + channels,).
+
+        Args:
+            change: (p + 1,) of the model's parameters, and 1 for the residual.
+            weights: (channels,).
+        """
+        right = np.einsum("i,cik,c->k", change, self.cross, weights)
+        power = weights @ self.power
+        shows = power > _SHOWN**2 * self.rows
+        with np.errstate(all="ignore"):
+            amplitudes = np.where(shows, -right / power * self.slope, np.nan)
+        losses = np.einsum("i,cij,j->c", change, self.left, change) / self.rows
+        return np.concatenate([amplitudes, 0.5 * np.log(losses + _LEAST_POWER)])
+
+
+def _left_out(
+    parts: Sequence[_Products], is_fitted: Sequence[bool], weights: Array
+) -> list[Array | None]:
+    """Returns how the model's parameters change if each episode is not fitted.
+
+    (p + 1,), the last is 1. None of an episode that alone was fitted.
+    """
+    size = parts[0].left.shape[1] - 1
+    nothing = np.append(np.zeros(size), 1.0)
+    if not size:
+        return [nothing for _ in parts]
+    fitted = [i for i, own in enumerate(is_fitted) if own]
+    grams = {i: np.einsum("c,cij->ij", weights, parts[i].left) for i in fitted}
+    total = np.sum(list(grams.values()), axis=0)
+
+    def _step(gram: Array) -> Array:
+        return -solve(gram[:-1, :-1], gram[:-1, -1])
+
+    changes: list[Array | None] = [nothing for _ in parts]
+    for i in fitted:
+        own = _step(total - grams[i]) - _step(total) if len(fitted) > 1 else None
+        changes[i] = None if own is None else np.append(own, 1.0)
+    return changes
+
+
+def _changeable(
+    reference: Reference, model: LogModel, changes: Sequence[Candidate]
+) -> LogModel:
+    """Returns the model at the reference's values, with changes' amplitudes to vary.
+
+    A change acts besides the effects that the model has, of its own kind, too.
+    """
+    fixed = model.freeze({p.name: reference.values[p.name] for p in model.parameters})
+    bare, _ = extended(fixed.with_effects(()), changes)
+    before = fixed.effects
+    amplitudes = [moved_behind(both_ways(p), len(before)) for p in bare.parameters]
+    assert all(field_of(p) for p in bare.parameters)
+    return fixed.with_effects([*before, *bare.effects], amplitudes)
