@@ -41,8 +41,8 @@ FLOORS = {
         {"fitting"},
         {"residuals"},
         {"effect_selection"},
-        {"export", "monitoring"},
-        {"validation", "report", "experiment_design", "studies"},
+        {"export"},
+        {"validation", "report", "experiment_design", "studies", "monitoring"},
     ),
 }
 #: What each part of the repository may import of the others.

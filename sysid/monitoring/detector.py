@@ -98,6 +98,10 @@ class ShiftDetector:
     history: Array
     starts: int = 0
 
+    def with_reference(self, x: Array) -> Self:
+        """Returns the detector after one more episode (K,) that is in order."""
+        return dataclasses.replace(self, history=np.vstack([self.history, x]))
+
     def added(self, x: Array) -> Self:
         """Returns the detector after one more episode (K,)."""
         history = np.vstack([self.history, x])[-2 * WINDOW :]
@@ -134,9 +138,10 @@ class ShiftDetector:
 
     def _clipped(self) -> Array:
         """Returns the history (h, K) without what is far from all else."""
-        with np.errstate(all="ignore"):
-            middle = np.nanmedian(self.history, axis=0)
-            away = np.nanmedian(np.abs(self.history - middle), axis=0)
+        is_shown = np.isfinite(self.history).any(axis=0)
+        known = np.where(is_shown, self.history, 0.0)
+        middle = np.nanmedian(known, axis=0)
+        away = np.nanmedian(np.abs(known - middle), axis=0)
         reach = np.maximum(CLIPPED * _MAD * away, self.floors)
         return np.clip(self.history, middle - reach, middle + reach)
 

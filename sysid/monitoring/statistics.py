@@ -134,38 +134,31 @@ class Statistics:
         """Standard deviations (K,) below which scatter is rounding."""
         return np.array([each.floor for each in self.all])
 
-    def of_episode(self, log: Log) -> tuple[Array, int]:
-        """Returns the numbers (K,) of a log of one episode, and how many rows it has.
-
-        NaN where the episode does not show a change.
+    def of_episode(self, log: Log) -> "EpisodeNumbers":
+        """Returns the numbers of a log of one episode.
 
         Raises:
             DisasmError: the log is of another robot, or lacks what the model needs.
         """
-        model = self.reference.model([log])
-        products = self._products(model, with_own=False)
-        return products.numbers(np.ones(1), self._channel_weights(model)), products.rows
+        products = self._products(self.reference.model([log]), with_own=False)
+        return products.numbers(np.ones(1))
 
-    def of_reference(self, logs: Sequence[Log]) -> tuple[Array, list[int]]:
-        """Returns the numbers (n, K) of the reference's episodes, and their rows.
+    def of_reference(self, logs: Sequence[Log]) -> "list[EpisodeNumbers]":
+        """Returns the numbers of the reference's episodes.
 
         Of those that the model was fitted to as if it had not been: each is left out
         of the fit in turn, by one Gauss-Newton step. Of a model fitted to a single
         episode that one is left out.
         """
-        parts, is_fitted, weights = [], [], np.ones(1)
+        parts, is_fitted = [], []
         for log in logs:
             for episode in log.episodes:
                 one = dataclasses.replace(log, episodes=(episode,))
                 model = self.reference.model([one])
                 parts.append(self._products(model, with_own=True))
-                weights = self._channel_weights(model)
                 is_fitted.append(model.measurements.names[0] in self.reference.fitted)
-        changes = _left_out(parts, is_fitted, weights)
-        pairs = [(p, c) for p, c in zip(parts, changes, strict=True) if c is not None]
-        numbers = [products.numbers(change, weights) for products, change in pairs]
-        table = np.array(numbers).reshape(-1, len(self.all))
-        return table, [products.rows for products, _ in pairs]
+        pairs = zip(parts, _left_out(parts, is_fitted), strict=True)
+        return [part.numbers(change) for part, change in pairs if change is not None]
 
     def _channel_weights(self, model: LogModel) -> Array:
         """Returns the weight (channels,) of each: what the reference left has power 1.
@@ -194,7 +187,11 @@ class Statistics:
         own = np.zeros((*linear.residual.shape, 0))
         if with_own and len(values):
             own = self._linearised(model, values).jacobian
-        return _Products.of(own, linear, slope)
+        groups = np.repeat(
+            np.arange(len(self.changes)), [len(each.fields) for each in self.changes]
+        )
+        weights = self._channel_weights(model)
+        return _Products.of(own, linear, weights, slope, groups)
 
     def _linearised(self, model: LogModel, theta: Array) -> Linearisation:
         """Returns the residual of a model and its derivatives at parameters (p,)."""
@@ -204,14 +201,32 @@ class Statistics:
 
 
 @dataclass(frozen=True)
+class EpisodeNumbers:
+    """What an episode shows.
+
+    Attributes:
+        values: (K,) of the statistics; NaN of a change that it does not show.
+        shares: (K,) of the weighted squared residual that a change takes away, all its
+            amplitudes fitted to this episode; zero of residuals.
+        rows: of the episode.
+    """
+
+    values: Array
+    shares: Array
+    rows: int
+
+
+@dataclass(frozen=True)
 class _Products:
-    """Products of an episode's columns and residual by channel.
+    """Products of an episode's columns and residual.
 
     Attributes:
         left: (channels, p + 1, p + 1) of derivatives by the model's p parameters and
-            of the residual, which is last.
-        cross: (channels, p + 1, K) of those and the derivatives by changes.
-        power: (channels, K) of these by themselves.
+            of the residual, which is last, by channel.
+        cross: (p + 1, K) of those and the derivatives by changes, weighted.
+        power: (K,) of these by themselves.
+        shares: see EpisodeNumbers.
+        weights: (channels,).
         slope: (K,) of each amplitude, SI, by the unit of its derivative.
         rows: of the episode.
     """
@@ -219,47 +234,84 @@ class _Products:
     left: Array
     cross: Array
     power: Array
+    shares: Array
+    weights: Array
     slope: Array
     rows: int
 
     @classmethod
-    def of(cls, own: Array, linear: Linearisation, slope: Array) -> "_Products":
+    def of(
+        cls,
+        own: Array,
+        linear: Linearisation,
+        weights: Array,
+        slope: Array,
+        groups: NDArray[np.int64],
+    ) -> "_Products":
         """Returns the products.
 
         Args:
             own: (rows, channels, p) derivatives by the model's parameters.
             linear: of the changes.
+            weights: (channels,).
             slope: see the class.
+            groups: (K,) number of the change that each amplitude is of.
         """
         left = np.concatenate([own, linear.residual[..., None]], axis=2)
-        weighted = left * linear.weights[..., None]
-        columns = linear.jacobian
-        return cls(
-            np.einsum("rci,rcj->cij", weighted, left, optimize=True),
-            np.einsum("rci,rck->cik", weighted, columns, optimize=True),
-            np.einsum("rc,rck->ck", linear.weights, columns**2, optimize=True),
-            slope,
-            len(own),
-        )
+        root = np.sqrt(linear.weights)[..., None]
+        left, columns = root * left, root * linear.jacobian
+        whole = np.sqrt(weights)[:, None]
+        flat = (whole * columns).reshape(-1, columns.shape[2])
+        right = (whole * left).reshape(-1, left.shape[2])
+        power = np.sum(flat**2, axis=0)
+        shares = _shares(flat, right[:, -1], groups, power > _SHOWN**2 * len(own))
+        by_channel = np.einsum("rci,rcj->cij", left, left, optimize=True)
+        cross = right.T @ flat
+        return cls(by_channel, cross, power, shares, weights, slope, len(own))
 
-    def numbers(self, change: Array, weights: Array) -> Array:
-        """Returns the statistics (K + channels,).
+    def numbers(self, change: Array) -> EpisodeNumbers:
+        """Returns what the episode shows.
 
         Args:
             change: (p + 1,) of the model's parameters, and 1 for the residual.
-            weights: (channels,).
         """
-        right = np.einsum("i,cik,c->k", change, self.cross, weights)
-        power = weights @ self.power
-        shows = power > _SHOWN**2 * self.rows
-        with np.errstate(all="ignore"):
-            amplitudes = np.where(shows, -right / power * self.slope, np.nan)
+        shows = self.power > _SHOWN**2 * self.rows
+        right = change @ self.cross
+        power = np.where(shows, self.power, np.inf)
+        amplitudes = np.where(shows, -right / power * self.slope, np.nan)
         losses = np.einsum("i,cij,j->c", change, self.left, change) / self.rows
-        return np.concatenate([amplitudes, 0.5 * np.log(losses + _LEAST_POWER)])
+        values = np.concatenate([amplitudes, 0.5 * np.log(losses + _LEAST_POWER)])
+        shares = np.append(self.shares, np.zeros(len(losses)))
+        return EpisodeNumbers(values, shares, self.rows)
+
+
+def _shares(
+    columns: Array,
+    residual: Array,
+    groups: NDArray[np.int64],
+    shows: NDArray[np.bool_],
+) -> Array:
+    """Returns the share (K,) of the squared residual that each change takes away.
+
+    Args:
+        columns: (n, K) weighted derivatives.
+        residual: (n,) weighted.
+        groups: (K,) number of each column's change.
+        shows: (K,) which columns the episode shows.
+    """
+    loss = max(float(residual @ residual), _LEAST_POWER)
+    found = np.zeros(len(groups))
+    for group in np.unique(groups):
+        own = np.flatnonzero((groups == group) & shows)
+        if len(own):
+            part = columns[:, own]
+            right = part.T @ residual
+            found[groups == group] = right @ solve(part.T @ part, right) / loss
+    return found
 
 
 def _left_out(
-    parts: Sequence[_Products], is_fitted: Sequence[bool], weights: Array
+    parts: Sequence[_Products], is_fitted: Sequence[bool]
 ) -> list[Array | None]:
     """Returns how the model's parameters change if each episode is not fitted.
 
@@ -270,7 +322,7 @@ def _left_out(
     if not size:
         return [nothing for _ in parts]
     fitted = [i for i, own in enumerate(is_fitted) if own]
-    grams = {i: np.einsum("c,cij->ij", weights, parts[i].left) for i in fitted}
+    grams = {i: np.tensordot(parts[i].weights, parts[i].left, 1) for i in fitted}
     total = np.sum(list(grams.values()), axis=0)
 
     def _step(gram: Array) -> Array:

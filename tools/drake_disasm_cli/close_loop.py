@@ -36,6 +36,8 @@ from sysid.identification.split import split_episodes
 from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.measurements import episode_names
+from sysid.monitoring.reference import KEY as REFERENCE_KEY
+from sysid.monitoring.reference import Reference
 from sysid.report import changes_page, closing_page
 from sysid.scenario_parameters import read_requests
 from sysid.workers import Workers
@@ -145,7 +147,7 @@ def main(arguments: Sequence[str]) -> int:
     logs = [*references, *common.named_logs(args.log)]
     if args.held_out:  # names, which are wrong more often than anything takes time
         split_episodes(episode_names(logs), args.held_out)
-    model = _model(args, logs)
+    model = model_of(logs, _choice(args))
     if args.export:
         refuse_export(model, args.export)
     origin = program.provenance("drake-disasm close-loop", arguments, 0)
@@ -170,7 +172,10 @@ def main(arguments: Sequence[str]) -> int:
         _finish(args.out, changes.closed, changes_text(changes))
         return 0
     exports, refusal = _exports(closed, args.export)
-    _write(args.out, closed, findings, origin, exports)
+    known = Reference.of(
+        closed, logs, _choice(args), args.imports, args.drop_flagged_rows
+    )
+    _write(args.out, closed, known, findings, origin, exports)
     _finish(args.out, closed, closed.text)
     if refusal is not None:
         raise refusal
@@ -236,16 +241,15 @@ def _exports(
         return None, error
 
 
-def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
-    """Returns the model of the logs that the command line asks for."""
-    choice = ModelChoice(
+def _choice(args: argparse.Namespace) -> ModelChoice:
+    """Returns the model that the command line asks for."""
+    return ModelChoice(
         scenario=load_scenario(args.scenario) if args.scenario else None,
         requests=tuple(read_requests(args.parameters)) if args.parameters else (),
         urdf=args.urdf,
         fixed=True,
         trust_urdf=args.trust == "urdf",
     )
-    return model_of(logs, choice)
 
 
 def _write_changes(
@@ -265,6 +269,7 @@ def _write_changes(
 def _write(
     folder: Path,
     closed: ClosedLoop,
+    known: Reference,
     findings: Sequence[DataFinding],
     origin: dict[str, object],
     exports: Exports | None,
@@ -279,6 +284,7 @@ def _write(
     of_data = {"data_findings": [finding.to_mapping() for finding in findings]}
     exported = None if exports is None else exports.to_mapping()
     of_run = {"provenance": origin, "export": exported}
+    of_run |= {REFERENCE_KEY: known.to_mapping()}
     write_json(folder / "result.json", to_mapping(closed) | of_data | of_run)
     page = closing_page(closed, origin, findings, exported)
     write_text(folder / "report.html", page)

@@ -33,6 +33,7 @@ COMMANDS = {
         "check-log": "check logs before anything is fitted to them",
         "identify": "find the parameters of a model, with intervals",
         "close-loop": "find which physical effect the model lacks, and add it",
+        "monitor": "watch a robot for changes, episode by episode",
     },
 }
 SUBCOMMANDS = {
