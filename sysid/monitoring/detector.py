@@ -120,17 +120,17 @@ class ShiftDetector:
         total = float(logsumexp(each, b=self.weights))
         return Evidence(total, each, starts)
 
-    def shift(self, number: int, log_starts: Array) -> Shift:
-        """Returns how far a statistic has shifted since its most likely start.
+    def shift(self, number: int, start: int) -> Shift:
+        """Returns how far a statistic has shifted since a start.
 
         Args:
             number: of the statistic.
-            log_starts: (w, K) of the evidence.
+            start: number of the start, from 0.
         """
-        start = int(np.argmax(log_starts[:, number]))
         one = self.history[:, number : number + 1]
         n, m, value, variance = (
-            float(part[start, 0]) for part in self._two_samples(one, slice(number, number + 1))
+            float(part[start, 0])
+            for part in self._two_samples(one, slice(number, number + 1))
         )
         student = t_distribution.ppf(0.975, max(n + m - 2.0, 1.0))
         reach = float(student * np.sqrt(variance * (1.0 / n + 1.0 / m)))
@@ -153,7 +153,9 @@ class ShiftDetector:
         Numbers before and since, difference of the means, pooled variance.
         """
         known = np.isfinite(history)
-        middle = np.where(known, history, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+        middle = np.where(known, history, 0.0).sum(axis=0) / np.maximum(
+            known.sum(axis=0), 1
+        )
         x = np.where(known, history - middle, 0.0)
         since = (np.cumsum(part[::-1], axis=0)[::-1] for part in (1.0 * known, x, x**2))
         m, after, after_square = since

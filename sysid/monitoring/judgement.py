@@ -18,8 +18,7 @@ class Suspect:
     Attributes:
         statistic: which.
         log10_evidence: sum over starts of its Bayes factors.
-        share: of the squared residual since then, by how much more its effect explains
-            than before.
+        share: of what the loss has grown by since then, that its effect explains.
         shift: since its most likely start.
         since: that start's log and episode.
     """

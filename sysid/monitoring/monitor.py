@@ -83,7 +83,7 @@ class Monitor:
         """
         logs = reference.read_logs()
         statistics = Statistics.of(reference, logs)
-        baseline = Episodes.none(len(statistics.all))
+        baseline = Episodes.none(statistics)
         for number, numbers in enumerate(statistics.of_reference(logs), start=1):
             baseline = baseline.added(f"{OWN}{number}", numbers)
         return cls(statistics, baseline, every, nominal)
@@ -124,16 +124,27 @@ class Monitor:
         Raises:
             DisasmError: the log is of another robot, or lacks what the model needs.
         """
-        numbers = self.statistics.of_episode(log)
         episode = int(log.episodes[0].name.rpartition("_")[2])
-        name = f"{log.folder.name}/{log.episodes[0].name}"
+        return self.judge_numbers(log.folder, episode, self.statistics.of_episode(log))
+
+    def judge_numbers(
+        self, folder: Path, episode: int, numbers: EpisodeNumbers
+    ) -> Judgement:
+        """Returns what is said of what an episode shows; see `judge`.
+
+        Args:
+            folder: of its log.
+            episode: number in the log.
+            numbers: that it shows.
+        """
+        name = f"{folder.name}/episode_{episode:04d}"
         self._leave_out_reference(numbers.rows)
         usual = float(np.median(self.baseline.rows)) if self.baseline else 0.0
         if numbers.rows < LEAST_ROWS * usual:
             few = f"has {numbers.rows} rows, the reference's episodes have {usual:.0f}"
-            return self.skip(log.folder, episode, f"{few}; record as long ones")
+            return self.skip(folder, episode, f"{few}; record as long ones")
         self.count += 1
-        said = Judgement(self.count, log.folder, episode, "reference", numbers.rows)
+        said = Judgement(self.count, folder, episode, "reference", numbers.rows)
         if self.missing:
             self.baseline = self.baseline.added(name, numbers)
             self.restart()
@@ -159,12 +170,10 @@ class Monitor:
         if self.starts or not self.has_own_reference:
             return
         if self.missing or rows < LEAST_ROWS * np.median(self.baseline.rows):
-            self.baseline = Episodes.none(len(self.statistics.all))
+            self.baseline = Episodes.none(self.statistics)
             self.restart()
 
-    def _judged(
-        self, said: Judgement, name: str, numbers: EpisodeNumbers
-    ) -> Judgement:
+    def _judged(self, said: Judgement, name: str, numbers: EpisodeNumbers) -> Judgement:
         """Returns what is said of one more episode."""
         self.history = self.history.added(name, numbers).last(2 * WINDOW)
         self.starts = min(self.starts + 1, WINDOW)
@@ -190,36 +199,60 @@ class Monitor:
         best: dict[str, int] = {}
         for number in np.argsort(-found.log_each, kind="stable").tolist():
             best.setdefault(self.statistics.all[number].name, number)
-        return [self._suspect(found, i) for i in list(best.values())[:most]]
+        return [
+            self._suspect(found, number, int(np.argmax(found.log_starts[:, number])))
+            for number in list(best.values())[:most]
+        ]
 
     def _named(self, found: Evidence) -> list[Suspect]:
         """Returns what is suspected at an alarm, that which explains most first.
 
-        Of all that has surely shifted. An effect is ambiguous with the first if it explains
-        about as much; a residual is named if no effect explains half of it.
+        Of all that has surely shifted. An effect is ambiguous with the first if it
+        explains about as much, and the one with the fewest amplitudes comes first. A
+        residual is named if no effect explains half of what the loss has grown by.
         """
-        most = min(float(found.log_each.max()) - _TENTH, _SURE)
-        sure = [
-            suspect
-            for suspect in self._suspects(found, len(found.log_each))
-            if suspect.log10_evidence >= _log10(most)
-        ]
-        effects = [each for each in sure if not each.statistic.is_residual]
-        residuals = [each for each in sure if each.statistic.is_residual]
-        effects.sort(key=lambda each: -each.share)
-        best = effects[0].share if effects else 0.0
-        room = max(min(best, 1.0 - best), 0.0)
-        least = best - DEFAULT_SETTINGS.ambiguity_margin * room
-        alike = [each for each in effects if each.share >= least]
-        return alike if best >= _EXPLAINED else [*alike, *residuals]
+        start = int(np.argmax(found.log_starts[:, int(np.argmax(found.log_each))]))
+        least = min(float(found.log_each.max()) - _TENTH, _SURE)
+        shares, best = self._shares(start), dict[str, int]()
+        numbers = np.flatnonzero(found.log_each >= least)
+        sure = {self.statistics.all[i].name for i in numbers}
+        for i in np.lexsort([-found.log_each, -shares]).tolist():
+            if self.statistics.all[i].name in sure:
+                best.setdefault(self.statistics.all[i].name, i)
+        known = list(best.values())
+        effects = [i for i in known if not self.statistics.all[i].is_residual]
+        residuals = [i for i in known if self.statistics.all[i].is_residual]
+        most = float(shares[effects[0]]) if effects else 0.0
+        room = DEFAULT_SETTINGS.ambiguity_margin * max(min(most, 1.0 - most), 0.0)
+        named = [i for i in effects if shares[i] >= most - room]
+        named.sort(key=lambda i: self.statistics.all[i].amplitudes)
+        named += residuals * (most < _EXPLAINED)
+        return [self._suspect(found, i, start, float(shares[i])) for i in named]
 
-    def _suspect(self, found: Evidence, number: int) -> Suspect:
-        shift = self.detector.shift(number, found.log_starts)
-        shares = self.history.shares[:, number]
-        since = len(self.history) - shift.age
-        share = float(shares[since:].mean() - shares[:since].mean())
+    def _shares(self, start: int) -> Array:
+        """Returns the share (K,) of what the loss has grown by that effects explain.
+
+        All amplitudes of an effect in one shape, which are the same since a start; less
+        what they explain before, at zero for a robot in good order.
+        """
+        begin = len(self.history) - self.starts + start
+        before = self.history.select(slice(0, begin))
+        since = self.history.select(slice(begin, None))
+        groups = self.statistics.groups
+        gain = since.gains(groups) - before.gains(groups)
+        growth = float(since.losses.mean() - before.losses.mean())
+        found = np.zeros(len(self.statistics.all))
+        for group, own in zip(groups, gain, strict=True):
+            found[group.start : group.stop] = own
+        return found / growth if growth > 0.0 else found / since.losses.mean()
+
+    def _suspect(
+        self, found: Evidence, number: int, start: int, share: float = 0.0
+    ) -> Suspect:
+        """Returns a statistic that has shifted since a start."""
+        shift = self.detector.shift(number, start)
+        name = self.history.names[len(self.history) - shift.age]
         evidence = _log10(float(found.log_each[number]))
-        name = self.history.names[since]
         return Suspect(self.statistics.all[number], evidence, share, shift, name)
 
     def _command(self, judgement: Judgement) -> str:

@@ -57,9 +57,14 @@ def course_figure(monitor: Monitor) -> Figure:
 
 def suspects_figure(monitor: Monitor) -> Figure:
     """Returns the most suspicious statistics by episode, with the reference's band."""
-    found = monitor.detector.evidence()
-    order = np.argsort(-found.log_each, kind="stable").tolist()
-    known = monitor.statistics.all
+    found, known = monitor.detector.evidence(), monitor.statistics.all
+    named = (
+        {s["parameter"] for s in monitor.recent[-1]["suspects"]}
+        if monitor.has_alarm
+        else {}
+    )
+    first = np.array([each.text not in named for each in known])
+    order = np.lexsort([-found.log_each, first]).tolist()
     names = [known[i].name for i in order]
     numbers = [i for n, i in enumerate(order) if names.index(names[n]) == n][:_DRAWN]
     figure = Figure(figsize=(9.0, 2.3 * len(numbers)), layout="constrained")

@@ -139,7 +139,9 @@ class Reference:
                 what they say.
         """
         path = folder / "result.json"
-        content = read_json(path, "name the --out folder of `drake-disasm close-loop`", {})
+        content = read_json(
+            path, "name the --out folder of `drake-disasm close-loop`", {}
+        )
         if "courses" in content:
             raise DisasmError(
                 f"{folder}: is a comparison of logs; name the closed loop of the "

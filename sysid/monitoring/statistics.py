@@ -10,6 +10,9 @@ A change that no effect explains shows in the logarithm of each channel's rms re
 """
 
 import dataclasses
+import functools
+import itertools
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -47,12 +50,14 @@ class Statistic:
         text: with the effect's shape and amplitude: "TorqueOffset.joint_1.size".
         unit: SI; "1" for a logarithm.
         floor: standard deviation below which scatter is rounding.
+        amplitudes: number of those that the effect has; 0 of a residual.
     """
 
     name: str
     text: str
     unit: str
     floor: float
+    amplitudes: int = 0
 
     @property
     def is_residual(self) -> bool:
@@ -109,7 +114,9 @@ class Statistics:
                 parameter = next(own)
                 floor = _ROUNDING * (parameter.high - parameter.low)
                 text = f"{candidate.text}.{field}"
-                found.append(Statistic(candidate.name, text, parameter.unit, floor))
+                size = len(candidate.fields)
+                each = Statistic(candidate.name, text, parameter.unit, floor, size)
+                found.append(each)
         for channel in model.measurements.channels:
             name = f"{RESIDUAL} of {channel.name}"
             found.append(Statistic(name, name, "1", _ROUNDING))
@@ -122,14 +129,21 @@ class Statistics:
             "all": [each.to_mapping() for each in self.all],
         }
 
-    @property
+    @functools.cached_property
     def weights(self) -> Array:
         """Weight (K,) of each: one for each effect, shared by its amplitudes."""
         names = [each.name for each in self.all]
-        share = np.array([1.0 / names.count(name) for name in names])
+        counts = Counter(names)
+        share = np.array([1.0 / counts[name] for name in names])
         return np.asarray(share / share.sum())
 
-    @property
+    @functools.cached_property
+    def groups(self) -> tuple[range, ...]:
+        """Numbers of each change's amplitudes."""
+        ends = np.cumsum([len(each.fields) for each in self.changes]).tolist()
+        return tuple(range(a, b) for a, b in itertools.pairwise([0, *ends]))
+
+    @functools.cached_property
     def floors(self) -> Array:
         """Standard deviations (K,) below which scatter is rounding."""
         return np.array([each.floor for each in self.all])
@@ -140,8 +154,15 @@ class Statistics:
         Raises:
             DisasmError: the log is of another robot, or lacks what the model needs.
         """
-        products = self._products(self.reference.model([log]), with_own=False)
-        return products.numbers(np.ones(1))
+        return self.linearised(log).numbers()
+
+    def linearised(self, log: Log) -> "LinearEpisode":
+        """Returns a log of one episode near the reference's values.
+
+        Raises:
+            DisasmError: the log is of another robot, or lacks what the model needs.
+        """
+        return self._linear_episode(self.reference.model([log]), with_own=False)
 
     def of_reference(self, logs: Sequence[Log]) -> "list[EpisodeNumbers]":
         """Returns the numbers of the reference's episodes.
@@ -155,7 +176,8 @@ class Statistics:
             for episode in log.episodes:
                 one = dataclasses.replace(log, episodes=(episode,))
                 model = self.reference.model([one])
-                parts.append(self._products(model, with_own=True))
+                part = self._linear_episode(model, with_own=True)
+                parts.append(_Products.of(part))
                 is_fitted.append(model.measurements.names[0] in self.reference.fitted)
         pairs = zip(parts, _left_out(parts, is_fitted), strict=True)
         return [part.numbers(change) for part, change in pairs if change is not None]
@@ -172,8 +194,8 @@ class Statistics:
         pooled = np.array([power[labels == label].mean() for label in labels])
         return np.asarray(1.0 / np.maximum(pooled, _LEAST_POWER))
 
-    def _products(self, model: LogModel, with_own: bool) -> "_Products":
-        """Returns the products of a model of one episode.
+    def _linear_episode(self, model: LogModel, with_own: bool) -> "LinearEpisode":
+        """Returns a model of one episode near the reference's values.
 
         Args:
             model: with its effects and parameters.
@@ -187,11 +209,8 @@ class Statistics:
         own = np.zeros((*linear.residual.shape, 0))
         if with_own and len(values):
             own = self._linearised(model, values).jacobian
-        groups = np.repeat(
-            np.arange(len(self.changes)), [len(each.fields) for each in self.changes]
-        )
         weights = self._channel_weights(model)
-        return _Products.of(own, linear, weights, slope, groups)
+        return LinearEpisode(own, linear, weights, slope, self.groups)
 
     def _linearised(self, model: LogModel, theta: Array) -> Linearisation:
         """Returns the residual of a model and its derivatives at parameters (p,)."""
@@ -206,14 +225,46 @@ class EpisodeNumbers:
 
     Attributes:
         values: (K,) of the statistics; NaN of a change that it does not show.
-        shares: (K,) of the weighted squared residual that a change takes away, all its
-            amplitudes fitted to this episode; zero of residuals.
+        right: (k,) products of the changes' derivatives and the residual.
+        grams: (q,) of each change's derivatives with each other, one after the other.
+        loss: weighted square of the residual.
         rows: of the episode.
     """
 
     values: Array
-    shares: Array
+    right: Array
+    grams: Array
+    loss: float
     rows: int
+
+
+@dataclass(frozen=True)
+class LinearEpisode:
+    """An episode near the reference's values.
+
+    Attributes:
+        own: (rows, channels, p) derivatives by the model's parameters.
+        linear: residual, and its derivatives by changes.
+        weights: (channels,).
+        slope: (K,) of each amplitude, SI, by the unit of its derivative.
+        groups: numbers of each change's amplitudes.
+    """
+
+    own: Array
+    linear: Linearisation
+    weights: Array
+    slope: Array
+    groups: tuple[range, ...]
+
+    def with_residual(self, residual: Array) -> "LinearEpisode":
+        """Returns the same motion with another residual (rows, channels)."""
+        linear = dataclasses.replace(self.linear, residual=residual)
+        return dataclasses.replace(self, linear=linear)
+
+    def numbers(self) -> EpisodeNumbers:
+        """Returns what the episode shows."""
+        nothing = np.append(np.zeros(self.own.shape[2]), 1.0)
+        return _Products.of(self).numbers(nothing)
 
 
 @dataclass(frozen=True)
@@ -225,7 +276,7 @@ class _Products:
             of the residual, which is last, by channel.
         cross: (p + 1, K) of those and the derivatives by changes, weighted.
         power: (K,) of these by themselves.
-        shares: see EpisodeNumbers.
+        grams: see EpisodeNumbers.
         weights: (channels,).
         slope: (K,) of each amplitude, SI, by the unit of its derivative.
         rows: of the episode.
@@ -234,40 +285,27 @@ class _Products:
     left: Array
     cross: Array
     power: Array
-    shares: Array
+    grams: Array
     weights: Array
     slope: Array
     rows: int
 
     @classmethod
-    def of(
-        cls,
-        own: Array,
-        linear: Linearisation,
-        weights: Array,
-        slope: Array,
-        groups: NDArray[np.int64],
-    ) -> "_Products":
-        """Returns the products.
-
-        Args:
-            own: (rows, channels, p) derivatives by the model's parameters.
-            linear: of the changes.
-            weights: (channels,).
-            slope: see the class.
-            groups: (K,) number of the change that each amplitude is of.
-        """
-        left = np.concatenate([own, linear.residual[..., None]], axis=2)
+    def of(cls, episode: LinearEpisode) -> "_Products":
+        """Returns the products of an episode."""
+        linear, weights, rows = episode.linear, episode.weights, len(episode.own)
+        left = np.concatenate([episode.own, linear.residual[..., None]], axis=2)
         root = np.sqrt(linear.weights)[..., None]
         left, columns = root * left, root * linear.jacobian
         whole = np.sqrt(weights)[:, None]
         flat = (whole * columns).reshape(-1, columns.shape[2])
         right = (whole * left).reshape(-1, left.shape[2])
         power = np.sum(flat**2, axis=0)
-        shares = _shares(flat, right[:, -1], groups, power > _SHOWN**2 * len(own))
+        parts = (flat[:, group.start : group.stop] for group in episode.groups)
+        grams = np.concatenate([(part.T @ part).reshape(-1) for part in parts])
         by_channel = np.einsum("rci,rcj->cij", left, left, optimize=True)
         cross = right.T @ flat
-        return cls(by_channel, cross, power, shares, weights, slope, len(own))
+        return cls(by_channel, cross, power, grams, weights, episode.slope, rows)
 
     def numbers(self, change: Array) -> EpisodeNumbers:
         """Returns what the episode shows.
@@ -281,33 +319,8 @@ class _Products:
         amplitudes = np.where(shows, -right / power * self.slope, np.nan)
         losses = np.einsum("i,cij,j->c", change, self.left, change) / self.rows
         values = np.concatenate([amplitudes, 0.5 * np.log(losses + _LEAST_POWER)])
-        shares = np.append(self.shares, np.zeros(len(losses)))
-        return EpisodeNumbers(values, shares, self.rows)
-
-
-def _shares(
-    columns: Array,
-    residual: Array,
-    groups: NDArray[np.int64],
-    shows: NDArray[np.bool_],
-) -> Array:
-    """Returns the share (K,) of the squared residual that each change takes away.
-
-    Args:
-        columns: (n, K) weighted derivatives.
-        residual: (n,) weighted.
-        groups: (K,) number of each column's change.
-        shows: (K,) which columns the episode shows.
-    """
-    loss = max(float(residual @ residual), _LEAST_POWER)
-    found = np.zeros(len(groups))
-    for group in np.unique(groups):
-        own = np.flatnonzero((groups == group) & shows)
-        if len(own):
-            part = columns[:, own]
-            right = part.T @ residual
-            found[groups == group] = right @ solve(part.T @ part, right) / loss
-    return found
+        loss = float(self.weights @ losses) * self.rows
+        return EpisodeNumbers(values, right, self.grams, loss, self.rows)
 
 
 def _left_out(

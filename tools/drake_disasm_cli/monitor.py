@@ -119,7 +119,9 @@ def main(arguments: Sequence[str]) -> int:
     _say_what_it_is(record)
     if record.monitor.has_alarm:
         if not args.keep_going:
-            _say(f"alarm: {record.monitor.recent[-1]['sentence']}; --keep-going goes on")
+            _say(
+                f"alarm: {record.monitor.recent[-1]['sentence']}; --keep-going goes on"
+            )
             return EXIT_ALARM
         record.monitor.restart()
     try:
