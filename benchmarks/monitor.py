@@ -44,10 +44,10 @@ from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.monitoring.judgement import Judgement
+from sysid.monitoring.linear_episode import EpisodeNumbers, LinearEpisode
 from sysid.monitoring.monitor import Monitor
 from sysid.monitoring.record import Record
 from sysid.monitoring.reference import KEY, Reference
-from sysid.monitoring.statistics import EpisodeNumbers, LinearEpisode
 from sysid.monitoring.watched import Arrival
 
 _PROGRAM = "benchmarks/monitor.py"
@@ -332,7 +332,7 @@ def main(arguments: Sequence[str]) -> int:
     add("--changes", type=options.positive, default=200, metavar="N",
         help="of each kind (default: 200)")  # fmt: skip
     add("--out", type=Path, default=Path("out/monitor"), metavar="DIR",
-        help="a folder; a run that was stopped goes on (default: out/monitor)")  # fmt: skip
+        help="a run that was stopped goes on (default: out/monitor)")  # fmt: skip
     add_results_argument(parser)
     args = parser.parse_args(arguments)
     make_folder(args.out)

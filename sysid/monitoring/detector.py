@@ -20,7 +20,7 @@ more, on average, if nothing has changed (Shiryaev-Roberts; Shin, Ramdas and Rin
 2024). A start that is an episode old counts one at most: one odd episode raises no
 alarm by itself. Dropping the oldest starts, too, only makes R smaller.
 
-Episodes are taken to be independent of each other and alike. They need not be normal:
+Episodes are taken to be independent of each other. They need not be normal:
 what is further than `CLIPPED` robust standard deviations from the median counts as if
 it were just there. Of A = 1000 stated, one statistic keeps 3800 measured episodes if
 it is normal, 3300 with Student's t of 4 degrees of freedom (400 without clipping), and
@@ -58,12 +58,10 @@ class Evidence:
     Attributes:
         log_total: log R_n, over all statistics.
         log_each: (K,) log of the sum over starts of each statistic.
-        log_starts: (w, K) log of each start's Bayes factor, the oldest first.
     """
 
     log_total: float
     log_each: Array
-    log_starts: Array
 
 
 @dataclass(frozen=True)
@@ -112,13 +110,22 @@ class ShiftDetector:
         """Returns the evidence for a shift since any of the last episodes."""
         if not self.starts:
             nothing = np.full(len(self.weights), -np.inf)
-            return Evidence(-np.inf, nothing, nothing[:0])
+            return Evidence(-np.inf, nothing)
         n, m, difference, variance = self._two_samples(self._clipped())
         starts = log_bayes_factor(n, m, difference, np.sqrt(variance))
         starts = np.where(m < 2, np.minimum(starts, 0.0), starts)
         each = logsumexp(starts, axis=0)
         total = float(logsumexp(each, b=self.weights))
-        return Evidence(total, each, starts)
+        return Evidence(total, each)
+
+    def start(self, number: int) -> int:
+        """Returns the most likely start of a statistic's shift, from 0.
+
+        By the values as they are: clipped ones are too much like the scatter before.
+        """
+        n, m, difference, variance = self._two_samples_of(number)
+        found = log_bayes_factor(n, m, difference, np.sqrt(variance))
+        return int(np.argmax(found))
 
     def shift(self, number: int, start: int) -> Shift:
         """Returns how far a statistic has shifted since a start.
@@ -127,14 +134,16 @@ class ShiftDetector:
             number: of the statistic.
             start: number of the start, from 0.
         """
-        one = self.history[:, number : number + 1]
-        n, m, value, variance = (
-            float(part[start, 0])
-            for part in self._two_samples(one, slice(number, number + 1))
-        )
+        parts = self._two_samples_of(number)
+        n, m, value, variance = (float(part[start]) for part in parts)
         student = t_distribution.ppf(0.975, max(n + m - 2.0, 1.0))
         reach = float(student * np.sqrt(variance * (1.0 / n + 1.0 / m)))
         return Shift(value, (value - reach, value + reach), self.starts - start)
+
+    def _two_samples_of(self, number: int) -> list[Array]:
+        """Returns what `_two_samples` does of one statistic, not clipped, (w,) each."""
+        own = slice(number, number + 1)
+        return [part[:, 0] for part in self._two_samples(self.history[:, own], own)]
 
     def _clipped(self) -> Array:
         """Returns the history (h, K) without what is far from all else."""

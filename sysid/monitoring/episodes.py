@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from sysid.fitting.block_grams import solve
 from sysid.monitoring.detector import Array
-from sysid.monitoring.statistics import EpisodeNumbers, Statistics
+from sysid.monitoring.linear_episode import EpisodeNumbers
+from sysid.monitoring.statistics import Statistics
 from sysid.report.thinning import extreme_rows
 
 _ARRAYS = ("values", "right", "grams", "losses", "rows")

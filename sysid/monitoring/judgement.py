@@ -1,11 +1,13 @@
 """What is said of an episode, and of what is suspected."""
 
 import math
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from sysid.monitoring.detector import Shift
+from sysid.monitoring.reference import Reference
 from sysid.monitoring.statistics import Statistic
 
 Role = Literal["judged", "reference", "skipped"]
@@ -112,3 +114,29 @@ class Judgement:
         if self.is_alarm:
             plain |= {"sentence": self.sentence, "command": self.command}
         return plain
+
+
+def verdict_command(
+    reference: Reference, judgement: Judgement, nominal: Path | None
+) -> str:
+    """Returns the command that gives the full verdict on an alarm.
+
+    Args:
+        reference: of the watch.
+        judgement: with the alarm.
+        nominal: file of the reference's scenario, if one was given.
+    """
+    folder, choice = judgement.folder, reference.choice
+    since = judgement.suspects[0].since.rpartition("/")[0]
+    logs = {folder}
+    if since != folder.name:
+        known = (path for path in folder.parent.iterdir() if path.is_dir())
+        logs |= {path for path in known if since <= path.name <= folder.name}
+    words = ["drake-disasm", "close-loop", "--reference"]
+    words += [str(path) for path in reference.logs]
+    words += ["--log", *sorted(str(path) for path in logs)]
+    words += ["--scenario", str(nominal)] if nominal else []
+    words += ["--urdf", choice.urdf] if choice.urdf else []
+    words += [word for name in reference.imports for word in ("--import", name)]
+    words += ["--drop-flagged-rows"] * reference.drop_flagged_rows
+    return shlex.join([*words, "--out", f"changed_{judgement.number}"])

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,9 +12,10 @@ from drake_disasm.logs import Log
 from sysid.fitting.settings import DEFAULT_SETTINGS
 from sysid.monitoring.detector import WINDOW, Array, Evidence, ShiftDetector
 from sysid.monitoring.episodes import Course, Episodes
-from sysid.monitoring.judgement import Judgement, Suspect
+from sysid.monitoring.judgement import Judgement, Suspect, verdict_command
+from sysid.monitoring.linear_episode import EpisodeNumbers
 from sysid.monitoring.reference import Reference
-from sysid.monitoring.statistics import EpisodeNumbers, Statistics
+from sysid.monitoring.statistics import Statistics
 
 #: Episodes in good order before any is judged: of two, the scatter is unknown to a
 #: factor of thirty.
@@ -110,7 +110,7 @@ class Monitor:
 
     @property
     def has_own_reference(self) -> bool:
-        """Whether the reference's episodes serve as such, and not the first new ones."""
+        """Whether the reference's episodes serve as such, not the first new ones."""
         return bool(self.baseline) and self.baseline.names[0].startswith(OWN)
 
     @property
@@ -192,7 +192,8 @@ class Monitor:
         if not is_alarm:
             return said
         self.alarms += 1
-        return dataclasses.replace(said, command=self._command(said))
+        command = verdict_command(self.reference, said, self.nominal)
+        return dataclasses.replace(said, command=command)
 
     def _suspects(self, found: Evidence, most: int = _SUSPECTS) -> list[Suspect]:
         """Returns the statistics with most evidence, one of each name."""
@@ -200,7 +201,7 @@ class Monitor:
         for number in np.argsort(-found.log_each, kind="stable").tolist():
             best.setdefault(self.statistics.all[number].name, number)
         return [
-            self._suspect(found, number, int(np.argmax(found.log_starts[:, number])))
+            self._suspect(found, number, self.detector.start(number))
             for number in list(best.values())[:most]
         ]
 
@@ -211,7 +212,7 @@ class Monitor:
         explains about as much, and the one with the fewest amplitudes comes first. A
         residual is named if no effect explains half of what the loss has grown by.
         """
-        start = int(np.argmax(found.log_starts[:, int(np.argmax(found.log_each))]))
+        start = self.detector.start(int(np.argmax(found.log_each)))
         least = min(float(found.log_each.max()) - _TENTH, _SURE)
         shares, best = self._shares(start), dict[str, int]()
         numbers = np.flatnonzero(found.log_each >= least)
@@ -249,28 +250,11 @@ class Monitor:
     def _suspect(
         self, found: Evidence, number: int, start: int, share: float = 0.0
     ) -> Suspect:
-        """Returns a statistic that has shifted since a start."""
+        """Returns a statistic that has shifted since a start, and by how much."""
         shift = self.detector.shift(number, start)
         name = self.history.names[len(self.history) - shift.age]
         evidence = _log10(float(found.log_each[number]))
         return Suspect(self.statistics.all[number], evidence, share, shift, name)
-
-    def _command(self, judgement: Judgement) -> str:
-        """Returns the command that gives the full verdict on an alarm."""
-        reference, folder = self.reference, judgement.folder
-        since = judgement.suspects[0].since.rpartition("/")[0]
-        logs = {folder}
-        if since != folder.name:
-            beside = (path for path in folder.parent.iterdir() if path.is_dir())
-            logs |= {path for path in beside if since <= path.name <= folder.name}
-        words = ["drake-disasm", "close-loop", "--reference"]
-        words += [str(path) for path in reference.logs]
-        words += ["--log", *sorted(str(path) for path in logs)]
-        words += ["--scenario", str(self.nominal)] if self.nominal else []
-        words += ["--urdf", reference.choice.urdf] if reference.choice.urdf else []
-        words += [word for name in reference.imports for word in ("--import", name)]
-        words += ["--drop-flagged-rows"] * reference.drop_flagged_rows
-        return shlex.join([*words, "--out", f"changed_{judgement.number}"])
 
     def to_archive(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Returns all that it has come to, as arrays and plain data."""

@@ -81,7 +81,8 @@ def _draw(ax: Axes, statistic: Statistic, values: Array, baseline: Array) -> Non
     at = np.arange(len(values)) - len(values) + 1
     ax.plot(at, values, ".", ms=4, color="#2060a0")
     if np.isfinite(baseline).sum() > 1:
-        middle, reach = np.nanmean(baseline), _BAND * np.nanstd(baseline, ddof=1)
+        middle = float(np.nanmean(baseline))
+        reach = _BAND * float(np.nanstd(baseline, ddof=1))
         ax.axhspan(middle - reach, middle + reach, color="#202020", alpha=0.1, lw=0)
     unit = "log of the rms / noise" if statistic.is_residual else statistic.unit
     ax.set_title(f"{statistic.text} [{unit}]", fontsize=9, loc="left")

@@ -1,7 +1,6 @@
 """A closed loop as a reference: all that is needed to judge other logs by its model."""
 
 import dataclasses
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,16 +14,13 @@ from drake_disasm.common.files import read_json
 from drake_disasm.common.plain_data import check_like
 from drake_disasm.effects import import_effects
 from drake_disasm.logs import Log, read_logs
-from drake_disasm.scenario import (
-    Scenario,
-    scenario_from_mapping,
-    scenario_to_mapping,
-)
+from drake_disasm.scenario import scenario_from_mapping, scenario_to_mapping
 from sysid.data_checks import check_data, without_flagged_rows
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.fitting.candidates import Candidate, extended
 from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
+from sysid.monitoring.plain_effects import candidates_of, mappings_of
 from sysid.scenario_parameters import Request
 
 #: In `result.json`; and what a reader of this version understands.
@@ -157,8 +153,9 @@ class Reference:
             raise DisasmError(f"{path}: {error}; {_AGAIN}") from None
         if found.written:
             raise DisasmError(
-                f"{folder}: its logs are not what they say ({', '.join(found.written)}); "
-                "put them right as its verdict says, and close the loop again"
+                f"{folder}: its logs are not what they say "
+                f"({', '.join(found.written)}); correct them as its verdict says, and "
+                "close the loop again"
             )
         return found
 
@@ -284,29 +281,6 @@ class Reference:
                 f"({min(odd)}); name logs of the reference's robot"
             )
         return model
-
-
-def mappings_of(effects: Sequence[Candidate]) -> list[dict[str, Any]]:
-    """Returns candidates as plain data."""
-    scenario = Scenario(effects=[each.effect for each in effects])
-    plain = json.loads(json.dumps(scenario_to_mapping(scenario)["effects"]))
-    return [
-        {"effect": effect, "fields": list(each.fields)}
-        for effect, each in zip(plain, effects, strict=True)
-    ]
-
-
-def candidates_of(raw: Sequence[Mapping[str, Any]]) -> tuple[Candidate, ...]:
-    """Returns the candidates that plain data describe.
-
-    Raises:
-        DisasmError: one is of no registered effect.
-    """
-    scenario = scenario_from_mapping({"effects": [each["effect"] for each in raw]})
-    return tuple(
-        Candidate.of(effect).only(tuple(each["fields"]))
-        for effect, each in zip(scenario.effects, raw, strict=True)
-    )
 
 
 def _absolute(name: str) -> str:

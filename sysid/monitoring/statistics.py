@@ -23,21 +23,26 @@ from numpy.typing import NDArray
 from drake_disasm.effects import registered_effects
 from drake_disasm.logs import Log
 from sysid.effect_selection.effect_names import in_words
-from sysid.fitting.block_grams import solve
 from sysid.fitting.candidates import Candidate, candidates, extended
 from sysid.identification.linearisation import Linearisation, linearise
 from sysid.models import LogModel
 from sysid.models.changed import both_ways, moved_behind
 from sysid.models.effects import field_of
-from sysid.monitoring.reference import Reference, candidates_of, mappings_of
+from sysid.monitoring.linear_episode import (
+    LEAST_POWER,
+    EpisodeNumbers,
+    LinearEpisode,
+    Products,
+    left_out,
+)
+from sysid.monitoring.plain_effects import candidates_of, mappings_of
+from sysid.monitoring.reference import Reference
 from sysid.objective import Objective
 from sysid.parameters import Scaling, nominal_values
 
 Array = NDArray[np.float64]
 
-_SHOWN = 1e-6  # of a residual of the noise's size: what a change over its range moves
 _ROUNDING = 1e-9  # of an amplitude's range, and of a logarithm
-_LEAST_POWER = 1e-24  # mean square residual of a channel, in units of the noise
 RESIDUAL = "residual"
 
 
@@ -148,7 +153,7 @@ class Statistics:
         """Standard deviations (K,) below which scatter is rounding."""
         return np.array([each.floor for each in self.all])
 
-    def of_episode(self, log: Log) -> "EpisodeNumbers":
+    def of_episode(self, log: Log) -> EpisodeNumbers:
         """Returns the numbers of a log of one episode.
 
         Raises:
@@ -156,7 +161,7 @@ class Statistics:
         """
         return self.linearised(log).numbers()
 
-    def linearised(self, log: Log) -> "LinearEpisode":
+    def linearised(self, log: Log) -> LinearEpisode:
         """Returns a log of one episode near the reference's values.
 
         Raises:
@@ -164,7 +169,7 @@ class Statistics:
         """
         return self._linear_episode(self.reference.model([log]), with_own=False)
 
-    def of_reference(self, logs: Sequence[Log]) -> "list[EpisodeNumbers]":
+    def of_reference(self, logs: Sequence[Log]) -> list[EpisodeNumbers]:
         """Returns the numbers of the reference's episodes.
 
         Of those that the model was fitted to as if it had not been: each is left out
@@ -177,9 +182,9 @@ class Statistics:
                 one = dataclasses.replace(log, episodes=(episode,))
                 model = self.reference.model([one])
                 part = self._linear_episode(model, with_own=True)
-                parts.append(_Products.of(part))
+                parts.append(Products.of(part))
                 is_fitted.append(model.measurements.names[0] in self.reference.fitted)
-        pairs = zip(parts, _left_out(parts, is_fitted), strict=True)
+        pairs = zip(parts, left_out(parts, is_fitted), strict=True)
         return [part.numbers(change) for part, change in pairs if change is not None]
 
     def _channel_weights(self, model: LogModel) -> Array:
@@ -192,9 +197,9 @@ class Statistics:
             return np.ones(len(power))
         labels = np.array(model.noise_groups)
         pooled = np.array([power[labels == label].mean() for label in labels])
-        return np.asarray(1.0 / np.maximum(pooled, _LEAST_POWER))
+        return np.asarray(1.0 / np.maximum(pooled, LEAST_POWER))
 
-    def _linear_episode(self, model: LogModel, with_own: bool) -> "LinearEpisode":
+    def _linear_episode(self, model: LogModel, with_own: bool) -> LinearEpisode:
         """Returns a model of one episode near the reference's values.
 
         Args:
@@ -217,135 +222,6 @@ class Statistics:
         delta = self.reference.huber_delta
         objective = Objective(model, huber_delta=delta, surrogate=model.surrogate())
         return linearise(objective, objective.scaling.to_unit(theta), central=False)
-
-
-@dataclass(frozen=True)
-class EpisodeNumbers:
-    """What an episode shows.
-
-    Attributes:
-        values: (K,) of the statistics; NaN of a change that it does not show.
-        right: (k,) products of the changes' derivatives and the residual.
-        grams: (q,) of each change's derivatives with each other, one after the other.
-        loss: weighted square of the residual.
-        rows: of the episode.
-    """
-
-    values: Array
-    right: Array
-    grams: Array
-    loss: float
-    rows: int
-
-
-@dataclass(frozen=True)
-class LinearEpisode:
-    """An episode near the reference's values.
-
-    Attributes:
-        own: (rows, channels, p) derivatives by the model's parameters.
-        linear: residual, and its derivatives by changes.
-        weights: (channels,).
-        slope: (K,) of each amplitude, SI, by the unit of its derivative.
-        groups: numbers of each change's amplitudes.
-    """
-
-    own: Array
-    linear: Linearisation
-    weights: Array
-    slope: Array
-    groups: tuple[range, ...]
-
-    def with_residual(self, residual: Array) -> "LinearEpisode":
-        """Returns the same motion with another residual (rows, channels)."""
-        linear = dataclasses.replace(self.linear, residual=residual)
-        return dataclasses.replace(self, linear=linear)
-
-    def numbers(self) -> EpisodeNumbers:
-        """Returns what the episode shows."""
-        nothing = np.append(np.zeros(self.own.shape[2]), 1.0)
-        return _Products.of(self).numbers(nothing)
-
-
-@dataclass(frozen=True)
-class _Products:
-    """Products of an episode's columns and residual.
-
-    Attributes:
-        left: (channels, p + 1, p + 1) of derivatives by the model's p parameters and
-            of the residual, which is last, by channel.
-        cross: (p + 1, K) of those and the derivatives by changes, weighted.
-        power: (K,) of these by themselves.
-        grams: see EpisodeNumbers.
-        weights: (channels,).
-        slope: (K,) of each amplitude, SI, by the unit of its derivative.
-        rows: of the episode.
-    """
-
-    left: Array
-    cross: Array
-    power: Array
-    grams: Array
-    weights: Array
-    slope: Array
-    rows: int
-
-    @classmethod
-    def of(cls, episode: LinearEpisode) -> "_Products":
-        """Returns the products of an episode."""
-        linear, weights, rows = episode.linear, episode.weights, len(episode.own)
-        left = np.concatenate([episode.own, linear.residual[..., None]], axis=2)
-        root = np.sqrt(linear.weights)[..., None]
-        left, columns = root * left, root * linear.jacobian
-        whole = np.sqrt(weights)[:, None]
-        flat = (whole * columns).reshape(-1, columns.shape[2])
-        right = (whole * left).reshape(-1, left.shape[2])
-        power = np.sum(flat**2, axis=0)
-        parts = (flat[:, group.start : group.stop] for group in episode.groups)
-        grams = np.concatenate([(part.T @ part).reshape(-1) for part in parts])
-        by_channel = np.einsum("rci,rcj->cij", left, left, optimize=True)
-        cross = right.T @ flat
-        return cls(by_channel, cross, power, grams, weights, episode.slope, rows)
-
-    def numbers(self, change: Array) -> EpisodeNumbers:
-        """Returns what the episode shows.
-
-        Args:
-            change: (p + 1,) of the model's parameters, and 1 for the residual.
-        """
-        shows = self.power > _SHOWN**2 * self.rows
-        right = change @ self.cross
-        power = np.where(shows, self.power, np.inf)
-        amplitudes = np.where(shows, -right / power * self.slope, np.nan)
-        losses = np.einsum("i,cij,j->c", change, self.left, change) / self.rows
-        values = np.concatenate([amplitudes, 0.5 * np.log(losses + _LEAST_POWER)])
-        loss = float(self.weights @ losses) * self.rows
-        return EpisodeNumbers(values, right, self.grams, loss, self.rows)
-
-
-def _left_out(
-    parts: Sequence[_Products], is_fitted: Sequence[bool]
-) -> list[Array | None]:
-    """Returns how the model's parameters change if each episode is not fitted.
-
-    (p + 1,), the last is 1. None of an episode that alone was fitted.
-    """
-    size = parts[0].left.shape[1] - 1
-    nothing = np.append(np.zeros(size), 1.0)
-    if not size:
-        return [nothing for _ in parts]
-    fitted = [i for i, own in enumerate(is_fitted) if own]
-    grams = {i: np.tensordot(parts[i].weights, parts[i].left, 1) for i in fitted}
-    total = np.sum(list(grams.values()), axis=0)
-
-    def _step(gram: Array) -> Array:
-        return -solve(gram[:-1, :-1], gram[:-1, -1])
-
-    changes: list[Array | None] = [nothing for _ in parts]
-    for i in fitted:
-        own = _step(total - grams[i]) - _step(total) if len(fitted) > 1 else None
-        changes[i] = None if own is None else np.append(own, 1.0)
-    return changes
 
 
 def _changeable(

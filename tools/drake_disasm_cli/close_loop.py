@@ -23,7 +23,6 @@ from drake_disasm.common import options, program
 from drake_disasm.common.cluster import executor_for
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, write_json, write_text
-from drake_disasm.logs import Log
 from drake_disasm.scenario import dump_scenario, load_scenario
 from drake_disasm_cli import common, data_arguments
 from sysid.data_checks import DataFinding

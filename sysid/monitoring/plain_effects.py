@@ -1,0 +1,35 @@
+"""Effects that may be added to a model as plain data, and back."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from drake_disasm.scenario import (
+    Scenario,
+    scenario_from_mapping,
+    scenario_to_mapping,
+)
+from sysid.fitting.candidates import Candidate
+
+
+def mappings_of(effects: Sequence[Candidate]) -> list[dict[str, Any]]:
+    """Returns candidates as plain data."""
+    scenario = Scenario(effects=[each.effect for each in effects])
+    plain = json.loads(json.dumps(scenario_to_mapping(scenario)["effects"]))
+    return [
+        {"effect": effect, "fields": list(each.fields)}
+        for effect, each in zip(plain, effects, strict=True)
+    ]
+
+
+def candidates_of(raw: Sequence[Mapping[str, Any]]) -> tuple[Candidate, ...]:
+    """Returns the candidates that plain data describe.
+
+    Raises:
+        DisasmError: one is of no registered effect.
+    """
+    scenario = scenario_from_mapping({"effects": [each["effect"] for each in raw]})
+    return tuple(
+        Candidate.of(effect).only(tuple(each["fields"]))
+        for effect, each in zip(scenario.effects, raw, strict=True)
+    )
