@@ -11,6 +11,8 @@ from drake_disasm.scenario import (
 )
 from sysid.fitting.candidates import Candidate
 
+_AT_ONCE = 50  # effects: a scenario has a limit, which candidates exceed
+
 
 def mappings_of(effects: Sequence[Candidate]) -> list[dict[str, Any]]:
     """Returns candidates as plain data."""
@@ -28,8 +30,11 @@ def candidates_of(raw: Sequence[Mapping[str, Any]]) -> tuple[Candidate, ...]:
     Raises:
         DisasmError: one is of no registered effect.
     """
-    scenario = scenario_from_mapping({"effects": [each["effect"] for each in raw]})
+    effects: list[Any] = []
+    for begin in range(0, len(raw), _AT_ONCE):
+        part = [each["effect"] for each in raw[begin : begin + _AT_ONCE]]
+        effects += scenario_from_mapping({"effects": part}).effects
     return tuple(
         Candidate.of(effect).only(tuple(each["fields"]))
-        for effect, each in zip(scenario.effects, raw, strict=True)
+        for effect, each in zip(effects, raw, strict=True)
     )
