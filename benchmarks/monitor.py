@@ -39,7 +39,6 @@ from drake_disasm.effects import (
 )
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
-from drake_disasm.scenario import Scenario
 from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
@@ -55,7 +54,7 @@ _EXAMPLES = """examples:
   python benchmarks/monitor.py models/iiwa14/iiwa14.urdf --files 300
 """
 _SEED, _DURATION, _RHO = 59_500, 3.0, 0.9
-_PATHS, _REFERENCES = 40, 20
+_PATHS, _REFERENCES = 16, 12
 _LEVELS = (100.0, 1000.0)
 _BEFORE, _MOST = 10, 60  # episodes before a change, and after it at most
 _MASS, _WARMTH, _OFFSET = 0.01, 0.05, 0.05  # kg, share, N m: of the day
@@ -125,12 +124,11 @@ class Simulation:
         shutil.rmtree(scratch, ignore_errors=True)
         with LogWriter(scratch, self.header) as writer:
             writer.write_episode(flat_columns("joint_motion", columns))
-        log = read_log(scratch)
+        model = JointMotionModel([read_log(scratch)])
+        nominal = np.array([p.nominal for p in model.parameters])
 
         def _torques(*effects: Effect) -> Array:
-            scenario = Scenario(effects=[*self.own, *effects])
-            model = JointMotionModel([log], scenario=scenario)
-            return model.predictions(np.array([p.nominal for p in model.parameters]))
+            return model.with_effects([*self.own, *effects]).predictions(nominal)
 
         tau = _torques()
         warm = [e for e in self.own if isinstance(e, JointViscousFriction)]
@@ -341,7 +339,7 @@ def main(arguments: Sequence[str]) -> int:
     for kind in KINDS:
         rows += _delay_rows(kind, delays(case, kind, args.changes))
     rows += _file_rows(args.files, through_files(case, args.files))
-    columns = ("episodes", "what", "number", "of", "remark")
+    columns = ("change", "what is counted", "number", "of", "remark")
     for row in rows:
         print("| " + " | ".join(map(str, row)) + " |")
     title = f"A watch of {args.urdf.stem}, simulated"
