@@ -42,7 +42,7 @@ FLOORS = {
         {"residuals"},
         {"effect_selection"},
         {"export", "acceptance"},
-        {"validation", "report", "experiment_design", "studies"},
+        {"validation", "report", "experiment_design", "studies", "monitoring"},
     ),
 }
 #: What each part of the repository may import of the others.

@@ -44,9 +44,11 @@ _EXAMPLES = """examples:
 """
 
 
-def motion(joints: int, random: np.random.Generator) -> tuple[Array, ...]:
+def motion(
+    joints: int, random: np.random.Generator, duration: float = _DURATION
+) -> tuple[Array, ...]:
     """Returns time (n,) and q, v, vd (n, joints) of a sum of sines."""
-    time = np.arange(0.0, _DURATION, 1.0 / _RATE)
+    time = np.arange(0.0, duration, 1.0 / _RATE)
     w = 2.0 * np.pi * _HARMONICS
     phase = w[:, None, None] * time[None, :, None]
     a, b = random.normal(0.0, 0.25, (2, len(w), 1, joints)) / np.sqrt(w)[:, None, None]

@@ -2,7 +2,7 @@
 
 import dataclasses
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -93,11 +93,15 @@ class Log:
     remarks: tuple[str, ...] = ()
 
 
-def read_log(folder: str | Path) -> Log:
+def read_log(folder: str | Path, numbers: Collection[int] | None = None) -> Log:
     """Reads the log in a folder; `docs/reference/log-format.md` describes the format.
 
     Temporary files that a killed writer left behind are ignored. An episode that is
     being recorded, or that a kill cut off, is left out with a remark.
+
+    Args:
+        folder: of the log.
+        numbers: of the episodes to read, all if left out; the hash is of these alone.
 
     Raises:
         DisasmError: the folder is not a log, or something in it breaks the format;
@@ -105,7 +109,11 @@ def read_log(folder: str | Path) -> Log:
     """
     folder = Path(folder)
     header = read_header(folder)
-    paths = tuple(episode_files(folder).values())
+    paths = tuple(
+        path
+        for number, path in episode_files(folder).items()
+        if numbers is None or number in numbers
+    )
     remarks = tuple(_unfinished(folder))
     if not paths:
         raise refusal(

@@ -69,7 +69,7 @@ class ChangedModel(LogModel):
         self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
     ) -> Self:
         """See LogModel: the effects are changes, and may be of either sign."""
-        found = super().with_effects(effects, [_both_ways(p) for p in parameters])
+        found = super().with_effects(effects, [both_ways(p) for p in parameters])
         return found._with_newer()
 
     def freeze(self, values: Mapping[str, float]) -> Self:
@@ -79,7 +79,7 @@ class ChangedModel(LogModel):
     def _with_newer(self) -> Self:
         """Returns the same with the changes that it has in the newer logs' model."""
         before = self.known.effects
-        own = [_moved(p, len(before)) for p in self.parameters if field_of(p)]
+        own = [moved_behind(p, len(before)) for p in self.parameters if field_of(p)]
         unchanged = self.newer.replace(
             _effects=before, parameters=self.known.parameters
         )
@@ -227,15 +227,20 @@ def _own(parameter: Parameter, values: Mapping[str, float]) -> Parameter:
     return dataclasses.replace(parameter, name=name, path="", nominal=within)
 
 
-def _both_ways(parameter: Parameter) -> Parameter:
+def both_ways(parameter: Parameter) -> Parameter:
     """Returns an amplitude that may fall as far as it may rise."""
     if parameter.is_shape or parameter.log_scale:
         return parameter
     return dataclasses.replace(parameter, low=min(parameter.low, -parameter.high))
 
 
-def _moved(parameter: Parameter, count: int) -> Parameter:
-    """Returns a field of an effect that comes after others."""
+def moved_behind(parameter: Parameter, count: int) -> Parameter:
+    """Returns a field of an effect that is a change, and comes after other effects.
+
+    Args:
+        parameter: whose path is `effects.0.size` and the like.
+        count: number of the other effects.
+    """
     head, number, field = parameter.path.split(".")
     path = f"{head}.{int(number) + count}.{field}"
     return dataclasses.replace(parameter, name=f"{_CHANGE} {parameter.name}", path=path)

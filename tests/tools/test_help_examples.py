@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from drake_disasm_cli.main import SUBCOMMANDS
 
+from tests.sysid.monitoring.days import write_day, write_reference
 from tests.tools.inputs import (
     SLIDE,
     slide_motion,
@@ -34,8 +35,10 @@ _SMALL = {
     "excite": ("--iterations=1", "--duration=4"),
     "play-motion": ("--no-meshcat",),
 }
-#: Examples that need a cluster or devices; fake-cell runs until it is stopped.
-_ELSEWHERE = re.compile(r"--executor dask|--station hardware|^drake-disasm fake-cell")
+#: Examples that need a cluster or devices; some programs run until they are stopped.
+_ELSEWHERE = re.compile(
+    r"--executor dask|--station hardware|^drake-disasm fake-cell|--follow"
+)
 _QUICK = ("simulate", "evaluate", "import-log", "check-log", "plot-training", "accept")
 #: A study's own factors, at one level each.
 _LEVELS = {
@@ -126,6 +129,9 @@ def test_examples_run(name: str, folder: Path) -> None:
         write_policy(folder / "out/first/seed_000/policy.npz")
     if name in ("check-log", "identify", "close-loop"):
         _log_of_the_twin(folder)
+    if name == "monitor":
+        write_reference(folder / "out")
+        write_day(folder / "out/days/day_0", 0)
     ran = 0
     for command in examples(name):
         if _ELSEWHERE.search(shlex.join(command)):

@@ -24,7 +24,6 @@ from drake_disasm.common import options, program
 from drake_disasm.common.cluster import executor_for
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, write_json, write_text
-from drake_disasm.logs import Log
 from drake_disasm.scenario import dump_scenario, load_scenario
 from drake_disasm_cli import common, data_arguments
 from sysid.data_checks import DataFinding
@@ -37,6 +36,8 @@ from sysid.identification.split import split_episodes
 from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.measurements import episode_names
+from sysid.monitoring.reference import KEY as REFERENCE_KEY
+from sysid.monitoring.reference import Reference
 from sysid.motor_constants import MotorConstants
 from sysid.report import changes_page, closing_page
 from sysid.scenario_parameters import read_requests
@@ -157,7 +158,7 @@ def main(arguments: Sequence[str]) -> int:
     logs, constants = data_arguments.in_torques(read, args, len(references))
     if args.held_out:  # names, which are wrong more often than anything takes time
         split_episodes(episode_names(logs), args.held_out)
-    model = data_arguments.with_constants(_model(args, logs), constants)
+    model = data_arguments.with_constants(model_of(logs, _choice(args)), constants)
     if args.export:
         refuse_export(model, args.export)
     origin = program.provenance("drake-disasm close-loop", arguments, 0)
@@ -183,7 +184,15 @@ def main(arguments: Sequence[str]) -> int:
         _finish(args.out, changes.closed, changes_text(changes), run)
         return 0
     exports, refusal = _exports(closed, args.export)
-    _write(args.out, closed, run, exports)
+    known = Reference.of(
+        closed,
+        logs,
+        _choice(args),
+        args.imports,
+        args.drop_flagged_rows,
+        constants.values if constants else (),
+    )
+    _write(args.out, closed, known, run, exports)
     _finish(args.out, closed, closed.text, run)
     if refusal is not None:
         raise refusal
@@ -275,16 +284,15 @@ def _exports(
         return None, error
 
 
-def _model(args: argparse.Namespace, logs: Sequence[Log]) -> LogModel:
-    """Returns the model of the logs that the command line asks for."""
-    choice = ModelChoice(
+def _choice(args: argparse.Namespace) -> ModelChoice:
+    """Returns the model that the command line asks for."""
+    return ModelChoice(
         scenario=load_scenario(args.scenario) if args.scenario else None,
         requests=tuple(read_requests(args.parameters)) if args.parameters else (),
         urdf=args.urdf,
         fixed=True,
         trust_urdf=args.trust == "urdf",
     )
-    return model_of(logs, choice)
 
 
 def _write_changes(folder: Path, changes: Changes, run: _Run) -> None:
@@ -297,7 +305,11 @@ def _write_changes(folder: Path, changes: Changes, run: _Run) -> None:
 
 
 def _write(
-    folder: Path, closed: ClosedLoop, run: _Run, exports: Exports | None
+    folder: Path,
+    closed: ClosedLoop,
+    known: Reference,
+    run: _Run,
+    exports: Exports | None,
 ) -> None:
     make_folder(folder)
     learned = closed.verdict.residual_model
@@ -307,7 +319,8 @@ def _write(
     if scenario is not None:
         write_text(folder / "scenario.yaml", dump_scenario(scenario))
     exported = None if exports is None else exports.to_mapping()
-    mapping = to_mapping(closed) | run.to_mapping() | {"export": exported}
+    of_run = {"export": exported, REFERENCE_KEY: known.to_mapping()}
+    mapping = to_mapping(closed) | run.to_mapping() | of_run
     write_json(folder / "result.json", mapping)
     page = closing_page(closed, run.origin, run.findings, exported)
     write_text(folder / "report.html", page)

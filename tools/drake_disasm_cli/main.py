@@ -34,6 +34,7 @@ COMMANDS = {
         "identify": "find the parameters of a model, with intervals",
         "close-loop": "find which physical effect the model lacks, and add it",
         "accept": "say whether to put a policy on the robot",
+        "monitor": "watch a robot for changes, episode by episode",
     },
 }
 SUBCOMMANDS = {

@@ -1,0 +1,1 @@
+"""Watches a robot: judges each new episode against a reference that was in order."""
