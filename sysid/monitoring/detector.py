@@ -24,8 +24,9 @@ Episodes are taken to be independent of each other. They need not be normal:
 what is further than `CLIPPED` robust standard deviations from the median counts as if
 it were just there. Of A = 1000 stated, one statistic keeps 3800 measured episodes if
 it is normal, 3300 with Student's t of 4 degrees of freedom (400 without clipping), and
-90 if each episode is correlated with the next by 0.5: a gear that warms up over
-several episodes is no robot in good order.
+90 if each episode is correlated with the next by 0.5. Many statistics that are so
+correlated raise alarms still sooner: a gear that warms up over several episodes is no
+robot in good order.
 """
 
 import dataclasses
