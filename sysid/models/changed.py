@@ -94,6 +94,20 @@ class ChangedModel(LogModel):
         own = slice(rows.start - count, rows.stop - count)
         return self.newer.simulate(theta, own)
 
+    def simulate_all(self, thetas: Array, rows: slice) -> list[Array | str]:
+        """See LogModel."""
+        full = np.array([self.with_frozen(theta) for theta in thetas])
+        count = self.known.measurements.rows
+        if rows.stop <= count:
+            return self.known.simulate_all(full[:, : self._own_count], rows)
+        own = slice(rows.start - count, rows.stop - count)
+        return self.newer.simulate_all(full, own)
+
+    @property
+    def together(self) -> int:
+        """See LogModel."""
+        return self.newer.together
+
     def read(self, theta: Array, rows: slice, simulated: Array) -> Array:
         """See LogModel."""
         theta = self.with_frozen(theta)

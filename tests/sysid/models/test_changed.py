@@ -10,6 +10,8 @@ from drake_disasm.effects import FlangePayload, JointCoulombFriction
 from sysid.fitting.candidates import Candidate, extended
 from sysid.models.changed import ChangedModel
 from sysid.models.joint_motion import JointMotionModel
+from sysid.models.response.model import JointResponseModel
+from tests.sysid.models.response.servo import write_response
 from tests.sysid.models.two_logs import two_logs
 
 ELBOW = JointCoulombFriction("elbow", 0.3)
@@ -54,6 +56,22 @@ def test_rows_are_predicted_one_by_one_as_together(model):
     border = int(np.flatnonzero(is_newer(model))[0])
     across = slice(border - 3, border + 3)
     assert np.allclose(changed.predict(theta, across), whole[across])
+
+
+def test_parameter_sets_are_simulated_together(tmp_path):
+    logs = [write_response(tmp_path / n, episodes=1, duration=1.0) for n in "ab"]
+    servo = JointResponseModel(logs)
+    changed, _ = extended(
+        ChangedModel(servo, is_newer(servo)),
+        [Candidate.of(JointCoulombFriction("servo", 0.1))],
+    )
+    changed = changed.freeze({changed.parameters[1].name: 0.1})
+    thetas = nominal(changed) * np.array([[1.0], [0.9], [1.2]])
+    assert changed.together > len(thetas)
+    for rows in changed.chunks():
+        one_by_one = [changed.simulate(theta, rows) for theta in thetas]
+        together = changed.simulate_all(thetas, rows)
+        np.testing.assert_allclose(together, one_by_one, atol=1e-9)
 
 
 def test_frozen_parameters_keep_their_values(model):
