@@ -148,8 +148,8 @@ class FittedExpectation(Expectation):
 
     def fitted(self) -> Array:
         """Returns the fit to what was measured at all rows (rows, channels), SI."""
-        count = len(self._steps)
-        theta = self._theta + self._fitted[:count] @ self._steps.reshape(count, -1)
+        count, size = len(self._steps), len(self._theta)
+        theta = self._theta + self._fitted[:count] @ self._steps.reshape(count, size)
         found = self.model.predictions(theta)
         rest = self._fitted[count:]
         for channel in range(found.shape[1]):

@@ -37,7 +37,7 @@ _NOTES = """# {stem}: what was identified, and what the files hold
 |---|---|---|
 {trips}
 
-All torques have {torque:.3g} rms. What no file holds makes {left_out:.3g} of them.
+The torques have an rms of {torque:.3g} N m; no file holds {left_out:.3g} N m of it.
 
 ## What the files do not hold
 
@@ -63,7 +63,7 @@ _EXACT = "The bodies are physical and have exactly the identified base parameter
 _MOVED = (
     "No physical arm has exactly the identified base parameters. Those of the files "
     "are within the joint 95 % interval, at {ratio:.2f} of the way to its edge. This "
-    "moves the predicted torques by {moved:.3g} rms."
+    "moves the predicted torques by {moved:.3g} N m rms, and friction with them."
 )
 
 

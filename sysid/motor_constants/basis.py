@@ -45,7 +45,7 @@ def constants_by_payload(
         raise DisasmError(f"known payload {payload:g} kg: give a mass above zero")
     if not 0 < references < len(logs):
         raise DisasmError(
-            "a known payload needs logs without it as references, and logs with it"
+            "a known payload needs logs without it, by `reference`, and logs with it"
         )
     motion, current, by_log = _recorded(logs, urdf)
     loaded = by_log >= references
@@ -59,7 +59,7 @@ def constants_by_payload(
         a = grams.fit(a)
         load = known + shared @ grams.theta(a)
     assert a is not None
-    basis = f"a known payload of {payload:g} kg"
+    basis = f"a known payload of {payload:g} kg, which the verdict only repeats"
     return identified_constants(motion.joints, a, grams.half_widths(a), basis)
 
 

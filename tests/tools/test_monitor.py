@@ -72,6 +72,9 @@ def test_bad_input_is_refused_in_one_line(closed, tmp_path):
     write_slide_log(tmp_path / "days" / "slide")
     words = ["no episode could be judged", "kind is joint_motion"]
     assert_one_line(run(*arguments, tmp_path / "days"), words)
+    new = ("--reference", closed, "--log", tmp_path / "days", "--out")
+    assert_one_line(run(*new, tmp_path / "new"), ["kind is joint_motion"])
+    assert not (tmp_path / "new").exists()
     other = ("--reference", tmp_path, "--log", tmp_path / "days")
     assert_one_line(run(*other), ["result.json", "close-loop"])
     assert_one_line(

@@ -101,3 +101,7 @@ def overview() -> str:
         lines += [f"  {name:{width}}  {text}" for name, text in commands.items()]
         lines += [""]
     return "\n".join([*lines, "drake-disasm COMMAND --help explains one."])
+
+
+if __name__ == "__main__":
+    run()

@@ -25,7 +25,7 @@ from drake_disasm.common.errors import DisasmError
 from sysid.monitoring.judgement import Judgement
 from sysid.monitoring.record import PAGE, Record
 from sysid.monitoring.reference import Reference
-from sysid.monitoring.watched import Arrival
+from sysid.monitoring.watched import Arrival, WatchedFolder
 
 EXIT_ALARM = 3
 #: In the environment of --on-alarm.
@@ -106,7 +106,9 @@ def main(arguments: Sequence[str]) -> int:
         raise DisasmError(f"{args.log}: is no folder; name one to which logs are added")
     reference = Reference.read(args.reference)
     out = args.out or args.reference / "monitor"
-    _say("reading the reference's logs" * (not out.is_dir()))
+    if not out.is_dir():
+        _refuse_other_robot(reference, WatchedFolder(args.log.resolve()))
+        _say("reading the reference's logs")
     origin = program.provenance("drake-disasm monitor", arguments, 0)
     record = Record.open(
         out.absolute(),
@@ -129,6 +131,17 @@ def main(arguments: Sequence[str]) -> int:
     finally:
         record.draw()
         _say(f"report: {out / PAGE}")
+
+
+def _refuse_other_robot(reference: Reference, watched: WatchedFolder) -> None:
+    """Refuses a folder whose first episode is of another robot, before all else.
+
+    Raises:
+        DisasmError: it is, or the folder is gone.
+    """
+    first = next((each.log for each in watched.arrivals() if each.log), None)
+    if first is not None:
+        reference.refuse_other(first)
 
 
 def _watch(record: Record, args: argparse.Namespace) -> int:

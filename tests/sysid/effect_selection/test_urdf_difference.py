@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import FlangePayload, JointViscousFriction, LinkPayload
+from drake_disasm.effects import (
+    FlangePayload,
+    JointViscousFriction,
+    LinkPayload,
+    RotorInertia,
+)
 from drake_disasm.logs import read_log, write_static_wrench
+from sysid.data_checks import check_data
 from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.urdf_difference import links_in_base, urdf_difference
 from sysid.fitting.candidates import Candidate, extended
@@ -38,6 +44,19 @@ def test_a_body_on_the_flange_is_weighed_against_the_urdf(loaded):
     assert low <= value <= high
     assert value == pytest.approx(0.8, rel=0.1)
     assert "more on lower than the URDF says" in found.sentence
+
+
+def test_rotors_are_no_body(tmp_path):
+    rotors = [RotorInertia("shoulder", 0.3), RotorInertia("elbow", 0.2)]
+    found = urdf_difference(fitted(JointMotionModel(two_logs(tmp_path, rotors)[:1])))
+    assert found is not None and found.body is None
+    assert found.rotors > 0.95
+    assert "inertia of rotors explains" in found.sentence
+
+
+def test_the_check_of_the_data_trusts_a_urdf(loaded):
+    model = model_of([loaded], ModelChoice(trust_urdf=True))
+    assert all(each.kind != "spikes" for each in check_data([loaded], model))
 
 
 def test_a_right_urdf_differs_by_nothing_that_shows(tmp_path):
