@@ -75,7 +75,11 @@ def _of_another_joint(
     correlation = np.abs(centred.T @ centred) / np.maximum(np.outer(size, size), 1e-300)
     np.fill_diagonal(correlation, 0.0)
     orders = _orders(len(values))
-    spans = [np.linalg.qr(expected.columns(n))[0] for n in range(len(names))]
+    # A model of known bodies has them in no column.
+    spans = [
+        np.linalg.qr(np.column_stack([expected.columns(n), expected.nominal[:, n]]))[0]
+        for n in range(len(names))
+    ]
     whole = np.maximum(size**2, 1e-300)
     explained = np.array(
         [
