@@ -143,6 +143,7 @@ class Effect:
         is_random: whether it acts on the variance alone; models predict the mean.
         is_physical: whether it has a meaning beyond its log: searches try no others.
         is_of_time: whether it depends on time alone, as slow noise seems to.
+        is_whole: whether its amplitudes mean something together alone, as a body's.
         noun: what a sentence calls it: "dry friction"; by default its name in words.
         experiment: the recording that shows it apart from others, in words.
         task_experiment: the same in steps of the task, if that is no recording of
@@ -155,6 +156,7 @@ class Effect:
     is_random: ClassVar[bool] = False
     is_physical: ClassVar[bool] = True
     is_of_time: ClassVar[bool] = False
+    is_whole: ClassVar[bool] = False
     noun: ClassVar[str] = ""
     experiment: ClassVar[str] = ""
     task_experiment: ClassVar[str] = ""

@@ -251,8 +251,8 @@ def thinned(
     """Returns the gain of an effect with those columns that lower the loss.
 
     Columns are added one by one, the best first, as effects are: those of an effect may
-    depend on each other, as moments and forces of one payload do. Kinds at all joints
-    stay whole.
+    depend on each other. Kinds at all joints stay whole, and so do bodies: a first
+    moment without a mass is none.
 
     Args:
         equations: by folds.
@@ -260,7 +260,8 @@ def thinned(
         settings: thresholds.
     """
     columns = gain.term.columns
-    if len(columns) < 2 or len(gain.term.candidates) > 1:
+    one, *others = gain.term.candidates
+    if len(columns) < 2 or others or one.effect.is_whole:
         return gain
     before = equations.losses
     kept, least = np.array([], dtype=np.int64), before

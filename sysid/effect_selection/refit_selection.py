@@ -306,8 +306,9 @@ def _simplified(fitter: Fitter, fit: Fit, known: int) -> Fit:
     which, new = away > fit.half_intervals, []
     for effect in fit.effects[known:]:
         pairs = zip(effect.fields, fit.columns_of(effect), strict=True)
-        if fields := [name for name, column in pairs if which[column]]:
-            new.append(effect.only(fields))
+        fields = [name for name, column in pairs if which[column]]
+        if fields:
+            new.append(effect if effect.effect.is_whole else effect.only(fields))
     effects = (*fit.effects[:known], *new)
     if not new or effects == fit.effects:
         return fit

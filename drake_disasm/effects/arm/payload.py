@@ -17,6 +17,7 @@ class Payload(ArmEffect, ABC):
         cx, cy, cz: first moment m p_BoPcm_B [kg m].
     """
 
+    is_whole = True
     mass: float
     cx: float
     cy: float
