@@ -358,7 +358,7 @@ def ranked(
     each = folds.held_out_each()
     found = []
     for term in terms:
-        columns = folds.feasible(term.columns)
+        columns = _without_parts(term, folds.feasible(term.columns))
         if not len(columns):
             continue
         single = len(columns) == 1
@@ -366,6 +366,19 @@ def ranked(
         gains = (before - after) / total
         found.append(Gain(term.of_columns(columns), float(gains.sum()), gains))
     return sorted(found, key=lambda gain: -gain.share)
+
+
+def _without_parts(term: Term, columns: Columns) -> Columns:
+    """Returns columns of a term without those of bodies whose mass is not among them.
+
+    The first amplitude of an effect that is whole is its mass: where that does not
+    show, or would be negative, what is left of the body is none.
+    """
+    for number, candidate in enumerate(term.candidates):
+        own = term.columns[term.owners == number]
+        if candidate.effect.is_whole and own[0] not in columns:
+            columns = np.setdiff1d(columns, own)
+    return columns
 
 
 def significant_columns(
