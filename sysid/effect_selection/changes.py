@@ -137,9 +137,12 @@ def find_changes(
     def _closed_since(row: int) -> ClosedLoop:
         is_newer = np.arange(len(episode)) >= row
         changed = ChangedModel(whole, is_newer, reference.last.values)
-        return search.closed(changed, f"since_{row}")
+        return search.closed(changed, f"since_{row}_{len(whole.parameters)}")
 
     closed, onset = _closed_since(int(np.argmax(episode >= known))), None
+    if common := _common(closed, whole, workers or Workers()):
+        whole, _ = extended(whole, common)
+        closed = _closed_since(int(np.argmax(episode >= known)))
     if (begin := _onset_row(closed, known)) is not None:
         later = _closed_since(begin[0])
         if _loss(later) < _loss(closed):
@@ -180,6 +183,35 @@ class _Search:
             folder=self.folder / name if self.folder else None,
             time_budget=share * max(self.deadline - time.monotonic(), 0.0),
         )
+
+
+def _common(closed: ClosedLoop, whole: LogModel, workers: Workers) -> list[Candidate]:
+    """Returns changes that explain as much as effects of all logs: they are none.
+
+    What the references show too weakly to be named may show in the newer logs.
+
+    Args:
+        closed: with changes in the newer rows.
+        whole: of all logs, with the references' effects.
+        workers: fit.
+    """
+    if closed.is_provisional:
+        return []
+    last, changes = closed.last, _at_values(closed)
+    assert isinstance(closed.first.model, ChangedModel)
+    is_newer = closed.first.model.is_newer
+    measured = last.model.measurements
+    measured = measured.with_noise(measured.noise, "estimated")
+    found = []
+    for number, effect in enumerate(last.effects):
+        more, _ = extended(whole, [effect])
+        model = ChangedModel(more, is_newer, last.values).with_measurements(measured)
+        delta = last.linearisation.huber_delta
+        fitter = Fitter.of(model, workers, delta, last.settings)
+        others = (*changes[:number], *changes[number + 1 :])
+        if fitter.fit(others).loss <= last.loss:
+            found.append(effect)
+    return found
 
 
 def _with_effects_of(model: LogModel, reference: ClosedLoop) -> LogModel:

@@ -65,6 +65,11 @@ class ChangedModel(LogModel):
         self.__dict__.update({name: getattr(model, name) for name in _AS_INNER})
         self._own_count = len(model.parameters)
 
+    @property
+    def is_newer(self) -> NDArray[np.bool_]:
+        """Which rows (rows,) are no references."""
+        return np.arange(self.measurements.rows) >= self.known.measurements.rows
+
     def with_effects(
         self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
     ) -> Self:
