@@ -197,7 +197,7 @@ def _common(closed: ClosedLoop, whole: LogModel, workers: Workers) -> list[Candi
     """
     if closed.is_provisional:
         return []
-    last, changes = closed.last, _at_values(closed)
+    last = closed.last
     assert isinstance(closed.first.model, ChangedModel)
     is_newer = closed.first.model.is_newer
     measured = last.model.measurements
@@ -208,7 +208,7 @@ def _common(closed: ClosedLoop, whole: LogModel, workers: Workers) -> list[Candi
         model = ChangedModel(more, is_newer, last.values).with_measurements(measured)
         delta = last.linearisation.huber_delta
         fitter = Fitter.of(model, workers, delta, last.settings)
-        others = (*changes[:number], *changes[number + 1 :])
+        others = (*last.effects[:number], *last.effects[number + 1 :])
         if fitter.fit(others).loss <= last.loss:
             found.append(effect)
     return found
@@ -253,7 +253,7 @@ def _courses(
     closed: ClosedLoop, known: int, workers: Workers | None
 ) -> tuple[Course, ...]:
     """Returns how large the changes are in each newer log, if there are several."""
-    model, effects = closed.last.model, tuple(_at_values(closed))
+    model, effects = closed.last.model, closed.last.effects
     names = model.measurements.names
     if len(names) - known < 2 or not effects:
         return ()

@@ -88,6 +88,19 @@ def test_an_offset_that_jumps_within_the_log_has_a_row(tmp_path):
     assert f"since rows {found.onset.row}" in changes_text(found)
 
 
+def test_a_friction_that_fell_has_a_course(tmp_path):
+    first = two_logs(tmp_path / "a", _FRICTION, [JointCoulombFriction("elbow", -0.3)])
+    second = two_logs(tmp_path / "b", _FRICTION, [JointCoulombFriction("elbow", -0.5)])
+    found = find_changes(JointMotionModel([*first, second[1]]), 1)
+    sizes = [
+        value.value
+        for course in found.courses
+        for value in course.values
+        if value.name == "JointCoulombFriction.elbow.size"
+    ]
+    assert sizes == pytest.approx([-0.3, -0.5], abs=0.03)
+
+
 @pytest.mark.slow
 def test_a_change_of_each_log_has_a_course(tmp_path):
     first = two_logs(tmp_path / "a", _FRICTION, [TorqueOffset("elbow", 0.2)])
