@@ -21,6 +21,7 @@ from scipy.optimize import minimize, minimize_scalar
 from scipy.stats import t as student
 
 from sysid.confidence import QUANTILES
+from sysid.models.channel_grams import jackknife_error
 
 Array = NDArray[np.float64]
 
@@ -75,8 +76,8 @@ class CurrentGrams:
             start: (joints,) from which it is sought; None for one common to all.
             without: number of a block that is left out.
         """
-        G = self.G.sum(axis=0) if without is None else np.delete(self.G, without, 0)
-        G = G if G.ndim == 3 else G.sum(axis=0)
+        kept = self.G if without is None else np.delete(self.G, without, axis=0)
+        G = kept.sum(axis=0)
         joints = len(G)
         if start is None:
             common = minimize_scalar(
@@ -96,9 +97,8 @@ class CurrentGrams:
     def half_widths(self, a: Array) -> Array:
         """Returns half the widths (joints,) of 95 % intervals, by the jackknife."""
         without = np.array([self.fit(a, k) for k in range(len(self.G))])
-        n = len(without)
-        error = np.sqrt((n - 1) / n * np.sum((without - without.mean(0)) ** 2, axis=0))
-        return np.asarray(student.ppf(QUANTILES[1], n - 1) * error)
+        errors = np.array([jackknife_error(own) for own in without.T])
+        return np.asarray(student.ppf(QUANTILES[1], len(without) - 1) * errors)
 
     def loss(self, a: Array, G: Array) -> tuple[float, Array]:
         """Returns the sum of squares at the best theta and f, and its gradient by a.

@@ -5,6 +5,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
+from motor_constants import in_currents
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
@@ -32,26 +33,12 @@ _FRICTION = [
 _PAYLOAD = FlangePayload(1.5, 0.02, 0.0, 0.03)
 
 
-def in_currents(logs, constants=_TRUE):
-    """Returns logs with currents in place of torques."""
-
-    def _episode(episode):
-        columns = {n: v for n, v in episode.columns.items() if not n.startswith("tau.")}
-        tau = episode["tau"]
-        columns |= {f"current.{i}": tau[:, i] / k for i, k in enumerate(constants)}
-        return dataclasses.replace(episode, columns=MappingProxyType(columns))
-
-    return [
-        dataclasses.replace(log, episodes=tuple(map(_episode, log.episodes)))
-        for log in logs
-    ]
-
-
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory):
     """An arm without and with a payload, with friction that nobody declared."""
     folder = tmp_path_factory.mktemp("arm")
-    return in_currents(two_logs(folder, _FRICTION, [_PAYLOAD], rows=800))
+    logs = two_logs(folder, _FRICTION, [_PAYLOAD], rows=800)
+    return [in_currents(log, _TRUE) for log in logs]
 
 
 def test_a_known_payload_gives_the_constants(logs):
@@ -86,9 +73,8 @@ def test_a_current_that_does_not_follow_the_urdf_determines_nothing(logs):
 
 
 def test_a_current_of_the_other_sign_is_refused(logs):
-    reversed_ = in_currents(
-        constants_by_urdf(logs[:1]).torques(logs[:1]), (_TRUE[0], -_TRUE[1])
-    )
+    [log] = constants_by_urdf(logs[:1]).torques(logs[:1])
+    reversed_ = [in_currents(log, (_TRUE[0], -_TRUE[1]))]
     with pytest.raises(DisasmError, match="the current of elbow has the other sign"):
         constants_by_urdf(reversed_)
 
