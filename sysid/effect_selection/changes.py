@@ -3,10 +3,12 @@
 import dataclasses
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import ttest_ind
 
 from drake_disasm.common.errors import DisasmError
@@ -37,6 +39,21 @@ class Onset:
     episode: str
     row: int
     rows: int
+
+    @classmethod
+    def of(
+        cls, block: range, episode: NDArray[np.int64], names: Sequence[str]
+    ) -> "Onset":
+        """Returns the onset within a block of all rows.
+
+        Args:
+            block: of rows.
+            episode: (rows,) number of each row's episode.
+            names: of the episodes.
+        """
+        number = int(episode[block.start])
+        first = int(np.argmax(episode == number))
+        return cls(names[number], block.start - first, len(block))
 
 
 @dataclass(frozen=True)
@@ -139,16 +156,15 @@ def find_changes(
         changed = ChangedModel(whole, is_newer, reference.last.values)
         return search.closed(changed, f"since_{row}_{len(whole.parameters)}")
 
-    closed, onset = _closed_since(int(np.argmax(episode >= known))), None
+    begin, onset = int(np.argmax(episode >= known)), None
+    closed = _closed_since(begin)
     if common := _common(closed, whole, workers or Workers()):
         whole, _ = extended(whole, common)
-        closed = _closed_since(int(np.argmax(episode >= known)))
-    if (begin := _onset_row(closed, known)) is not None:
-        later = _closed_since(begin[0])
+        closed = _closed_since(begin)
+    if (block := _onset_rows(closed, known)) is not None:
+        later = _closed_since(block.start)
         if _loss(later) < _loss(closed):
-            closed = later
-            own = begin[0] - int(np.argmax(episode == episode[begin[0]]))
-            onset = Onset(names[int(episode[begin[0]])], own, begin[1])
+            closed, onset = later, Onset.of(block, episode, names)
     return Changes(reference, closed, known, onset, _courses(closed, known, workers))
 
 
@@ -233,15 +249,16 @@ def _at_values(closed: ClosedLoop) -> list[Candidate]:
     ]
 
 
-def _onset_row(closed: ClosedLoop, known: int) -> tuple[int, int] | None:
-    """Returns the row at which something else changes, and how many rows it may be."""
+def _onset_rows(closed: ClosedLoop, known: int) -> range | None:
+    """Returns the rows within which something else changes, if it does."""
     grams = closed.search.account.system.grams
     if closed.is_provisional or grams.rows.sum() != closed.last.model.measurements.rows:
         return None
     block = onset_block(closed.search.account, grams.episode >= known)
     if block is None:
         return None
-    return int(grams.rows[:block].sum()), int(grams.rows[block])
+    row = int(grams.rows[:block].sum())
+    return range(row, row + int(grams.rows[block]))
 
 
 def _loss(closed: ClosedLoop) -> float:
