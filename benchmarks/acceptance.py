@@ -18,9 +18,9 @@ from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.mdp import Outcome
-from drake_disasm.studies.runner import open_study, read_test, run_study
-from drake_disasm.studies.study import StudyOptions
 from sysid.studies.policy_acceptance import read_acceptance
+from sysid.studies.runner import open_study, read_test, run_study
+from sysid.studies.study import StudyOptions
 from sysid.studies.twin_transfer import TwinTransferStudy, file_of
 
 _PROGRAM = "benchmarks/acceptance.py"

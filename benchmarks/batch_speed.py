@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from drake_disasm.batch.twin import BatchedTwin
 from drake_disasm.common.arrays import to_numpy
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.task.simulation import TaskSimulation
+from drake_disasm.twin.batch import BatchedTwin
 
 SIZES = (1, 16, 256, 4096)
 #: Where a batch computes, and on how many threads, by what a key says.

@@ -17,11 +17,11 @@ from drake_disasm.cell.parsing import movable_joints
 from drake_disasm.common import program
 from drake_disasm.common.files import write_text
 from drake_disasm.effects import Effect, JointCoulombFriction
-from drake_disasm.fakes.bag import FakeBag, bag_times
 from drake_disasm.free_motion.cell_urdf import cell_urdf
 from drake_disasm.free_motion.playing import MotionPlayer
 from drake_disasm.free_motion.table import MotionTable
-from drake_disasm.importing import (
+from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
+from drake_disasm.logs.importing import (
     Known,
     Processing,
     guessed_map,
@@ -29,10 +29,10 @@ from drake_disasm.importing import (
     read_source,
     write_log,
 )
-from drake_disasm.importing.shift import Shift
-from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
+from drake_disasm.logs.importing.shift import Shift
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import Station, make_station
+from drake_disasm.stations.fake_cell.bag import FakeBag, bag_times
 from sysid.effect_selection import close_loop
 from sysid.effect_selection.verdict import Verdict
 from sysid.models.from_logs import ModelChoice, model_of

@@ -16,8 +16,8 @@ from tqdm import tqdm
 
 from drake_disasm.common import options
 from drake_disasm.common.program import argument_parser, run
-from drake_disasm.importing.cutoff import chosen_cutoff, motion_spectra
-from drake_disasm.importing.signals import LowPass
+from drake_disasm.logs.importing.cutoff import chosen_cutoff, motion_spectra
+from drake_disasm.logs.importing.signals import LowPass
 
 Array = NDArray[np.float64]
 

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from drake_disasm.common import program
-from drake_disasm.fakes import hex_box, robotiq_gripper
-from drake_disasm.fakes.cell import IIWA_FAULTS, FakeCell
-from drake_disasm.fakes.lockstep import fake_hardware
+from drake_disasm.devices.onrobot_hex import fake_box
+from drake_disasm.devices.robotiq import fake_gripper
 from drake_disasm.policies import make_policy
 from drake_disasm.safety import Mode
 from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.stations.fake_cell.cell import IIWA_FAULTS, FakeCell
+from drake_disasm.stations.fake_cell.lockstep import fake_hardware
 from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.systems.policy import Policy
 from drake_disasm.task.simulation import TaskSimulation
@@ -26,8 +27,8 @@ from drake_disasm.visualization import MeshcatView
 
 ALL = (
     *(("iiwa", fault) for fault in IIWA_FAULTS if fault),
-    *(("ft_sensor", fault) for fault in hex_box.FAULTS if fault),
-    *(("gripper", fault) for fault in robotiq_gripper.FAULTS if fault),
+    *(("ft_sensor", fault) for fault in fake_box.FAULTS if fault),
+    *(("gripper", fault) for fault in fake_gripper.FAULTS if fault),
 )
 _STEPS_BEFORE, _STEPS_WITH = 3, 12
 _REAL_PACE = 0.1  # s of real time for a step, where a thread polls in real time

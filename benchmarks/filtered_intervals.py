@@ -29,7 +29,8 @@ from drake_disasm.effects import (
     RotorInertia,
 )
 from drake_disasm.effects.fields import amplitudes
-from drake_disasm.importing import (
+from drake_disasm.logs import Log, read_log
+from drake_disasm.logs.importing import (
     Known,
     Processing,
     guessed_map,
@@ -37,7 +38,6 @@ from drake_disasm.importing import (
     read_source,
     write_log,
 )
-from drake_disasm.logs import Log, read_log
 from sysid.identification.linearisation import Linearisation, linearise
 from sysid.identification.uncertainty import uncertainty
 from sysid.models.effects import effect_parameter

@@ -12,8 +12,8 @@ import numpy as np
 from fault_runs import in_lockstep
 
 from drake_disasm.common import program
-from drake_disasm.fakes.cell import FakeCell
 from drake_disasm.scenario import CONTROLS, load_scenario
+from drake_disasm.stations.fake_cell.cell import FakeCell
 from drake_disasm.stations.hardware import HoldError
 
 #: Actions (6,) that press the bolt against the groove until a hold.

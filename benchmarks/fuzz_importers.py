@@ -29,8 +29,7 @@ from subject import (
 )
 
 from drake_disasm.common.archive import Arrays
-from drake_disasm.fakes.bag import FakeBag
-from drake_disasm.importing import (
+from drake_disasm.logs.importing import (
     FieldMap,
     Known,
     Processing,
@@ -42,13 +41,14 @@ from drake_disasm.importing import (
     read_source,
     write_log,
 )
-from drake_disasm.importing.description import described, summary
-from drake_disasm.importing.field_map import Column
-from drake_disasm.importing.joining import WAYS, joined
-from drake_disasm.importing.lerobot import calibrated
-from drake_disasm.importing.orientations import FORMS, JOINTS
-from drake_disasm.importing.presets import PRESETS
-from drake_disasm.importing.units import NORMALISED
+from drake_disasm.logs.importing.description import described, summary
+from drake_disasm.logs.importing.field_map import Column
+from drake_disasm.logs.importing.joining import WAYS, joined
+from drake_disasm.logs.importing.lerobot import calibrated
+from drake_disasm.logs.importing.orientations import FORMS, JOINTS
+from drake_disasm.logs.importing.presets import PRESETS
+from drake_disasm.logs.importing.units import NORMALISED
+from drake_disasm.stations.fake_cell.bag import FakeBag
 
 _JOINTS = ("shoulder", "elbow")
 _URDF = "package://disasm_models/iiwa14/iiwa14.urdf"

@@ -23,14 +23,14 @@ from drake_disasm.cell.parsing import movable_joints
 from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import FlangePayload
-from drake_disasm.importing import (
+from drake_disasm.logs import Episode, Log, read_log
+from drake_disasm.logs.importing import (
     Processing,
     import_recordings,
     read_source,
     write_log,
 )
-from drake_disasm.importing.field_map import parse_map
-from drake_disasm.logs import Episode, Log, read_log
+from drake_disasm.logs.importing.field_map import parse_map
 from sysid.motor_constants import (
     MotorConstants,
     constants_by_payload,

@@ -20,8 +20,8 @@ from tqdm import tqdm
 
 from drake_disasm.common import options
 from drake_disasm.common.program import argument_parser, run
-from drake_disasm.fakes.bag import FakeBag
-from drake_disasm.importing.importer import low_pass_of
+from drake_disasm.logs.importing.importer import low_pass_of
+from drake_disasm.stations.fake_cell.bag import FakeBag
 from sysid.effect_selection import close_loop
 from sysid.effect_selection.verdict import Verdict
 from sysid.models.from_logs import ModelChoice, model_of

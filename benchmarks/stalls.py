@@ -28,11 +28,11 @@ from tqdm import tqdm
 from drake_disasm.common import options, program
 from drake_disasm.common.files import write_json
 from drake_disasm.devices.datagrams import receive, stamp_arrivals
-from drake_disasm.fakes.cell import FakeCell
-from drake_disasm.fakes.real_time import RealTime
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
+from drake_disasm.stations.fake_cell.cell import FakeCell
+from drake_disasm.stations.fake_cell.real_time import RealTime
 from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.task.simulation import TaskSimulation

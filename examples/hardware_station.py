@@ -14,8 +14,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from drake_disasm.common.timing import boundary
-from drake_disasm.fakes.lockstep import fake_hardware
 from drake_disasm.policies import make_policy
+from drake_disasm.stations.fake_cell.lockstep import fake_hardware
 from drake_disasm.task.diagram import add_task
 
 

@@ -12,8 +12,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput
 
-from drake_disasm.fakes.lockstep import FakeHardware, fake_hardware
 from drake_disasm.stations import STATIONS, Station, make_station
+from drake_disasm.stations.fake_cell.lockstep import FakeHardware, fake_hardware
 from drake_disasm.visualization import add_cell_view, start_meshcat
 
 SCENARIO = "removal"  # without effects, which hardware refuses

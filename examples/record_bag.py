@@ -18,7 +18,7 @@ from pydrake.multibody.tree import MultibodyForces
 from scipy.interpolate import CubicSpline
 
 from drake_disasm.common.resources import model_path, package_map
-from drake_disasm.fakes.bag import FakeBag, bag_times
+from drake_disasm.stations.fake_cell.bag import FakeBag, bag_times
 
 FRICTION = np.array([0.0, 4.0, 0.0, 2.5, 0.0, 0.0, 0.0])  # N m
 DURATION, LATE, LOAD = 20.0, 0.012, 2.0  # s, s, kg

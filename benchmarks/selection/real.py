@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from real_data import data_folder
 
 from drake_disasm.common.files import write_text
-from drake_disasm.importing import (
+from drake_disasm.logs import Log, LogHeader, LogWriter, read_log
+from drake_disasm.logs.importing import (
     FieldMap,
     Processing,
     import_recordings,
@@ -21,8 +22,7 @@ from drake_disasm.importing import (
     read_source,
     write_log,
 )
-from drake_disasm.importing.field_map import Column
-from drake_disasm.logs import Log, LogHeader, LogWriter, read_log
+from drake_disasm.logs.importing.field_map import Column
 from selection.answer import Case
 
 #: Nm/A, the first set that the authors state.

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.importing.importer import processing_origin
-from drake_disasm.importing.processing import Processing, process
-from drake_disasm.importing.recording import Recording
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
+from drake_disasm.logs.importing.importer import processing_origin
+from drake_disasm.logs.importing.processing import Processing, process
+from drake_disasm.logs.importing.recording import Recording
 from selection.answer import Case
 from selection.hidden import Truth, hide, hide_at_all_joints
 from selection.noise import UNMODELLED, drawn_noise

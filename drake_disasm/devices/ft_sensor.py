@@ -17,6 +17,7 @@ from pydrake.systems.framework import (
 
 from drake_disasm.common.arrays import Array, namespace
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.ports import Health
 from drake_disasm.common.spatial import (
     shift_and_express,
     wrench_from_spatial_force,
@@ -29,7 +30,6 @@ from drake_disasm.devices.sensor_chain import (
     sensed_sample,
 )
 from drake_disasm.effects import Sensing, SensorEffect
-from drake_disasm.ports import Health
 from drake_disasm.scenario import SensorConfig
 
 #: How many numbers the effects of a sensor may remember together.

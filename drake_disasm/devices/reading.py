@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from drake_disasm.ports import Health
+from drake_disasm.common.ports import Health
 
 #: A sample that comes so long after it was taken has waited somewhere [s].
 QUEUED = 0.02

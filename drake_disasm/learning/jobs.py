@@ -6,7 +6,6 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from drake_disasm.batch.twin import with_impact
 from drake_disasm.common.executors import WorkerPool
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.learning.checkpoint import load_memory
@@ -20,6 +19,7 @@ from drake_disasm.learning.warm_start import start_checkpoint, start_hash
 from drake_disasm.logs import LogWriter, flat_columns, read_logs
 from drake_disasm.logs.transitions import observations
 from drake_disasm.task.recording import transitions_header
+from drake_disasm.twin.batch import with_impact
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,8 +9,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from drake_disasm.batch.history import BatchHistory, RecordedEpisode
-from drake_disasm.batch.twin import BatchedTwin, BatchResult, with_impact
 from drake_disasm.common.arrays import to_numpy
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.training import (
@@ -24,6 +22,8 @@ from drake_disasm.policies import ActionMap
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.episode import EpisodeSummary
 from drake_disasm.task.simulation import StepResult
+from drake_disasm.twin.batch import BatchedTwin, BatchResult, with_impact
+from drake_disasm.twin.history import BatchHistory, RecordedEpisode
 
 
 def refuse_envs(envs: int, station: str, acts: bool, lockstep: bool = False) -> None:

@@ -21,9 +21,6 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from drake_disasm.batch.refusals import refuse_count
-from drake_disasm.batch.starts import NextEpisodes
-from drake_disasm.batch.twin import BatchedTwin, BatchResult, with_impact
 from drake_disasm.common.arrays import to_numpy
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.environment import effects_in
@@ -36,6 +33,9 @@ from drake_disasm.mdp import (
 )
 from drake_disasm.scenario import Scenario
 from drake_disasm.scenario.given import scenario_of
+from drake_disasm.twin.batch import BatchedTwin, BatchResult, with_impact
+from drake_disasm.twin.refusals import refuse_count
+from drake_disasm.twin.starts import NextEpisodes
 
 _MODES = (AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP)
 _WORTH_A_GPU = 1024  # environments: with fewer, starting its kernels takes longer

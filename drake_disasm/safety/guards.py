@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from pydrake.math import RigidTransform
 
+from drake_disasm.common.ports import Health
 from drake_disasm.devices.reading import Reading
-from drake_disasm.ports import Health
 from drake_disasm.safety.lag import Lag
 from drake_disasm.safety.limits import SafetyConfig
 

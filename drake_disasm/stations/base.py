@@ -16,11 +16,11 @@ from drake_disasm.cell.coordinates import ArmCoordinates, Coordinates
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.ports import Port
 from drake_disasm.common.quantity import closest
 from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.devices.sensor_chain import Payload
 from drake_disasm.effects import BoltMotion, Effect
-from drake_disasm.ports import Port
 from drake_disasm.scenario import Scenario
 from drake_disasm.systems.observation import Mounting
 

@@ -25,8 +25,8 @@ from drake_disasm.cell.arm_dynamics import ArmDynamics
 from drake_disasm.cell.grip import AXIS_ORDER, finger_springs
 from drake_disasm.cell.lock_dimensions import bolt_inertia
 from drake_disasm.cell.tool import FINGERS
+from drake_disasm.common.ports import CELL_PORTS
 from drake_disasm.effects import ArmEffect
-from drake_disasm.ports import CELL_PORTS
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.arm_mechanics import ArmMechanics, refuse_unknown_arm_effects
 from drake_disasm.stations.base import refuse_twins_contact

@@ -7,6 +7,7 @@ import numpy as np
 from pydrake.lcm import DrakeLcm
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.ports import Health
 from drake_disasm.devices.iiwa import (
     CommandChannel,
     CommandMonitor,
@@ -15,7 +16,6 @@ from drake_disasm.devices.iiwa import (
 from drake_disasm.devices.onrobot_hex import HexClient
 from drake_disasm.devices.reading import Clock, Reading
 from drake_disasm.devices.robotiq import RobotiqClient, RobotiqSettings
-from drake_disasm.ports import Health
 from drake_disasm.safety.robot_lock import DeviceLocks, lcm_address
 from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm.systems.device_reader import Readable

@@ -1,14 +1,12 @@
 """Contact between bolt and groove: one strategy for each contact model.
 
-A strategy states which quantities of an `Environment` it models, writes them into a
-Context, and adds its systems to the diagram. `Parts` maps a system of the station to
-its Context.
+A strategy writes an `Environment` into a Context, and adds its systems to the diagram.
+`Parts` maps a system of the station to its Context.
 """
 
 import abc
 import dataclasses
-from collections.abc import Iterable, Sequence
-from typing import ClassVar
+from collections.abc import Iterable
 
 import numpy as np
 from pydrake.geometry import (
@@ -17,7 +15,7 @@ from pydrake.geometry import (
     GeometrySet,
     SceneGraph,
 )
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
@@ -28,27 +26,21 @@ from drake_disasm.cell.lock import (
     set_pose,
 )
 from drake_disasm.cell.lock_materials import has_same_material
-from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import Effect, Environment, EnvironmentEffect, environment_at
-from drake_disasm.impact import ImpactConditions, ImpactLaw, LockShape, Surroundings
+from drake_disasm.effects import Environment
 from drake_disasm.scenario import ContactConfig, LockConfig
 from drake_disasm.stations.base import Parts
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
-from drake_disasm.systems.impact_contact import ImpactContact
 from drake_disasm.systems.outside_force import OutsideForce
+from drake_disasm.twin import ImpactConditions, ImpactLaw, LockShape, Surroundings
+from drake_disasm.twin.contact_system import ImpactContact
 
 
 class ContactStrategy(abc.ABC):
     """A model of the contact between bolt and groove.
 
     Attributes:
-        quantities: fields of an Environment that it models.
-        remedy: for an effect that changes only other fields.
         outside_force: adds forces on the bolt other than contact.
     """
-
-    quantities: ClassVar[frozenset[str]]
-    remedy: ClassVar[str]
 
     def __init__(
         self,
@@ -86,19 +78,6 @@ class ContactStrategy(abc.ABC):
 
 class HydroelasticContact(ContactStrategy):
     """Drake's own contact, of the surfaces' materials in the scene graph."""
-
-    quantities = frozenset(
-        (
-            "X_GnG",
-            "friction",
-            "modulus",
-            "head_modulus",
-            "dissipation",
-            "clearance",
-            "force_Gn",
-        )
-    )
-    remedy = "set contact.model to impact, and use `station` twin"
 
     def add_forces(self, builder: DiagramBuilder, forces: OutputPort) -> OutputPort:
         """See ContactStrategy."""
@@ -154,18 +133,6 @@ class ImpactContactForce(ContactStrategy):
         contact: parameters of the law.
         environment: of the default Context.
     """
-
-    quantities = frozenset(
-        (
-            "X_GnG",
-            "friction",
-            "clearance",
-            "impact_stiffness",
-            "impact_exponent",
-            "force_Gn",
-        )
-    )
-    remedy = "set contact.model to hydroelastic"
 
     def __init__(
         self,
@@ -247,44 +214,3 @@ CONTACTS: dict[str, type[ContactStrategy]] = {
     "hydroelastic": HydroelasticContact,
     "impact": ImpactContactForce,
 }
-
-
-def refuse_without_quantity(
-    model: str, nominal: Environment, effects: Sequence[Effect]
-) -> None:
-    """Refuses effects on quantities that a contact model does not have.
-
-    Args:
-        model: the scenario's `contact.model`.
-        nominal: the environment without effects.
-        effects: any.
-
-    Raises:
-        DisasmError: names the first effect that would change nothing.
-    """
-    contact = CONTACTS[model]
-    for effect in effects:
-        if isinstance(effect, EnvironmentEffect):
-            actual = environment_at(nominal, [effect])
-            changed = environment_differences(nominal, actual)
-            if changed and not changed & contact.quantities:
-                raise DisasmError(
-                    f"{type(effect).__name__}: changes {', '.join(sorted(changed))}, "
-                    f"which {model} contact does not have; take it out of effects, or "
-                    f"{contact.remedy}"
-                )
-
-
-def environment_differences(one: Environment, other: Environment) -> frozenset[str]:
-    """Returns the names of the quantities in which environments differ."""
-    return frozenset(
-        field.name
-        for field in dataclasses.fields(Environment)
-        if not _same(getattr(one, field.name), getattr(other, field.name))
-    )
-
-
-def _same(one: object, other: object) -> bool:
-    if isinstance(one, RigidTransform) and isinstance(other, RigidTransform):
-        return one.IsExactlyEqualTo(other)
-    return one == other

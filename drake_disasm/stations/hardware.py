@@ -16,10 +16,11 @@ from drake_disasm.cell.arm_description import refuse_unlimited_arm
 from drake_disasm.cell.coordinates import ArmCoordinates
 from drake_disasm.cell.parsing import add_arm
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.ports import CELL_PORTS, Health, check_ports
 from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.devices.reading import Clock, Reading
 from drake_disasm.effects import Effect
-from drake_disasm.ports import CELL_PORTS, Health, check_ports
+from drake_disasm.effects.refusals import refuse_on_hardware
 from drake_disasm.safety import (
     CommandPacer,
     LagMonitor,
@@ -31,7 +32,6 @@ from drake_disasm.safety import (
 from drake_disasm.scenario import ArmConfig, Scenario, validate
 from drake_disasm.stations.arm_over_lcm import command_sender, export_status
 from drake_disasm.stations.base import InitialState, Station, refuse_twins_contact
-from drake_disasm.stations.capabilities import refuse_on_hardware
 from drake_disasm.stations.cell_devices import CellDevices
 from drake_disasm.stations.hardware_config import (
     HardwareConfig,

@@ -15,6 +15,7 @@ from pydrake.systems.primitives import RandomSource
 
 from drake_disasm.cell.lock import Lock, nominal_environment
 from drake_disasm.cell.placement import nominal_groove_pose
+from drake_disasm.common.ports import check_ports
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor
 from drake_disasm.effects import (
     ArmEffect,
@@ -24,7 +25,7 @@ from drake_disasm.effects import (
     is_local,
     sensor_chain,
 )
-from drake_disasm.ports import check_ports
+from drake_disasm.effects.refusals import refuse_unknown_kinds, refuse_without_quantity
 from drake_disasm.scenario import Scenario, validate
 from drake_disasm.stations.base import (
     InitialState,
@@ -32,11 +33,9 @@ from drake_disasm.stations.base import (
     Station,
     add_nominal_groove,
 )
-from drake_disasm.stations.capabilities import refuse_unknown_kinds
 from drake_disasm.stations.contact import (
     ContactStrategy,
     HydroelasticContact,
-    refuse_without_quantity,
 )
 from drake_disasm.stations.local_effects import LocalEffectsMonitor
 from drake_disasm.stations.wiring import add_plant, export_bolt_pose, wire_sensor

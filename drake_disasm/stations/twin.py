@@ -17,9 +17,9 @@ from drake_disasm.cell.lock_dimensions import GROOVE_FIELDS
 from drake_disasm.cell.tool import summed
 from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.ports import TWIN_PORTS
 from drake_disasm.effects import ArmEffect
-from drake_disasm.impact import ImpactConditions
-from drake_disasm.ports import TWIN_PORTS
+from drake_disasm.effects.refusals import refuse_arm_effects
 from drake_disasm.scenario import (
     ArmConfig,
     GripperConfig,
@@ -27,14 +27,16 @@ from drake_disasm.scenario import (
     Scenario,
     validate,
 )
-from drake_disasm.stations.arm_node import ArmNode, ArmStep
-from drake_disasm.stations.capabilities import refuse_arm_effects
+from drake_disasm.stations.arm_node import ArmNode
 from drake_disasm.stations.contact import ContactStrategy, ImpactContactForce
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.stations.wiring import export_ready_device, export_required
 from drake_disasm.systems.optional_input import OptionalInput
 from drake_disasm.systems.outside_force import OutsideForce
+from drake_disasm.twin import ImpactConditions
+from drake_disasm.twin.arm_step import ArmStep
+from drake_disasm.twin.motion import SETTLING_TIME
 
 _MATERIAL_FIELDS = ("friction", "modulus", "head_modulus", "dissipation")
 _SPRING_FIELDS = (
@@ -80,7 +82,7 @@ class TwinStation(SimulatedStation):
     table = TWIN_PORTS
     arm = "bolt"
     has_velocity_input = True
-    settling_time = 0.5
+    settling_time = SETTLING_TIME
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__(scenario)

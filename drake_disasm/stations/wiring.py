@@ -12,8 +12,8 @@ from pydrake.multibody.plant import (
 from pydrake.systems.framework import DiagramBuilder, InputPort
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
+from drake_disasm.common.ports import Health
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor
-from drake_disasm.ports import Health
 from drake_disasm.scenario import SimulationConfig
 from drake_disasm.systems.body_pose import BodyPose
 from drake_disasm.systems.required_input import RequiredInput

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.importing.signals import stretches
+from drake_disasm.logs.importing.signals import stretches
 from drake_disasm.logs.schema import SLOW_KINDS
 from sysid.data_checks.finding import DataFinding, rows_of
 from sysid.data_checks.settings import DataSettings

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.importing.repeats import held_of, held_rows, is_saturated
+from drake_disasm.logs.importing.repeats import held_of, held_rows, is_saturated
 from sysid.data_checks.expectation import Expectation, FittedExpectation
 from sysid.data_checks.finding import DataFinding, Severity, rows_of
 from sysid.data_checks.settings import DEFAULT_DATA_SETTINGS, DataSettings

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.importing.importer import is_noise
-from drake_disasm.importing.signals import unwrapped
 from drake_disasm.logs import Episode
+from drake_disasm.logs.importing.importer import is_noise
+from drake_disasm.logs.importing.signals import unwrapped
 from sysid.data_checks.finding import DataFinding, Severity, rows_of
 from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject

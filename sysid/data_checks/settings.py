@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from drake_disasm.importing.repeats import COARSE, FEWEST
+from drake_disasm.logs.importing.repeats import COARSE, FEWEST
 from sysid.models.rate_factors import MOST_TURN
 from sysid.thresholds import threshold
 

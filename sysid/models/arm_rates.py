@@ -9,7 +9,7 @@ from drake_disasm.cell.grip import AXIS_ORDER
 from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import Scenario
-from drake_disasm.stations.arm_node import ArmStep
+from drake_disasm.twin.arm_step import ArmStep
 from sysid.models.base import Array
 
 

@@ -11,7 +11,7 @@ from drake_disasm.cell.twin_parameters import TwinParameters, twin_of
 from drake_disasm.common.arrays import apply_matrix
 from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import Scenario
-from drake_disasm.stations.arm_node import ArmStep
+from drake_disasm.twin.arm_step import ArmStep
 from sysid.models.base import Array
 
 #: How far from A compliance is compared, in coordinates [m, rad]: along x that is where

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from scipy.signal import oaconvolve
 
 from drake_disasm.effects import ArmEffect, ArmSamples
-from drake_disasm.importing.importer import low_pass_of
-from drake_disasm.importing.signals import LowPass, resample
 from drake_disasm.logs import Log, LogHeader
+from drake_disasm.logs.importing.importer import low_pass_of
+from drake_disasm.logs.importing.signals import LowPass, resample
 from sysid.models.arm_motion import ArmMotion, torque_of
 from sysid.models.base import Array
 from sysid.models.path_memory import PathMemory

@@ -10,7 +10,7 @@ from drake_disasm.cell.coordinates import BoltCoordinates
 from drake_disasm.common.spatial import pose_from_vector
 from drake_disasm.logs import Episode
 from drake_disasm.logs.transitions import observations
-from drake_disasm.task.replay import Steps
+from drake_disasm.twin.steps import Steps
 from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
 from sysid.models.cell_arm import CellArm

@@ -16,8 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from drake_disasm.scenario import Scenario
-from drake_disasm.task.impact_replay import ImpactReplay
-from drake_disasm.task.replay import Ends, Steps, TwinReplay
+from drake_disasm.task.diagram_replay import TwinReplay
+from drake_disasm.twin.replay import ImpactReplay
+from drake_disasm.twin.steps import Ends, Steps
 
 _MOST_BYTES = 2**26  # of simulations that are kept
 

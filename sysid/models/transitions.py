@@ -16,7 +16,7 @@ from drake_disasm.logs.refusal import refusal
 from drake_disasm.logs.transitions import observations
 from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.scenario import Scenario
-from drake_disasm.task.replay import Steps
+from drake_disasm.twin.steps import Steps
 from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
 from sysid.models.cell_arm import CellArm, Sway

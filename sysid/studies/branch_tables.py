@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from drake_disasm.studies.results import mean_of, paired_difference, rate
-from drake_disasm.studies.study import Level, Table
+from sysid.studies.results import mean_of, paired_difference, rate
+from sysid.studies.study import Level, Table
 
 #: Figures by seed of what is finished of a combination of levels.
 Read = Callable[[dict[str, Level]], Mapping[int, Mapping[str, Any]]]

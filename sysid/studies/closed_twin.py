@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drake_disasm.batch.twin import with_impact
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, read_json, write_json, write_text
 from drake_disasm.common.progress import Progress
@@ -16,6 +15,7 @@ from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
+from drake_disasm.twin.batch import with_impact
 from sysid.acceptance.corrected_twin import refused_verdict, with_intervals
 from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.output import to_mapping

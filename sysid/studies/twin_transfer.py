@@ -27,19 +27,6 @@ from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.training import Purpose, seed_for
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.scenario.schema import Range
-from drake_disasm.studies.runner import SeedResult, finished, read_test
-from drake_disasm.studies.study import (
-    Factor,
-    Level,
-    Picture,
-    PolicyTest,
-    Stage,
-    Study,
-    Table,
-    Treatment,
-    agent_config,
-    folder_name,
-)
 from sysid.acceptance import DRAWS
 from sysid.studies.branch_tables import (
     BranchTables,
@@ -52,6 +39,19 @@ from sysid.studies.branch_tables import (
 from sysid.studies.closed_twin import ClosedTwin, with_effects
 from sysid.studies.mismatches import MISMATCHES
 from sysid.studies.policy_acceptance import PolicyAcceptance, read_acceptance
+from sysid.studies.runner import SeedResult, finished, read_test
+from sysid.studies.study import (
+    Factor,
+    Level,
+    Picture,
+    PolicyTest,
+    Stage,
+    Study,
+    Table,
+    Treatment,
+    agent_config,
+    folder_name,
+)
 
 _SCENARIO = "chapter3"
 _STATION = "cell"  # which stands for the robot

@@ -27,9 +27,9 @@ from drake_disasm.effects import (
 from drake_disasm.logs import LogWriter, flat_columns
 from drake_disasm.scenario import Scenario
 from drake_disasm.systems.pose_target import through_motion
-from drake_disasm.task.impact_replay import ImpactReplay
 from drake_disasm.task.recording import transitions_header
-from drake_disasm.task.replay import Steps
+from drake_disasm.twin.replay import ImpactReplay
+from drake_disasm.twin.steps import Steps
 from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
 from sysid.models.commands import twin_coordinates

@@ -7,7 +7,7 @@ from pathlib import Path
 from acceptance import rows
 
 from drake_disasm.learning.evaluation import Evaluation
-from drake_disasm.studies.study import StudyOptions
+from sysid.studies.study import StudyOptions
 from sysid.studies.twin_transfer import TwinTransferStudy, file_of
 from tests.refusals import refused
 

@@ -28,10 +28,11 @@ from pydrake.lcm import DrakeLcm
 
 from drake_disasm.common import options, program, stopping
 from drake_disasm.common.files import write_text
-from drake_disasm.fakes import hex_box, robotiq_gripper
-from drake_disasm.fakes.cell import IIWA_FAULTS, FakeCell
-from drake_disasm.fakes.real_time import RealTime
+from drake_disasm.devices.onrobot_hex import fake_box
+from drake_disasm.devices.robotiq import fake_gripper
 from drake_disasm.scenario import load_scenario
+from drake_disasm.stations.fake_cell.cell import IIWA_FAULTS, FakeCell
+from drake_disasm.stations.fake_cell.real_time import RealTime
 from drake_disasm.stations.hardware_config import HardwareConfig
 from drake_disasm_cli import common
 
@@ -93,8 +94,8 @@ class _Console:
         self._cell, self._greatest = cell, 0.0
         self._devices: dict[str, tuple[object, Sequence[str]]] = {
             "iiwa": (cell, IIWA_FAULTS),
-            "ft_sensor": (cell.hex, hex_box.FAULTS),
-            "gripper": (cell.gripper, robotiq_gripper.FAULTS),
+            "ft_sensor": (cell.hex, fake_box.FAULTS),
+            "gripper": (cell.gripper, fake_gripper.FAULTS),
         }
 
     def look(self) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from drake_disasm.common import stopping
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.ports import Health
 from drake_disasm.devices.reading import Reading
-from drake_disasm.ports import Health
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.hardware import HardwareStation
 from drake_disasm.stations.hardware_config import load_hardware_config

@@ -22,7 +22,9 @@ from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_text
 from drake_disasm.common.resources import model_path
-from drake_disasm.importing import (
+from drake_disasm.logs import KINDS
+from drake_disasm.logs.header import HEADER_NAME, read_header
+from drake_disasm.logs.importing import (
     FieldMap,
     Known,
     NoGuessError,
@@ -35,14 +37,12 @@ from drake_disasm.importing import (
     read_source,
     write_log,
 )
-from drake_disasm.importing.description import described, joint_words, summary
-from drake_disasm.importing.joining import WAYS, joined
-from drake_disasm.importing.lerobot import calibrated
-from drake_disasm.importing.plots import plot_import
-from drake_disasm.importing.presets import PRESETS
-from drake_disasm.importing.usage import without_torques
-from drake_disasm.logs import KINDS
-from drake_disasm.logs.header import HEADER_NAME, read_header
+from drake_disasm.logs.importing.description import described, joint_words, summary
+from drake_disasm.logs.importing.joining import WAYS, joined
+from drake_disasm.logs.importing.lerobot import calibrated
+from drake_disasm.logs.importing.plots import plot_import
+from drake_disasm.logs.importing.presets import PRESETS
+from drake_disasm.logs.importing.usage import without_torques
 
 _EXAMPLES = """examples:
   drake-disasm import-log run.npz --show            what is in it, and the guess

@@ -14,14 +14,11 @@ from pathlib import Path
 from drake_disasm.common import options, program
 from drake_disasm.common.cluster import executor_for
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.studies import STUDIES as OF_LEARNING
-from drake_disasm.studies.report import as_text, write_report
-from drake_disasm.studies.runner import open_study, run_study
-from drake_disasm.studies.study import Study, StudyOptions, level_text
 from drake_disasm_cli import common
-from sysid.studies import STUDIES as OF_TWINS
-
-STUDIES: dict[str, type[Study]] = OF_LEARNING | OF_TWINS
+from sysid.studies import STUDIES
+from sysid.studies.report import as_text, write_report
+from sysid.studies.runner import open_study, run_study
+from sysid.studies.study import Study, StudyOptions, level_text
 
 _EXAMPLES = """examples:
   drake-disasm study --list                       the studies and their factors

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.importing.cutoff import chosen_cutoff, motion_spectra
-from drake_disasm.importing.signals import (
+from drake_disasm.logs import Episode
+from drake_disasm.logs.importing.cutoff import chosen_cutoff, motion_spectra
+from drake_disasm.logs.importing.signals import (
     even_times,
     longest_stretch,
     quantum,
     resample,
 )
-from drake_disasm.logs import Episode
 from sysid.models.base import Array
 from sysid.models.response.drive import DriveSettings, Inputs
 

@@ -8,7 +8,7 @@ from drake_disasm.cell.grip import Springs
 from drake_disasm.cell.twin_parameters import ControlledArm, _condensed, twin_of
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import TwinStation
-from drake_disasm.stations.arm_node import ArmStep
+from drake_disasm.twin.arm_step import ArmStep
 from tests.refusals import refusal
 
 _P = np.array([0.0, 0.02, 0.01])

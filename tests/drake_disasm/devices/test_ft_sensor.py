@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from drake_disasm.common.ports import Health
 from drake_disasm.effects import PayloadError, SensorBias
-from drake_disasm.ports import Health
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation, SimulatedStation, TwinStation
 from drake_disasm.task.simulation import TaskSimulation

@@ -8,10 +8,10 @@ from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.tree import BodyIndex, JointIndex
 from pydrake.systems.framework import Context
 
+from drake_disasm.common.ports import Health
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor, quantise
 from drake_disasm.devices.sensor_chain import Payload
 from drake_disasm.effects import PayloadError, Sensing, SensorBias, SensorEffect
-from drake_disasm.ports import Health
 from drake_disasm.scenario import SensorConfig, load_scenario
 from drake_disasm.task.simulation import TaskSimulation
 

@@ -8,10 +8,10 @@ import numpy as np
 import psutil
 import pytest
 
+from drake_disasm.common.ports import Health
 from drake_disasm.devices.onrobot_hex import Command, HexClient, Request
+from drake_disasm.devices.onrobot_hex.fake_box import JUMP, FakeHexBox
 from drake_disasm.devices.reading import Counters
-from drake_disasm.fakes.hex_box import JUMP, FakeHexBox
-from drake_disasm.ports import Health
 from tests.progress import wait_until
 from tests.refusals import refusal
 

@@ -11,10 +11,10 @@ import numpy as np
 import psutil
 import pytest
 
+from drake_disasm.common.ports import Health
 from drake_disasm.devices.codec_error import CodecError
 from drake_disasm.devices.robotiq import Activation, RobotiqClient, RobotiqSettings
-from drake_disasm.fakes.robotiq_gripper import FakeRobotiqGripper
-from drake_disasm.ports import Health
+from drake_disasm.devices.robotiq.fake_gripper import FakeRobotiqGripper
 from tests.progress import wait_until
 from tests.refusals import refusal
 

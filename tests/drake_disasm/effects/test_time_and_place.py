@@ -8,7 +8,6 @@ import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from drake_disasm.batch.twin import BatchedTwin
 from drake_disasm.common.arrays import to_numpy
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
@@ -27,6 +26,7 @@ from drake_disasm.scenario import Scenario, load_scenario, scenario_from_mapping
 from drake_disasm.stations import make_station
 from drake_disasm.task.diagram import add_task
 from drake_disasm.task.simulation import TaskSimulation
+from drake_disasm.twin.batch import BatchedTwin
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.validation.synthetic_logs import transitions_log

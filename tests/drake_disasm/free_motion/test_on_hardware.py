@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from drake_disasm.fakes.lockstep import fake_hardware
 from drake_disasm.free_motion.playing import MotionPlayer
 from drake_disasm.free_motion.table import MotionTable
 from drake_disasm.scenario import load_scenario
+from drake_disasm.stations.fake_cell.lockstep import fake_hardware
 from drake_disasm.stations.hardware import HoldError
 from tests.drake_disasm.free_motion.test_playing import MOTION
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from torch.utils._pytree import tree_leaves
 
-from drake_disasm.batch.history import RecordedEpisode
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.hyperparameters import preset
 from drake_disasm.learning.lockstep import (
@@ -20,6 +19,7 @@ from drake_disasm.learning.training import Training, TrainingSpec
 from drake_disasm.mdp import Outcome
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.recording import EpisodeRecorder
+from drake_disasm.twin.history import RecordedEpisode
 from tests.drake_disasm.conftest import without_imprecision
 
 _OVERRIDES = ["contact.model=impact", "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"]

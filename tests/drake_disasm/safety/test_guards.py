@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from drake_disasm.common.ports import Health
 from drake_disasm.devices.reading import Mailbox, Reading
-from drake_disasm.ports import Health
 from drake_disasm.safety import Lag, SafetyConfig, Situation, guards
 
 Q = np.array([0.1, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0])

@@ -5,8 +5,8 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import JacobianWrtVariable
 
+from drake_disasm.common.ports import Health
 from drake_disasm.effects import GroovePose
-from drake_disasm.ports import Health
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import CellStation
 from tests.drake_disasm.conftest import QUIET

@@ -15,12 +15,12 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.ports import CELL_PORTS, port_differences
 from drake_disasm.effects import GroovePose
-from drake_disasm.fakes.cell import FakeCell, arrival
 from drake_disasm.policies import make_policy
-from drake_disasm.ports import CELL_PORTS, port_differences
 from drake_disasm.safety import Mode
 from drake_disasm.scenario import load_scenario
+from drake_disasm.stations.fake_cell.cell import FakeCell, arrival
 from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.stations.hardware_config import HardwareConfig
 from tests.refusals import refused

@@ -7,7 +7,7 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import System
 
-from drake_disasm.ports import (
+from drake_disasm.common.ports import (
     CELL_PORTS,
     TWIN_PORTS,
     Port,

@@ -5,9 +5,9 @@ import pytest
 from fault_runs import in_lockstep
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.fakes.cell import FakeCell
 from drake_disasm.logs import LogWriter, read_log
 from drake_disasm.scenario import load_scenario
+from drake_disasm.stations.fake_cell.cell import FakeCell
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from drake_disasm.importing.field_map import read_map
 from drake_disasm.logs import Log, read_log, write_static_wrench
+from drake_disasm.logs.importing.field_map import read_map
 from sysid.data_checks import check_data, contradicting_rows, without_flagged_rows
 from sysid.models.base import LogModel
 from sysid.models.from_logs import ModelChoice, model_of

@@ -7,7 +7,7 @@ from drake_disasm.cell.grip import AXIS_ORDER
 from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import load_scenario
-from drake_disasm.stations.arm_node import ArmStep
+from drake_disasm.twin.arm_step import ArmStep
 from sysid.models.arm_rates import ArmRates
 
 _STEPS, _FINE = 20, 100

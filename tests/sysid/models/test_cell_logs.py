@@ -14,9 +14,9 @@ from drake_disasm.effects import SensorBias, SensorGainDrift
 from drake_disasm.logs import Log
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
-from drake_disasm.stations.arm_node import ArmStep
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
+from drake_disasm.twin.arm_step import ArmStep
 from sysid.models.cell_arm import CellArm, Sway
 from sysid.models.transitions import FORCE_ERROR, POSE_ERROR
 from sysid.models.twin import TwinModel

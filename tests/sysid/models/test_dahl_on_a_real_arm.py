@@ -12,14 +12,14 @@ from drake_disasm.effects import (
     JointViscousFriction,
     TorqueOffset,
 )
-from drake_disasm.importing import (
+from drake_disasm.logs import Log, read_log
+from drake_disasm.logs.importing import (
     Processing,
     import_recordings,
     read_map,
     read_source,
     write_log,
 )
-from drake_disasm.logs import Log, read_log
 from sysid.models.joint_motion import JointMotionModel
 from tests.sysid.real_data import real_folder
 

@@ -12,15 +12,15 @@ from drake_disasm.effects import (
     JointViscousFriction,
     TorqueOffset,
 )
-from drake_disasm.importing import (
+from drake_disasm.logs import read_log
+from drake_disasm.logs.importing import (
     Processing,
     guessed_map,
     import_recordings,
     read_source,
     write_log,
 )
-from drake_disasm.importing.importer import low_pass_of
-from drake_disasm.logs import read_log
+from drake_disasm.logs.importing.importer import low_pass_of
 from drake_disasm.scenario import Scenario
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.log_filters import LogFilter, log_filters

@@ -18,15 +18,15 @@ from drake_disasm.logs import read_log
 from drake_disasm.mdp import REWARD_TERMS
 from drake_disasm.policies import load_policy
 from drake_disasm.scenario import dump_scenario, load_scenario, validate
-from drake_disasm.studies.precision import PrecisionStudy
-from drake_disasm.studies.report import write_report
-from drake_disasm.studies.results import mean_of, paired_difference
-from drake_disasm.studies.runner import run_study
-from drake_disasm.studies.study import StudyOptions
 from sysid.acceptance.corrected_twin import CorrectedTwin, refused_verdict
 from sysid.studies import twin_transfer
 from sysid.studies.closed_twin import ClosedTwin, with_effects
 from sysid.studies.mismatches import MISMATCHES
+from sysid.studies.precision import PrecisionStudy
+from sysid.studies.report import write_report
+from sysid.studies.results import mean_of, paired_difference
+from sysid.studies.runner import run_study
+from sysid.studies.study import StudyOptions
 from sysid.studies.twin_transfer import TwinTransferStudy, _name_on_twin, file_of
 from tests.refusals import refused
 

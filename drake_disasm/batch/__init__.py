@@ -1,1 +1,0 @@
-"""The twin in batches: many episodes in lockstep, by the same equations."""

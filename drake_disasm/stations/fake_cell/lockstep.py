@@ -1,0 +1,62 @@
+"""The hardware station and a fake cell in step with it, in one process."""
+
+import contextlib
+import dataclasses
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydrake.lcm import DrakeLcm
+from pydrake.systems.analysis import Simulator
+
+from drake_disasm.scenario import Scenario
+from drake_disasm.scenario.given import scenario_of
+from drake_disasm.stations.fake_cell.cell import FakeCell, arrival, in_step
+from drake_disasm.stations.hardware import HardwareStation
+
+
+@dataclasses.dataclass(frozen=True)
+class FakeHardware:
+    """A hardware station, and the played devices that it talks to.
+
+    Attributes:
+        station: talks to the devices by their own protocols.
+        cell: plays the devices, with a simulated cell behind them.
+    """
+
+    station: HardwareStation
+    cell: FakeCell
+
+    def attach(self, simulator: Simulator) -> None:
+        """Advances the fake cell whenever the station's diagram is advanced."""
+        read = self.station.devices["ft_sensor"].read
+        simulator.set_monitor(in_step(self.cell, read))
+
+
+@contextlib.contextmanager
+def fake_hardware(
+    scenario: Scenario | str | Path,
+    seed: int = 0,
+    limits: Mapping[str, Any] | None = None,
+) -> Iterator[FakeHardware]:
+    """Yields a hardware station with fake devices, in virtual time.
+
+    Args:
+        scenario: of the task, an object, a shipped name, or a file; effects in it are
+            refused, as by any hardware station.
+        seed: of the fake sensor's noise.
+        limits: fields of the safety limits that differ from the defaults, by name.
+    """
+    scenario, lcm = scenario_of(scenario), DrakeLcm("memq://")
+    with FakeCell(scenario, lcm, seed) as cell:
+
+        def wait(_: float) -> None:
+            """Lets a period pass while the station waits."""
+            cell.advance(arrival(station.devices["ft_sensor"].read))
+
+        config = cell.config()
+        config.safety = dataclasses.replace(config.safety, **(limits or {}))
+        with HardwareStation(
+            scenario, config, clock=cell.clock, wait=wait, lcm=lcm
+        ) as station:
+            yield FakeHardware(station, cell)

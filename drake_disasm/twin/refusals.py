@@ -1,0 +1,143 @@
+"""What a batch can't carry: one clear error each, before any work."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from drake_disasm.cell.lock import nominal_environment
+from drake_disasm.common.arrays import Array
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import (
+    ArmEffect,
+    PoseEffect,
+    SensorMemoryEffect,
+    sensor_chain,
+)
+from drake_disasm.effects.refusals import (
+    refuse_arm_effects,
+    refuse_unknown_kinds,
+    refuse_without_quantity,
+)
+from drake_disasm.scenario import Scenario, corner, validate
+
+#: What all environments of a batch share, by the name of the field.
+_SHARED: dict[str, Callable[[Scenario], Any]] = {
+    "task.period": lambda s: s.task.period,
+    "task.success": lambda s: s.task.success,
+    "simulation.twin_time_step": lambda s: s.simulation.twin_time_step,
+    "ft_sensor.period": lambda s: s.ft_sensor.period,
+    "observation.variant": lambda s: s.observation.variant,
+}
+
+
+def make_like(device: str) -> Array:
+    """Returns an empty array of the kind with which a device computes.
+
+    Args:
+        device: "numpy", or one of torch's: "cpu", "cuda", "cuda:1".
+
+    Raises:
+        DisasmError: there is no such device, or Numba can't compile for it.
+    """
+    import numpy as np
+
+    if device == "numpy":
+        return np.zeros(0)
+    import torch
+
+    try:
+        like = torch.zeros(0, dtype=torch.float64, device=device)
+    except (RuntimeError, AssertionError) as error:
+        reason = " ".join(str(error).split(". ")[0].split())
+        raise DisasmError(
+            f"device: '{device}' is not there ({reason}); use cpu or numpy"
+        ) from None
+    if like.device.type == "cuda":
+        refuse_without_compiler(device)
+    return like
+
+
+def refuse_without_compiler(device: str) -> None:
+    """Refuses a GPU for which Numba can't compile the contact.
+
+    Raises:
+        DisasmError: says what to install.
+    """
+    from numba import cuda
+
+    if not cuda.is_available():
+        raise DisasmError(
+            f"device: Numba can't compile contact for '{device}'; "
+            "pip install 'drake_disasm[gpu]', or use cpu or numpy"
+        )
+
+
+def refuse_count(count: int) -> None:
+    """Refuses a batch of nothing.
+
+    Raises:
+        DisasmError: says what to give.
+    """
+    if count < 1:
+        raise DisasmError(f"num_envs: {count} is no number of environments; give 1")
+
+
+def refuse_scenarios(scenarios: Sequence[Scenario]) -> None:
+    """Refuses scenarios that one batch can't simulate.
+
+    Raises:
+        DisasmError: names the first field or effect, and the remedy.
+    """
+    for scenario in {repr(s): s for s in scenarios}.values():
+        validate(scenario)
+        _refuse_contact(scenario)
+        refuse_unknown_kinds(scenario.effects)
+        refuse_arm_effects([e for e in scenario.effects if isinstance(e, ArmEffect)])
+        _refuse_late_poses(scenario)
+        nominal = nominal_environment(scenario.lock, scenario.contact)
+        refuse_without_quantity("impact", nominal, scenario.effects)
+        _refuse_sampling(scenario)
+        for end in ("low", "high"):
+            _refuse_others(corner(scenario, end), corner(scenarios[0], "low"))
+
+
+def _refuse_others(scenario: Scenario, first: Scenario) -> None:
+    """Refuses what differs and is one for a batch."""
+    for name, value in _SHARED.items():
+        if value(scenario) != value(first):
+            raise DisasmError(
+                f"{name}: {value(scenario)} and {value(first)} in one batch; make a "
+                "batch for each"
+            )
+
+
+def _refuse_contact(scenario: Scenario) -> None:
+    if scenario.contact.model != "impact":
+        raise DisasmError(
+            f"contact.model: '{scenario.contact.model}' has no form for a batch; set "
+            "it to impact, or use the diagram's twin"
+        )
+
+
+def _refuse_late_poses(scenario: Scenario) -> None:
+    for effect in scenario.effects:
+        if isinstance(effect, PoseEffect):
+            raise DisasmError(
+                f"{type(effect).__name__}: a batch reports poses as they are; take it "
+                "out, or use the diagram's twin"
+            )
+
+
+def _refuse_sampling(scenario: Scenario) -> None:
+    """A sensor with a memory takes its samples where the plant has just stepped."""
+    memories = [
+        e for e in sensor_chain(scenario.effects) if isinstance(e, SensorMemoryEffect)
+    ]
+    fine, period = scenario.simulation.twin_time_step, scenario.ft_sensor.period
+    for longer, shorter in ((period, fine), (scenario.task.period, period)):
+        count = longer / shorter
+        if memories and abs(count - round(count)) > 1e-6:
+            raise DisasmError(
+                f"ft_sensor.period: {period:g} s does not fit between the twin's step "
+                f"of {fine:g} s and the task's of {scenario.task.period:g} s, as "
+                f"{type(memories[0]).__name__} needs in a batch; give a whole fraction"
+            )
