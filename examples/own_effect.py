@@ -4,10 +4,10 @@ python examples/own_effect.py
 """
 
 import dataclasses
-import math
 import tempfile
 from pathlib import Path
 
+from drake_disasm.common.arrays import as_number, at_most, exponential
 from drake_disasm.effects import (
     BoltMotion,
     Environment,
@@ -43,8 +43,9 @@ class MagneticCatch(EnvironmentEffect):
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds the pull of the magnet."""
         x, y, z = environment.force_Gn
-        x += self.force * math.exp(min(bolt.p[0] - TRAVEL, 0.0) / self.reach)
-        return dataclasses.replace(environment, force_Gn=(x, y, z))
+        away = at_most(0.0, as_number(bolt.p[..., 0] - TRAVEL))
+        pull = self.force * exponential(away / self.reach)
+        return dataclasses.replace(environment, force_Gn=(x + pull, y, z))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 from pydrake.systems.analysis import Simulator
 
 from drake_disasm.common.errors import DivergedError
-from drake_disasm.twin import NO_BALANCE
+from drake_disasm.twin.contact_step import NO_BALANCE
 
 #: By which Drake's messages, and ours, say that there is no next state.
 _DIVERGED = ("NaN", "non-finite", "not finite", NO_BALANCE)

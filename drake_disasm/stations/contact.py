@@ -31,8 +31,10 @@ from drake_disasm.scenario import ContactConfig, LockConfig
 from drake_disasm.stations.base import Parts
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.systems.outside_force import OutsideForce
-from drake_disasm.twin import ImpactConditions, ImpactLaw, LockShape, Surroundings
+from drake_disasm.twin.conditions import ImpactConditions, Surroundings
 from drake_disasm.twin.contact_system import ImpactContact
+from drake_disasm.twin.law import ImpactLaw
+from drake_disasm.twin.shape import LockShape
 
 
 class ContactStrategy(abc.ABC):

@@ -34,9 +34,9 @@ from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.stations.wiring import export_ready_device, export_required
 from drake_disasm.systems.optional_input import OptionalInput
 from drake_disasm.systems.outside_force import OutsideForce
-from drake_disasm.twin import ImpactConditions
 from drake_disasm.twin.arm_step import ArmStep
-from drake_disasm.twin.motion import SETTLING_TIME
+from drake_disasm.twin.conditions import ImpactConditions
+from drake_disasm.twin.plant import SETTLING_TIME
 
 _MATERIAL_FIELDS = ("friction", "modulus", "head_modulus", "dissipation")
 _SPRING_FIELDS = (

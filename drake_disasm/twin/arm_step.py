@@ -1,13 +1,14 @@
 """A step of the twin's arm, a linear system between command and gripper."""
 
 import dataclasses
+import functools
 
 import numpy as np
 from scipy.linalg import expm
 
 from drake_disasm.cell.grip import AXIS_ORDER, Springs
 from drake_disasm.cell.twin_parameters import ControlledArm
-from drake_disasm.common.arrays import Array, apply_matrix
+from drake_disasm.common.arrays import Array, apply_matrix, namespace
 
 _ORDER = list(AXIS_ORDER)
 
@@ -61,6 +62,13 @@ class ArmStep:
         C = np.hstack([by_place, by_rate - h * by_place])
         springs = _softer(grip, G)
         return cls(h, step[:, :12], C, G @ _gains(springs), G, H, springs)
+
+    @functools.cached_property
+    def table(self) -> Array:
+        """F, C and P of each arm, or of one for all (m, 3, 12, 12)."""
+        xp = namespace(self.F)
+        matrices = xp.stack(xp.broadcast_arrays(self.F, self.C, self.P), axis=-3)
+        return matrices if matrices.ndim > 3 else matrices[None]
 
     def ahead(self, x: Array, u: Array) -> Array:
         """Returns x' (n, 12) for states and commands (n, 12)."""

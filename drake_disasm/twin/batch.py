@@ -13,10 +13,10 @@ from drake_disasm.scenario import Scenario, draw, with_values
 from drake_disasm.systems.imprecision import clamped
 from drake_disasm.systems.pose_target import executed_pose, moved_poses
 from drake_disasm.twin.episodes import Episodes, TwinBatch
-from drake_disasm.twin.probe import refuse_scalar_effects
+from drake_disasm.twin.plant import Plant
 from drake_disasm.twin.refusals import make_like, refuse_count, refuse_scenarios
 from drake_disasm.twin.stacking import put_rows, rows_of
-from drake_disasm.twin.twins import at_A
+from drake_disasm.twin.twins import Twins
 
 _NOISE_STREAM = 0x4E4F4953  # apart from that of the ranges
 #: What no arm does to a bolt in a step: contact has thrown it. m from where an episode
@@ -77,6 +77,7 @@ class BatchedTwin:
             ranges may differ.
         count: how many environments; of a list, its length.
         device: "cpu", or "cuda", where torch computes; or "numpy".
+        threads: of the host, which share the environments.
 
     Raises:
         DisasmError: the batch can't carry an effect or a scenario, the device is not
@@ -88,6 +89,7 @@ class BatchedTwin:
         scenarios: Scenario | Sequence[Scenario],
         count: int | None = None,
         device: str = "cpu",
+        threads: int = 1,
     ) -> None:
         given = [scenarios] if isinstance(scenarios, Scenario) else list(scenarios)
         count = len(given) if count is None else count
@@ -96,8 +98,7 @@ class BatchedTwin:
         self.count = len(self.scenarios)
         refuse_scenarios(self.scenarios)
         self.like = make_like(device)
-        self._batch = TwinBatch(self.scenarios, self.like)
-        refuse_scalar_effects(self._batch.slots.slots, self.like)
+        self._batch = TwinBatch(self.scenarios, self.like, threads)
         self.drawn: list[dict[str, float]] = [{} for _ in self.scenarios]
         self._steps = max(s.task.steps for s in self.scenarios)
         self._noise = np.zeros((self.count, 0, 12))
@@ -106,6 +107,7 @@ class BatchedTwin:
             self._noise = array_like(np.zeros(shape, np.float32), self.like)
         self._starts, self._start_of = self._common_starts()
         self.episodes: Episodes
+        self._twins: Twins
         self.observation: Array
         self.reading: Array
         self.action = self.action_executed = array_like(
@@ -155,6 +157,7 @@ class BatchedTwin:
         """
         if beginning is not self.episodes:
             put_rows(self.episodes, rows, beginning)
+        self._twins = self._batch.twins(self.episodes)
         for row, seed in zip(rows, seeds, strict=True):
             self.drawn[row] = draw(self.scenarios[row], seed)
             if self._noise.shape[1]:
@@ -173,7 +176,7 @@ class BatchedTwin:
             actions: (n, 6) [m, rad], clipped to the bounds.
         """
         xp, episodes, before = namespace(self.like), self.episodes, self.observation
-        numbers = self._batch.twins(episodes).numbers
+        numbers = self._twins.numbers
         action = array_like(actions, self.like)
         is_finite = xp.all(xp.isfinite(action), axis=1)
         action = xp.where(is_finite[:, None], action, 0.0)
@@ -185,7 +188,8 @@ class BatchedTwin:
         goal = self._goal(action)
         # An environment that fails may overflow; what fails is named below.
         with np.errstate(over="ignore", invalid="ignore"):
-            is_solved = self._batch.advance(episodes, goal, action[:, :3] / self.period)
+            v = action[:, :3] / self.period
+            is_solved = self._batch.advance(episodes, self._twins, goal, v)
             episodes.steps = episodes.steps + 1.0
             found = self._observed()
         is_solved = is_solved & xp.all(xp.isfinite(found), axis=1)
@@ -219,8 +223,7 @@ class BatchedTwin:
 
     def bolt_is_out(self) -> np.ndarray:
         """Returns whether each bolt truly is out (n,): only a simulation knows."""
-        twins = self._batch.twins(self.episodes)
-        numbers, around = twins.numbers, twins.conditions(at_A(self.action)).around
+        numbers, around = self._twins.numbers, self._twins.plant_at_A.conditions.around
         X_GnB = numbers.coordinates.poses(self.episodes.state.q)
         p_GBo = namespace(self.like).matmul(
             (X_GnB.p - around.p_GnG)[:, None], around.R_GnG
@@ -236,29 +239,32 @@ class BatchedTwin:
         """Returns the coordinates (n, 6) to which the command goes."""
         episodes = self.episodes
         episodes.commanded = executed = moved_poses(episodes.commanded, action)
-        twins = self._batch.twins(episodes)
-        effects = twins.effects.motion
+        effects = self._twins.effects.motion
         if effects:
             wrench, memory = self.observation[:, 6:], episodes.motion_memory
             executed, episodes.motion_memory = executed_pose(
                 effects, executed, wrench, memory, self.period
             )
-        return twins.numbers.coordinates.of_poses(executed)
+        return self._twins.numbers.coordinates.of_poses(executed)
 
     def _observed(self) -> Array:
         """Returns what the newest readings show (n, 12), with noise."""
-        episodes, twins = self.episodes, self._batch.twins(self.episodes)
-        numbers = twins.numbers
+        episodes, numbers = self.episodes, self._twins.numbers
         reading = episodes.reading
         if self._noise.shape[1]:
             reading = reading + numbers.noise * self._noise_now()[:, 6:]
         self.reading = quantise(reading, numbers.quantum)
         pose = self.pose_measured()
-        return twins.processing.state(pose, self.reading, episodes.offset)
+        return self._twins.processing.state(pose, self.reading, episodes.offset)
+
+    @property
+    def plant_at_A(self) -> Plant:
+        """The plants, while bolts rest at A; see `Twins`."""
+        return self._twins.plant_at_A
 
     def pose_measured(self) -> Pose:
         """Returns where the encoders have the bolts, X_GB (n, ...)."""
-        coordinates = self._batch.twins(self.episodes).numbers.coordinates
+        coordinates = self._twins.numbers.coordinates
         return coordinates.poses(self.episodes.state.arm[:, :6])
 
     def _noise_now(self) -> Array:

@@ -7,7 +7,8 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context, LeafSystem
 
-from drake_disasm.twin import NO_BALANCE, ImpactConditions, ImpactStep
+from drake_disasm.twin.conditions import ImpactConditions
+from drake_disasm.twin.contact_step import NO_BALANCE, ImpactStep
 
 
 class ImpactContact(LeafSystem):

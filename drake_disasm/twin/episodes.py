@@ -14,9 +14,9 @@ from drake_disasm.devices.sensor_chain import (
 )
 from drake_disasm.effects import BoltMotion, MotionEffect
 from drake_disasm.scenario import Scenario, with_values
-from drake_disasm.twin import ImpactConditions
-from drake_disasm.twin.motion import SETTLING_TIME, TwinState, plant_step
 from drake_disasm.twin.numbers import TwinNumbers
+from drake_disasm.twin.plant import Plant, PlantState
+from drake_disasm.twin.scalar_effects import refuse_scalar_effects
 from drake_disasm.twin.slots import EffectSlots
 from drake_disasm.twin.stacking import leaves_of, shared, with_leaves
 from drake_disasm.twin.twins import Twins, at_A
@@ -40,7 +40,7 @@ class Episodes:
 
     numbers: tuple[Array, ...]
     effects: Array
-    state: TwinState
+    state: PlantState
     goal: Array
     commanded: Pose
     offset: Array
@@ -60,7 +60,7 @@ class _Samples:
         is_solved: (n,) whether contact always found a balance.
     """
 
-    state: TwinState
+    state: PlantState
     reading: Array
     memory: Array
     is_solved: Array
@@ -72,10 +72,17 @@ class TwinBatch:
     Args:
         scenarios: one for each environment, with their ranges.
         like: an empty array of the kind that computes.
+        threads: of the host, which share the environments.
+
+    Raises:
+        DisasmError: the equation of a user's own effect takes no arrays.
     """
 
-    def __init__(self, scenarios: Sequence[Scenario], like: Array) -> None:
-        self.like, self.slots = like, EffectSlots(scenarios)
+    def __init__(
+        self, scenarios: Sequence[Scenario], like: Array, threads: int = 1
+    ) -> None:
+        self.like, self.slots, self._threads = like, EffectSlots(scenarios), threads
+        refuse_scalar_effects(self.slots.slots, like)
         first = scenarios[0]
         self.period = first.task.period
         self.h = first.simulation.twin_time_step
@@ -88,7 +95,8 @@ class TwinBatch:
         """Returns the environments' twins."""
         leaves = dict(zip(self._varying, episodes.numbers, strict=True))
         numbers = _in_columns(with_leaves(self._template, leaves))
-        return Twins(numbers, self.slots.effects(episodes.effects), self._is_exact)
+        effects, start = self.slots.effects(episodes.effects), at_A(episodes.goal)
+        return Twins(numbers, effects, self._is_exact, start, self._threads)
 
     def begin(self, which: Sequence[int], scenarios: Sequence[Scenario]) -> Episodes:
         """Returns episodes that have settled at A, zeroed and made their first step.
@@ -99,40 +107,34 @@ class TwinBatch:
         """
         episodes = self.at_rest(which, scenarios)
         twins, still = self.twins(episodes), 0.0 * episodes.goal
-        conditions = twins.conditions(at_A(still))
-        arm, body = twins.numbers.arm, twins.numbers.body
-        for _ in range(round(SETTLING_TIME / self.h)):
-            step = plant_step(episodes.state, still, arm, body, conditions)
-            episodes.state = step.state
+        step = twins.plant_at_A.settled(episodes.state)
         load = twins.load_S(step.state.arm, step)
         sensing = twins.sensing(step.state.arm, episodes.steps)
         reading = sensed_at_zeroing(load, twins.effects.sensor, sensing)
         episodes.offset = twins.processing.offset(reading)
         episodes.state = dataclasses.replace(step.state, v=still)
-        samples = self._period(episodes, still, twins, conditions, steps=1)
+        samples = self._period(episodes, still, twins, twins.plant_at_A, steps=1)
         episodes.state, episodes.reading = samples.state, samples.reading
         episodes.sensor_memory = samples.memory
         return episodes
 
-    def advance(self, episodes: Episodes, goal: Array, v: Array) -> Array:
+    def advance(self, episodes: Episodes, twins: Twins, goal: Array, v: Array) -> Array:
         """Moves the command to other coordinates in one period.
 
         Args:
             episodes: changed in place, but for their steps.
+            twins: theirs.
             goal: (n, 6) coordinates.
             v: (n, 3) the bolt's commanded velocity in Gn [m/s].
 
         Returns:
             Whether the contact of each always found a balance (n,).
         """
-        twins, motion = self.twins(episodes), at_A(goal)
-        if twins.effects.is_local:
-            X_GB = twins.numbers.coordinates.poses(episodes.state.q)
-            motion = BoltMotion(X_GB.p, v, episodes.steps * self.period)
-        conditions = twins.conditions(motion)
+        X_GB = twins.numbers.coordinates.poses(episodes.state.q)
+        plant = twins.plant(BoltMotion(X_GB.p, v, episodes.steps * self.period))
         rate = (goal - episodes.goal) / self.period
         steps = round(self.period / self.h)
-        samples = self._period(episodes, rate, twins, conditions, steps)
+        samples = self._period(episodes, rate, twins, plant, steps)
         episodes.state, episodes.goal = samples.state, goal
         episodes.reading, episodes.sensor_memory = samples.reading, samples.memory
         return samples.is_solved
@@ -156,7 +158,7 @@ class TwinBatch:
         episodes = Episodes(
             numbers=own,
             effects=array_like(np.reshape(rows, (count, -1)), like),
-            state=TwinState(zeros(12), zeros(6), zeros(6), zeros(6)),
+            state=PlantState(zeros(12), zeros(6), zeros(6), zeros(6)),
             goal=zeros(6),
             commanded=Pose(zeros(3, 3) + array_like(np.eye(3), like), zeros(3)),
             offset=zeros(6),
@@ -174,25 +176,29 @@ class TwinBatch:
         episodes: Episodes,
         rate: Array,
         twins: Twins,
-        conditions: ImpactConditions,
+        plant: Plant,
         steps: int,
     ) -> _Samples:
-        """Returns what becomes of the episodes in some steps of the plant."""
-        arm, body, sensor = twins.numbers.arm, twins.numbers.body, twins.effects.sensor
-        state, memory, is_solved = episodes.state, episodes.sensor_memory, True
+        """Returns what becomes of the episodes in some steps of the plant.
+
+        In one go, unless the sensor's memory takes a sample in between.
+        """
+        sensor, state = twins.effects.sensor, episodes.state
+        memory, is_solved = episodes.sensor_memory, True
         is_first = steps == 1  # of an episode, before which nothing has moved
-        interval = 0.0 if is_first else self.h * self._per_sample
-        begin = episodes.steps * self.period
-        for number in range(1, steps + 1):
-            encoders, time = state.arm, begin + (0.0 if is_first else number * self.h)
-            step = plant_step(state, rate, arm, body, conditions)
-            state, is_solved = step.state, is_solved & step.is_solved
-            is_sample = is_first or number % self._per_sample == 0
-            if memory.shape[1] and is_sample:
-                sensing = twins.sensing(encoders, time)
-                load = twins.load_S(encoders, step)
-                _, memory = sensed_sample(load, sensor, sensing, memory, interval)
-        sensing = twins.sensing(state.arm, time)
+        begin, done = episodes.steps * self.period, 0
+        h = 0.0 if is_first else self.h
+        while done < steps:
+            size = min(self._per_sample, steps - done) if memory.shape[1] else steps
+            step = plant.advance(state, rate, size)
+            state, is_solved, done = step.state, is_solved & step.is_solved, done + size
+            if memory.shape[1] and (is_first or done % self._per_sample == 0):
+                sensing = twins.sensing(step.arm_before, begin + done * h)
+                load = twins.load_S(step.arm_before, step)
+                _, memory = sensed_sample(
+                    load, sensor, sensing, memory, h * self._per_sample
+                )
+        sensing = twins.sensing(state.arm, begin + steps * h)
         load = twins.load_S(state.arm, step)
         reading, _ = sensed_sample(load, sensor, sensing, memory, 0.0)
         return _Samples(state, reading, memory, is_solved)

@@ -11,7 +11,7 @@ class ImpactLaw:
     """F = max(0, k p^e + step(p, 0, 0, d, c) dp/dt) for p > 0, else 0 (thesis, 4.3).
 
     `step` is Adams' cubic, c x^2 (3 - 2 x) with x = p / d up to 1. Adams counts in mm,
-    and so do the parameters. Computed by `contact.normal_force`. A
+    and so do the parameters. Computed by `equations.normal_force`. A
     parameter is a number, or an array (n,) with one for each of n states.
 
     Attributes:

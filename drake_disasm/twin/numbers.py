@@ -28,9 +28,11 @@ from drake_disasm.mdp import TaskGeometry, action_bounds
 from drake_disasm.scenario import Scenario, TaskConfig
 from drake_disasm.systems.imprecision import Imprecise
 from drake_disasm.systems.observation import Mounting
-from drake_disasm.twin import ImpactConditions, ImpactLaw, LockShape, Surroundings
 from drake_disasm.twin.arm_step import ArmStep
-from drake_disasm.twin.motion import Body
+from drake_disasm.twin.conditions import ImpactConditions, Surroundings
+from drake_disasm.twin.law import ImpactLaw
+from drake_disasm.twin.plant import Body
+from drake_disasm.twin.shape import LockShape
 
 _GRAVITY_W = np.array([0.0, 0.0, -9.81])
 _JOINTS = [3, 4, 5, *(axis - 3 for axis in AXIS_ORDER[3:])]  # of Drake's [w; v]

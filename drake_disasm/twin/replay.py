@@ -7,6 +7,7 @@ takes a fraction of the diagram's time (docs/results/identification.md has the f
 """
 
 import dataclasses
+import itertools
 from collections.abc import Sequence
 from typing import Self
 
@@ -16,14 +17,13 @@ from drake_disasm.common.rotations import rotation_vectors
 from drake_disasm.devices.sensor_chain import sensed, sensed_at_zeroing
 from drake_disasm.scenario import Scenario, validate
 from drake_disasm.twin.episodes import Episodes, TwinBatch
-from drake_disasm.twin.motion import SETTLING_TIME, PlantStep, TwinState, plant_step
 from drake_disasm.twin.numbers import TwinNumbers
-from drake_disasm.twin.stacking import mapped, rows_of
+from drake_disasm.twin.plant import PlantState, PlantStep
+from drake_disasm.twin.stacking import rows_of
 from drake_disasm.twin.steps import Ends, Steps, bolt_motion, noise_free
-from drake_disasm.twin.twins import Twins, at_A
+from drake_disasm.twin.twins import Twins
 
 _COARSE = 0.01  # s: with 20 ms, steps under friction ended twice as far off
-_REST = 1e-6  # m/s, rad/s: in half a second less than the sensor can tell
 
 
 class ImpactReplay:
@@ -122,18 +122,9 @@ class _EvenReplay:
         Where they come to rest does not depend on the steps' length.
         """
         batch = self._batches[h]
-        twins, still = batch.twins(slice(None)), np.zeros((batch.count, 6))
-        arm, body = twins.numbers.arm, twins.numbers.body
-        conditions = twins.conditions(at_A(still))
-        step = plant_step(batch.at_rest.state, still, arm, body, conditions)
-        moves = np.ones(batch.count, bool)
-        for _ in range(round(SETTLING_TIME / h) - 1):
-            following = plant_step(step.state, still, arm, body, conditions)
-            v, change = following.state.v, following.state.v - step.state.v
-            step = _chosen(moves, following, step)
-            moves &= np.abs(np.hstack([v, change])).max(axis=1) >= _REST
-            if not moves.any():
-                break
+        twins = batch.twins(slice(None))
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            step = twins.plant_at_A.settled(batch.at_rest.state)
         reading = sensed_at_zeroing(
             twins.load_S(step.state.arm, step),
             twins.effects.sensor,
@@ -152,13 +143,12 @@ class _EvenReplay:
         motion = bolt_motion(
             numbers.coordinates, p_BoTo_B, q_bolt, steps.qd_rate, begin
         )
-        conditions = {h: twins[h].conditions(motion) for h in set(self._time_steps)}
+        plants = {h: each.plant(motion) for h, each in twins.items()}
         arm = np.hstack([steps.q, steps.v])
-        state = TwinState(arm, q_bolt, steps.v + steps.give_rate, steps.qd)
+        state = PlantState(arm, q_bolt, steps.v + steps.give_rate, steps.qd)
         is_solved = np.ones(len(which), bool)
-        for h in self._time_steps:
-            arm_step, body = twins[h].numbers.arm, numbers.body
-            step = plant_step(state, steps.qd_rate, arm_step, body, conditions[h])
+        for h, same in itertools.groupby(self._time_steps):
+            step = plants[h].advance(state, steps.qd_rate, len(list(same)))
             state, is_solved = step.state, is_solved & step.is_solved
         found = _observed(twins[h], step, end, self._offset[which])
         give = state.q - state.arm[:, :6]
@@ -212,16 +202,6 @@ def _observed(
     reading = sensed(load, twins.effects.sensor, sensing)
     wrench = twins.processing.wrench(X_GB.R, reading, offset)
     return np.hstack([X_GB.p, rotation_vectors(X_GB.R), wrench])
-
-
-def _chosen(which: np.ndarray, step: PlantStep, other: PlantStep) -> PlantStep:
-    """Returns rows of one step where a mask (n,) is true, of another elsewhere."""
-
-    def chosen(new: np.ndarray, old: np.ndarray) -> np.ndarray:
-        """Returns rows of one array or another."""
-        return np.where(which.reshape(-1, *[1] * (new.ndim - 1)), new, old)
-
-    return mapped(chosen, step, other)
 
 
 def _with_time_step(scenario: Scenario, h: float) -> Scenario:

@@ -1,15 +1,15 @@
 """What many twins are made of, and what acts in them: equations without a state."""
 
 import dataclasses
+import functools
 
 from drake_disasm.common.arrays import Array, array_like, namespace
 from drake_disasm.common.spatial import shifted_wrench
 from drake_disasm.effects import BoltMotion, Environment, Sensing
 from drake_disasm.systems.observation import Processing
-from drake_disasm.twin import ImpactConditions, Surroundings
-from drake_disasm.twin.motion import PlantStep
+from drake_disasm.twin.conditions import Surroundings
 from drake_disasm.twin.numbers import TwinNumbers
-from drake_disasm.twin.own_effects import with_effect
+from drake_disasm.twin.plant import Plant, PlantStep
 from drake_disasm.twin.slots import BatchEffects
 
 
@@ -21,28 +21,46 @@ class Twins:
         numbers: of the twins.
         effects: theirs.
         is_exact: whether readings are processed exactly, or as the thesis does.
+        at_A: the bolts at rest at A, (n, 3) each.
+        threads: of the host, which share the twins.
     """
 
     numbers: TwinNumbers
     effects: BatchEffects
     is_exact: bool
+    at_A: BoltMotion
+    threads: int = 1
 
     @property
     def processing(self) -> Processing:
         """Of the readings."""
         return Processing(self.numbers.mounting, self.is_exact)
 
-    def conditions(self, motion: BoltMotion) -> ImpactConditions:
-        """Returns the contact's conditions.
+    @functools.cached_property
+    def plant_at_A(self) -> Plant:
+        """The plants of bolts at A; everywhere, unless effects depend on the motion."""
+        return self._plant(self.at_A)
+
+    def plant(self, motion: BoltMotion) -> Plant:
+        """Returns the plants, in the environments that effects make.
 
         Args:
             motion: (n, 3) each, of the bolts, on which effects may depend.
         """
+        return self._plant(motion) if self.effects.is_local else self.plant_at_A
+
+    def _plant(self, motion: BoltMotion) -> Plant:
+        environment = self.environment(motion)
+        around = _around(environment, motion.p)
+        conditions = self.numbers.conditions(environment, around)
+        return Plant(self.numbers.arm, self.numbers.body, conditions, self.threads)
+
+    def environment(self, motion: BoltMotion) -> Environment:
+        """Returns the bolts' environments; see `plant`."""
         environment = self.numbers.nominal
         for effect in self.effects.environment:
-            if not effect.is_null:
-                environment = with_effect(effect, environment, motion)
-        return self.numbers.conditions(environment, _around(environment, motion.p))
+            environment = effect.apply(environment, motion)
+        return environment
 
     def load_S(self, arm: Array, step: PlantStep) -> Array:
         """Returns the load on the sensor (n, 6), [f; tau] at So in S.

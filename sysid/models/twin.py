@@ -25,7 +25,7 @@ from drake_disasm.logs import Log
 from drake_disasm.logs.schema import WRENCH
 from drake_disasm.scenario import Scenario
 from drake_disasm.scenario.names import find_field
-from drake_disasm.twin import NO_BALANCE
+from drake_disasm.twin.contact_step import NO_BALANCE
 from drake_disasm.twin.steps import Steps
 from sysid.models.base import Array, PredictionError, even_chunks
 from sysid.models.commands import bolt_path, twin_coordinates

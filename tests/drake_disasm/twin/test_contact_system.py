@@ -11,14 +11,11 @@ from drake_disasm.scenario import LockConfig, load_scenario
 from drake_disasm.task.diagram_replay import TwinReplay
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.simulation import TaskSimulation
-from drake_disasm.twin import (
-    ImpactConditions,
-    ImpactLaw,
-    LockShape,
-    Surroundings,
-)
-from drake_disasm.twin.contact import normal_force
+from drake_disasm.twin.conditions import ImpactConditions, Surroundings
 from drake_disasm.twin.contact_system import ImpactContact
+from drake_disasm.twin.equations import normal_force
+from drake_disasm.twin.law import ImpactLaw
+from drake_disasm.twin.shape import LockShape
 from tests.drake_disasm.conftest import QUIET, STIFF
 
 NOISELESS = ["contact.model=impact", QUIET]

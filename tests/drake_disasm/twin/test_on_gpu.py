@@ -1,4 +1,4 @@
-"""The contact's equations on a GPU give what they give on the host."""
+"""The plant's steps on a GPU are those on the host."""
 
 import os
 import subprocess
@@ -10,49 +10,72 @@ import pytest
 import torch
 
 from drake_disasm.common.arrays import to_numpy
-from drake_disasm.twin import ImpactStep
-from tests.drake_disasm.twin.test_step import TURNED, H, states
+from drake_disasm.scenario import load_scenario
+from drake_disasm.twin.batch import BatchedTwin, with_impact
+from drake_disasm.twin.plant import Plant, PlantState
 
 #: The kernel in Numba's emulation of a GPU, thread after thread.
 EMULATED = """
 import sys
 import numpy as np
-from drake_disasm.twin import turning
 from drake_disasm.twin.on_gpu import kernel
-from tests.drake_disasm.twin.test_step import COUNT, H, TURNED, states
 
-E, R_GnB = turning(states()[0][:, 3:])
-rows = (*states(), E, np.linalg.inv(E), R_GnB)
-after, wrench = np.full((2, COUNT, 6), np.nan)
-is_solved = np.zeros(COUNT, bool)
-kernel[2, 32](TURNED.table, H, rows, after, wrench, is_solved)
-np.savez(sys.argv[1], after=after, wrench=wrench, is_solved=is_solved)
+given = np.load(sys.argv[1])
+state, count = given["state"], len(given["state"])
+newest, is_solved = np.empty_like(state), np.zeros(count, bool)
+tables = tuple(given[name] for name in ("conditions", "body", "arm"))
+kernel[2, 32](tables, float(given["h"]), 3, given["rate"], state, newest, is_solved)
+np.savez(sys.argv[1], state=state, newest=newest, is_solved=is_solved)
 """
+COUNT, STEPS = 40, 3
 
 
-def test_each_thread_does_what_the_host_does(tmp_path):
+def pushed() -> tuple[Plant, PlantState, np.ndarray]:
+    """Returns plants of bolts in a turned groove, their states, and their commands."""
+    twin = BatchedTwin(with_impact(load_scenario("removal_turned")), COUNT, "numpy")
+    twin.reset(range(COUNT))
+    random = np.random.default_rng(0)
+    for _ in range(3):
+        twin.step(
+            random.uniform(-1, 1, (COUNT, 6)) * [3e-3, 1e-3, 1e-3, 0.0, 0.01, 0.0]
+        )
+    rate = random.uniform(-1, 1, (COUNT, 6)) * [0.03, 0.01, 0.01, 0.0, 0.1, 0.0]
+    return twin.plant_at_A, twin.episodes.state, rate
+
+
+def test_each_thread_does_what_the_host_does(tmp_path: Path) -> None:
+    plant, state, rate = pushed()
+    file, joined = tmp_path / "arrays.npz", (state.arm, state.q, state.v, state.qd)
+    np.savez(
+        file,
+        conditions=plant.conditions.table,
+        body=plant.body.table,
+        arm=plant.arm.table,
+        h=plant.arm.h,
+        state=np.hstack(joined),
+        rate=rate,
+    )
     emulation = {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
     subprocess.run(
-        [sys.executable, "-c", EMULATED, tmp_path / "found.npz"],
+        [sys.executable, "-c", EMULATED, file],
         cwd=Path(__file__).parents[3],
         env={**os.environ, **emulation},
         check=True,
     )
-    found, expected = (
-        np.load(tmp_path / "found.npz"),
-        ImpactStep.of(TURNED, H, *states()),
-    )
-    assert expected.wrench.any() and found["is_solved"].all()
-    np.testing.assert_allclose(found["after"], expected.v, atol=1e-14)
-    np.testing.assert_allclose(found["wrench"], expected.wrench, atol=1e-10)
+    found, expected = np.load(file), plant.advance(state, rate, STEPS)
+    assert np.abs(expected.outside).max() > 0.1 and found["is_solved"].all()
+    np.testing.assert_allclose(found["state"][:, 12:18], expected.state.q, atol=1e-13)
+    np.testing.assert_allclose(found["newest"][:, 24:], expected.outside, atol=1e-8)
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no GPU")
-def test_a_gpu_finds_what_the_host_finds():
-    host = ImpactStep.of(TURNED, H, *states())
-    there = (torch.asarray(each, device="cuda") for each in states())
-    gpu = ImpactStep.of(TURNED, H, *there)
-    assert gpu.v.device.type == "cuda"
-    np.testing.assert_allclose(to_numpy(gpu.v), host.v, atol=1e-12)
-    np.testing.assert_allclose(to_numpy(gpu.wrench), host.wrench, atol=1e-8)
+def test_a_gpu_does_what_the_host_does() -> None:
+    plant, state, rate = pushed()
+    host = plant.advance(state, rate, STEPS)
+    parts = (state.arm, state.q, state.v, state.qd)
+    there = PlantState(*(torch.asarray(part, device="cuda") for part in parts))
+    gpu = plant.advance(there, torch.asarray(rate, device="cuda"), STEPS)
+    assert gpu.state.q.device.type == "cuda"
+    np.testing.assert_allclose(to_numpy(gpu.state.q), host.state.q, atol=1e-12)
+    np.testing.assert_allclose(to_numpy(gpu.outside), host.outside, atol=1e-6)
     np.testing.assert_array_equal(to_numpy(gpu.is_solved), host.is_solved)

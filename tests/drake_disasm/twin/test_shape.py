@@ -4,17 +4,32 @@ import numpy as np
 import pytest
 
 from drake_disasm.scenario import LockConfig
-from drake_disasm.twin import LockShape
-from drake_disasm.twin.contact import NORMALS, find_places
+from drake_disasm.twin.equations import (
+    ARM,
+    DEPTH,
+    LOCK,
+    NORMALS,
+    P_GBO,
+    PLACES,
+    R_GB,
+    SIZE,
+    find_places,
+)
+from drake_disasm.twin.shape import LockShape
 
 MM = 1e-3
 
 
-def places(R_GB, p_GBo):
-    depth, arm = np.empty(len(NORMALS)), np.empty(NORMALS.shape)
-    lock = np.array(LockShape.of(LockConfig()).row)
-    find_places(np.ascontiguousarray(R_GB), np.array(p_GBo), lock, depth, arm)
-    return depth, arm
+def places(R, p):
+    w = np.full(SIZE, np.nan)
+    for place, numbers in (
+        (LOCK, LockShape.of(LockConfig()).row),
+        (R_GB, R),
+        (P_GBO, p),
+    ):
+        w[place : place + np.size(numbers)] = np.ravel(numbers)
+    find_places(w)
+    return w[DEPTH : DEPTH + PLACES], w[ARM : ARM + 3 * PLACES].reshape(-1, 3)
 
 
 def deepest(position):

@@ -1,0 +1,875 @@
+"""The twin's equations for one row after the other, compiled.
+
+A row is one twin: its constants, and the state of its plant. All that is known of it,
+and all that is computed, stands side by side in one array, the workspace `w`, at the
+places that the capital letters below name; a function that is given a place reads or
+sets what begins there. So the same functions compile for a GPU (`on_gpu`), whose
+threads can't allocate arrays, and none copies an array or a part of one.
+
+Wrenches are [f; tau]. Of the contact: twists are [velocity of To; angular velocity] in
+G, and wrenches at To in G, (6,) each.
+"""
+
+import itertools
+import math
+
+import numpy as np
+
+from drake_disasm.common.compiled import compiled
+
+_MM = 1000.0
+_LEAST = 1e-12  # mm: a power of zero has no slope
+_STICTION = 1e-4  # m/s: creep at which friction is three quarters
+_ITERATIONS = 60
+_SHORTEST = 11  # times that a step is halved before it is given up
+_TOLERANCE = 1e-8  # m/s, of the velocities after the step
+_ROUNDS = 64  # of a step by `_by_rounds`
+#: How Newton's method ends: solved; where no step leads to less error; not done.
+_SOLVED, _STUCK, _UNFINISHED = 0, 1, 2
+
+_RIM_POINTS = 8
+_ANGLES = 2.0 * np.pi * np.arange(_RIM_POINTS) / _RIM_POINTS
+_RIM = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+
+
+def _normals() -> np.ndarray:
+    """Returns the normals (k, 3) of all places, out of the groove."""
+    across = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
+    stops = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    up = np.array([[0.0, 1.0, 0.0]])
+    planes = np.repeat(np.concatenate([-up, up]), _RIM_POINTS, axis=0)
+    return np.concatenate([across, across, across, stops, planes])
+
+
+#: (k, 3) of all places, out of the groove, towards the bolt, in G: along its axes.
+NORMALS = _normals()
+PLACES = len(NORMALS)
+_STOPS, _PLANES = 6, 8  # first places at the stops, and at lips and floor
+# Along which axis, and to which side.
+_AXES = np.argmax(np.abs(NORMALS), axis=1)
+_SIDES = np.sum(NORMALS, axis=1)
+
+
+def _begins(*sizes: int) -> tuple[int, ...]:
+    """Returns where quantities begin that stand side by side, and where they end."""
+    return tuple(itertools.accumulate(sizes, initial=0))
+
+
+#: A row of `ImpactConditions.table`: the law, the lock, the surroundings ...
+(LAW, LOCK, FRICTION, _R_GNG, _P_GNG, _F_GN, _M0, _K, _D, _P_BOTO, _BODY) = _begins(
+    *(4, 12, 1, 9, 3, 3, 36, 6, 6, 3)
+)
+#: ... one of `Body.table`: mass, p_ToBcm_B, inertia about To in B, weight in Gn ...
+(_MASS, _P_TOBCM, _I_TO, _WEIGHT, _STATE) = (
+    _BODY + place for place in _begins(1, 3, 9, 3)
+)
+#: ... the state: of the arm, of the bolt (q, v), of the command (qd and its rate) ...
+(_X, _Q, _V, _QD, _RATE, _NEWEST) = (
+    _STATE + place for place in _begins(12, 6, 6, 6, 6)
+)
+#: ... what the newest step was: before it, q'', wrench of the surroundings on the bolt
+#: at Bo in Gn; and what the arm would do without springs ...
+(_X_BEFORE, _Q_BEFORE, _VDOT, _WRENCH, _AHEAD, _MATRICES) = (
+    _NEWEST + place for place in _begins(12, 6, 6, 6, 12)
+)
+#: ... w = E [yaw', pitch', roll'], rotations, the inertia about To in Gn; twist = T v;
+#: A and b of the step without contact; the slopes of what is out of balance; M ...
+(_E, _E_BACK, _R_GNB, R_GB, _I, _T, _T_BACK, A, SLOPE, _TRIAL_SLOPE, _M, _SIX) = (
+    _MATRICES + place for place in _begins(*[9] * 5, *[36] * 6)
+)
+#: ... (6,) of Newton's method; the terms that act on the joints besides M ...
+(B, _BEFORE, TWIST, W, REST, _STEP, _THERE, _TRIAL_W, _TRIAL, _LAST_W) = (
+    _SIX + place for place in range(0, 60, 6)
+)
+_ACTING, _THREE = _SIX + 60, _SIX + 66
+#: ... (3,): p_ToBo in Gn, p_GBo, what is passed on within a function, a force and its
+#: slope (3, 6) by the twist ...
+(_P_TOBO, P_GBO, _ONE, _OTHER, _OMEGA, _C, _TURNED, _FORCE, _BY_TWIST, _PLACES) = (
+    _THREE + place for place in _begins(*[3] * 8, 18)
+)
+#: ... of the places (k,): how deep they are, how fast they go in, which normal force
+#: lagged friction is of; (k, 3) arms from To in G.
+(DEPTH, _INWARD, PRESSED, ARM, SIZE) = (
+    _PLACES + place for place in _begins(PLACES, PLACES, PLACES, 3 * PLACES)
+)
+
+
+@compiled
+def advance_rows(
+    constants: tuple[np.ndarray, ...],
+    h: float,
+    steps: int,
+    rate: np.ndarray,
+    state: np.ndarray,
+    newest: np.ndarray,
+    is_solved: np.ndarray,
+    first: int,
+    end: int,
+) -> None:
+    """Advances some plants by some steps, one plant after the other.
+
+    Args:
+        constants: of m twins, 1 for all or n: `ImpactConditions.table` (m, 83),
+            `Body.table` (m, 16), F, C, P of `ArmStep` (m, 3, 12, 12).
+        h: the step [s].
+        steps: how many.
+        rate: (n, 6) of the commanded coordinates.
+        state: (n, 30) of all plants: arm, q, v, qd; is changed.
+        newest: (n, 30) is set to what the newest step was: arm and q before it, q'',
+            wrench of the surroundings on the bolt at Bo in Gn.
+        is_solved: (n,) is set: whether contact found a balance in all steps.
+        first, end: numbers of the plants.
+    """
+    w = np.empty(SIZE)
+    for i in range(first, end):
+        is_solved[i] = advance_row(constants, h, steps, rate, state, newest, i, w)
+
+
+@compiled
+def advance_row(
+    constants: tuple[np.ndarray, ...],
+    h: float,
+    steps: int,
+    rate: np.ndarray,
+    state: np.ndarray,
+    newest: np.ndarray,
+    i: int,
+    w: np.ndarray,
+) -> bool:
+    """Advances one plant, by its number i; see `advance_rows`."""
+    conditions, bodies, arms = constants
+    _load(conditions, bodies, i, w)
+    for j in range(_RATE - _STATE):
+        w[_STATE + j] = state[i, j]
+    for j in range(6):
+        w[_RATE + j] = rate[i, j]
+    arm = i if len(arms) > 1 else 0
+    is_solved = True
+    for _ in range(steps):
+        if not _plant_step(h, arms, arm, w):
+            is_solved = False
+    for j in range(_RATE - _STATE):
+        state[i, j] = w[_STATE + j]
+    for j in range(_AHEAD - _NEWEST):
+        newest[i, j] = w[_NEWEST + j]
+    return is_solved
+
+
+@compiled
+def _load(conditions: np.ndarray, bodies: np.ndarray, i: int, w: np.ndarray) -> None:
+    """Takes over the constants of a plant, by its number."""
+    row = i if len(conditions) > 1 else 0
+    for j in range(_BODY):
+        w[j] = conditions[row, j]
+    row = i if len(bodies) > 1 else 0
+    for j in range(_STATE - _BODY):
+        w[_BODY + j] = bodies[row, j]
+
+
+@compiled
+def _plant_step(h: float, arms: np.ndarray, arm: int, w: np.ndarray) -> bool:
+    """Advances the plant by a step; returns whether contact found a balance.
+
+    Contact foresees the step with the inertia at the joints' zero; the plant has all.
+
+    Args:
+        h: the step [s].
+        arms: (m, 3, 12, 12).
+        arm: which of them.
+        w: workspace.
+    """
+    for j in range(6):
+        w[_QD + j] += h * w[_RATE + j]
+        w[_Q_BEFORE + j] = w[_Q + j]
+    _set_ahead(arms, arm, w)
+    _set_turning(w)
+    is_solved = _set_contact(h, w)
+    for j in range(3):
+        w[_WRENCH + j] += w[_F_GN + j]
+    _set_dynamics(w)
+    _set_joint_forces(w)
+    for j in range(6):
+        K, D = w[_K + j], w[_D + j]
+        pull = K * (w[_AHEAD + j] - w[_Q + j]) + D * w[_AHEAD + 6 + j]
+        b = h * (pull + w[_ACTING + j] + w[REST + j])
+        for k in range(6):
+            b += w[_M + 6 * j + k] * w[_V + k]
+            w[A + 6 * j + k] = w[_M + 6 * j + k]
+        w[A + 7 * j] += h * D + h * h * K
+        w[B + j] = b
+    solve_in_place(A, B, w)
+    for j in range(6):
+        w[_VDOT + j] = (w[B + j] - w[_V + j]) / h
+        w[_V + j] = w[B + j]
+        w[_Q + j] += h * w[B + j]
+    _set_arm(arms, arm, w)
+    return is_solved
+
+
+@compiled
+def _set_ahead(arms: np.ndarray, arm: int, w: np.ndarray) -> None:
+    """Sets x' = F x + C u, where the arm would go without springs; notes x."""
+    for j in range(12):
+        w[_X_BEFORE + j] = w[_X + j]
+    for j in range(12):
+        by_state, by_command = 0.0, 0.0
+        for k in range(12):
+            by_state += arms[arm, 0, j, k] * w[_X + k]
+            by_command += arms[arm, 1, j, k] * w[_QD + k]  # qd and its rate
+        w[_AHEAD + j] = by_state + by_command
+
+
+@compiled
+def _set_arm(arms: np.ndarray, arm: int, w: np.ndarray) -> None:
+    """Sets x+ = x' + P (s+ - x') once the bolt is at s+ = [q, v]."""
+    for j in range(12):
+        moved = 0.0
+        for k in range(12):
+            moved += arms[arm, 2, j, k] * (w[_Q + k] - w[_AHEAD + k])
+        w[_X + j] = w[_AHEAD + j] + moved
+
+
+@compiled
+def _set_turning(w: np.ndarray) -> None:
+    """Sets R_GnB of yaw, pitch and roll, E of their rates, and its inverse."""
+    sy, cy = math.sin(w[_Q + 3]), math.cos(w[_Q + 3])
+    sp, cp = math.sin(w[_Q + 4]), math.cos(w[_Q + 4])
+    sr, cr = math.sin(w[_Q + 5]), math.cos(w[_Q + 5])
+    xx, yx, zx = cy * cp, sy * cp, -sp
+    w[_R_GNB], w[_R_GNB + 3], w[_R_GNB + 6] = xx, yx, zx
+    w[_R_GNB + 1], w[_R_GNB + 2] = cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
+    w[_R_GNB + 4], w[_R_GNB + 5] = sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
+    w[_R_GNB + 7], w[_R_GNB + 8] = cp * sr, cp * cr
+    w[_E], w[_E + 1], w[_E + 2] = 0.0, -sy, xx
+    w[_E + 3], w[_E + 4], w[_E + 5] = 0.0, cy, yx
+    w[_E + 6], w[_E + 7], w[_E + 8] = 1.0, 0.0, zx
+    w[_E_BACK], w[_E_BACK + 1], w[_E_BACK + 2] = cy * sp / cp, sy * sp / cp, 1.0
+    w[_E_BACK + 3], w[_E_BACK + 4], w[_E_BACK + 5] = -sy, cy, 0.0
+    w[_E_BACK + 6], w[_E_BACK + 7], w[_E_BACK + 8] = cy / cp, sy / cp, 0.0
+
+
+@compiled
+def _cross(a: int, b: int, j: int, w: np.ndarray) -> float:
+    """Returns element j of the cross product of vectors at two places."""
+    one, other = (j + 1) % 3, (j + 2) % 3
+    return float(w[a + one] * w[b + other] - w[a + other] * w[b + one])
+
+
+@compiled
+def _times(matrix: int, vector: int, j: int, w: np.ndarray) -> float:
+    """Returns element j of a matrix (3, 3) times a vector (3,)."""
+    row = matrix + 3 * j
+    total = w[row] * w[vector] + w[row + 1] * w[vector + 1]
+    return float(total + w[row + 2] * w[vector + 2])
+
+
+@compiled
+def _back(matrix: int, vector: int, j: int, w: np.ndarray) -> float:
+    """Returns element j of a transposed matrix (3, 3) times a vector (3,)."""
+    row = matrix + j
+    total = w[row] * w[vector] + w[row + 3] * w[vector + 1]
+    return float(total + w[row + 6] * w[vector + 2])
+
+
+@compiled
+def _set_dynamics(w: np.ndarray) -> None:
+    """Sets the mass matrix M of the joints, and what else acts on them.
+
+    `_ACTING` is the change of the weight with the angles, since the grip carries it as
+    it is at their zero, less the terms with products of velocities (Newton's and
+    Euler's laws at To, with the derivative of E).
+    """
+    for j in range(3):
+        w[_C + j] = _times(_R_GNB, _P_TOBCM, j, w)
+        w[_OMEGA + j] = _times(_E, _V + 3, j, w)
+    _set_inertia(w)
+    _set_mass_matrix(w)
+    _set_derivative_term(w)
+    for j in range(3):
+        w[_OTHER + j] = _cross(_OMEGA, _C, j, w)
+        w[_ONE + j] = _times(_I, _OMEGA, j, w)
+    for j in range(3):
+        a = _cross(_OMEGA, _OTHER, j, w) + _cross(_TURNED, _C, j, w)
+        w[_ACTING + j] = -w[_MASS] * a
+    for j in range(3):
+        weight = _cross(_C, _WEIGHT, j, w)
+        spun = _cross(_OMEGA, _ONE, j, w) + _times(_I, _TURNED, j, w)
+        w[_OTHER + j] = weight - spun
+    for j in range(3):
+        # At the angles' zero E turns the order of the axes around.
+        carried = _cross(_P_TOBCM, _WEIGHT, 2 - j, w)
+        w[_ACTING + 3 + j] = _back(_E, _OTHER, j, w) - carried
+
+
+@compiled
+def _set_inertia(w: np.ndarray) -> None:
+    """Sets the rotational inertia about To in Gn, R I R^T."""
+    for k in range(3):
+        for a in range(3):
+            w[_ONE + a] = _times(_I_TO, _R_GNB + 3 * k, a, w)
+        for j in range(3):
+            w[_I + 3 * j + k] = _times(_R_GNB, _ONE, j, w)
+
+
+@compiled
+def _set_mass_matrix(w: np.ndarray) -> None:
+    """Sets the joints' mass matrix, T^T S T with the spatial inertia S at To."""
+    mass = w[_MASS]
+    for k in range(3):
+        for a in range(3):
+            w[_ONE + a] = w[_E + 3 * a + k]
+        for a in range(3):
+            w[_OTHER + a] = _times(_I, _ONE, a, w)
+        for j in range(3):
+            turn = -mass * _cross(_C, _ONE, j, w)
+            w[_M + 6 * j + k] = mass if j == k else 0.0
+            w[_M + 6 * j + 3 + k] = w[_M + 6 * (3 + k) + j] = turn
+            w[_M + 6 * (3 + j) + 3 + k] = _back(_E, _OTHER, j, w)
+
+
+@compiled
+def _set_derivative_term(w: np.ndarray) -> None:
+    """Sets `_TURNED`, E' times the angles' rates."""
+    yaw, pitch, roll = w[_V + 3], w[_V + 4], w[_V + 5]
+    sine, cosine = -w[_E + 1], w[_E + 4]
+    w[_ONE], w[_ONE + 1], w[_ONE + 2] = -pitch * sine, pitch * cosine, yaw
+    for j in range(3):
+        w[_OTHER + j] = w[_E + 3 * j + 2]
+    for j in range(3):
+        w[_TURNED + j] = roll * _cross(_ONE, _OTHER, j, w)
+    w[_TURNED] -= pitch * yaw * cosine
+    w[_TURNED + 1] -= pitch * yaw * sine
+
+
+@compiled
+def _set_joint_forces(w: np.ndarray) -> None:
+    """Sets the joints' forces `REST` of the wrench on the bolt at Bo in Gn."""
+    for j in range(3):
+        w[REST + j] = w[_WRENCH + j]
+        w[_OTHER + j] = w[_WRENCH + 3 + j] + _cross(_P_TOBO, _WRENCH, j, w)
+    for j in range(3):
+        w[REST + 3 + j] = _back(_E, _OTHER, j, w)
+
+
+@compiled
+def solve_rows(
+    conditions: np.ndarray,
+    bodies: np.ndarray,
+    h: float,
+    states: tuple[np.ndarray, ...],
+    after: np.ndarray,
+    wrench: np.ndarray,
+    is_solved: np.ndarray,
+) -> None:
+    """Finds what `ImpactStep` has, of one state after the other.
+
+    Args:
+        conditions: (m, 83) of `ImpactConditions`.
+        bodies: (1, 16), which contact does not look at.
+        h: the step [s].
+        states: q, v, qd, vd (n, 6).
+        after, wrench, is_solved: (n, 6), (n, 6), (n,) are set.
+    """
+    w = np.empty(SIZE)
+    q, v, qd, vd = states
+    for i in range(len(after)):
+        _load(conditions, bodies, i, w)
+        for j in range(6):
+            w[_Q + j], w[_V + j] = q[i, j], v[i, j]
+            w[_AHEAD + j], w[_AHEAD + 6 + j] = qd[i, j], vd[i, j]
+        _set_turning(w)
+        is_solved[i] = _set_contact(h, w)
+        for j in range(6):
+            after[i, j] = 0.0
+            for k in range(6):
+                after[i, j] += w[_T_BACK + 6 * j + k] * w[TWIST + k]
+            wrench[i, j] = w[_WRENCH + j]
+
+
+@compiled
+def _set_contact(h: float, w: np.ndarray) -> bool:
+    """Sets twist, W and wrench of the contact in a step; is there a balance?"""
+    _set_places(w)
+    _set_without_contact(h, w)
+    _set_maps(w)
+    _to_twists(w)
+    for j in range(6):
+        w[_BEFORE + j] = 0.0
+        for k in range(6):
+            w[_BEFORE + j] += w[_T + 6 * j + k] * w[_V + k]
+    is_solved = _solve(h, w)
+    for j in range(3):
+        w[_WRENCH + j] = _times(_R_GNG, W, j, w)
+        w[_WRENCH + 3 + j] = _times(_R_GNG, W + 3, j, w)
+    for j in range(3):
+        w[_WRENCH + 3 + j] -= _cross(_P_TOBO, _WRENCH, j, w)
+    return is_solved
+
+
+@compiled
+def _set_places(w: np.ndarray) -> None:
+    """Sets R_GB, p_ToBo in Gn, p_GBo in G, and the places, from To in G."""
+    for j in range(3):
+        w[_P_TOBO + j] = -_times(_R_GNB, _P_BOTO, j, w)
+        p_GnTo = w[_Q + j] + w[_P_BOTO + j]
+        w[_ONE + j] = p_GnTo + w[_P_TOBO + j] - w[_P_GNG + j]
+    for j in range(3):
+        w[P_GBO + j] = _back(_R_GNG, _ONE, j, w)
+        w[_OTHER + j] = _back(_R_GNG, _P_TOBO, j, w)
+        for k in range(3):
+            total = 0.0
+            for a in range(3):
+                total += w[_R_GNG + 3 * a + j] * w[_R_GNB + 3 * a + k]
+            w[R_GB + 3 * j + k] = total
+    find_places(w)
+    x, y, z = w[_OTHER], w[_OTHER + 1], w[_OTHER + 2]
+    for k in range(PLACES):
+        w[ARM + 3 * k] += x
+        w[ARM + 3 * k + 1] += y
+        w[ARM + 3 * k + 2] += z
+
+
+@compiled
+def _set_without_contact(h: float, w: np.ndarray) -> None:
+    """Sets A and b of the step without contact, still of joints: A v+ = b."""
+    for j in range(3):
+        w[_OTHER + j] = _cross(_P_TOBO, _F_GN, j, w)
+    for j in range(6):
+        K, D = w[_K + j], w[_D + j]
+        pull = K * (w[_AHEAD + j] - w[_Q + j]) + D * w[_AHEAD + 6 + j]
+        pull += w[_F_GN + j] if j < 3 else _back(_E, _OTHER, j - 3, w)
+        b = h * pull
+        for k in range(6):
+            w[A + 6 * j + k] = w[_M0 + 6 * j + k]
+            b += w[_M0 + 6 * j + k] * w[_V + k]
+        w[A + 7 * j] += h * D + h * h * K
+        w[B + j] = b
+
+
+@compiled
+def _set_maps(w: np.ndarray) -> None:
+    """Sets T and its inverse."""
+    for j in range(36):
+        w[_T + j] = w[_T_BACK + j] = 0.0
+    for i in range(3):
+        for j in range(3):
+            w[_T + 6 * i + j] = w[_R_GNG + 3 * j + i]
+            w[_T_BACK + 6 * i + j] = w[_R_GNG + 3 * i + j]
+            there, back = 0.0, 0.0
+            for k in range(3):
+                there += w[_R_GNG + 3 * k + i] * w[_E + 3 * k + j]
+                back += w[_E_BACK + 3 * i + k] * w[_R_GNG + 3 * k + j]
+            w[_T + 6 * (3 + i) + 3 + j] = there
+            w[_T_BACK + 6 * (3 + i) + 3 + j] = back
+
+
+@compiled
+def _to_twists(w: np.ndarray) -> None:
+    """Makes A, b of joints those of twists, T^-T A T^-1 and T^-T b."""
+    product, sums = SLOPE, REST
+    for i in range(6):
+        total = 0.0
+        for j in range(6):
+            total += w[_T_BACK + 6 * j + i] * w[B + j]
+        w[sums + i] = total
+        for j in range(6):
+            total = 0.0
+            for k in range(6):
+                total += w[A + 6 * i + k] * w[_T_BACK + 6 * k + j]
+            w[product + 6 * i + j] = total
+    for i in range(6):
+        w[B + i] = w[sums + i]
+        for j in range(6):
+            total = 0.0
+            for k in range(6):
+                total += w[_T_BACK + 6 * k + i] * w[product + 6 * k + j]
+            w[A + 6 * i + j] = total
+
+
+@compiled
+def _solve(h: float, w: np.ndarray) -> bool:
+    """Sets twist and wrench W of the balance; is there one?"""
+    _copy(A, SLOPE, 36, w)
+    _copy(B, TWIST, 6, w)
+    solve_in_place(SLOPE, TWIST, w)
+    alone = _error(h, TWIST, w)
+    if not math.isfinite(alone) or squared(W, w) == 0.0:
+        return math.isfinite(alone)
+    # A bolt that leans on a wall mostly goes on doing so.
+    leans = _error(h, _BEFORE, w) < alone and squared(W, w) > 0.0
+    ended = _UNFINISHED
+    for start in range(0 if leans else 1, 2):
+        twist = _BEFORE if start == 0 else TWIST
+        ended = newton(h, False, twist, w)
+        if ended == _SOLVED:
+            _copy(twist, TWIST, 6, w)
+            return True
+    return _by_rounds(h, w) or ended == _STUCK
+
+
+@compiled
+def _error(h: float, twist: int, w: np.ndarray) -> float:
+    """Returns how much is out of balance at a twist, squared; sets W."""
+    balance(h, False, twist, W, REST, SLOPE, w)
+    return squared(REST, w)
+
+
+@compiled
+def _by_rounds(h: float, w: np.ndarray) -> bool:
+    """Sets twist and wrench W where Newton's method finds no balance; is there one?
+
+    It stops short where friction is large: the normal forces then depend on the
+    friction that depends on them. Friction of given normal forces leaves a convex
+    problem with one solution, where the normal force falls with the way out. It has
+    new normal forces, which in the mean with the given ones are those of the next
+    round. Friction of given forces can only brake, so they are bounded, and some of
+    them are their own (Brouwer's fixed point theorem): a balance. Without one after
+    the last round, friction is of the forces of the round before.
+
+    Without a solution for given forces, twist and wrench are left as they are.
+    """
+    last, law = _BEFORE, (w[LAW], w[LAW + 1], w[LAW + 2], w[LAW + 3])
+    _copy(TWIST, last, 6, w)
+    _copy(W, _LAST_W, 6, w)
+    is_solved = False
+    for k in range(PLACES):
+        w[PRESSED + k] = 0.0
+    for n in range(_ROUNDS):
+        if newton(h, True, TWIST, w) != _SOLVED:
+            break
+        _copy(TWIST, last, 6, w)
+        _copy(W, _LAST_W, 6, w)
+        is_tried = n & (n + 1) == 0  # as often again as before: most tries are in vain
+        if is_tried and newton(h, False, TWIST, w) == _SOLVED:
+            return True
+        _copy(last, TWIST, 6, w)
+        _set_inward(last, w)
+        for k in range(PLACES):
+            rate = w[_INWARD + k]
+            F, _, _ = normal_force(w[DEPTH + k] + h * rate, rate, law)
+            w[PRESSED + k] = 0.5 * (w[PRESSED + k] + F) if is_solved else F
+        is_solved = True
+    _copy(last, TWIST, 6, w)
+    _copy(_LAST_W, W, 6, w)
+    return is_solved
+
+
+@compiled
+def balance(
+    h: float,
+    is_lagged: bool,
+    twist: int,
+    wrench: int,
+    rest: int,
+    slope: int,
+    w: np.ndarray,
+) -> None:
+    """Finds what is out of balance at a twist after the step: A twist - b - h W.
+
+    Args:
+        h: the step [s].
+        is_lagged: whether friction is of the forces at `PRESSED`, not of those at the
+            twist.
+        twist: place of (6,).
+        wrench: of (6,) that is set, the contact's on the bolt, W.
+        rest: of (6,) that is set.
+        slope: of (6, 6) that is set, the rest's by the twist.
+        w: workspace, with A, b, and the places before the step.
+    """
+    law, mu = (w[LAW], w[LAW + 1], w[LAW + 2], w[LAW + 3]), w[FRICTION]
+    for i in range(6):
+        w[wrench + i] = 0.0
+    for i in range(36):
+        w[slope + i] = 0.0
+    _set_inward(twist, w)
+    for k in range(PLACES):
+        rate = w[_INWARD + k]
+        after = w[DEPTH + k] + h * rate
+        if after <= 0.0 and not (is_lagged and w[PRESSED + k] > 0.0):
+            continue
+        F, by_depth, by_rate = normal_force(after, rate, law)
+        dF = h * by_depth + by_rate
+        limit, limit_by_rate = mu * F, mu * dF
+        if is_lagged:
+            limit, limit_by_rate = mu * w[PRESSED + k], 0.0
+        _push(k, F, dF, w)
+        _rub(k, twist, limit, limit_by_rate, w)
+        _add_wrench(k, wrench, slope, w)
+    for i in range(6):
+        total = -w[B + i] - h * w[wrench + i]
+        for j in range(6):
+            total += w[A + 6 * i + j] * w[twist + j]
+            at = slope + 6 * i + j
+            w[at] = w[A + 6 * i + j] - h * w[at]
+        w[rest + i] = total
+
+
+@compiled
+def _set_inward(twist: int, w: np.ndarray) -> None:
+    """Sets at what rate each place goes into the groove [m/s]; see `NORMALS`."""
+    vx, vy, vz = w[twist], w[twist + 1], w[twist + 2]
+    wx, wy, wz = w[twist + 3], w[twist + 4], w[twist + 5]
+    for k in range(_STOPS):
+        x, y = w[ARM + 3 * k], w[ARM + 3 * k + 1]
+        w[_INWARD + k] = -_SIDES[k] * (vz + (wx * y - wy * x))
+    for k in range(_STOPS, _PLANES):
+        y, z = w[ARM + 3 * k + 1], w[ARM + 3 * k + 2]
+        w[_INWARD + k] = -_SIDES[k] * (vx + (wy * z - wz * y))
+    for k in range(_PLANES, PLACES):
+        x, z = w[ARM + 3 * k], w[ARM + 3 * k + 2]
+        w[_INWARD + k] = -_SIDES[k] * (vy + (wz * x - wx * z))
+
+
+@compiled
+def _push(k: int, F: float, dF: float, w: np.ndarray) -> None:
+    """Sets the normal force at a place, and its slope by the place's velocity.
+
+    Args:
+        k: number of the place.
+        F: normal force [N].
+        dF: by which it falls with the velocity along the normal [N s/m].
+        w: workspace.
+    """
+    axis = _AXES[k]
+    w[_FORCE + axis] = _SIDES[k] * F
+    for j in range(3):
+        w[_BY_TWIST + 6 * axis + j] = 0.0
+    w[_BY_TWIST + 7 * axis] = -dF
+
+
+@compiled
+def _rub(k: int, twist: int, limit: float, by_rate: float, w: np.ndarray) -> None:
+    """Sets the friction at a place, and its slope by the place's velocity.
+
+    Coulomb's, regularised: limit s / sqrt(s^2 + stiction^2) against the slip s.
+
+    Args:
+        k: number of the place.
+        twist: of the bolt.
+        limit: coefficient of friction times normal force [N].
+        by_rate: by which that falls with the velocity along the normal [N s/m].
+        w: workspace.
+    """
+    axis = _AXES[k]
+    one, other = (axis + 1) % 3, (axis + 2) % 3
+    u = w[twist + one] + _cross(twist + 3, ARM + 3 * k, one, w)
+    v = w[twist + other] + _cross(twist + 3, ARM + 3 * k, other, w)
+    speed = math.sqrt(u**2 + v**2 + _STICTION**2)
+    drag, along, across = limit / speed, u / speed, v / speed
+    w[_FORCE + one], w[_FORCE + other] = -drag * u, -drag * v
+    side = _SIDES[k] * by_rate
+    row, next_row = _BY_TWIST + 6 * one, _BY_TWIST + 6 * other
+    w[row + axis], w[next_row + axis] = side * along, side * across
+    w[row + one] = drag * (along * along - 1.0)
+    w[next_row + other] = drag * (across * across - 1.0)
+    w[row + other] = w[next_row + one] = drag * along * v / speed
+
+
+@compiled
+def _add_wrench(k: int, wrench: int, slope: int, w: np.ndarray) -> None:
+    """Adds a place's force to the wrench, and its change by the twist to the slope.
+
+    Args:
+        k: number of the place.
+        wrench, slope: of (6,) and (6, 6), to which is added.
+        w: workspace, with the force and its slope by the place's velocity.
+    """
+    arm = ARM + 3 * k
+    for i in range(3):
+        w[wrench + i] += w[_FORCE + i]
+        w[wrench + 3 + i] += _cross(arm, _FORCE, i, w)
+        for j in range(3):
+            w[_BY_TWIST + 6 * i + 3 + j] = _cross(arm, _BY_TWIST + 6 * i, j, w)
+    for j in range(6):
+        for i in range(3):
+            a, b = _BY_TWIST + 6 * ((i + 1) % 3), _BY_TWIST + 6 * ((i + 2) % 3)
+            w[slope + 6 * i + j] += w[_BY_TWIST + 6 * i + j]
+            turn = w[arm + (i + 1) % 3] * w[b + j] - w[arm + (i + 2) % 3] * w[a + j]
+            w[slope + 6 * (3 + i) + j] += turn
+
+
+@compiled
+def newton(h: float, is_lagged: bool, twist: int, w: np.ndarray) -> int:
+    """Goes from a twist to the balance; returns how it ended.
+
+    A Newton step is halved until the error is lower; but the first is taken whole: it
+    finds which places touch. Where the law jumps (an exponent below 1, full
+    damping at once) there may be no such step: then the jump is where the bolt stays.
+
+    Args:
+        h: the step [s].
+        is_lagged: see `balance`.
+        twist: place of (6,), which is changed.
+        w: workspace; W is set.
+    """
+    _copy(twist, _THERE, 6, w)
+    error = math.inf
+    for n in range(1 + _ITERATIONS):
+        for _ in range(1 + _SHORTEST):
+            balance(h, is_lagged, _THERE, _TRIAL_W, _TRIAL, _TRIAL_SLOPE, w)
+            trial = squared(_TRIAL, w)
+            if trial < error or (n == 1 and math.isfinite(trial)):
+                break
+            for i in range(6):
+                w[_STEP + i] *= 0.5
+                w[_THERE + i] = w[twist + i] + w[_STEP + i]
+        else:
+            return _STUCK
+        _copy(_THERE, twist, 6, w)
+        _copy(_TRIAL_W, W, 6, w)
+        error, largest = trial, 0.0
+        for i in range(6):
+            w[_STEP + i] = -w[_TRIAL + i]
+        solve_in_place(_TRIAL_SLOPE, _STEP, w)
+        for i in range(6):
+            largest = max(largest, abs(w[_STEP + i]))
+            w[_THERE + i] = w[twist + i] + w[_STEP + i]
+        if largest < _TOLERANCE:
+            return _SOLVED
+    return _UNFINISHED
+
+
+@compiled
+def squared(vector: int, w: np.ndarray) -> float:
+    """Returns the squared length of a vector (6,)."""
+    total = 0.0
+    for i in range(6):
+        total += w[vector + i] * w[vector + i]
+    return total
+
+
+@compiled
+def solve_in_place(matrix: int, x: int, w: np.ndarray) -> None:
+    """Solves A x = b by Gauss's elimination with pivots.
+
+    Numba's own solver raises where A is singular; here x is then not finite.
+
+    Args:
+        matrix: place of A (6, 6); is changed.
+        x: place of b (6,); is replaced by the solution.
+        w: workspace.
+    """
+    for k in range(6):
+        pivot = k
+        for i in range(k + 1, 6):
+            if abs(w[matrix + 6 * i + k]) > abs(w[matrix + 6 * pivot + k]):
+                pivot = i
+        if pivot != k:
+            for j in range(k, 6):
+                one, other = matrix + 6 * k + j, matrix + 6 * pivot + j
+                w[one], w[other] = w[other], w[one]
+            w[x + k], w[x + pivot] = w[x + pivot], w[x + k]
+        for i in range(k + 1, 6):
+            factor = w[matrix + 6 * i + k] / w[matrix + 7 * k]
+            for j in range(k + 1, 6):
+                w[matrix + 6 * i + j] -= factor * w[matrix + 6 * k + j]
+            w[x + i] -= factor * w[x + k]
+    for k in range(5, -1, -1):
+        for j in range(k + 1, 6):
+            w[x + k] -= w[matrix + 6 * k + j] * w[x + j]
+        w[x + k] /= w[matrix + 7 * k]
+
+
+@compiled
+def _copy(one: int, other: int, size: int, w: np.ndarray) -> None:
+    """Copies numbers from one place to another."""
+    for i in range(size):
+        w[other + i] = w[one + i]
+
+
+@compiled
+def normal_force(
+    penetration: float, rate: float, law: tuple[float, float, float, float]
+) -> tuple[float, float, float]:
+    """Returns F [N], dF/dp [N/m] and dF/d(dp/dt) [N s/m]; see `ImpactLaw`.
+
+    Args:
+        penetration: [m].
+        rate: of the penetration [m/s].
+        law: its parameters (`ImpactLaw.row`).
+    """
+    stiffness, exponent, damping, depth = law
+    if penetration <= 0.0:
+        return 0.0, 0.0, 0.0
+    p, depth = max(_LEAST, penetration * _MM), max(_LEAST, depth)
+    x = min(1.0, p / depth)
+    elastic, full = stiffness * p**exponent, damping * x * x * (3.0 - 2.0 * x)
+    force = elastic + full * rate * _MM
+    if force <= 0.0:
+        return 0.0, 0.0, 0.0
+    ramp = damping * 6.0 * x * (1.0 - x) / depth
+    slope = elastic * exponent / p + ramp * rate * _MM
+    return force, slope * _MM, full * _MM
+
+
+@compiled
+def find_places(w: np.ndarray) -> None:
+    """Finds the places where bolt and groove could touch.
+
+    Sets how deep they are in each other [m], negative where there is a gap, and arms
+    from Bo to the places in G [m].
+
+    Args:
+        w: workspace, with R_GB and p_GBo, and the dimensions of `LockShape`.
+    """
+    slot, wall, lips_end = w[LOCK], w[LOCK + 1], w[LOCK + 2]
+    lip, under_lip, floor = w[LOCK + 3], w[LOCK + 4], w[LOCK + 5]
+    start, end, neck = w[LOCK + 6], w[LOCK + 7], w[LOCK + 8]
+    head, top, bottom = w[LOCK + 9], w[LOCK + 10], w[LOCK + 11]
+    px, py, pz = w[P_GBO], w[P_GBO + 1], w[P_GBO + 2]
+    ux, uy, uz = w[R_GB + 1], w[R_GB + 4], w[R_GB + 7]
+    middle = (top + bottom) / 2.0
+    _circle_between(lip, pz + lip * uz, 2, neck, slot, 0, w)
+    _circle_between(-lip, pz - lip * uz, 2, neck, slot, 2, w)
+    if px + lip * ux >= lips_end:
+        w[DEPTH] = w[DEPTH + 1] = -1.0
+    if px - lip * ux >= lips_end:
+        w[DEPTH + 2] = w[DEPTH + 3] = -1.0
+    _circle_between(middle, pz + middle * uz, 2, head, wall, 4, w)
+    _circle_between(middle, px + middle * ux, 0, head, end, 6, w)
+    w[DEPTH + 7] = start - (px + middle * ux - head)
+    xx, yx, zx = w[R_GB], w[R_GB + 3], w[R_GB + 6]
+    xz, yz, zz = w[R_GB + 2], w[R_GB + 5], w[R_GB + 8]
+    for i in range(_RIM_POINTS):
+        above, below = _PLANES + i, _PLANES + _RIM_POINTS + i
+        along, across = _RIM[i, 0], _RIM[i, 1]
+        x = head * (xx * along + xz * across)
+        y = head * (yx * along + yz * across)
+        z = head * (zx * along + zz * across)
+        w[ARM + 3 * below], w[ARM + 3 * below + 1] = x + bottom * ux, y + bottom * uy
+        w[ARM + 3 * below + 2] = z + bottom * uz
+        w[DEPTH + below] = floor - (py + (y + bottom * uy))
+        x, y, z = x + top * ux, y + top * uy, z + top * uz
+        w[ARM + 3 * above], w[ARM + 3 * above + 1], w[ARM + 3 * above + 2] = x, y, z
+        is_covered = px + x < lips_end and abs(pz + z) > slot
+        is_inside = py + y < under_lip + head  # not yet lifted out
+        w[DEPTH + above] = py + y - under_lip if is_covered and is_inside else -1.0
+
+
+@compiled
+def _circle_between(
+    height: float,
+    place: float,
+    along: int,
+    radius: float,
+    wall: float,
+    first: int,
+    w: np.ndarray,
+) -> None:
+    """Sets two places, of a circle between two walls.
+
+    Args:
+        height: of the circle's centre above Bo, along the bolt's axis [m].
+        place: of its centre in G along the axis across the walls [m].
+        along: number of the axis across the walls, at -wall and wall.
+        radius, wall: [m].
+        first: number of the first of the two places.
+        w: workspace, with R_GB.
+    """
+    for side in range(2):
+        sign = 1.0 - 2.0 * side
+        w[DEPTH + first + side] = radius - wall + sign * place
+        arm = ARM + 3 * (first + side)
+        for axis in range(3):
+            w[arm + axis] = height * w[R_GB + 3 * axis + 1]
+        w[arm + along] += sign * radius
