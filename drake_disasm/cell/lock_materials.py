@@ -9,6 +9,7 @@ even without friction (docs/explanation/physics.md).
 
 import dataclasses
 
+import numpy as np
 from pydrake.geometry import (
     AddCompliantHydroelasticProperties,
     AddContactMaterial,
@@ -17,7 +18,6 @@ from pydrake.geometry import (
 )
 from pydrake.multibody.plant import CoulombFriction
 
-from drake_disasm.cell.lock_dimensions import facet_length
 from drake_disasm.effects import Environment
 from drake_disasm.scenario import LockConfig
 
@@ -48,6 +48,17 @@ def _surface(environment: Environment) -> ProximityProperties:
     # changes nothing but the speed (docs/explanation/physics.md).
     properties.AddProperty("hydroelastic", "margin", 0.0)
     return properties
+
+
+def facet_length(diameter: float, resolution: float) -> float:
+    """Returns the edge length [m] that gives a cylinder a multiple of four facets.
+
+    So vertices lie on the axis across the slot, where the play is measured: with a
+    facet's middle there instead the neck would be thinner. Drake rounds the number
+    of facets up, hence an edge slightly longer than the exact one.
+    """
+    facets = 4 * int(np.ceil(np.pi * diameter / (4 * resolution) - 1e-9))
+    return np.pi * diameter / facets * (1 + 1e-6)
 
 
 def groove_material(environment: Environment) -> ProximityProperties:

@@ -3,8 +3,8 @@
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from drake_disasm.cell.lock_dimensions import plate_bottom
-from drake_disasm.scenario import LockConfig, PlacementConfig
+from drake_disasm.cell.part import Part
+from drake_disasm.scenario import PlacementConfig
 
 _MIDDLE = 0.02  # m along the groove, where the bench's middle is
 
@@ -15,11 +15,11 @@ def nominal_groove_pose(placement: PlacementConfig) -> RigidTransform:
     return RigidTransform(R, placement.p_WG)
 
 
-def bench_top(X_WG: RigidTransform, lock: LockConfig) -> np.ndarray:
+def bench_top(X_WG: RigidTransform, part: Part) -> np.ndarray:
     """Returns the middle of the bench's top (3,), in the world [m].
 
     Args:
         X_WG: nominal groove frame.
-        lock: whose plate lies on it.
+        part: what lies on it.
     """
-    return np.asarray(X_WG @ np.array([_MIDDLE, plate_bottom(lock), 0.0]))
+    return np.asarray(X_WG @ np.array([_MIDDLE, part.bottom, 0.0]))

@@ -19,7 +19,7 @@ from pydrake.multibody.tree import (
     WeldJoint,
 )
 
-from drake_disasm.cell.lock_dimensions import bolt_inertia, lip_height
+from drake_disasm.cell.door_chain import part_of
 from drake_disasm.cell.parsing import add_model, model_frame
 from drake_disasm.scenario import Scenario
 
@@ -68,11 +68,9 @@ class Tool:
     @classmethod
     def from_models(cls, scenario: Scenario) -> Self:
         """Returns the tool of the scenario's sensor, gripper and lock."""
-        plant = MultibodyPlant(0.0)
+        plant, M_bolt_B = MultibodyPlant(0.0), part_of(scenario).M_moved_B
         models = add_tool(plant, plant.world_frame(), scenario)
-        bolt = plant.AddRigidBody(
-            "bolt", plant.AddModelInstance("bolt"), bolt_inertia(scenario.lock)
-        )
+        bolt = plant.AddRigidBody("bolt", plant.AddModelInstance("bolt"), M_bolt_B)
         plant.WeldFrames(models.frame_T, bolt.body_frame(), grasp_pose(scenario))
         plant.Finalize()
         context = plant.CreateDefaultContext()
@@ -94,7 +92,7 @@ class Tool:
             M_F=M_F,
             M_palm_F=plant.CalcSpatialInertia(context, plant.world_frame(), palm),
             M_fingers_B=plant.CalcSpatialInertia(context, bolt.body_frame(), fingers),
-            M_bolt_B=bolt_inertia(scenario.lock),
+            M_bolt_B=M_bolt_B,
             p_SoScm_S=X_SF @ M_F.get_com(),
         )
 
@@ -164,5 +162,5 @@ def grasp_rotation() -> RotationMatrix:
 
 def grasp_pose(scenario: Scenario) -> RigidTransform:
     """Returns X_TB: the fingertips end above the plate."""
-    tip = lip_height(scenario.lock) + scenario.gripper.fingertip_gap
+    tip = part_of(scenario).surface + scenario.gripper.fingertip_gap
     return RigidTransform(grasp_rotation(), [0.0, 0.0, tip + PAD_LENGTH / 2])

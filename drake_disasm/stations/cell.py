@@ -22,8 +22,8 @@ from pydrake.systems.primitives import (
 
 from drake_disasm.cell.arm_control import joint_gains
 from drake_disasm.cell.arm_dynamics import ArmDynamics
+from drake_disasm.cell.door_chain import part_of
 from drake_disasm.cell.grip import AXIS_ORDER, finger_springs
-from drake_disasm.cell.lock_dimensions import bolt_inertia
 from drake_disasm.cell.tool import FINGERS
 from drake_disasm.common.ports import CELL_PORTS
 from drake_disasm.effects import ArmEffect
@@ -223,7 +223,7 @@ class CellStation(SimulatedStation):
         for i in range(1, plant.num_bodies()):  # 0 is the world
             body = plant.get_body(BodyIndex(i))
             body.SetSpatialInertiaInBodyFrame(context, SpatialInertia.Zero())
-        M_B = bolt_inertia(self.scenario.lock).ReExpress(X_FB.rotation())
+        M_B = part_of(self.scenario).M_moved_B.ReExpress(X_FB.rotation())
         load = plant.GetBodyByName("tool")
         load.SetSpatialInertiaInBodyFrame(context, M_B.Shift(-X_FB.translation()))
         carried = builder.AddNamedSystem(

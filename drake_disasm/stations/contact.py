@@ -27,21 +27,19 @@ from drake_disasm.cell.lock import (
 )
 from drake_disasm.cell.lock_materials import has_same_material
 from drake_disasm.effects import Environment
-from drake_disasm.scenario import ContactConfig, LockConfig
 from drake_disasm.stations.base import Parts
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
-from drake_disasm.systems.outside_force import OutsideForce
+from drake_disasm.systems.bolt_environment import BoltEnvironment
 from drake_disasm.twin.conditions import ImpactConditions, Surroundings
 from drake_disasm.twin.contact_system import ImpactContact
 from drake_disasm.twin.law import ImpactLaw
-from drake_disasm.twin.shape import LockShape
 
 
 class ContactStrategy(abc.ABC):
     """A model of the contact between bolt and groove.
 
     Attributes:
-        outside_force: adds forces on the bolt other than contact.
+        surroundings: the environment in force.
     """
 
     def __init__(
@@ -49,10 +47,10 @@ class ContactStrategy(abc.ABC):
         plant: MultibodyPlant,
         scene_graph: SceneGraph,
         lock: Lock,
-        outside_force: OutsideForce,
+        surroundings: BoltEnvironment,
     ) -> None:
         self._plant, self._scene_graph, self._lock = plant, scene_graph, lock
-        self.outside_force = outside_force
+        self.surroundings = surroundings
 
     @abc.abstractmethod
     def add_forces(self, builder: DiagramBuilder, forces: OutputPort) -> OutputPort:
@@ -66,8 +64,8 @@ class ContactStrategy(abc.ABC):
         """
 
     @abc.abstractmethod
-    def reconfigure(self, lock: Lock, contact: ContactConfig, parts: Parts) -> None:
-        """Changes lock and contact; `set_environment` must be called next."""
+    def reconfigure(self, lock: Lock, parts: Parts) -> None:
+        """Changes the part; `set_environment` must be called next."""
 
     @abc.abstractmethod
     def set_environment(self, environment: Environment, parts: Parts) -> None:
@@ -85,20 +83,17 @@ class HydroelasticContact(ContactStrategy):
         """See ContactStrategy."""
         return forces
 
-    def reconfigure(self, lock: Lock, contact: ContactConfig, parts: Parts) -> None:
+    def reconfigure(self, lock: Lock, parts: Parts) -> None:
         """See ContactStrategy."""
         self._lock = lock
-        self._reshape(lock.config, parts)
+        self._reshape(lock.part.environment, parts)
 
     def set_environment(self, environment: Environment, parts: Parts) -> None:
         """See ContactStrategy; reassigns all materials, which takes milliseconds."""
-        outside = parts(self.outside_force)
-        if environment.clearance != self.outside_force.material(outside).clearance:
-            clearance = environment.clearance
-            shape = dataclasses.replace(self._lock.config, clearance=clearance)
-            self._reshape(shape, parts)
-        self.outside_force.set_force(outside, np.array(environment.force_Gn))
-        self.outside_force.set_material(outside, environment)
+        known = self.surroundings.get(parts(self.surroundings))
+        if environment.clearance != known.clearance:
+            self._reshape(environment, parts)
+        self.surroundings.set(parts(self.surroundings), environment)
         set_environment(
             self._lock,
             environment,
@@ -109,20 +104,21 @@ class HydroelasticContact(ContactStrategy):
 
     def change_environment(self, environment: Environment, parts: Parts) -> None:
         """See ContactStrategy; skips materials that have not changed noticeably."""
-        outside = parts(self.outside_force)
-        if has_same_material(self.outside_force.material(outside), environment):
-            set_pose(self._lock, environment, parts(self._plant))
-            self.outside_force.set_force(outside, np.array(environment.force_Gn))
-        else:
+        context = parts(self.surroundings)
+        known = self.surroundings.get(context)
+        if not has_same_material(known, environment):
             self.set_environment(environment, parts)
+            return
+        set_pose(self._lock, environment, parts(self._plant))
+        # With the friction that the scene graph has, so that it can't drift away.
+        changed = dataclasses.replace(environment, friction=known.friction)
+        self.surroundings.set(context, changed)
 
-    def _reshape(self, config: LockConfig, parts: Parts) -> None:
-        reshape_groove(self._lock, config, self._scene_graph, parts(self._scene_graph))
-        outside = parts(self.outside_force)
-        material = self.outside_force.material(outside)
-        self.outside_force.set_material(
-            outside, dataclasses.replace(material, clearance=config.clearance)
-        )
+    def _reshape(self, environment: Environment, parts: Parts) -> None:
+        scene_graph, context = self._scene_graph, parts(self.surroundings)
+        reshape_groove(self._lock, environment, scene_graph, parts(scene_graph))
+        known, clearance = self.surroundings.get(context), environment.clearance
+        self.surroundings.set(context, dataclasses.replace(known, clearance=clearance))
 
 
 class ImpactContactForce(ContactStrategy):
@@ -132,7 +128,6 @@ class ImpactContactForce(ContactStrategy):
         spring: the twin's, which the law's solution depends on, as on the masses.
         R_WGn, time_step: of the station [s].
         p_BoTo_B: (3,) where the spring is [m].
-        contact: parameters of the law.
         environment: of the default Context.
     """
 
@@ -141,18 +136,17 @@ class ImpactContactForce(ContactStrategy):
         plant: MultibodyPlant,
         scene_graph: SceneGraph,
         lock: Lock,
-        outside_force: OutsideForce,
+        surroundings: BoltEnvironment,
         *,
         spring: SixAxisSpring,
         R_WGn: RotationMatrix,
         p_BoTo_B: np.ndarray,
         time_step: float,
-        contact: ContactConfig,
         environment: Environment,
     ) -> None:
-        super().__init__(plant, scene_graph, lock, outside_force)
-        self._spring, self._contact = spring, contact
-        self._p_BoTo_B, self._M = p_BoTo_B, spring.mass_matrix()
+        super().__init__(plant, scene_graph, lock, surroundings)
+        self._spring, self._M = spring, spring.mass_matrix()
+        self._p_BoTo_B = p_BoTo_B
         exclude_collisions(scene_graph, lock.bolt_ids.values(), lock.groove_ids)
         self.system = ImpactContact(
             lock.bolt.index(), R_WGn, time_step, self._conditions(environment)
@@ -168,31 +162,30 @@ class ImpactContactForce(ContactStrategy):
         builder.Connect(forces, system.GetInputPort("applied_spatial_force"))
         return system.get_output_port()
 
-    def reconfigure(self, lock: Lock, contact: ContactConfig, parts: Parts) -> None:
+    def reconfigure(self, lock: Lock, parts: Parts) -> None:
         """See ContactStrategy.
 
         The scene graph keeps the old shapes: changing them would drop the collision
         filter between bolt and groove.
         """
-        self._lock, self._contact = lock, contact
+        self._lock = lock
 
     def set_environment(self, environment: Environment, parts: Parts) -> None:
         """See ContactStrategy."""
-        plant_context, outside = parts(self._plant), parts(self.outside_force)
-        self.outside_force.set_force(outside, np.array(environment.force_Gn))
-        set_pose(self._lock, environment, plant_context)
+        self.surroundings.set(parts(self.surroundings), environment)
+        set_pose(self._lock, environment, parts(self._plant))
         conditions = self._conditions(environment)
         self.system.set_conditions(parts(self.system), conditions)
 
     def _conditions(self, environment: Environment) -> ImpactConditions:
-        K, D = self._spring.gains()
+        (K, D), part = self._spring.gains(), self._lock.part
         return ImpactConditions(
             law=dataclasses.replace(
-                ImpactLaw.of(self._contact.impact),
+                ImpactLaw.of(part.contact.impact),
                 stiffness=environment.impact_stiffness,
                 exponent=environment.impact_exponent,
             ),
-            shape=LockShape.of(self._lock.config).with_clearance(environment.clearance),
+            shape=part.shape.with_clearance(environment.clearance),
             around=Surroundings.of([environment]),
             M=self._M,
             K=K,

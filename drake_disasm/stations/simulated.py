@@ -13,7 +13,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder, System
 from pydrake.systems.primitives import RandomSource
 
-from drake_disasm.cell.lock import Lock, nominal_environment
+from drake_disasm.cell.door_chain import part_of
+from drake_disasm.cell.lock import Lock
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.common.ports import check_ports
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor
@@ -39,8 +40,8 @@ from drake_disasm.stations.contact import (
 )
 from drake_disasm.stations.local_effects import LocalEffectsMonitor
 from drake_disasm.stations.wiring import add_plant, export_bolt_pose, wire_sensor
+from drake_disasm.systems.bolt_environment import BoltEnvironment
 from drake_disasm.systems.effects_in_force import EffectsInForce
-from drake_disasm.systems.outside_force import OutsideForce
 
 
 class SimulatedStation(Station):
@@ -78,7 +79,7 @@ class SimulatedStation(Station):
         # A copy, so that a later change to the scenario's list is detected.
         self._default_effects = copy.deepcopy(list(scenario.effects))
         self._acting_by_default = _acting(self._default_effects)
-        self._nominal = nominal_environment(scenario.lock, scenario.contact)
+        self._nominal = part_of(scenario).environment
         self.refuse_effects(scenario.effects)
         self._environment = environment_at(self._nominal, scenario.effects)
         self._initial: InitialState | None = None
@@ -125,21 +126,21 @@ class SimulatedStation(Station):
     def _wire_applied_forces(self, builder: DiagramBuilder) -> None:
         """Exports the input for forces from outside; adds what pulls on the bolt."""
         R_WGn = self.X_WG.rotation()
-        outside = builder.AddNamedSystem(
-            "outside_force",
-            OutsideForce(self.lock.bolt.index(), R_WGn, self._environment),
+        surroundings = builder.AddNamedSystem(
+            "bolt_environment",
+            BoltEnvironment(self.lock.bolt.index(), R_WGn, self._environment),
         )
-        port = outside.GetInputPort("applied_spatial_force")
+        port = surroundings.GetInputPort("applied_spatial_force")
         builder.ExportInput(port, "applied_spatial_force")
-        self.contact = self._make_contact(outside)
-        forces = self.contact.add_forces(builder, outside.get_output_port())
+        self.contact = self._make_contact(surroundings)
+        forces = self.contact.add_forces(builder, surroundings.get_output_port())
         applied = self.plant.get_applied_spatial_force_input_port()
         builder.Connect(forces, applied)
 
-    def _make_contact(self, outside_force: OutsideForce) -> ContactStrategy:
+    def _make_contact(self, surroundings: BoltEnvironment) -> ContactStrategy:
         """Returns the contact strategy for bolt and groove."""
         return HydroelasticContact(
-            self.plant, self.scene_graph, self.lock, outside_force
+            self.plant, self.scene_graph, self.lock, surroundings
         )
 
     def _settle_by_default(self) -> None:
@@ -190,7 +191,7 @@ class SimulatedStation(Station):
         arm = [effect for effect in effects if isinstance(effect, ArmEffect)]
         self._set_arm_effects(context, arm)
         self.contact.set_environment(
-            environment_at(self.lock.nominal, effects), self._parts(context)
+            environment_at(self.lock.part.environment, effects), self._parts(context)
         )
         self.sensor.set_effects(
             self.part_context(self.sensor, context), sensor_chain(effects)
@@ -211,7 +212,7 @@ class SimulatedStation(Station):
             bolt: its motion in the step to come.
         """
         if is_local(effects):
-            environment = environment_at(self.lock.nominal, effects, bolt)
+            environment = environment_at(self.lock.part.environment, effects, bolt)
             self.contact.change_environment(environment, self._parts(context))
 
     def attach(self, simulator: Simulator) -> None:

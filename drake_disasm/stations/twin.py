@@ -11,9 +11,9 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, PassThrough
 
 from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.cell.door_chain import GROOVE_FIELDS, part_of
 from drake_disasm.cell.grip import deflection
-from drake_disasm.cell.lock import add_lock, nominal_environment
-from drake_disasm.cell.lock_dimensions import GROOVE_FIELDS
+from drake_disasm.cell.lock import add_lock
 from drake_disasm.cell.tool import summed
 from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.errors import DisasmError
@@ -32,8 +32,8 @@ from drake_disasm.stations.contact import ContactStrategy, ImpactContactForce
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.stations.wiring import export_ready_device, export_required
+from drake_disasm.systems.bolt_environment import BoltEnvironment
 from drake_disasm.systems.optional_input import OptionalInput
-from drake_disasm.systems.outside_force import OutsideForce
 from drake_disasm.twin.arm_step import ArmStep
 from drake_disasm.twin.conditions import ImpactConditions
 from drake_disasm.twin.plant import SETTLING_TIME
@@ -123,11 +123,7 @@ class TwinStation(SimulatedStation):
         self.scenario, self._initial = scenario, None
         self.parameters = twin_of(scenario)
         self._is_reconfigured = True
-        self.lock = dataclasses.replace(
-            self.lock,
-            config=scenario.lock,
-            nominal=nominal_environment(scenario.lock, scenario.contact),
-        )
+        self.lock = dataclasses.replace(self.lock, part=part_of(scenario))
         self._prepare(context)
         self.set_effects(context, scenario.effects)
 
@@ -168,8 +164,7 @@ class TwinStation(SimulatedStation):
     def _prepare(self, context: Context) -> None:
         if not self._is_reconfigured:
             return
-        scenario = self.scenario
-        self.contact.reconfigure(self.lock, scenario.contact, self._parts(context))
+        self.contact.reconfigure(self.lock, self._parts(context))
         step = self._arm_step()
         self._spring.set_springs(step.springs)
         self.arm_node.set_step(step)
@@ -178,9 +173,7 @@ class TwinStation(SimulatedStation):
         scenario = self.scenario
         frame_Gn = self._add_plant(builder, scenario.simulation.twin_time_step)
         plant = self.plant
-        self.lock = add_lock(
-            plant, frame_Gn, scenario.lock, scenario.contact, self._environment
-        )
+        self.lock = add_lock(plant, frame_Gn, part_of(scenario), self._environment)
         p_BoTo_B, springs = self.parameters.p_BoTo_B, self._arm_step().springs
         frame_Tn = plant.AddFrame(
             FixedOffsetFrame("grip_nominal", frame_Gn, RigidTransform(p_BoTo_B))
@@ -198,19 +191,18 @@ class TwinStation(SimulatedStation):
         export_ready_device(builder, "bolt", self.time_step)
         self._finish(builder)
 
-    def _make_contact(self, outside_force: OutsideForce) -> ContactStrategy:
+    def _make_contact(self, surroundings: BoltEnvironment) -> ContactStrategy:
         if self.scenario.contact.model == "hydroelastic":
-            return super()._make_contact(outside_force)
+            return super()._make_contact(surroundings)
         return ImpactContactForce(
             self.plant,
             self.scene_graph,
             self.lock,
-            outside_force,
+            surroundings,
             spring=self._spring,
             R_WGn=self.X_WG.rotation(),
             p_BoTo_B=self.parameters.p_BoTo_B,
             time_step=self.time_step,
-            contact=self.scenario.contact,
             environment=self._environment,
         )
 

@@ -7,10 +7,10 @@ from typing import Self
 
 import numpy as np
 
+from drake_disasm.cell.lock_shape import LockShape
 from drake_disasm.common.arrays import Array, array_like, namespace
 from drake_disasm.effects import Environment
 from drake_disasm.twin.law import ImpactLaw
-from drake_disasm.twin.shape import LockShape
 
 
 @dataclasses.dataclass(frozen=True)

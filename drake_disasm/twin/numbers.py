@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.multibody.tree import SpatialInertia
 
 from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.cell.door_chain import GROOVE_FIELDS, part_of
 from drake_disasm.cell.grip import (
     AXIS_ORDER,
     Springs,
@@ -15,8 +16,7 @@ from drake_disasm.cell.grip import (
     deflection,
     in_joint_order,
 )
-from drake_disasm.cell.lock import nominal_environment
-from drake_disasm.cell.lock_dimensions import GROOVE_FIELDS, bolt_inertia
+from drake_disasm.cell.lock_shape import LockShape
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import summed
 from drake_disasm.cell.twin_parameters import TwinParameters, twin_of
@@ -32,7 +32,6 @@ from drake_disasm.twin.arm_step import ArmStep
 from drake_disasm.twin.conditions import ImpactConditions, Surroundings
 from drake_disasm.twin.law import ImpactLaw
 from drake_disasm.twin.plant import Body
-from drake_disasm.twin.shape import LockShape
 
 _GRAVITY_W = np.array([0.0, 0.0, -9.81])
 _JOINTS = [3, 4, 5, *(axis - 3 for axis in AXIS_ORDER[3:])]  # of Drake's [w; v]
@@ -82,15 +81,15 @@ class TwinNumbers:
             DisasmError: the arm can't reach the lock.
         """
         rigid = _rigid(_Case.of(scenario))
-        bounds = action_bounds(scenario.task)
+        part, bounds = part_of(scenario), action_bounds(scenario.task)
         return cls(
             law=ImpactLaw.of(scenario.contact.impact),
-            shape=LockShape.of(scenario.lock),
+            shape=part.shape,
             M=rigid.M,
             arm=rigid.arm,
             grip=rigid.grip,
             body=rigid.body,
-            nominal=nominal_environment(scenario.lock, scenario.contact),
+            nominal=part.environment,
             mounting=rigid.mounting,
             task=scenario.task,
             geometry=TaskGeometry.of(scenario, rigid.compliance),
@@ -178,7 +177,7 @@ def _rigid(case: _Case) -> _Rigid:
     scenario = case.scenario
     parameters = twin_of(scenario)
     time_step = scenario.simulation.twin_time_step
-    M_B = summed([bolt_inertia(scenario.lock), parameters.M_fingers_B])
+    M_B = summed([part_of(scenario).M_moved_B, parameters.M_fingers_B])
     return _Rigid(
         M=_mass_matrix(M_B, parameters.p_BoTo_B),
         arm=ArmStep.of(parameters.arm, parameters.grip, time_step),

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from drake_disasm.cell.lock import nominal_environment
+from drake_disasm.cell.door_chain import part_of
 from drake_disasm.common.arrays import Array
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
@@ -93,7 +93,7 @@ def refuse_scenarios(scenarios: Sequence[Scenario]) -> None:
         refuse_unknown_kinds(scenario.effects)
         refuse_arm_effects([e for e in scenario.effects if isinstance(e, ArmEffect)])
         _refuse_late_poses(scenario)
-        nominal = nominal_environment(scenario.lock, scenario.contact)
+        nominal = part_of(scenario).environment
         refuse_without_quantity("impact", nominal, scenario.effects)
         _refuse_sampling(scenario)
         for end in ("low", "high"):

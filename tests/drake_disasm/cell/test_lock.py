@@ -6,9 +6,10 @@ import itertools
 import numpy as np
 import pytest
 
-from drake_disasm.cell import lock_dimensions as dimensions
+from drake_disasm.cell.door_chain import DoorChain
 from drake_disasm.cell.lock import set_environment
-from drake_disasm.scenario import LockConfig
+from drake_disasm.cell.lock_materials import facet_length
+from drake_disasm.scenario import ContactConfig, LockConfig
 from drake_disasm.stations import SimulatedStation
 
 LOCKS = [
@@ -18,9 +19,14 @@ LOCKS = [
 ]
 
 
+def part(lock: LockConfig) -> DoorChain:
+    """Returns the part of a lock."""
+    return DoorChain(lock, ContactConfig())
+
+
 @pytest.mark.parametrize("lock", LOCKS)
 def test_gaps_are_the_clearances(lock: LockConfig) -> None:
-    boxes = dimensions.groove_boxes(lock)
+    boxes = part(lock).groove_boxes(lock.clearance)
     low = {name: box[0] for name, box in boxes.items()}
     high = {name: box[1] for name, box in boxes.items()}
     slot = low["lip_left"][2] - high["lip_right"][2]
@@ -36,7 +42,7 @@ def test_gaps_are_the_clearances(lock: LockConfig) -> None:
 
 @pytest.mark.parametrize("lock", LOCKS)
 def test_solid_parts_do_not_overlap_and_are_a_mirror_image(lock: LockConfig) -> None:
-    boxes = dimensions.groove_boxes(lock)
+    boxes = part(lock).groove_boxes(lock.clearance)
     for first, second in itertools.combinations(boxes.values(), 2):
         low, high = np.maximum(first[0], second[0]), np.minimum(first[1], second[1])
         assert np.any(high - low < 1e-12), (first, second)
@@ -52,28 +58,26 @@ def test_solid_parts_do_not_overlap_and_are_a_mirror_image(lock: LockConfig) -> 
 def test_heights_add_up(lock: LockConfig) -> None:
     """The head hangs midway in the channel; to be out it rises past lip and itself."""
     play = lock.axial_clearance / 2
-    assert -dimensions.lip_height(lock) - dimensions.head_top(lock) == pytest.approx(
-        play
-    )
-    underside = dimensions.head_top(lock) - lock.head_thickness
-    channel_floor = dimensions.groove_boxes(lock)["floor"][1][1]
+    assert -part(lock).surface - part(lock).shape.top == pytest.approx(play)
+    underside = part(lock).shape.top - lock.head_thickness
+    channel_floor = part(lock).groove_boxes(lock.clearance)["floor"][1][1]
     assert underside - channel_floor == pytest.approx(play)
-    assert dimensions.plate_bottom(lock) < channel_floor
+    assert part(lock).bottom < channel_floor
     lifted = underside + lock.lift_needed(0.002)
-    assert lifted == pytest.approx(dimensions.lip_height(lock) + 0.002)
+    assert lifted == pytest.approx(part(lock).surface + 0.002)
 
 
 def test_bolt_weight_and_facets() -> None:
     """Facets by Drake's count: the circumference over the hint, rounded up."""
     lock = LockConfig(bolt_mass=0.3)
-    M_B = dimensions.bolt_inertia(lock)
+    M_B = part(lock).M_moved_B
     assert M_B.get_mass() == 0.3
     middle = lock.lip_thickness / 2 + lock.grip_standoff + lock.grip_size[1] / 2
     np.testing.assert_allclose(M_B.get_com(), [0, middle, 0])
     assert M_B.IsPhysicallyValid()
     for diameter in (0.002, 0.005, 0.0073, 0.02):
         for resolution in (1e-4, 0.8e-3, 1.6e-3, 5e-3):
-            edge = dimensions.facet_length(diameter, resolution)
+            edge = facet_length(diameter, resolution)
             facets = np.ceil(np.pi * diameter / edge)
             assert facets % 4 == 0
             assert edge <= resolution * (1 + 1e-5)
@@ -95,7 +99,7 @@ def test_bolt_starts_free_of_the_groove(name: str, request) -> None:
 def test_environment_reaches_every_contact_property(name: str, request) -> None:
     station: SimulatedStation = request.getfixturevalue(name)
     context, lock = station.CreateDefaultContext(), station.lock
-    changed = dataclasses.replace(lock.nominal, friction=0.55, modulus=3e8)
+    changed = dataclasses.replace(lock.part.environment, friction=0.55, modulus=3e8)
     plant = station.part_context(station.plant, context)
     scene = station.part_context(station.scene_graph, context)
     set_environment(lock, changed, plant, station.scene_graph, scene)

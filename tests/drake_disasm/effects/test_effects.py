@@ -207,7 +207,7 @@ def test_groove_pose_moves_body_and_geometry(station_type) -> None:
     before = RigidTransform(query.Eval(context).GetPoseInWorld(geometry))
     effect = ef.GroovePose(ry=0.05, y=0.003)
     station.set_effects(context, [effect])
-    X_GnG = effect.apply(station.lock.nominal, ef.AT_REST).X_GnG
+    X_GnG = effect.apply(station.lock.part.environment, ef.AT_REST).X_GnG
     assert station.true_groove_pose(context).IsExactlyEqualTo(X_GnG)
     after = query.Eval(context).GetPoseInWorld(geometry)
     X_WG = station.X_WG

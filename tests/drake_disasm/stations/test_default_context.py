@@ -110,7 +110,7 @@ def test_begin_and_the_scenarios_effects_leave_it_and_come_back_to_it(station):
 def test_groove_and_materials_are_the_effects(station: SimulatedStation) -> None:
     context = station.CreateDefaultContext()
     effects = station.scenario.effects
-    expected = fx.environment_at(station.lock.nominal, effects, fx.AT_REST)
+    expected = fx.environment_at(station.lock.part.environment, effects, fx.AT_REST)
     assert station.true_groove_pose(context).IsExactlyEqualTo(expected.X_GnG)
     inspector = station.GetOutputPort("query_object").Eval(context).inspector()
     for geometry in (*station.lock.groove_ids, *station.lock.bolt_ids.values()):

@@ -5,6 +5,7 @@ import pytest
 from pydrake.math import RotationMatrix
 from pydrake.multibody.tree import BodyIndex
 
+from drake_disasm.cell.lock_shape import LockShape
 from drake_disasm.cell.twin_parameters import bolt_stiffness
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import LockConfig, load_scenario
@@ -15,7 +16,6 @@ from drake_disasm.twin.conditions import ImpactConditions, Surroundings
 from drake_disasm.twin.contact_system import ImpactContact
 from drake_disasm.twin.equations import normal_force
 from drake_disasm.twin.law import ImpactLaw
-from drake_disasm.twin.shape import LockShape
 from tests.drake_disasm.conftest import QUIET, STIFF
 
 NOISELESS = ["contact.model=impact", QUIET]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from drake_disasm.cell.lock_shape import LockShape
 from drake_disasm.scenario import LockConfig
 from drake_disasm.twin.equations import (
     ARM,
@@ -15,7 +16,6 @@ from drake_disasm.twin.equations import (
     SIZE,
     find_places,
 )
-from drake_disasm.twin.shape import LockShape
 
 MM = 1e-3
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw
 
+from drake_disasm.cell.lock_shape import LockShape
 from drake_disasm.scenario import LockConfig
 from drake_disasm.twin import equations
 from drake_disasm.twin.conditions import ImpactConditions, Surroundings
 from drake_disasm.twin.contact_step import ImpactStep
 from drake_disasm.twin.law import ImpactLaw
 from drake_disasm.twin.plant import turning
-from drake_disasm.twin.shape import LockShape
 
 M = np.diag([3.0, 3.0, 3.0, 0.02, 0.02, 0.02])
 K, D = np.array([15e3] * 3 + [150.0] * 3), np.array([400.0] * 3 + [3.0] * 3)

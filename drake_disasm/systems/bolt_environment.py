@@ -1,4 +1,4 @@
-"""A force on the bolt other than contact, such as a chain's pull."""
+"""What surrounds the bolt, and pulls on it besides contact, as a chain does."""
 
 import numpy as np
 from pydrake.common.value import Value
@@ -6,19 +6,19 @@ from pydrake.math import RotationMatrix
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import BodyIndex
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import Context, LeafSystem
 
 from drake_disasm.effects import Environment
 
 
-class OutsideForce(LeafSystem):
-    """The environment's force on the bolt at Bo, and the station's force input.
+class BoltEnvironment(LeafSystem):
+    """The bolt's environment in force, its pull, and the station's force input.
 
-    The force is a parameter of the Context; the output is computed when it changes,
-    not in each step of the plant.
+    The environment is a parameter of the Context; the output is computed when it
+    changes, not in each step of the plant.
 
     @system
-    name: OutsideForce
+    name: BoltEnvironment
     input_ports:
     - applied_spatial_force
     output_ports:
@@ -36,9 +36,7 @@ class OutsideForce(LeafSystem):
     ) -> None:
         super().__init__()
         self._bolt, self._R_WGn = bolt, R_WGn.matrix()
-        force = BasicVector(np.array(environment.force_Gn))
-        self._force = self.DeclareNumericParameter(force)
-        self._material = self.DeclareAbstractParameter(Value[object](environment))
+        self._environment = self.DeclareAbstractParameter(Value[object](environment))
         self._outside = self.DeclareAbstractInputPort(
             "applied_spatial_force", Value[list[ExternallyAppliedSpatialForce]]()
         )
@@ -52,21 +50,17 @@ class OutsideForce(LeafSystem):
             },
         )
 
-    def set_force(self, context: Context, f_Gn: np.ndarray) -> None:
-        """Puts a force (3,) [N], in Gn, into this system's Context."""
-        context.get_mutable_numeric_parameter(self._force).SetFromVector(f_Gn)
-
-    def set_material(self, context: Context, environment: Environment) -> None:
-        """Records the environment whose material the scene graph's Context has."""
-        parameter = context.get_mutable_abstract_parameter(self._material)
+    def set(self, context: Context, environment: Environment) -> None:
+        """Puts an environment into this system's Context."""
+        parameter = context.get_mutable_abstract_parameter(self._environment)
         parameter.set_value(environment)
 
-    def material(self, context: Context) -> Environment:
-        """Returns what `set_material` recorded."""
-        return context.get_abstract_parameter(self._material).get_value()
+    def get(self, context: Context) -> Environment:
+        """Returns the environment in this system's Context."""
+        return context.get_abstract_parameter(self._environment).get_value()
 
     def _calc(self, context: Context, output: Value) -> None:
-        f_Gn = context.get_numeric_parameter(self._force).value()
+        f_Gn = np.array(self.get(context).force_Gn)
         forces = []
         if f_Gn.any():
             force = ExternallyAppliedSpatialForce()

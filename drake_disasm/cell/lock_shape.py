@@ -1,19 +1,17 @@
-"""The lock as circles and planes, for penalty contact.
-
-The neck is a circle at either edge of the lips, the head a disc in its channel. The
-groove's normals are along its axes.
-"""
+"""The lock as circles and planes: the gaps between bolt and groove."""
 
 import dataclasses
 
-from drake_disasm.cell.lock_dimensions import groove_boxes, head_top, lip_height
 from drake_disasm.common.arrays import Array
 from drake_disasm.scenario import LockConfig
 
 
 @dataclasses.dataclass(frozen=True)
 class LockShape:
-    """The lock as circles and planes; a length is a number, or (n,) one for each pose.
+    """The lock as circles and planes; a length is a number, or (n,) of n locks.
+
+    The neck is a circle at either edge of the lips, the head a disc in its channel. The
+    groove's normals are along its axes.
 
     Attributes:
         slot, wall: half widths of slot and channel [m].
@@ -40,19 +38,20 @@ class LockShape:
     @classmethod
     def of(cls, lock: LockConfig) -> "LockShape":
         """Returns the shape of a lock's dimensions."""
-        boxes = groove_boxes(lock)
-        top = head_top(lock)
+        lip = lock.lip_thickness / 2
+        half_hole = (lock.head_diameter + lock.keyhole_clearance) / 2
+        top = -lip - lock.axial_clearance / 2  # half the axial play below the lips
         return cls(
-            slot=float(boxes["lip_left"][0][2]),
-            wall=float(boxes["wall_left"][0][2]),
-            lips_end=float(boxes["lip_left"][1][0]),
-            lip=lip_height(lock),
-            under_lip=float(boxes["lip_left"][0][1]),
-            floor=float(boxes["floor"][1][1]),
-            start=float(boxes["stop_a"][1][0]),
-            end=float(boxes["stop_b"][0][0]),
-            neck=lock.neck_diameter / 2.0,
-            head=lock.head_diameter / 2.0,
+            slot=(lock.neck_diameter + lock.clearance) / 2,
+            wall=(lock.head_diameter + lock.channel_clearance) / 2,
+            lips_end=lock.travel - half_hole,
+            lip=lip,
+            under_lip=-lip,
+            floor=-lip - lock.head_thickness - lock.axial_clearance,
+            start=-half_hole,
+            end=lock.travel + half_hole,
+            neck=lock.neck_diameter / 2,
+            head=lock.head_diameter / 2,
             top=top,
             bottom=top - lock.head_thickness,
         )
@@ -63,5 +62,5 @@ class LockShape:
 
     @property
     def row(self) -> tuple[float | Array, ...]:
-        """Its dimensions as `find_places` has them."""
+        """Its dimensions as `twin.equations` has them."""
         return tuple(getattr(self, f.name) for f in dataclasses.fields(self))
