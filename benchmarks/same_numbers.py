@@ -4,11 +4,12 @@
     python benchmarks/same_numbers.py --out out/after --before out/before     in another
 
 Runs trainings, simulations, an identification and verdicts by `drake-disasm`, keeps
-what they write, and compares it number by number. A case whose folder is there is not
-run again.
+what they write, and compares it number by number. Both read the same logs, those of the
+earlier run. A case whose folder is there is not run again.
 """
 
 import argparse
+import contextlib
 import csv
 import json
 import os
@@ -74,7 +75,7 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     for name, command in cases.items():
         if not options.only or name in options.only:
-            _run(name, command, options.out.absolute())
+            _run(name, command, options.out.absolute(), options.before or options.out)
     if options.before:
         rows = [_compared(options.before, options.out, name) for name in cases]
         print(f"{'case':16} {'numbers':>8}  largest relative change, how many differ")
@@ -82,12 +83,13 @@ def main() -> None:
             print(f"{row[0]:16} {row[1]:>8}  {row[3]:>8}  {row[2]}")
 
 
-def _run(name: str, command: str, out: Path) -> None:
+def _run(name: str, command: str, out: Path, logs: Path) -> None:
     folder, hidden = out / name, out / "hidden.yaml"
     if folder.exists():
         return
     hidden.write_text(_HIDDEN, "utf-8")
-    places = {case: str(out / case) for case in CASES} | {"hidden": str(hidden)}
+    places = {case: str(logs.absolute() / case) for case in CASES}
+    places["hidden"] = str(hidden)
     words = command.format(**(places | {"out": str(folder)})).split()
     paths = os.pathsep.join((str(_ROOT), str(_ROOT / "tools")))
     print(f"{name}: drake-disasm {' '.join(words)}", flush=True)
@@ -142,7 +144,7 @@ def _numbers(folder: Path) -> Iterator[tuple[str, Any]]:
         elif path.suffix == ".csv":
             rows = list(csv.reader(path.read_text("utf-8").splitlines()))
             yield from (
-                (f"{name}:{i}:{j}", cell)
+                (f"{name}:{i}:{j}", _number(cell))
                 for i, row in enumerate(rows)
                 for j, cell in enumerate(row)
             )
@@ -154,6 +156,12 @@ def _numbers(folder: Path) -> Iterator[tuple[str, Any]]:
             table = pq.read_table(path)
             for column in table.column_names:
                 yield f"{name}:{column}", table[column].to_numpy()
+
+
+def _number(text: str) -> float | str:
+    with contextlib.suppress(ValueError):
+        return float(text)
+    return text
 
 
 def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:

@@ -23,7 +23,13 @@ from typing import Any, Self
 import numpy as np
 
 from drake_disasm.cell.grip import bolt_compliance
-from drake_disasm.common.arrays import Array, apply_matrix, as_number, namespace
+from drake_disasm.common.arrays import (
+    Array,
+    apply_matrix,
+    as_number,
+    namespace,
+    side_by_side,
+)
 from drake_disasm.scenario import Scenario, TaskConfig
 
 _MM = 1000.0  # the reward speaks millimetres, because the thesis does
@@ -163,7 +169,7 @@ def counts(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> Array:
     p = geometry.place(state)
     xp, x, y = namespace(p), p[..., 0], p[..., 1]
     way = xp.where(x < geometry.groove_end, x, geometry.groove_end)
-    return xp.stack([way, xp.where(x > task.travel_success, y, 0.0)], axis=-1)
+    return side_by_side([way, xp.where(x > task.travel_success, y, 0.0)])
 
 
 def outcome(

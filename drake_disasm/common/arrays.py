@@ -65,12 +65,22 @@ def last_axis(parts: Sequence[Any], like: Array) -> Array:
     return xp.stack(xp.broadcast_arrays(*arrays), axis=-1)
 
 
+def side_by_side(parts: Sequence[Array]) -> Array:
+    """Returns arrays of one shape (...) side by side (..., k); faster than `stack`."""
+    if not isinstance(parts[0], np.ndarray | np.generic):
+        return namespace(parts[0]).stack(parts, axis=-1)
+    joined = np.empty((*parts[0].shape, len(parts)), parts[0].dtype)
+    for i, part in enumerate(parts):
+        joined[..., i] = part
+    return joined
+
+
 def cross(a: Array, b: Array) -> Array:
     """Returns the cross product of vectors (..., 3); faster than `np.cross`."""
     a1, a2, a3 = a[..., 0], a[..., 1], a[..., 2]
     b1, b2, b3 = b[..., 0], b[..., 1], b[..., 2]
     parts = (a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1)
-    return namespace(a, b).stack(parts, axis=-1)
+    return side_by_side(parts)
 
 
 def apply_matrix(matrices: Array, vectors: Array) -> Array:
@@ -125,5 +135,6 @@ def transposed(matrices: Array) -> Array:
 
 def matrix_of(rows: Sequence[Sequence[Array]]) -> Array:
     """Returns matrices (..., n, m) of their elements (...) by rows."""
-    xp = namespace(rows[0][0])
-    return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+    elements = side_by_side([element for row in rows for element in row])
+    xp = namespace(elements)
+    return xp.reshape(elements, (*elements.shape[:-1], len(rows), len(rows[0])))

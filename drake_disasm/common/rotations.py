@@ -16,6 +16,7 @@ from drake_disasm.common.arrays import (
     array_like,
     matrix_of,
     namespace,
+    side_by_side,
     transposed,
 )
 from drake_disasm.common.spatial import rotation_from_vector
@@ -59,8 +60,8 @@ def rotation_vectors(R: Array) -> Array:
     """
     xp = namespace(R)
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
-    axial = xp.stack(
-        [R[..., j, i] - R[..., i, j] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1
+    axial = side_by_side(
+        [R[..., j, i] - R[..., i, j] for i, j in ((1, 2), (2, 0), (0, 1))]
     )
     sine = xp.sqrt(xp.sum(axial * axial, axis=-1)) / 2.0
     angle = xp.atan2(sine, (trace - 1.0) / 2.0)
@@ -89,13 +90,12 @@ def rpy_of_matrices(R: Array) -> Array:
     """Returns roll, pitch and yaw (..., 3) of R, pitch within a quarter turn."""
     xp = namespace(R)
     level = xp.sqrt(R[..., 0, 0] ** 2 + R[..., 1, 0] ** 2)
-    return xp.stack(
+    return side_by_side(
         [
             xp.atan2(R[..., 2, 1], R[..., 2, 2]),
             xp.atan2(-R[..., 2, 0], level),
             xp.atan2(R[..., 1, 0], R[..., 0, 0]),
-        ],
-        axis=-1,
+        ]
     )
 
 

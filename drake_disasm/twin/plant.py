@@ -12,6 +12,7 @@ from drake_disasm.common.arrays import (
     Array,
     apply_matrix,
     cross,
+    matrix_of,
     namespace,
     to_numpy,
     transposed,
@@ -223,5 +224,5 @@ def turning(angles: Array) -> tuple[Array, Array]:
     R_GnB = matrices_of_rpy(xp.flip(angles, axis=-1))
     s, c = xp.sin(angles[:, 0]), xp.cos(angles[:, 0])
     zero, one = xp.zeros_like(s), xp.ones_like(s)
-    axes = [xp.stack(axis, axis=1) for axis in ([zero, zero, one], [-s, c, zero])]
-    return xp.stack([*axes, R_GnB[:, :, 0]], axis=2), R_GnB
+    x, y, z = R_GnB[:, 0, 0], R_GnB[:, 1, 0], R_GnB[:, 2, 0]
+    return matrix_of([[zero, -s, x], [zero, c, y], [one, zero, z]]), R_GnB
