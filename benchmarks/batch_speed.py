@@ -22,14 +22,14 @@ SIZES = (1, 16, 256, 4096)
 #: Where a batch computes, and on how many threads, by what a key says.
 KINDS = {
     "numpy": ("numpy", 1),
+    "numpy_two": ("numpy", 2),
     "torch": ("cpu", 1),
-    "torch_two": ("cpu", 2),
     "cuda": ("cuda", 1),
 }
 #: All batches that are measured: kinds and how many environments.
 BATCHES = [
     *((kind, count) for kind in KINDS if kind != "cuda" for count in SIZES),
-    *(("cuda", count) for count in (256, 4096, 65536)),
+    *(("cuda", count) for count in (256, 4096, 65536, 262144)),
 ]
 CONTACTS = ("hydroelastic", "impact")
 _SCENARIO, _POLICY = "removal_turned", "admittance"
@@ -70,7 +70,7 @@ def batch_speed(count: int, kind: str, moves: np.ndarray) -> float:
     before = torch.get_num_threads()
     torch.set_num_threads(threads)
     try:
-        twin = BatchedTwin(scenario_with("impact"), count, device)
+        twin = BatchedTwin(scenario_with("impact"), count, device, threads)
         twin.reset(range(count))
         twin.step(moves[:1].repeat(count, axis=0))  # compiles what a GPU runs
         twin.reset(range(count))

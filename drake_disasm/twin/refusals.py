@@ -3,6 +3,9 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.lib import NumpyVersion
+
 from drake_disasm.cell.door_chain import part_of
 from drake_disasm.common.arrays import Array
 from drake_disasm.common.errors import DisasmError
@@ -38,8 +41,6 @@ def make_like(device: str) -> Array:
     Raises:
         DisasmError: there is no such device, or Numba can't compile for it.
     """
-    import numpy as np
-
     if device == "numpy":
         return np.zeros(0)
     import torch
@@ -64,7 +65,8 @@ def refuse_without_compiler(device: str) -> None:
     """
     from numba import cuda
 
-    if not cuda.is_available():
+    is_too_new = NumpyVersion(np.__version__) >= "2.5.0"  # for numba-cuda
+    if is_too_new or not cuda.is_available():
         raise DisasmError(
             f"device: Numba can't compile contact for '{device}'; "
             "pip install 'drake_disasm[gpu]', or use cpu or numpy"
