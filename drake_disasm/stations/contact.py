@@ -30,7 +30,7 @@ from drake_disasm.effects import Environment
 from drake_disasm.stations.base import Parts
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.systems.bolt_environment import BoltEnvironment
-from drake_disasm.twin.conditions import ImpactConditions, Surroundings
+from drake_disasm.twin.conditions import ImpactConditions
 from drake_disasm.twin.contact_system import ImpactContact
 from drake_disasm.twin.law import ImpactLaw
 
@@ -179,14 +179,11 @@ class ImpactContactForce(ContactStrategy):
 
     def _conditions(self, environment: Environment) -> ImpactConditions:
         (K, D), part = self._spring.gains(), self._lock.part
-        return ImpactConditions(
-            law=dataclasses.replace(
-                ImpactLaw.of(part.contact.impact),
-                stiffness=environment.impact_stiffness,
-                exponent=environment.impact_exponent,
-            ),
-            shape=part.shape.with_clearance(environment.clearance),
-            around=Surroundings.of([environment]),
+        return ImpactConditions.of(
+            ImpactLaw.of(part.contact.impact),
+            part.shape,
+            environment,
+            np.zeros((1, 3)),
             M=self._M,
             K=K,
             D=D,

@@ -74,10 +74,6 @@ class ArmStep:
         """Returns x' (n, 12) for states and commands (n, 12)."""
         return apply_matrix(self.F, x) + apply_matrix(self.C, u)
 
-    def after(self, x_ahead: Array, s: Array) -> Array:
-        """Returns x+ (n, 12) once the bolt is at s (n, 12)."""
-        return x_ahead + apply_matrix(self.P, s - x_ahead)
-
     @property
     def is_stable(self) -> bool:
         """Whether an arm that leans on a bolt in contact comes to rest."""

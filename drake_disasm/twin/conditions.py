@@ -5,10 +5,11 @@ import functools
 from collections.abc import Sequence
 from typing import Self
 
-import numpy as np
+from pydrake.math import RigidTransform
 
 from drake_disasm.cell.lock_shape import LockShape
-from drake_disasm.common.arrays import Array, array_like, namespace
+from drake_disasm.common.arrays import Array, array_like, namespace, side_by_side
+from drake_disasm.common.rotations import Pose
 from drake_disasm.effects import Environment
 from drake_disasm.twin.law import ImpactLaw
 
@@ -29,13 +30,25 @@ class Surroundings:
     f_Gn: Array
 
     @classmethod
-    def of(cls, environments: Sequence[Environment]) -> Self:
-        """Returns those of environments, one for each state or one for all."""
+    def of(cls, environment: Environment, like: Array) -> Self:
+        """Returns those of an environment, or of n.
+
+        Args:
+            environment: in which bolts are.
+            like: (n, ...) as many rows, of the kind that is wanted.
+        """
+        xp, count, X_GnG = namespace(like), len(like), environment.X_GnG
+        if isinstance(X_GnG, RigidTransform):
+            X_GnG = Pose.of(X_GnG)
+        friction, *force = (
+            xp.broadcast_to(array_like(number, like), (count,))
+            for number in (environment.friction, *environment.force_Gn)
+        )
         return cls(
-            np.array([e.friction for e in environments]),
-            np.array([e.X_GnG.rotation().matrix() for e in environments]),
-            np.array([e.X_GnG.translation() for e in environments]),
-            np.array([e.force_Gn for e in environments]),
+            friction,
+            xp.broadcast_to(array_like(X_GnG.R, like), (count, 3, 3)),
+            xp.broadcast_to(array_like(X_GnG.p, like), (count, 3)),
+            side_by_side(force),
         )
 
 
@@ -61,6 +74,31 @@ class ImpactConditions:
     K: Array
     D: Array
     p_BoTo_B: Array
+
+    @classmethod
+    def of(
+        cls,
+        law: ImpactLaw,
+        shape: LockShape,
+        environment: Environment,
+        like: Array,
+        **joints: Array,
+    ) -> Self:
+        """Returns the conditions in an environment, or in n.
+
+        Args:
+            law, shape: nominal.
+            environment: in which bolts are.
+            like: see `Surroundings.of`.
+            joints: M, K, D and p_BoTo_B.
+        """
+        law = dataclasses.replace(
+            law,
+            stiffness=environment.impact_stiffness,
+            exponent=environment.impact_exponent,
+        )
+        shape = shape.with_clearance(environment.clearance)
+        return cls(law, shape, Surroundings.of(environment, like), **joints)
 
     @functools.cached_property
     def table(self) -> Array:

@@ -14,7 +14,6 @@ from drake_disasm.cell.grip import (
     Springs,
     bolt_compliance,
     deflection,
-    in_joint_order,
 )
 from drake_disasm.cell.lock_shape import LockShape
 from drake_disasm.cell.placement import nominal_groove_pose
@@ -29,7 +28,6 @@ from drake_disasm.scenario import Scenario, TaskConfig
 from drake_disasm.systems.imprecision import Imprecise
 from drake_disasm.systems.observation import Mounting
 from drake_disasm.twin.arm_step import ArmStep
-from drake_disasm.twin.conditions import ImpactConditions, Surroundings
 from drake_disasm.twin.law import ImpactLaw
 from drake_disasm.twin.plant import Body
 
@@ -117,24 +115,6 @@ class TwinNumbers:
         """
         body = self.body
         return deflection(self.grip, body.p_BoTo_B, body.mass * body.g_Gn, wrench)
-
-    def conditions(
-        self, environment: Environment, around: Surroundings
-    ) -> ImpactConditions:
-        """Returns the contact's conditions in an environment with effects.
-
-        Args:
-            environment: of which law and clearance are taken.
-            around: the rest of it.
-        """
-        law = dataclasses.replace(
-            self.law,
-            stiffness=environment.impact_stiffness,
-            exponent=environment.impact_exponent,
-        )
-        shape = self.shape.with_clearance(environment.clearance)
-        K, D = in_joint_order(self.arm.springs)
-        return ImpactConditions(law, shape, around, self.M, K, D, self.body.p_BoTo_B)
 
 
 @dataclasses.dataclass(frozen=True)

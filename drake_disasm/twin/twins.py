@@ -3,11 +3,12 @@
 import dataclasses
 import functools
 
-from drake_disasm.common.arrays import Array, array_like, namespace
+from drake_disasm.cell.grip import in_joint_order
+from drake_disasm.common.arrays import Array, namespace
 from drake_disasm.common.spatial import shifted_wrench
 from drake_disasm.effects import BoltMotion, Environment, Sensing
 from drake_disasm.systems.observation import Processing
-from drake_disasm.twin.conditions import Surroundings
+from drake_disasm.twin.conditions import ImpactConditions
 from drake_disasm.twin.numbers import TwinNumbers
 from drake_disasm.twin.plant import Plant, PlantStep
 from drake_disasm.twin.slots import BatchEffects
@@ -50,10 +51,19 @@ class Twins:
         return self._plant(motion) if self.effects.is_local else self.plant_at_A
 
     def _plant(self, motion: BoltMotion) -> Plant:
-        environment = self.environment(motion)
-        around = _around(environment, motion.p)
-        conditions = self.numbers.conditions(environment, around)
-        return Plant(self.numbers.arm, self.numbers.body, conditions, self.threads)
+        numbers = self.numbers
+        K, D = in_joint_order(numbers.arm.springs)
+        conditions = ImpactConditions.of(
+            numbers.law,
+            numbers.shape,
+            self.environment(motion),
+            motion.p,
+            M=numbers.M,
+            K=K,
+            D=D,
+            p_BoTo_B=numbers.body.p_BoTo_B,
+        )
+        return Plant(numbers.arm, numbers.body, conditions, self.threads)
 
     def environment(self, motion: BoltMotion) -> Environment:
         """Returns the bolts' environments; see `plant`."""
@@ -91,17 +101,3 @@ def at_A(like: Array) -> BoltMotion:
     """Returns bolts at rest at A, as many as an array (n, ...) has rows."""
     nothing = 0.0 * like[:, :3]
     return BoltMotion(nothing, nothing, nothing[:, 0])
-
-
-def _around(environment: Environment, like: Array) -> Surroundings:
-    """Returns what may differ from twin to twin, (n, ...) of a kind with (n, 3)."""
-    xp, count, X_GnG = namespace(like), len(like), environment.X_GnG
-    f_Gn = [
-        xp.broadcast_to(array_like(f, like), (count,)) for f in environment.force_Gn
-    ]
-    return Surroundings(
-        xp.broadcast_to(array_like(environment.friction, like), (count,)),
-        xp.broadcast_to(X_GnG.rotation(), (count, 3, 3)),
-        xp.broadcast_to(X_GnG.translation(), (count, 3)),
-        xp.stack(f_Gn, axis=1),
-    )

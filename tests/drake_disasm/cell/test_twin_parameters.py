@@ -71,17 +71,6 @@ def test_a_step_without_springs_is_the_exact_solution() -> None:
     np.testing.assert_allclose(found, exact, rtol=1e-6, atol=1e-12)
 
 
-def test_no_bit_of_a_step_depends_on_its_company() -> None:
-    """As `rows @ matrix.T` would on a processor without AVX-512."""
-    springs = Springs(np.full(6, 500.0), np.full(6, 20.0))
-    step, random = ArmStep.of(_arm(2), springs, 0.005), np.random.default_rng(4)
-    x, u, s = random.uniform(-1, 1, (3, 48, 12)) * 1e-3
-    whole = step.after(step.ahead(x, u), s)
-    for count in (1, 2, 5, 7, 13):
-        some = step.after(step.ahead(x[:count], u[:count]), s[:count])
-        assert some.tobytes() == whole[:count].tobytes()
-
-
 @pytest.mark.parametrize("compliance", ["adaptive", "rigid"])
 def test_grip_and_arm_are_in_series(compliance: str) -> None:
     scenario = load_scenario("removal", [f"gripper.compliance={compliance}"])
