@@ -203,7 +203,8 @@ def drive(pipe: Connection, port: int, ports: tuple[int, int]) -> None:
         solve = stallers["solver"].before(coordinates.solve)
         coordinates.solve = solve  # type: ignore[method-assign, assignment]
         robot = station.gate.robot
-        robot.send = stallers["sender"].before(robot.send)
+        send = stallers["sender"].before(robot.send)
+        robot.send = send  # type: ignore[method-assign, assignment]
         pipe.send(None)
         while True:
             place, stall, step, seed = pipe.recv()

@@ -32,7 +32,6 @@ from drake_disasm.stations.hardware_config import (
 )
 from drake_disasm.stations.wiring import export_required
 from drake_disasm.systems.command_gate import CommandGate
-from drake_disasm.systems.connection_check import ConnectionCheck
 from drake_disasm.systems.device_reader import DeviceReader
 
 _LOOKS = 3.0  # samples of arm and sensor that are due before motion goes on
@@ -127,7 +126,6 @@ class HardwareStation(Station):
         self._wire_gate(builder)
         for name in self.devices:
             self._export_reader(builder, name)
-        self._connection = builder.AddNamedSystem("connection", ConnectionCheck())
         builder.BuildInto(self)
         check_ports(self, self.table)
 
@@ -163,7 +161,6 @@ class HardwareStation(Station):
         self._refuse_far_start(position)
         reading = self._cell.mean_wrench()
         self.gate.begin(reading)
-        self._connection.is_connected = True
         return InitialState(position, reading)
 
     def check(self) -> None:
@@ -211,7 +208,7 @@ class HardwareStation(Station):
 
     def close(self) -> None:
         """Stops the clients: no thread and no socket stays."""
-        self._connection.is_connected = False
+        self.gate.is_open = False
         self._cell.close()
 
     def __enter__(self) -> Self:

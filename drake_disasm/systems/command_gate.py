@@ -5,7 +5,13 @@ from typing import Protocol
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
+from pydrake.systems.framework import (
+    Context,
+    DiscreteValues,
+    EventStatus,
+    LeafSystem,
+    State,
+)
 
 from drake_disasm.cell.coordinates import Coordinates
 from drake_disasm.common.errors import DisasmError
@@ -71,6 +77,7 @@ class CommandGate(LeafSystem):
     @endsystem
 
     Attributes:
+        is_open: whether every device has answered; a simulation before is refused.
         supervisor: decides; it outlives the Context, as the robot does.
         pace: keeps commands at their rate, and counts what that costs.
         lag: remembers how far the diagram fell behind, and what its parts took.
@@ -97,7 +104,7 @@ class CommandGate(LeafSystem):
         lag_window: float,
     ) -> None:
         super().__init__()
-        self.supervisor, self.robot = supervisor, robot
+        self.is_open, self.supervisor, self.robot = False, supervisor, robot
         self.pace = Pace(period, robot.clock, robot.let_pass, look)
         self.lag = LagMonitor(lag_window)
         self._coordinates, self._mounting = coordinates, mounting
@@ -107,6 +114,7 @@ class CommandGate(LeafSystem):
         self._before = self.sent = np.full(coordinates.size, np.nan)
         self._wanted = self.DeclareVectorInputPort("position", coordinates.size)
         self._opening = self.DeclareVectorInputPort("opening", 1)
+        self.DeclareInitializationDiscreteUpdateEvent(self._refuse_closed)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._pass_command)
         self.DeclarePeriodicPublishEvent(_GRIPPER_PERIOD, GRIPPER_DELAY, self._grip)
 
@@ -116,7 +124,7 @@ class CommandGate(LeafSystem):
         self.lag.stopwatches[name] = stopwatch
 
     def begin(self, reading: np.ndarray) -> None:
-        """Zeroes the load at the start of an episode, and forgets the last command.
+        """Opens at the start of an episode: zeroes the load, forgets the last command.
 
         Args:
             reading: (6,) of the sensor, taken there.
@@ -127,6 +135,16 @@ class CommandGate(LeafSystem):
         self.pace.begin()
         self.lag.begin()
         self.supervisor.begin()
+        self.is_open = True
+
+    def _refuse_closed(self, context: Context, _: DiscreteValues) -> EventStatus:
+        if not self.is_open:
+            raise DisasmError(
+                "the hardware station is not connected to its devices; call "
+                "station.begin(context), which waits for them, before the simulation "
+                "begins"
+            )
+        return EventStatus.DidNothing()
 
     def _pass_command(self, context: Context, _: State) -> EventStatus:
         situation = self._situation(context, self.pace.await_turn())

@@ -5,7 +5,7 @@ import dataclasses
 from drake_disasm.common.arrays import Array, array_like, namespace
 from drake_disasm.common.spatial import shifted_wrench
 from drake_disasm.effects import BoltMotion, Environment, Sensing
-from drake_disasm.systems.observation import Processing
+from drake_disasm.systems.observation import StateFromReadings
 from drake_disasm.twin import ImpactConditions, Surroundings
 from drake_disasm.twin.motion import PlantStep
 from drake_disasm.twin.numbers import TwinNumbers
@@ -28,9 +28,9 @@ class Twins:
     is_exact: bool
 
     @property
-    def processing(self) -> Processing:
+    def processing(self) -> StateFromReadings:
         """Of the readings."""
-        return Processing(self.numbers.mounting, self.is_exact)
+        return StateFromReadings(self.numbers.mounting, self.is_exact)
 
     def conditions(self, motion: BoltMotion) -> ImpactConditions:
         """Returns the contact's conditions.

@@ -62,6 +62,7 @@ def _behind_gate(robot: _Robot) -> tuple[Simulator, CommandGate, DeviceReader]:
     reader = builder.AddSystem(DeviceReader(robot, 2, PERIOD, 1.0, robot.clock))
     supervisor = Supervisor([], np.ones(2), 0.1, 0.1)
     gate = CommandGate(supervisor, robot, _Coordinates(), None, PERIOD, 3 * PERIOD, 1.0)
+    gate.is_open = True
     builder.AddSystem(gate)
     for port, value in (("position", [0.001, 0.0]), ("opening", [0.04])):
         source = builder.AddSystem(ConstantVectorSource(value))
