@@ -173,7 +173,6 @@ def run(minutes: float, folder: Path, seed: int) -> Tally:
     ):
         policy = Stalling(seed)
         simulation = TaskSimulation(scenario, lambda _: station, policy)
-        simulation.set_target_realtime_rate(1.0)
         while time.monotonic() < end:
             disturber.jog()
             station.resume()

@@ -69,9 +69,7 @@ class Ages:
         for name, reading in station.readings().items():
             self.ages[name].append(reading.age(now))
             self.times[name].append(reading.time)
-        context = station.GetMyContextFromRoot(root)
-        filter_context = station.safety_filter.GetMyContextFromRoot(root)
-        sent = filter_context.get_discrete_state(0).value()
+        context, sent = station.GetMyContextFromRoot(root), station.gate.sent
         if not self._sent or not np.array_equal(sent, self._sent[-1][1]):
             self._sent = [*self._sent[-40:], (now, sent.copy())]
         echo = station.GetOutputPort("iiwa.position_commanded").Eval(context)
@@ -111,7 +109,6 @@ def run(config: Path, minutes: float, views: Sequence[MeshcatView] = ()) -> Ages
     scenario = load_scenario("removal", [f"task.steps={steps + 1}"])
     with HardwareStation(scenario, load_hardware_config(config)) as station:
         simulation = TaskSimulation(scenario, lambda _: station, Shuttle(), views)
-        simulation.set_target_realtime_rate(1.0)
         simulation.reset(0)
         ages = Ages(station)
         simulation.simulator.set_monitor(ages.monitor)
@@ -141,7 +138,7 @@ def playing(*options: str) -> Iterator[tuple[Path, "subprocess.Popen[str]"]]:
         config = Path(folder) / "fake.yaml"
         fake = subprocess.Popen(
             [
-                *(sys.executable, _FAKE_CELL, "--config", str(config)),
+                *(sys.executable, _FAKE_CELL, "--hardware-config", str(config)),
                 *("--lcm-url", _LCM, *options),
             ],
             stdin=subprocess.PIPE,

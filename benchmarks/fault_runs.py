@@ -73,7 +73,6 @@ def in_lockstep(
     """
     with fake_hardware(scenario, seed, limits) as fake:
         simulation = TaskSimulation(scenario, lambda _: fake.station, policy, views)
-        fake.attach(simulation.simulator)
         yield simulation, fake.station, fake.cell
 
 

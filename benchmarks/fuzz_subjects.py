@@ -217,7 +217,7 @@ def _hex_sample() -> Subject:
 
 
 def _hex_request() -> Subject:
-    requests = [codec.Request(command, 1) for command in codec.Command]
+    requests = [codec.BoxRequest(command, 1) for command in codec.BoxCommand]
     valid = [codec.encode_request(request) for request in requests]
     return _datagram(valid, codec.decode_request)
 

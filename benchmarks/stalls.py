@@ -202,9 +202,9 @@ def drive(pipe: Connection, port: int, ports: tuple[int, int]) -> None:
         coordinates = station.coordinates
         solve = stallers["solver"].before(coordinates.solve)
         coordinates.solve = solve  # type: ignore[method-assign, assignment]
-        writer = station.GetSubsystemByName("iiwa_command")
-        writer.send = stallers["sender"].before(writer.send)
-        simulation.set_target_realtime_rate(1.0)
+        robot = station.gate.robot
+        send = stallers["sender"].before(robot.send)
+        robot.send = send  # type: ignore[method-assign, assignment]
         pipe.send(None)
         while True:
             place, stall, step, seed = pipe.recv()

@@ -26,7 +26,6 @@ def main(steps: int = 8) -> None:
         builder.AddNamedSystem("station", station)
         task = add_task(builder, station, make_policy("straight"))
         simulator = Simulator(builder.Build())
-        fake.attach(simulator)
         context = simulator.get_mutable_context()
         # Waits for the devices, checks the start, zeroes the sensor.
         task.begin(context)

@@ -13,13 +13,13 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput
 
 from drake_disasm.stations import STATIONS, Station, make_station
-from drake_disasm.stations.fake_cell.lockstep import FakeHardware, fake_hardware
+from drake_disasm.stations.fake_cell.lockstep import fake_hardware
 from drake_disasm.visualization import add_cell_view, start_meshcat
 
 SCENARIO = "removal"  # without effects, which hardware refuses
 
 
-def hold(station: Station, seconds: float, fake: FakeHardware | None = None) -> None:
+def hold(station: Station, seconds: float) -> None:
     """Holds the bolt at A for a time [s], and prints what the sensor reads."""
     builder = DiagramBuilder()
     builder.AddNamedSystem("station", station)
@@ -34,8 +34,8 @@ def hold(station: Station, seconds: float, fake: FakeHardware | None = None) -> 
     add_cell_view(builder, station, meshcat)
 
     simulator = Simulator(builder.Build())
-    (fake or station).attach(simulator)
-    simulator.set_target_realtime_rate(0.0 if fake else 1.0)
+    station.attach(simulator)
+    simulator.set_target_realtime_rate(1.0)
     context = station.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     station.begin(context)  # hardware connects here; the others are there already
     print(f"watch at {meshcat.web_url()}")
@@ -64,6 +64,6 @@ if __name__ == "__main__":
             hold(real, args.seconds)
     elif args.station == "hardware":
         with fake_hardware(SCENARIO) as fake:
-            hold(fake.station, args.seconds, fake)
+            hold(fake.station, args.seconds)
     else:
         hold(make_station(args.station, SCENARIO), args.seconds)

@@ -2,34 +2,50 @@
 
 import contextlib
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import read_bytes
 from drake_disasm.common.text import clipped
 
 if TYPE_CHECKING:
     from distributed import Client
+    from distributed.security import Security
 
 EXECUTORS = ("local", "dask")
 _PATIENCE = 10.0  # s until a scheduler must have answered
 #: What results depend on, beside what Dask itself compares.
 _PACKAGES = ["drake_disasm", "pydrake", "torch"]
+_TLS = "tls://"
+_TLS_FIELDS = ("tls_ca_file", "tls_client_cert", "tls_client_key")
+_LARGEST = 1_000_000  # of a certificate [bytes]
+_CERTIFICATES = (
+    "give `tls` CA CERTIFICATE KEY, or set distributed.comm.tls in Dask's configuration"
+)
 
 
 @contextlib.contextmanager
-def executor_for(name: str, scheduler: str) -> Iterator[tuple[Executor | None, str]]:
+def executor_for(
+    name: str, scheduler: str, tls: Sequence[Path] = ()
+) -> Iterator[tuple[Executor | None, str]]:
     """Gives an executor, and the name under which its workers reach this program.
 
     Args:
         name: one of EXECUTORS; "local" gives None: `WorkerPool` has its own processes.
-        scheduler: address of Dask's, as tcp://HOST:PORT.
+        scheduler: address of Dask's, as tcp://HOST:PORT, or tls://HOST:PORT.
+        tls: PEM files of the certificates' authority, of this program's certificate
+            and of its key; without them Dask's configuration has them.
 
     Raises:
-        DisasmError: Dask is not installed, its scheduler does not answer, it has no
-            workers, or they have other versions of what the work needs.
+        DisasmError: Dask is not installed, certificates are missing or wrong, the
+            scheduler does not answer, it has no workers, or they have other versions
+            of what the work needs.
     """
+    if tls and not scheduler.startswith(_TLS):
+        raise DisasmError("`tls`: is for a `scheduler` tls://HOST:PORT; give both")
     if name == "local":
         if scheduler:
             raise DisasmError(
@@ -43,7 +59,7 @@ def executor_for(name: str, scheduler: str) -> Iterator[tuple[Executor | None, s
         )
     with contextlib.ExitStack() as stack:
         stack.enter_context(_silent())
-        client = stack.enter_context(_client(scheduler))
+        client = stack.enter_context(_client(scheduler, tls))
         yield stack.enter_context(client.get_executor()), _own_name(scheduler)
 
 
@@ -60,7 +76,7 @@ def _silent() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _client(scheduler: str) -> Iterator["Client"]:
+def _client(scheduler: str, tls: Sequence[Path]) -> Iterator["Client"]:
     """Gives a client of a scheduler that answers, and closes it."""
     try:
         import distributed
@@ -69,19 +85,42 @@ def _client(scheduler: str) -> Iterator["Client"]:
             "`executor` dask: Dask is not installed; "
             "pip install 'drake_disasm[cluster]'"
         ) from None
+    security = _security(scheduler, tls) if scheduler.startswith(_TLS) else None
     try:
-        client = distributed.Client(scheduler, timeout=_PATIENCE)
+        client = distributed.Client(scheduler, timeout=_PATIENCE, security=security)
     except (OSError, ValueError, TypeError) as error:
         raise DisasmError(
             f"scheduler {scheduler}: does not answer within {_PATIENCE:g} s "
             f"({clipped(str(error))}); start one by `dask scheduler`, or check the "
-            "address"
+            "address, which begins with tls:// if it has certificates, and these"
         ) from None
     try:
         _check_workers(client, scheduler)
         yield client
     finally:
         client.close()
+
+
+def _security(scheduler: str, tls: Sequence[Path]) -> "Security":
+    """Returns the certificates by which to reach a scheduler; refuses what is wrong."""
+    from distributed.security import Security
+
+    files = dict(zip(_TLS_FIELDS, map(str, tls), strict=False))
+    security = Security(require_encryption=True, **files)
+    fields = [getattr(security, field) for field in _TLS_FIELDS]
+    if not all(fields[:2]):  # a certificate's file may hold the key, too
+        raise DisasmError(f"scheduler {scheduler}: needs certificates; {_CERTIFICATES}")
+    for field in fields:
+        if field and "\n" not in field:  # else it is the content itself
+            read_bytes(Path(field), _CERTIFICATES, _LARGEST)
+    try:
+        security.get_connection_args("client")
+    except (OSError, ValueError) as error:
+        raise DisasmError(
+            f"scheduler {scheduler}: a certificate, or its key, can't be used "
+            f"({clipped(str(error))}); {_CERTIFICATES}"
+        ) from None
+    return security
 
 
 def _check_workers(client: "Client", scheduler: str) -> None:

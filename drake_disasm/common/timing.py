@@ -15,10 +15,10 @@ POLICY_DELAY = 1e-6
 #: The pose target takes up the policy's action this long after it [s].
 MOTION_DELAY = 2e-6
 
-#: A command leaves for the arm this long after it was decided on [s]. At the same
-#: time it would leave before, being published at the end of the step that led there.
-#: It leaves before the policy acts, which may take its time.
-COMMAND_DELAY = 5e-7
+#: The gripper's command leaves this long after the arm's was decided on [s]. At the
+#: same time it would leave before, being published at the end of the step that led
+#: there. It leaves before the policy acts, which may take its time.
+GRIPPER_DELAY = 5e-7
 
 
 def boundary(steps: int, period: float) -> float:

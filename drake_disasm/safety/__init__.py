@@ -3,17 +3,16 @@
 from drake_disasm.safety.guards import Guard, Situation, guards
 from drake_disasm.safety.lag import Lag, LagMonitor
 from drake_disasm.safety.limits import SafetyConfig
-from drake_disasm.safety.pacing import CommandPacer, PaceCounts
+from drake_disasm.safety.pacing import Pace
 from drake_disasm.safety.retreat import Retreat
 from drake_disasm.safety.supervisor import Mode, Supervisor
 
 __all__ = [
-    "CommandPacer",
     "Guard",
     "Lag",
     "LagMonitor",
     "Mode",
-    "PaceCounts",
+    "Pace",
     "Retreat",
     "SafetyConfig",
     "Situation",

@@ -42,20 +42,35 @@ class PaceCounts:
     waited: float = 0.0
 
 
-class CommandPacer:
-    """Makes each command wait for its turn, one control period after the last.
+@dataclasses.dataclass(frozen=True)
+class Turn:
+    """When a command may be decided on.
+
+    Attributes:
+        now: by the clock [s].
+        overdue: by how much a stall had made the command late, before the devices
+            were looked at [s]; zero without one.
+        since_sent: how long after the last command this one leaves [s]: one period
+            at most, however long the last one is ago.
+    """
+
+    now: float
+    overdue: float
+    since_sent: float
+
+
+class Pace:
+    """Gives each command its turn, one control period after the last.
 
     Commands that are a little late, as on any machine without a real-time kernel, are
     made up for by gaps that are a little shorter, by no more than MIN_GAP allows.
     After a stall the schedule begins anew, and some time passes first, in which the
     devices' newest samples arrive: the guards look before the arm moves.
 
+    Each turn ends by `leave` or by `skip`.
+
     Attributes:
         counts: what it cost so far.
-        turn: when the present command's turn came, by the clock [s]; NaN before.
-        overdue: by how much a stall had made the present command late, before the
-            devices were looked at [s]; zero without one.
-        last_sent: when the last command left [s]; NaN before the first.
 
     Args:
         period: of the commands [s].
@@ -78,55 +93,44 @@ class CommandPacer:
 
     def begin(self) -> None:
         """Forgets the schedule: no command was sent, as between episodes."""
-        self._due = self.turn = self.last_sent = np.nan
-        self.overdue, self._stalled = 0.0, 0.0
+        self._due = self._turn = self._last_sent = np.nan
+        self._stalled = 0.0
 
-    def await_turn(self) -> float:
-        """Waits until the next command is due; returns the time then [s]."""
+    def await_turn(self) -> Turn:
+        """Waits until the next command is due."""
         while True:
             now = self._clock()
             if now - self._due > STALL * self._period:
                 self._slip(now)
             if not now < self._due - _ROUNDING:  # NaN before the first command
-                self.turn, self.overdue, self._stalled = now, self._stalled, 0.0
-                return now
+                break
             self._let_pass(self._due - now)
+        overdue, self._stalled, self._turn = self._stalled, 0.0, now
+        passed = np.maximum(now - self._last_sent, MIN_GAP * self._period)
+        return Turn(now, overdue, float(np.fmin(passed, self._period)))  # not of NaN
 
-    def await_gap(self) -> None:
-        """Waits until the last command is long enough ago for the next one to leave."""
+    def is_late(self) -> bool:
+        """Returns whether a stall came since the turn; its command must not leave."""
+        return self._clock() - self._turn > STALL * self._period
+
+    def leave(self, send: Callable[[], None]) -> None:
+        """Sends a command, once the last one is long enough ago."""
         least = MIN_GAP * self._period - _ROUNDING
-        while (passed := self._clock() - self.last_sent) < least:
+        while (passed := self._clock() - self._last_sent) < least:
             self._let_pass(least - passed)
-
-    def sent(self) -> None:
-        """Takes note that the command has left now."""
-        self.last_sent = self._clock()
-        due = self.last_sent if np.isnan(self._due) else self._due
+        send()
+        self._last_sent = self._clock()
+        due = self._last_sent if np.isnan(self._due) else self._due
         self._due = due + self._period
 
-    def skipped(self) -> None:
+    def skip(self) -> None:
         """Takes note that this turn's command is not sent at all."""
         self.counts.held += 1
-        self._due = (self.turn if np.isnan(self._due) else self._due) + self._period
-
-    def refuse_late(self) -> bool:
-        """Returns whether a stall came since the turn; its command must not leave."""
-        now = self._clock()
-        if not now - self.turn > STALL * self._period:
-            return False
-        self.counts.held += 1
-        self._slip(now)
-        return True
-
-    def since_sent(self, now: float) -> float:
-        """Returns how long after the last command the next one leaves [s].
-
-        No more than one period, however long the last one is ago.
-        """
-        passed = now - self.last_sent
-        if np.isnan(passed):
-            return self._period
-        return min(max(passed, MIN_GAP * self._period), self._period)
+        if self.is_late():
+            self._slip(self._clock())
+        else:
+            due = self._turn if np.isnan(self._due) else self._due
+            self._due = due + self._period
 
     def _let_pass(self, duration: float) -> None:
         begun = self._clock()
@@ -135,7 +139,7 @@ class CommandPacer:
 
     def _slip(self, now: float) -> None:
         """Counts a stall, and begins the schedule anew."""
-        due = self.turn if np.isnan(self._due) else self._due
+        due = self._turn if np.isnan(self._due) else self._due
         late, counts = now - due, self.counts
         self._stalled = max(self._stalled, late)
         counts.stalls += 1

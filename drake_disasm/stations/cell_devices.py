@@ -12,6 +12,7 @@ from drake_disasm.devices.iiwa import (
     CommandChannel,
     CommandMonitor,
     IiwaStatusMonitor,
+    encode_command,
 )
 from drake_disasm.devices.onrobot_hex import HexClient
 from drake_disasm.devices.reading import Clock, Reading
@@ -30,7 +31,7 @@ class CellDevices:
 
     Attributes:
         clients: by the device's name.
-        gripper: the client that takes commands.
+        is_commanded: whether anything is sent to what moves.
         lcm: by which the arm is reached.
         checked_lcm: carries the messages that the arm's monitor has accepted.
         clock: tells when samples come [s].
@@ -38,8 +39,7 @@ class CellDevices:
 
     Args:
         config: where the devices are, and limits.
-        activate: whether the robot is commanded, and the gripper may be activated,
-            which moves it.
+        is_commanded: see above; also whether the gripper may be activated.
         clock: see above.
         wait: lets a time [s] pass while devices answer.
         lcm: see above; None is the configured one.
@@ -48,7 +48,7 @@ class CellDevices:
     def __init__(
         self,
         config: HardwareConfig,
-        activate: bool,
+        is_commanded: bool,
         clock: Clock,
         wait: Callable[[float], None],
         lcm: DrakeLcm | None,
@@ -61,22 +61,22 @@ class CellDevices:
             sensor.address, sensor.port, sensor.period, sensor.filter_hz, clock
         )
         grip = dataclasses.replace(
-            config.gripper, activate=config.gripper.activate and activate
+            config.gripper, activate=config.gripper.activate and is_commanded
         )
         settings = RobotiqSettings(**dataclasses.asdict(grip))
-        self.gripper = RobotiqClient(settings, clock)
+        self._gripper = RobotiqClient(settings, clock)
         self._arm = IiwaStatusMonitor(
             self.lcm, self.checked_lcm, iiwa.status_channel, iiwa.status_period, clock
         )
         self.clients: dict[str, Readable] = {
             "iiwa": self._arm,
-            "gripper": self.gripper,
+            "gripper": self._gripper,
             "ft_sensor": self._sensor,
         }
         channel = CommandChannel(self.lcm, iiwa.command_channel)
         self.commands = CommandMonitor(channel, lambda: self._arm.commanded)
-        self._is_commanded = activate
-        self._locks = DeviceLocks(_used(config, self.lcm.get_lcm_url(), activate))
+        self.is_commanded = is_commanded
+        self._locks = DeviceLocks(_used(config, self.lcm.get_lcm_url(), is_commanded))
 
     def connect(self) -> None:
         """Starts the clients; calling it again restarts the sensor's stream.
@@ -85,19 +85,19 @@ class CellDevices:
             DisasmError: another program on this machine has one of the devices.
         """
         self._locks.acquire()
-        if self._is_commanded:
+        if self.is_commanded:
             self.commands.start()
         self._sensor.start()
-        self.gripper.start()
+        self._gripper.start()
 
     def close(self) -> None:
         """Stops the clients: no thread and no socket stays."""
         self._sensor.stop()
-        self.gripper.stop()
+        self._gripper.stop()
         self.commands.stop()
         self._locks.release()
 
-    def arm_listens(self) -> bool:
+    def listens(self) -> bool:
         """Returns whether the arm's driver sends, and has for long enough.
 
         To a driver that has just been started a command is an error.
@@ -107,8 +107,26 @@ class CellDevices:
         sends = self._arm.read().health(now, limit) is Health.READY
         return sends and self._arm.sending_for(now) >= _LISTENS_FIRST
 
+    @property
+    def foreign(self) -> str:
+        """Why somebody else commands the arm; empty if nobody does, or may not."""
+        return self.commands.foreign if self.is_commanded else ""
+
+    def send(self, position: np.ndarray, time: float) -> None:
+        """Sends joint positions (7,) [rad] of a time [s] to the arm's driver.
+
+        They are noted first: they come back as others' commands do.
+        """
+        self.commands.sent(position)
+        channel = self._config.iiwa.command_channel
+        self.lcm.Publish(channel, encode_command(position, time))
+
+    def grip(self, opening: float) -> None:
+        """Sends an opening [m] to the gripper."""
+        self._gripper.command(opening)
+
     def pump(self) -> None:
-        """Handles the arm's messages while no simulator does."""
+        """Handles the arm's messages that have come."""
         for lcm in (self.lcm, self.checked_lcm):
             while lcm.HandleSubscriptions(0):
                 pass
@@ -120,6 +138,7 @@ class CellDevices:
 
     def readings(self) -> dict[str, Reading]:
         """Returns the newest reading of each device."""
+        self.pump()
         return {name: device.read() for name, device in self.clients.items()}
 
     def healths(self) -> dict[str, Health]:
@@ -139,13 +158,12 @@ class CellDevices:
         """
         begun = self.clock()
         while True:
-            self.pump()
             health = self.healths()
             waited = self.clock() - begun
-            if self._is_commanded and self.commands.foreign:
-                raise DisasmError(self.commands.foreign)
+            if self.foreign:
+                raise DisasmError(self.foreign)
             not_ready = [n for n, h in health.items() if h is not Health.READY]
-            if not not_ready and waited >= _LISTENS_FIRST and self.arm_listens():
+            if not not_ready and waited >= _LISTENS_FIRST and self.listens():
                 return
             if waited > self._config.ready_timeout:
                 raise DisasmError(self._silence(not_ready))

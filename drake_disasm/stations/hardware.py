@@ -8,8 +8,7 @@ from typing import Self
 import numpy as np
 from pydrake.lcm import DrakeLcm
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, DiagramBuilder, InputPort
-from pydrake.systems.primitives import PassThrough
+from pydrake.systems.framework import Context, DiagramBuilder
 
 from drake_disasm.cell.arm_control import yielding
 from drake_disasm.cell.arm_description import refuse_unlimited_arm
@@ -21,16 +20,9 @@ from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.devices.reading import Clock, Reading
 from drake_disasm.effects import Effect
 from drake_disasm.effects.refusals import refuse_on_hardware
-from drake_disasm.safety import (
-    CommandPacer,
-    LagMonitor,
-    Mode,
-    Retreat,
-    Supervisor,
-    guards,
-)
+from drake_disasm.safety import Mode, Retreat, Supervisor, guards
 from drake_disasm.scenario import ArmConfig, Scenario, validate
-from drake_disasm.stations.arm_over_lcm import command_sender, export_status
+from drake_disasm.stations.arm_over_lcm import export_status
 from drake_disasm.stations.base import InitialState, Station, refuse_twins_contact
 from drake_disasm.stations.cell_devices import CellDevices
 from drake_disasm.stations.hardware_config import (
@@ -39,13 +31,9 @@ from drake_disasm.stations.hardware_config import (
     refuse_narrow_guard,
 )
 from drake_disasm.stations.wiring import export_required
-from drake_disasm.systems.arm_command_writer import ArmCommandWriter
-from drake_disasm.systems.connection_check import ConnectionCheck
+from drake_disasm.systems.command_gate import CommandGate
 from drake_disasm.systems.device_reader import DeviceReader
-from drake_disasm.systems.gripper_writer import GripperWriter
-from drake_disasm.systems.safety_filter import SafetyFilter
 
-_GRIPPER_PERIOD = 0.05  # s
 _LOOKS = 3.0  # samples of arm and sensor that are due before motion goes on
 _SIZES = {"iiwa": 7, "gripper": 2, "ft_sensor": 6}
 _VALUES = {
@@ -62,7 +50,7 @@ class HoldError(DisasmError):
 class HardwareStation(Station):
     """KUKA iiwa, OnRobot HEX and Robotiq 2F-140 behind their own protocols.
 
-    Commands reach the arm through a SafetyFilter. `begin` connects the devices, and
+    Commands reach the devices through a CommandGate. `begin` connects the devices, and
     `close` disconnects them; a simulation before `begin` is refused. A dry run reads
     the devices and sends nothing.
 
@@ -90,8 +78,7 @@ class HardwareStation(Station):
 
     Attributes:
         supervisor: lets commands through, or holds.
-        pacer: keeps commands at their rate, and counts what that costs.
-        lag: remembers how far the diagram fell behind, and what its parts took.
+        gate: by which commands get to the devices.
         allowed_lead: (7,) of the joints' commands before what is measured [rad].
         devices: clients by name.
 
@@ -134,20 +121,11 @@ class HardwareStation(Station):
         self.supervisor = _supervisor(
             scenario.arm, config, self._retreat(), self.allowed_lead
         )
-        self.pacer = CommandPacer(
-            self.control_period,
-            self._cell.clock,
-            self._cell.let_pass,
-            _LOOKS * max(config.iiwa.status_period, config.ft_sensor.period),
-        )
-        self.lag = LagMonitor(config.safety.lag_window)
         builder = DiagramBuilder()
         export_status(builder, self._cell, config.iiwa)
-        self._wire_command(builder)
-        self._wire_gripper(builder)
+        self._wire_gate(builder)
         for name in self.devices:
             self._export_reader(builder, name)
-        self._connection = builder.AddNamedSystem("connection", ConnectionCheck())
         builder.BuildInto(self)
         check_ports(self, self.table)
 
@@ -182,10 +160,7 @@ class HardwareStation(Station):
         position = self.devices["iiwa"].read().values
         self._refuse_far_start(position)
         reading = self._cell.mean_wrench()
-        self.safety_filter.zero(reading)
-        self.safety_filter.begin()
-        self.supervisor.begin()
-        self._connection.is_connected = True
+        self.gate.begin(reading)
         return InitialState(position, reading)
 
     def check(self) -> None:
@@ -219,12 +194,11 @@ class HardwareStation(Station):
 
     def register_part(self, name: str, stopwatch: Stopwatch) -> None:
         """See Station."""
-        stopwatch.clock = self._cell.clock
-        self.lag.stopwatches[name] = stopwatch
+        self.gate.add_part(name, stopwatch)
 
     def counts(self) -> dict[str, float | int]:
         """Returns what keeping the commands' pace has cost so far, by name."""
-        counts = dataclasses.asdict(self.pacer.counts)
+        counts = dataclasses.asdict(self.gate.pace.counts)
         rounded = {name: round(value, 4) for name, value in counts.items()}
         return rounded | {"clamped": self.supervisor.clamped}
 
@@ -234,7 +208,7 @@ class HardwareStation(Station):
 
     def close(self) -> None:
         """Stops the clients: no thread and no socket stays."""
-        self._connection.is_connected = False
+        self.gate.is_open = False
         self._cell.close()
 
     def __enter__(self) -> Self:
@@ -244,62 +218,34 @@ class HardwareStation(Station):
         self.close()
 
     def pump(self) -> None:
-        """Handles the arm's messages while no simulator does."""
+        """Handles the arm's messages: LCM keeps one of a channel, and drops later ones.
+
+        A simulation does so by itself, at least once a control period.
+        """
         self._cell.pump()
 
-    def _wire_command(self, builder: DiagramBuilder) -> None:
-        """Wires the way of a command: through the safety filter, then to the arm."""
-        period = self.control_period
-        self.safety_filter = builder.AddNamedSystem(
-            "safety_filter",
-            SafetyFilter(
-                self.supervisor,
-                self.pacer,
-                self.lag,
-                self.devices,
-                self.coordinates,
-                self.mounting,
-                period,
-                lambda: "" if self.dry_run else self._cell.commands.foreign,
-            ),
+    def _wire_gate(self, builder: DiagramBuilder) -> None:
+        """Adds the gate, behind the station's inputs."""
+        config = self.config
+        self.gate = CommandGate(
+            self.supervisor,
+            self._cell,
+            self.coordinates,
+            self.mounting,
+            self.control_period,
+            _LOOKS * max(config.iiwa.status_period, config.ft_sensor.period),
+            config.safety.lag_window,
         )
+        builder.AddNamedSystem("gate", self.gate)
         export_required(
             builder,
-            self.safety_filter.GetInputPort("position"),
+            self.gate.GetInputPort("position"),
             "iiwa.position",
             "connect the commanded joint angles (7,)",
         )
-        if self.dry_run:
-            return
-        writer = builder.AddNamedSystem(
-            "iiwa_command",
-            ArmCommandWriter(
-                command_sender(self._cell, self.config.iiwa),
-                self._cell.arm_listens,
-                self.pacer,
-                self.supervisor,
-                period,
-                self.coordinates.size,
-            ),
-        )
-        self.register_part("sending", writer.stopwatch)
-        builder.Connect(self.safety_filter.get_output_port(), writer.get_input_port())
-
-    def _wire_gripper(self, builder: DiagramBuilder) -> None:
-        if self.dry_run:
-            unheard = builder.AddNamedSystem("gripper_unheard", PassThrough(1))
-            self._export_grip(builder, unheard.get_input_port())
-            return
-        writer = builder.AddNamedSystem(
-            "gripper_writer",
-            GripperWriter(self._cell.gripper.command, self.supervisor, _GRIPPER_PERIOD),
-        )
-        self._export_grip(builder, writer.get_input_port())
-
-    def _export_grip(self, builder: DiagramBuilder, port: InputPort) -> None:
         export_required(
             builder,
-            port,
+            self.gate.GetInputPort("opening"),
             "gripper.position",
             "connect the commanded opening, [station.grip_command] to hold the bolt",
         )

@@ -126,7 +126,7 @@ def _length(vectors: Array) -> Array:
 
 
 @dataclasses.dataclass(frozen=True)
-class Processing:
+class StateFromReadings:
     """From readings to the state, as a pure function (thesis 4.2.4).
 
     Attributes:
@@ -204,7 +204,7 @@ class ObservationProcessor(LeafSystem):
         super().__init__()
         self._remember_poses(period, effects)
         self._coordinates = coordinates
-        self._processing = Processing(mounting, variant == "exact")
+        self._processing = StateFromReadings(mounting, variant == "exact")
         offset = np.zeros(6) if reading is None else self._processing.offset(reading)
         self._offset = self.DeclareNumericParameter(BasicVector(offset))
         self._position = self.DeclareVectorInputPort(

@@ -7,7 +7,7 @@ from drake_disasm.cell.grip import in_joint_order
 from drake_disasm.common.arrays import Array, namespace
 from drake_disasm.common.spatial import shifted_wrench
 from drake_disasm.effects import BoltMotion, Environment, Sensing
-from drake_disasm.systems.observation import Processing
+from drake_disasm.systems.observation import StateFromReadings
 from drake_disasm.twin.conditions import ImpactConditions
 from drake_disasm.twin.numbers import TwinNumbers
 from drake_disasm.twin.plant import Plant, PlantStep
@@ -33,9 +33,9 @@ class Twins:
     threads: int = 1
 
     @property
-    def processing(self) -> Processing:
+    def processing(self) -> StateFromReadings:
         """Of the readings."""
-        return Processing(self.numbers.mounting, self.is_exact)
+        return StateFromReadings(self.numbers.mounting, self.is_exact)
 
     @functools.cached_property
     def plant_at_A(self) -> Plant:

@@ -19,7 +19,7 @@ from drake_disasm.effects import (
     Effect,
     LinkPayload,
 )
-from drake_disasm.effects.arm.payload import Payload
+from drake_disasm.effects.arm.payload import PayloadEffect
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
@@ -188,7 +188,7 @@ class JointMotionModel(LogModel):
         """
         found = super().applicable_effects(library)
         if self._inertia is not None:
-            unknown: tuple[type[Effect], ...] = (ArmTilt, Payload)
+            unknown: tuple[type[Effect], ...] = (ArmTilt, PayloadEffect)
         elif not self._knows_links:
             unknown = (LinkPayload,)
         else:

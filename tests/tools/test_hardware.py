@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from drake import lcmt_iiwa_command
+from drake import lcmt_iiwa_command, lcmt_iiwa_status
 from pydrake.lcm import DrakeLcm
 
 from drake_disasm.logs import read_log
@@ -157,12 +157,24 @@ def test_no_row_is_lost_however_a_run_is_stopped(
         assert episode.rows >= count and episode["truncated"][-1]
 
 
+def _command_by_another_program() -> None:
+    """Commands the arm to where it is commanded already, all but a hair."""
+    lcm, heard = DrakeLcm(_LCM), []
+    lcm.Subscribe("IIWA_STATUS", heard.append)
+    while not heard:
+        lcm.HandleSubscriptions(500)
+    q = lcmt_iiwa_status.decode(heard[-1]).joint_position_commanded
+    message = lcmt_iiwa_command()
+    message.num_joints, message.joint_position = 7, [q[0] + 1e-5, *q[1:]]
+    lcm.Publish("IIWA_COMMAND", message.encode())
+
+
 @pytest.mark.slow
 def test_a_foreign_command_over_the_network_is_held_at(
     moving: list[str], tmp_path: Path
 ) -> None:
     with _in_motion(moving, tmp_path / "log", 4) as (process, _):
-        DrakeLcm(_LCM).Publish("IIWA_COMMAND", lcmt_iiwa_command().encode())
+        _command_by_another_program()
         _, errors = process.communicate()
     assert process.returncode == 2
     reason = "a command that is not ours came on IIWA_COMMAND from "

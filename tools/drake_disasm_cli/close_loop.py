@@ -164,7 +164,7 @@ def main(arguments: Sequence[str]) -> int:
     origin = program.provenance("drake-disasm close-loop", arguments, 0)
     with (
         program.ProgressBar(unit="run") as progress,
-        executor_for(args.executor, args.scheduler) as (executor, _),
+        executor_for(args.executor, args.scheduler, args.tls) as (executor, _),
         Workers(args.workers, executor=executor, progress=progress) as workers,
     ):
         model, findings = data_arguments.checked(logs, model, args, workers)

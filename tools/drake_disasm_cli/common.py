@@ -184,7 +184,7 @@ def add_workers_argument(parser: argparse.ArgumentParser, more: str = "") -> Non
 
 
 def add_executor_arguments(parser: argparse.ArgumentParser, more: str = "") -> None:
-    """Adds --workers, --executor and --scheduler."""
+    """Adds --workers, --executor, --scheduler and --tls."""
     add_workers_argument(parser, more or "; jobs at a time with --executor dask")
     parser.add_argument(
         "--executor",
@@ -196,8 +196,17 @@ def add_executor_arguments(parser: argparse.ArgumentParser, more: str = "") -> N
     parser.add_argument(
         "--scheduler",
         default="",
-        metavar="tcp://HOST:PORT",
-        help="of the Dask cluster",
+        metavar="ADDRESS",
+        help="of the Dask cluster: tcp://HOST:PORT, or tls://HOST:PORT",
+    )
+    parser.add_argument(
+        "--tls",
+        nargs=3,
+        default=(),
+        type=Path,
+        metavar=("CA", "CERTIFICATE", "KEY"),
+        help="PEM files for a scheduler tls://HOST:PORT (default: those of Dask's "
+        "configuration)",
     )
 
 

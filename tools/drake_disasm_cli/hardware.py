@@ -118,7 +118,6 @@ def _pump(station: HardwareStation, duration: float) -> None:
 
 def health_table(station: HardwareStation) -> str:
     """Returns a line for each device: health, values, age, packets."""
-    station.pump()  # else the arm's reading is as old as the last step
     readings, healths, now = station.readings(), station.healths(), time.monotonic()
     return "\n".join(
         _line(name, reading, healths[name], now) for name, reading in readings.items()

@@ -201,7 +201,7 @@ def main(arguments: Sequence[str]) -> int:
     journal = Journal(args.out, _identity(args, logs), args.resume)
     with (
         program.ProgressBar("evaluation") as bar,
-        executor_for(args.executor, args.scheduler) as (executor, _),
+        executor_for(args.executor, args.scheduler, args.tls) as (executor, _),
         Workers(args.workers, executor=executor) as workers,
     ):
         whole = args.objective == "rollout"
@@ -286,7 +286,7 @@ def _data(logs: Sequence[Log]) -> dict[str, object]:
 def _identity(args: argparse.Namespace, logs: Sequence[Log]) -> dict[str, object]:
     """Returns what must be the same for a resumed run to be the same run."""
     ignored = (
-        "workers", "executor", "scheduler", "resume", "out", "log", "profile",
+        "workers", "executor", "scheduler", "tls", "resume", "out", "log", "profile",
     )  # fmt: skip
     kept = {k: v for k, v in vars(args).items() if k not in ignored}
     return {**kept, "data": [log.data_hash for log in logs]}

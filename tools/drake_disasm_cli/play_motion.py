@@ -83,7 +83,8 @@ def main(arguments: Sequence[str]) -> int:
     motion = read_motion(args.motion, len(joints))
     refuse_beyond_limits(motion, scenario.arm.model, args.motion)
     writer = _open_log(args, arguments, scenario) if args.record else None
-    rate = 1.0 if args.station == "hardware" else common.realtime_rate(args)
+    # Of hardware, the pace is its own.
+    rate = 0.0 if args.station == "hardware" else common.realtime_rate(args)
     with _station(args, scenario) as station:
         player = MotionPlayer(station, motion, _view(args))
         print(

@@ -169,7 +169,6 @@ def _on_hardware(
         view = _open_view(args)
         views = [view] if view else []
         simulation = TaskSimulation(scenario, lambda _: station, policy, views)
-        simulation.set_target_realtime_rate(1.0)
         print("waiting for the devices", flush=True)
         try:
             print(summary_table([_run_one(simulation, seed, writer, view)]))

@@ -127,7 +127,7 @@ def main(arguments: Sequence[str]) -> int:
     study = _study(args, arguments)
     with (
         program.ProgressBar("episode", keep=True) as bar,
-        executor_for(args.executor, args.scheduler) as (executor, host),
+        executor_for(args.executor, args.scheduler, args.tls) as (executor, host),
     ):
         origin = open_study(study, args.out, args.resume)["provenance"]
         try:

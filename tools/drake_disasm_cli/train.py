@@ -193,7 +193,7 @@ def main(arguments: Sequence[str]) -> int:
         unit = "round" if experiment.logs else "episode"
         with (
             program.ProgressBar(unit, keep=True) as bar,
-            executor_for(args.executor, args.scheduler) as (executor, host),
+            executor_for(args.executor, args.scheduler, args.tls) as (executor, host),
         ):
             train_seeds(jobs, args.workers, bar, executor, host)
     finally:

@@ -2,8 +2,8 @@
 
 from drake_disasm.devices.onrobot_hex.client import HexClient
 from drake_disasm.devices.onrobot_hex.codec import (
-    Command,
-    Request,
+    BoxCommand,
+    BoxRequest,
     Sample,
     decode_request,
     decode_sample,
@@ -12,9 +12,9 @@ from drake_disasm.devices.onrobot_hex.codec import (
 )
 
 __all__ = [
-    "Command",
+    "BoxCommand",
+    "BoxRequest",
     "HexClient",
-    "Request",
     "Sample",
     "decode_request",
     "decode_sample",

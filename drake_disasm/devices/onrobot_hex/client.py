@@ -14,8 +14,8 @@ from drake_disasm.devices.datagrams import receive, stamp_arrivals
 from drake_disasm.devices.device_clock import DeviceClock
 from drake_disasm.devices.onrobot_hex.codec import (
     PORT,
-    Command,
-    Request,
+    BoxCommand,
+    BoxRequest,
     decode_sample,
     encode_request,
     filter_request,
@@ -68,7 +68,7 @@ class HexClient:
         self._requests = (
             filter_request(filter_hz),
             period_request(period),
-            Request(Command.START),
+            BoxRequest(BoxCommand.START),
         )
         self._box, self._silence = (address, port), silence
         self._mailbox = Mailbox(6, clock)
@@ -129,7 +129,7 @@ class HexClient:
         thread.join()
         # Not before: the thread might have asked the box to stream once more.
         with box, contextlib.suppress(OSError):
-            box.send(encode_request(Request(Command.STOP)))
+            box.send(encode_request(BoxRequest(BoxCommand.STOP)))
 
     def _ask(self, box: socket.socket) -> None:
         """Asks the box to stream; the numbers may begin anew.

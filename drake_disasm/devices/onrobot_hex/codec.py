@@ -28,7 +28,7 @@ _COUNTS = (10_000,) * 3 + (100_000,) * 3  # per N, per N m
 _NUMBERS = 2**32  # that a sequence has before it starts again at 0
 
 
-class Command(enum.IntEnum):
+class BoxCommand(enum.IntEnum):
     """What a request asks for, and what its data then mean."""
 
     STOP = 0x0000
@@ -39,10 +39,10 @@ class Command(enum.IntEnum):
 
 
 @dataclasses.dataclass(frozen=True)
-class Request:
+class BoxRequest:
     """What a client sends to the box."""
 
-    command: Command
+    command: BoxCommand
     data: int = 0
 
 
@@ -63,15 +63,15 @@ class Sample:
     wrench: tuple[float, ...]
 
 
-def filter_request(cutoff: float) -> Request:
+def filter_request(cutoff: float) -> BoxRequest:
     """Returns the request for a cut-off [Hz] of the box's filter; 0 is none."""
     if cutoff not in FILTERS:
         choices = ", ".join(f"{choice:g}" for choice in FILTERS)
         raise DisasmError(f"HEX: no filter of {cutoff:g} Hz; choose one of {choices}")
-    return Request(Command.FILTER, FILTERS[cutoff])
+    return BoxRequest(BoxCommand.FILTER, FILTERS[cutoff])
 
 
-def period_request(period: float) -> Request:
+def period_request(period: float) -> BoxRequest:
     """Returns the request for a period between samples [s], in whole ms."""
     matches = [ms for ms in PERIODS_MS if math.isclose(1000.0 * period, ms)]
     if not matches:
@@ -79,10 +79,10 @@ def period_request(period: float) -> Request:
             f"HEX: no period of {period:g} s; choose whole milliseconds "
             f"from {PERIODS_MS[0]} to {PERIODS_MS[-1]}"
         )
-    return Request(Command.PERIOD, matches[0])
+    return BoxRequest(BoxCommand.PERIOD, matches[0])
 
 
-def encode_request(request: Request) -> bytes:
+def encode_request(request: BoxRequest) -> bytes:
     """Returns the 8 bytes of a request; raises CodecError if it doesn't fit."""
     try:
         return _REQUEST.pack(_HEADER, request.command, request.data)
@@ -90,14 +90,14 @@ def encode_request(request: Request) -> bytes:
         raise CodecError(f"HEX: {request} has no encoding: {error}") from error
 
 
-def decode_request(datagram: bytes) -> Request:
+def decode_request(datagram: bytes) -> BoxRequest:
     """Returns the request of 8 bytes; raises CodecError if they are none."""
     _check_length(datagram, _REQUEST.size)
     header, command, data = _REQUEST.unpack(datagram)
     if header != _HEADER:
         raise CodecError(f"HEX: a request begins with {header:#06x}, not {_HEADER:#x}")
     try:
-        return Request(Command(command), data)
+        return BoxRequest(BoxCommand(command), data)
     except ValueError as error:
         raise CodecError(f"HEX: command {command:#06x} is unknown") from error
 

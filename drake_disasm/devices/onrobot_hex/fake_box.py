@@ -9,8 +9,8 @@ from typing import Self
 
 from drake_disasm.devices.codec_error import CodecError
 from drake_disasm.devices.onrobot_hex.codec import (
-    Command,
-    Request,
+    BoxCommand,
+    BoxRequest,
     Sample,
     decode_request,
     encode_sample,
@@ -55,7 +55,7 @@ class FakeHexBox:
         self._socket.bind(("127.0.0.1", port))
         self._socket.settimeout(0.05)
         self.port: int = self._socket.getsockname()[1]
-        self.requests: list[Request] = []
+        self.requests: list[BoxRequest] = []
         self.sequence, self.fault, self.delay_s = 0, "", 0.1
         self._clock = clock
         self._held: list[tuple[float, bytes]] = []  # when due, oldest first
@@ -136,12 +136,12 @@ class FakeHexBox:
                 datagram, client = self._socket.recvfrom(2048)
                 self._obey(decode_request(datagram), client)
 
-    def _obey(self, request: Request, client: tuple[str, int]) -> None:
+    def _obey(self, request: BoxRequest, client: tuple[str, int]) -> None:
         self.requests.append(request)
-        if request.command == Command.STOP:
+        if request.command == BoxCommand.STOP:
             self._client = None
             self._started.clear()
-        elif request.command == Command.START:
+        elif request.command == BoxCommand.START:
             if client != self._client:
                 self.sequence = 0
             self._client = client

@@ -4,7 +4,7 @@ from drake_disasm.devices.robotiq.client import RobotiqClient, RobotiqSettings
 from drake_disasm.devices.robotiq.registers import (
     Activation,
     Command,
-    Motion,
+    FingerState,
     Status,
     Stroke,
     decode_command,
@@ -17,7 +17,7 @@ from drake_disasm.devices.robotiq.registers import (
 __all__ = [
     "Activation",
     "Command",
-    "Motion",
+    "FingerState",
     "RobotiqClient",
     "RobotiqSettings",
     "Status",

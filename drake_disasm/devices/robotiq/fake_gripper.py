@@ -7,7 +7,7 @@ from typing import Self
 from drake_disasm.devices.robotiq.registers import (
     Activation,
     Command,
-    Motion,
+    FingerState,
     Status,
     decode_command,
     encode_status,
@@ -145,7 +145,9 @@ class FakeRobotiqGripper:
             activated=self.command.activate,
             going=self.command.go,
             state=self.state,
-            object_detected=Motion.STOPPED_CLOSING if held else Motion.AT_REQUEST,
+            object_detected=FingerState.STOPPED_CLOSING
+            if held
+            else FingerState.AT_REQUEST,
             fault=self.fault_code if self.fault == "status" else 0,
             position_request=self.command.position,
             position=self.position,

@@ -47,7 +47,7 @@ class Activation(enum.IntEnum):
     DONE = 3
 
 
-class Motion(enum.IntEnum):
+class FingerState(enum.IntEnum):
     """How the fingers are: gOBJ. Those stopped before their request hold an object."""
 
     MOVING = 0
@@ -97,7 +97,7 @@ class Status:
     activated: bool = False
     going: bool = False
     state: Activation = Activation.RESET
-    object_detected: Motion = Motion.MOVING
+    object_detected: FingerState = FingerState.MOVING
     fault: int = 0
     position_request: int = 0
     position: int = 0
@@ -189,7 +189,7 @@ def decode_status(registers: Sequence[int]) -> Status:
         activated=_bit(flags, 0),
         going=_bit(flags, 3),
         state=Activation(state),
-        object_detected=Motion(flags >> 6),
+        object_detected=FingerState(flags >> 6),
         fault=fault,
         position_request=request,
         position=position,

@@ -2,14 +2,14 @@
 
 import dataclasses
 
-from drake_disasm.effects.arm.payload import Payload
+from drake_disasm.effects.arm.payload import PayloadEffect
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.effects.registry import register_effect
 
 
 @register_effect
 @dataclasses.dataclass
-class FlangePayload(Payload):
+class FlangePayload(PayloadEffect):
     """A payload on the arm's last link that the arm's model lacks.
 
     Equation: tau = Y_F(q, v, vd) pi, with Y_F the arm's regressor of a body in the

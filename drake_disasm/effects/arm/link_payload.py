@@ -2,14 +2,14 @@
 
 import dataclasses
 
-from drake_disasm.effects.arm.payload import Payload
+from drake_disasm.effects.arm.payload import PayloadEffect
 from drake_disasm.effects.fields import amplitude, joint_name
 from drake_disasm.effects.registry import register_effect
 
 
 @register_effect
 @dataclasses.dataclass
-class LinkPayload(Payload):
+class LinkPayload(PayloadEffect):
     """A body on the link that a joint moves, which the arm's URDF does not have.
 
     Equation: tau = Y_B(q, v, vd) pi, with Y_B the arm's regressor of a body in the

@@ -9,7 +9,7 @@ from drake_disasm.effects.base import ArmEffect
 _LIGHTEST = 0.1  # kg, below which a payload's own inertia is bounded
 
 
-class Payload(ArmEffect, ABC):
+class PayloadEffect(ArmEffect, ABC):
     """A point mass on a link, by its mass and first moment in the link's frame B.
 
     Attributes:

@@ -13,10 +13,9 @@ import numpy as np
 from drake import lcmt_iiwa_command, lcmt_iiwa_status
 from pydrake.common import RandomGenerator
 from pydrake.lcm import DrakeLcm
-from pydrake.systems.framework import Context
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.timing import COMMAND_DELAY, boundary
+from drake_disasm.common.timing import boundary
 from drake_disasm.devices.onrobot_hex.fake_box import FakeHexBox
 from drake_disasm.devices.reading import Reading
 from drake_disasm.devices.robotiq.fake_gripper import FakeRobotiqGripper
@@ -228,28 +227,6 @@ class FakeCell:
         ):
             setattr(message, name, (sign * self._evaluate(f"iiwa.{port}")).tolist())
         return message
-
-
-def in_step(cell: FakeCell, read: Callable[[], Reading]) -> Callable[[Context], None]:
-    """Returns a monitor that advances a cell with a diagram, period by period.
-
-    Set it as the monitor of the diagram's simulator: the cell is then one period
-    ahead, and its messages have arrived when the diagram takes its next step.
-
-    Args:
-        cell: to advance.
-        read: of the sensor's client, to detect that a sample has arrived.
-    """
-    period, steps = cell.station.control_period, 0
-
-    def monitor(root: Context) -> None:
-        """Advances the fake devices up to the simulator's time."""
-        nonlocal steps
-        while steps * period + COMMAND_DELAY / 2 < root.get_time():
-            cell.advance(arrival(read))
-            steps += 1
-
-    return monitor
 
 
 def arrival(read: Callable[[], Reading]) -> Callable[[], bool]:

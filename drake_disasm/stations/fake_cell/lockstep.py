@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from pydrake.lcm import DrakeLcm
-from pydrake.systems.analysis import Simulator
 
 from drake_disasm.scenario import Scenario
 from drake_disasm.scenario.given import scenario_of
-from drake_disasm.stations.fake_cell.cell import FakeCell, arrival, in_step
+from drake_disasm.stations.fake_cell.cell import FakeCell, arrival
 from drake_disasm.stations.hardware import HardwareStation
 
 
@@ -26,11 +25,6 @@ class FakeHardware:
 
     station: HardwareStation
     cell: FakeCell
-
-    def attach(self, simulator: Simulator) -> None:
-        """Advances the fake cell whenever the station's diagram is advanced."""
-        read = self.station.devices["ft_sensor"].read
-        simulator.set_monitor(in_step(self.cell, read))
 
 
 @contextlib.contextmanager
@@ -51,7 +45,7 @@ def fake_hardware(
     with FakeCell(scenario, lcm, seed) as cell:
 
         def wait(_: float) -> None:
-            """Lets a period pass while the station waits."""
+            """Lets a period pass: the station waits, if only for a command's turn."""
             cell.advance(arrival(station.devices["ft_sensor"].read))
 
         config = cell.config()

@@ -9,7 +9,7 @@ import psutil
 import pytest
 
 from drake_disasm.common.ports import Health
-from drake_disasm.devices.onrobot_hex import Command, HexClient, Request
+from drake_disasm.devices.onrobot_hex import BoxCommand, BoxRequest, HexClient
 from drake_disasm.devices.onrobot_hex.fake_box import JUMP, FakeHexBox
 from drake_disasm.devices.reading import Counters
 from tests.progress import wait_until
@@ -17,9 +17,9 @@ from tests.refusals import refusal
 
 WRENCH = (1.0, -2.0, 3.0, 0.1, -0.2, 0.3)
 STREAM = [
-    Request(Command.FILTER, 4),
-    Request(Command.PERIOD, 2),
-    Request(Command.START, 0),
+    BoxRequest(BoxCommand.FILTER, 4),
+    BoxRequest(BoxCommand.PERIOD, 2),
+    BoxRequest(BoxCommand.START, 0),
 ]
 PATIENT = 1e6  # [s], silence that no machine reaches
 
@@ -74,7 +74,7 @@ def test_a_sample_is_read_after_the_settings(box, client, clock) -> None:
     assert box.requests == STREAM
     client.stop()
     wait_until(lambda: not box.started)
-    assert box.requests == [*STREAM, Request(Command.STOP)]
+    assert box.requests == [*STREAM, BoxRequest(BoxCommand.STOP)]
 
 
 @pytest.mark.parametrize(

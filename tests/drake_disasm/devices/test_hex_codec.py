@@ -8,12 +8,12 @@ from drake_disasm.devices.onrobot_hex import codec
 from tests.refusals import refusal
 
 REQUESTS = [
-    ("1234 0000 00000000", codec.Request(codec.Command.STOP)),
-    ("1234 0002 00000000", codec.Request(codec.Command.START)),
-    ("1234 0002 0000000a", codec.Request(codec.Command.START, 10)),
-    ("1234 0042 000000ff", codec.Request(codec.Command.BIAS, 0xFF)),
-    ("1234 0081 00000004", codec.Request(codec.Command.FILTER, 4)),
-    ("1234 0082 00000002", codec.Request(codec.Command.PERIOD, 2)),
+    ("1234 0000 00000000", codec.BoxRequest(codec.BoxCommand.STOP)),
+    ("1234 0002 00000000", codec.BoxRequest(codec.BoxCommand.START)),
+    ("1234 0002 0000000a", codec.BoxRequest(codec.BoxCommand.START, 10)),
+    ("1234 0042 000000ff", codec.BoxRequest(codec.BoxCommand.BIAS, 0xFF)),
+    ("1234 0081 00000004", codec.BoxRequest(codec.BoxCommand.FILTER, 4)),
+    ("1234 0082 00000002", codec.BoxRequest(codec.BoxCommand.PERIOD, 2)),
 ]
 ZEROS = "00000000" * 4
 SAMPLES = [
@@ -32,7 +32,7 @@ STILL = (0.0,) * 6
 
 
 @pytest.mark.parametrize(("text", "request_"), REQUESTS)
-def test_requests_both_ways(text: str, request_: codec.Request) -> None:
+def test_requests_both_ways(text: str, request_: codec.BoxRequest) -> None:
     assert codec.encode_request(request_) == bytes.fromhex(text)
     assert codec.decode_request(bytes.fromhex(text)) == request_
 
@@ -71,11 +71,11 @@ def test_what_is_no_request_or_sample_is_refused() -> None:
         codec.Sample(0, 0, 0, STILL[1:]),
         codec.Sample(2**32, 0, 0, STILL),
         codec.Sample(0, -1, 0, STILL),
-        codec.Request(codec.Command.START, -1),
-        codec.Request(codec.Command.START, 2**32),
+        codec.BoxRequest(codec.BoxCommand.START, -1),
+        codec.BoxRequest(codec.BoxCommand.START, 2**32),
     ],
 )
-def test_what_does_not_fit_is_refused(sample: codec.Sample | codec.Request) -> None:
+def test_what_does_not_fit_is_refused(sample: codec.Sample | codec.BoxRequest) -> None:
     encode = (
         codec.encode_sample
         if isinstance(sample, codec.Sample)
@@ -87,9 +87,9 @@ def test_what_does_not_fit_is_refused(sample: codec.Sample | codec.Request) -> N
 
 def test_settings_and_those_that_the_box_lacks() -> None:
     assert [codec.filter_request(hz).data for hz in codec.FILTERS] == list(range(7))
-    assert codec.filter_request(15) == codec.Request(codec.Command.FILTER, 4)
-    assert codec.period_request(0.002) == codec.Request(codec.Command.PERIOD, 2)
-    assert codec.period_request(0.2) == codec.Request(codec.Command.PERIOD, 200)
+    assert codec.filter_request(15) == codec.BoxRequest(codec.BoxCommand.FILTER, 4)
+    assert codec.period_request(0.002) == codec.BoxRequest(codec.BoxCommand.PERIOD, 2)
+    assert codec.period_request(0.2) == codec.BoxRequest(codec.BoxCommand.PERIOD, 200)
     assert "choose one of 0, 500, 150, 50, 15, 5, 1.5" in refusal(
         codec.filter_request, 30
     )

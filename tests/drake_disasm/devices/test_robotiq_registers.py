@@ -32,7 +32,7 @@ CLOSING = reg.Status(
     activated=True,
     going=True,
     state=reg.Activation.DONE,
-    object_detected=reg.Motion.MOVING,
+    object_detected=reg.FingerState.MOVING,
     position_request=0xFF,
     position=0x0E,
     current=0x0A,
@@ -42,7 +42,10 @@ CLOSING = reg.Status(
 GOLDEN_STATUSES = {
     "09 03 06 39 00 00 FF 0E 0A F7 8B": CLOSING,
     "09 03 06 B9 00 00 FF BD 00 1D 7C": dataclasses.replace(
-        CLOSING, object_detected=reg.Motion.STOPPED_CLOSING, position=0xBD, current=0
+        CLOSING,
+        object_detected=reg.FingerState.STOPPED_CLOSING,
+        position=0xBD,
+        current=0,
     ),
 }
 
@@ -84,9 +87,9 @@ def test_golden_frames() -> None:
         (reg.Status(going=True), (0x0800, 0, 0)),
         (reg.Status(state=reg.Activation.ACTIVATING), (0x1000, 0, 0)),
         (reg.Status(state=reg.Activation.DONE), (0x3000, 0, 0)),
-        (reg.Status(object_detected=reg.Motion.STOPPED_OPENING), (0x4000, 0, 0)),
-        (reg.Status(object_detected=reg.Motion.STOPPED_CLOSING), (0x8000, 0, 0)),
-        (reg.Status(object_detected=reg.Motion.AT_REQUEST), (0xC000, 0, 0)),
+        (reg.Status(object_detected=reg.FingerState.STOPPED_OPENING), (0x4000, 0, 0)),
+        (reg.Status(object_detected=reg.FingerState.STOPPED_CLOSING), (0x8000, 0, 0)),
+        (reg.Status(object_detected=reg.FingerState.AT_REQUEST), (0xC000, 0, 0)),
         (reg.Status(fault=0x8E), (0, 0x8E00, 0)),
         (reg.Status(position_request=0x81), (0, 0x0081, 0)),
         (reg.Status(position=0x81), (0, 0, 0x8100)),

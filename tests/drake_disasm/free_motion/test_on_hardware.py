@@ -17,7 +17,6 @@ _SLOWLY = MotionTable(4.0 * MOTION.time, MOTION.q)
 def test_the_workspace_holds_an_arm_that_lifts_the_bolt_beyond_it() -> None:
     with fake_hardware(load_scenario("removal")) as fake:
         player = MotionPlayer(fake.station, MOTION)
-        fake.attach(player.simulator)
         with pytest.raises(HoldError, match="workspace"):
             player.play()
         assert not len(player.columns()["time"])
@@ -27,7 +26,6 @@ def test_the_workspace_holds_an_arm_that_lifts_the_bolt_beyond_it() -> None:
 def test_it_is_played_where_the_configuration_leaves_room() -> None:
     with fake_hardware(load_scenario("removal"), limits=_WIDE) as fake:
         player = MotionPlayer(fake.station, _SLOWLY)
-        fake.attach(player.simulator)
         player.play()
         columns = player.columns()
     assert columns["time"][-1] == pytest.approx(6.0, abs=0.02)

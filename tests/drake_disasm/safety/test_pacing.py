@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drake_disasm.common.stopwatch import Stopwatch
-from drake_disasm.safety import CommandPacer, LagMonitor
+from drake_disasm.safety import LagMonitor, Pace
 
 PERIOD = 0.005  # s
 
@@ -22,46 +22,49 @@ class Time:
         self.now += duration
 
 
+def _nothing() -> None:
+    """Sends nothing, in no time."""
+
+
 def paced(stalls: dict[int, float], where: str, n: int = 200) -> tuple:
-    """When commands left (m,), and the pacer; stalls [s] by the command's number."""
+    """When commands left (m,), and the pace; stalls [s] by the command's number."""
     time = Time()
-    pacer = CommandPacer(PERIOD, time, time.wait, look=3 * PERIOD)
+    pace = Pace(PERIOD, time, time.wait, look=3 * PERIOD)
     sent = []
     for number in range(n):
         time.now += 0.0003  # what a diagram takes
         if where == "before":
             time.now += stalls.get(number, 0.0)
-        pacer.await_turn()
+        pace.await_turn()
         time.now += 0.0007
         if where == "sending":
             time.now += stalls.get(number, 0.0)
-        if pacer.refuse_late():
-            continue
-        pacer.await_gap()
-        sent.append(time.now)
-        pacer.sent()
-    return np.array(sent), pacer
+        if pace.is_late():
+            pace.skip()
+        else:
+            pace.leave(lambda: sent.append(time.now))
+    return np.array(sent), pace
 
 
 def test_without_stalls_it_keeps_the_period_and_loses_nothing() -> None:
     """Jitter is made up for by gaps that are a little shorter."""
-    sent, pacer = paced({}, "before")
+    sent, pace = paced({}, "before")
     assert np.diff(sent)[1:] == pytest.approx(PERIOD, abs=1e-9)
-    assert pacer.counts.slipped == 0.0 and pacer.counts.stalls == 0
-    sent, pacer = paced({20: 0.006, 40: 0.007, 41: 0.002}, "before")
+    assert pace.counts.slipped == 0.0 and pace.counts.stalls == 0
+    sent, pace = paced({20: 0.006, 40: 0.007, 41: 0.002}, "before")
     assert np.diff(sent).min() >= 0.9 * PERIOD - 1e-6
     assert sent[-1] - sent[0] == pytest.approx(199 * PERIOD, abs=1e-3)
-    assert pacer.counts.slipped == 0.0
+    assert pace.counts.slipped == 0.0
 
 
 @pytest.mark.parametrize("stall", [0.02, 3.0])
 @pytest.mark.parametrize("where", ["before", "sending"])
 def test_lost_time_stays_lost(stall: float, where: str) -> None:
-    sent, pacer = paced({50: stall}, where)
+    sent, pace = paced({50: stall}, where)
     assert np.diff(sent).min() >= 0.9 * PERIOD - 1e-6
     windows = np.searchsorted(sent, sent + 0.1) - np.arange(len(sent))
     assert windows.max() <= 1.2 * 0.1 / PERIOD
-    counts = pacer.counts
+    counts = pace.counts
     assert counts.stalls == 1 and counts.held == (where == "sending")
     assert counts.slipped == pytest.approx(stall + 3 * PERIOD, abs=1.5 * PERIOD)
     assert counts.longest_stall == pytest.approx(stall, abs=1.1 * PERIOD)
@@ -69,34 +72,36 @@ def test_lost_time_stays_lost(stall: float, where: str) -> None:
 
 def test_a_stall_is_told_of_once_at_the_next_turn() -> None:
     time = Time()
-    pacer = CommandPacer(PERIOD, time, time.wait)
+    pace = Pace(PERIOD, time, time.wait)
     overdue = []
     for number in range(6):
         time.now += 0.3 if number == 3 else 0.0
-        pacer.await_turn()
-        overdue.append(pacer.overdue)
-        pacer.sent()
+        overdue.append(pace.await_turn().overdue)
+        pace.leave(_nothing)
     assert overdue == [0.0, 0.0, 0.0, pytest.approx(0.295), 0.0, 0.0]
     stalls = [0.5]  # while it waits
 
     def wait(duration: float) -> None:
         time.now += duration + (stalls.pop() if stalls else 0.0)
 
-    pacer = CommandPacer(PERIOD, time, wait)
-    pacer.await_turn()
-    pacer.sent()
-    pacer.await_turn()
-    assert pacer.overdue == pytest.approx(0.496, abs=5e-3)
+    pace = Pace(PERIOD, time, wait)
+    pace.await_turn()
+    pace.leave(_nothing)
+    assert pace.await_turn().overdue == pytest.approx(0.496, abs=5e-3)
 
 
 def test_the_step_that_a_command_may_lead_is_of_the_time_since_the_last() -> None:
     time = Time()
-    pacer = CommandPacer(PERIOD, time, time.wait)
-    assert pacer.since_sent(time.now) == PERIOD  # the first
-    pacer.await_turn()
-    pacer.sent()
-    assert pacer.since_sent(time.now + 0.001) == pytest.approx(0.9 * PERIOD)
-    assert pacer.since_sent(time.now + 3.0) == PERIOD
+    pace = Pace(PERIOD, time, time.wait)
+    assert pace.await_turn().since_sent == PERIOD  # the first
+    pace.leave(_nothing)
+    assert pace.await_turn().since_sent == pytest.approx(PERIOD)
+    time.now += 0.7 * PERIOD  # it leaves late: the next one's turn comes soon after
+    pace.leave(_nothing)
+    assert pace.await_turn().since_sent == pytest.approx(0.9 * PERIOD)
+    pace.leave(_nothing)
+    time.now += 3.0
+    assert pace.await_turn().since_sent == PERIOD
 
 
 def test_shares_are_of_the_diagrams_own_time() -> None:

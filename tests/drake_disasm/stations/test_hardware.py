@@ -38,14 +38,10 @@ def station() -> HardwareStation:
 def test_ports_are_the_simulated_cells_and_a_dry_run_has_nothing_that_sends(
     station, cell, dry
 ):
-    def names(of: HardwareStation) -> set[str]:
-        return {system.get_name() for system in of.GetSystems()}
-
     assert station.table is cell.table is CELL_PORTS
     for each in (station, cell, dry):
         assert port_differences(each, CELL_PORTS) == []
-    assert {"iiwa_command", "gripper_writer"} <= names(station)
-    assert not {"iiwa_command", "gripper_writer", "iiwa_sender"} & names(dry)
+    assert station.gate.robot.is_commanded and not dry.gate.robot.is_commanded
 
 
 @pytest.mark.parametrize(("override", "words"), [
@@ -157,14 +153,14 @@ def test_time_that_was_lost_stays_lost(stall: float) -> None:
         return np.array([1e-3, 0, 0, 0, 0, 0])
 
     with in_lockstep(load_scenario("removal"), thinks) as (simulation, station, cell):
-        writer = station.GetSubsystemByName("iiwa_command")
-        send = writer.send
+        robot = station.gate.robot
+        send = robot.send
 
         def noted(q: np.ndarray, time: float) -> None:
             sent.append((cell.time, q.copy()))
             send(q, time)
 
-        writer.send = noted
+        robot.send = noted
         simulation.reset(0)
         for _ in range(8):
             simulation.step()

@@ -74,7 +74,7 @@ def test_a_run_on_hardware_is_seen_and_what_a_view_takes_is_counted(
         assert meshcat.HasPath("path")
         assert not meshcat.HasPath("/drake/contact_forces")
         monkeypatch.setattr(view.wrench, "_draw", lambda *_: cell.skip(1))
-        watches = station.lag.stopwatches
+        watches = station.gate.lag.stopwatches
         before = {name: watch.total for name, watch in watches.items()}
         simulation.step()
         took = {name: watch.total - before[name] for name, watch in watches.items()}
