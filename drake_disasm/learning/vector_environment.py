@@ -37,6 +37,8 @@ from drake_disasm.twin.batch import BatchedTwin, BatchResult, with_impact
 from drake_disasm.twin.refusals import refuse_count
 from drake_disasm.twin.starts import NextEpisodes
 
+#: Where a batch computes.
+DEVICES = ("auto", "numpy", "cpu", "cuda")
 _MODES = (AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP)
 _WORTH_A_GPU = 1024  # environments: with fewer, starting its kernels takes longer
 _UNITS = ("m",) * 3 + ("rad",) * 3 + ("N",) * 3 + ("N m",) * 3
@@ -101,7 +103,7 @@ class DisassemblyVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             "observation_units": dict(zip(STATE_NAMES, _UNITS, strict=True)),
             "action_units": dict(zip(ACTION_NAMES, _UNITS[:6], strict=True)),
         }
-        self.num_envs, self._device = num_envs, _device_of(device, num_envs)
+        self.num_envs, self._device = num_envs, choose_device(device, num_envs)
         self._given = _scenarios_of(scenario, num_envs)
         self._build(self._given)
         bounds = np.max([action_bounds(s.task) for s in self._given], axis=0)
@@ -305,7 +307,8 @@ def _mode_of(mode: AutoresetMode | str) -> AutoresetMode:
     return found
 
 
-def _device_of(name: str, count: int) -> str:
+def choose_device(name: str, count: int) -> str:
+    """Returns the device of a batch; of "auto" see `DisassemblyVectorEnv`."""
     if name != "auto":
         return name
     if count < _WORTH_A_GPU:  # torch need not even be loaded

@@ -39,14 +39,16 @@ class BatchResult:
         place: (n, 3) of the bolts, as in `StepResult` [m].
         reward_terms: the weighted terms by name, (n,) each.
         outcome: (n,) numbers of `mdp.Outcome`.
-        failure: (n) why the simulation of an environment failed, or "" where it did
-            not. Its observation is the one before, its reward zero.
+        has_failed: (n,) whether its simulation failed. Its observation is the one
+            before, its reward zero.
+        failure: (n) why, or "".
     """
 
     observation: Array
     place: Array
     reward_terms: dict[str, Array]
     outcome: Array
+    has_failed: Array
     failure: list[str]
 
     @property
@@ -198,9 +200,8 @@ class BatchedTwin:
         terms = {name: xp.where(has_failed, 0.0, term) for name, term in terms.items()}
         ends = outcomes(states[1], episodes.steps, numbers.task, numbers.geometry)
         reasons = self._reasons(has_failed, is_finite, is_solved)
-        return BatchResult(
-            after, numbers.geometry.place(states[1]), terms, ends, reasons
-        )
+        place = numbers.geometry.place(states[1])
+        return BatchResult(after, place, terms, ends, has_failed, reasons)
 
     def _reasons(
         self, has_failed: Array, is_finite: Array, is_solved: Array
