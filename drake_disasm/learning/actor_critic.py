@@ -98,7 +98,7 @@ class ActorCritic:
         return self._network
 
     def explore(self, observation: Array, noise: Array, sigma: Array) -> Array:
-        """Returns exploring actions (n, a) in [-1, 1], see `Agent`; SAC has its own sigma.
+        """Returns exploring actions (n, a), see `Agent`; SAC has its own sigma.
 
         Tensors go through the network all together, rows of NumPy one by one: so an
         episode is the same bits whatever runs with it.

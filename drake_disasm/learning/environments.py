@@ -9,45 +9,30 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.wrappers.vector import RescaleAction
 
-from drake_disasm.common.arrays import Array, to_numpy
+from drake_disasm.common.arrays import Array
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.environment import DisassemblyEnv
 from drake_disasm.learning.training import TrainingSpec
 from drake_disasm.mdp import Outcome
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.recording import EpisodeRecorder
-from drake_disasm.twin.batch import BatchedTwin, with_impact
+from drake_disasm.twin.batch import BatchedTwin, BatchResult, with_impact
 from drake_disasm.twin.history import BatchHistory
 
 Columns = dict[str, np.ndarray]
 
 
 @dataclasses.dataclass(frozen=True)
-class Step:
-    """A step of n environments; `EpisodeSummary.add` takes it.
+class Step(BatchResult):
+    """A step of n environments. Where it has failed it is not learned from.
 
     Attributes:
         seen: (n, s) what the agent sees after it.
-        observation: (n, 12) the task's state before rounding [m, rad, N, N m].
-        place: (n, 3) of the bolts, as in `StepResult` [m].
-        reward_terms: (n,) by name; the reward is their sum.
-        outcome: (n,) numbers of `Outcome`.
         counts: (n,) whether it is a whole step of the episode.
-        teaches: (n,) whether it may be learned from; the episode ends where not.
     """
 
     seen: Array
-    observation: Array
-    place: Array
-    reward_terms: dict[str, Array]
-    outcome: Array
     counts: Array
-    teaches: Array
-
-    @property
-    def reward(self) -> Array:
-        """Sum of the terms (n,)."""
-        return sum(self.reward_terms.values())
 
     def rows(self, which: slice) -> "Step":
         """Returns the step of some environments."""
@@ -106,13 +91,14 @@ class DiagramRow:
         if result.is_whole:
             self._recorder.acted(result)
         return Step(
-            observation[None],
             result.observation[None],
             result.place[None],
             {name: np.array([term]) for name, term in result.reward_terms.items()},
             np.array([result.outcome]),
-            np.array([result.is_whole]),
-            np.array([True]),
+            np.array([False]),
+            [""],
+            seen=observation[None],
+            counts=np.array([result.is_whole]),
         )
 
     def bolt_is_out(self) -> np.ndarray:
@@ -154,19 +140,12 @@ class TwinRows:
         return twin.observation
 
     def step(self, actions: Array) -> Step:
-        """Steps the batch; a simulation that fails is not learned from."""
+        """Steps the batch."""
         result = self._twin.step(actions)
         if self._history:
             self._history.add(result)
-        return Step(
-            result.observation,
-            result.observation,
-            result.place,
-            result.reward_terms,
-            result.outcome,
-            result.has_failed | True,
-            ~result.has_failed,
-        )
+        counts = result.has_failed | True
+        return Step(**vars(result), seen=result.observation, counts=counts)
 
     def bolt_is_out(self) -> np.ndarray:
         """Asks the batch."""
@@ -196,28 +175,25 @@ class GymnasiumRows:
     """
 
     def __init__(self, envs: VectorEnv[Any, Any, Any]) -> None:
-        spaces = envs.single_observation_space, envs.single_action_space
-        for name, space in zip(("observation", "action"), spaces, strict=True):
-            if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
-                raise DisasmError(
-                    f"{name}_space: {space} is no Box of one axis; wrap the environment"
-                )
+        self.sizes = (
+            _size_of("observation_space", envs.single_observation_space),
+            _size_of("action_space", envs.single_action_space),
+        )
         mode = envs.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
         if mode is not AutoresetMode.NEXT_STEP:
             raise DisasmError(
                 f"autoreset_mode: {mode} loses an episode's end; make the environment "
                 "with AutoresetMode.NEXT_STEP"
             )
-        self._envs = RescaleAction(envs, -1.0, 1.0)
+        self._envs = RescaleAction(envs, np.float32(-1.0), np.float32(1.0))
         self.count = envs.num_envs
-        self.sizes = spaces[0].shape[0], spaces[1].shape[0]
 
     def begin(self, rows: np.ndarray, seeds: Sequence[int]) -> np.ndarray:
         """Resets all rows."""
-        every: list[int | None] = [0] * self.count
-        for row, seed in zip(rows, seeds, strict=True):
-            every[row] = seed
-        observation, _ = self._envs.reset(seed=every)
+        every = np.zeros(self.count, np.int64)
+        every[rows] = seeds
+        seed: Any = every.tolist()  # which gymnasium's wrappers don't declare
+        observation, _ = self._envs.reset(seed=seed)
         return np.array(observation, float)
 
     def step(self, actions: np.ndarray) -> Step:
@@ -227,15 +203,15 @@ class GymnasiumRows:
         won = np.asarray(infos.get("is_success", np.zeros(self.count)), bool)
         ends = np.where(won, Outcome.SUCCESS, Outcome.WORKSPACE)
         cut = np.where(truncated, Outcome.STEP_LIMIT, Outcome.RUNNING)
-        always = np.ones(self.count, bool)
         return Step(
-            np.array(observation, float),
             np.zeros((self.count, 12)),
             np.zeros((self.count, 3)),
             {"reward": np.array(reward, float)},
             np.where(terminated, ends, cut),
-            always,
-            always,
+            np.zeros(self.count, bool),
+            [""] * self.count,
+            seen=np.array(observation, float),
+            counts=np.ones(self.count, bool),
         )
 
     def bolt_is_out(self) -> np.ndarray:
@@ -244,6 +220,12 @@ class GymnasiumRows:
 
     def recorded(self, row: int, steps: int) -> None:
         """Records nothing."""
+
+
+def _size_of(name: str, space: gymnasium.Space[Any]) -> int:
+    if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
+        raise DisasmError(f"{name}: {space} is no Box of one axis; flatten it")
+    return space.shape[0]
 
 
 def make_environments(

@@ -11,7 +11,6 @@ from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progre
 from drake_disasm.learning.checkpoint import load_memory
 from drake_disasm.learning.dataset import remember
 from drake_disasm.learning.environments import (
-    Columns,
     Environments,
     make_environments,
 )
@@ -20,7 +19,7 @@ from drake_disasm.learning.replay import Replay
 from drake_disasm.learning.run import finish, run_trainings
 from drake_disasm.learning.training import Training, action_map, make_training
 from drake_disasm.learning.warm_start import start_checkpoint, start_hash
-from drake_disasm.logs import LogWriter, flat_columns, read_logs
+from drake_disasm.logs import LogWriter, read_logs
 from drake_disasm.logs.transitions import observations
 from drake_disasm.task.recording import transitions_header
 from drake_disasm.twin.batch import with_impact
@@ -100,29 +99,19 @@ def _run(
             return None
         return make_environments(specs, experiment.lockstep, experiment.is_recorded)
 
-    logs = [_Log(job) if experiment.is_recorded else None for job in jobs]
+    logs = [_log(job) for job in jobs if experiment.is_recorded]
     run_trainings(trainings, make, [job.folder for job in jobs], logs, progress)
 
 
-class _Log:
-    """Writes each episode to the seed's log, once."""
-
-    def __init__(self, job: SeedJob) -> None:
-        experiment = job.experiment
-        scenario = experiment.scenario
-        if experiment.is_batched:
-            scenario = with_impact(scenario)
-        header = transitions_header(
-            scenario,
-            experiment.station,
-            experiment.provenance | {"seed": job.seed},
-        )
-        self._writer = LogWriter(job.folder / "log", header, resume=True)
-
-    def write(self, number: int, columns: Columns) -> None:
-        """Writes the episode, unless a run that was killed had written it."""
-        if number >= self._writer.next_number:
-            self._writer.write_episode(flat_columns("transitions", columns))
+def _log(job: SeedJob) -> LogWriter:
+    """Returns what writes the seed's log, or goes on with it."""
+    experiment = job.experiment
+    scenario = experiment.scenario
+    if experiment.is_batched:
+        scenario = with_impact(scenario)
+    provenance = experiment.provenance | {"seed": job.seed}
+    header = transitions_header(scenario, experiment.station, provenance)
+    return LogWriter(job.folder / "log", header, resume=True)
 
 
 def train_seed(job: SeedJob, progress: Progress) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from drake_disasm.common.arrays import Array, array_like, namespace
 from drake_disasm.learning.environments import Columns, Environments, Step
 from drake_disasm.learning.random_numbers import Purpose, seed_for
 from drake_disasm.learning.training import Training, clock
-from drake_disasm.mdp import Outcome, is_terminated
+from drake_disasm.mdp import Outcome
 from drake_disasm.task.episode import EpisodeSummary
 
 #: Episodes that have ended, and what is recorded of each.
@@ -65,10 +65,11 @@ class _Round:
             self._chosen,
             step.reward,
             step.seen / self._scale,
-            is_terminated(step.outcome),
-            running & step.teaches,
+            step.terminated,
+            running & ~step.has_failed,
         )
-        self.is_running = running & step.teaches & (step.outcome == Outcome.RUNNING)
+        goes_on = ~step.has_failed & (step.outcome == Outcome.RUNNING)
+        self.is_running = running & goes_on
         if self._every_step:
             self._learn(int(xp.sum(running, dtype=xp.int64)))
         return counts & ~self.is_running

@@ -27,7 +27,9 @@ class TensorRandom:
             "device": device,
         }
 
-    def standard_normal(self, shape: tuple[int, ...], dtype: object = None) -> Tensor:
+    def standard_normal(
+        self, shape: int | tuple[int, ...], dtype: object = None
+    ) -> Tensor:
         """Returns float32 of any `dtype`."""
         return torch.randn(shape, **self._options)
 

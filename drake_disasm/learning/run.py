@@ -18,7 +18,7 @@ import io
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.file_lock import try_lock
@@ -26,12 +26,14 @@ from drake_disasm.common.files import make_folder, read_text, write_json, write_
 from drake_disasm.common.plain_data import check_like
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.common.text import clipped
-from drake_disasm.learning.environments import Columns, Environments
+from drake_disasm.learning.actor_critic import ActorCritic
+from drake_disasm.learning.environments import Environments
 from drake_disasm.learning.evaluation import summed_up, validate_policy
 from drake_disasm.learning.loop import Ended, TrainingLoop
 from drake_disasm.learning.policy import trained_policy
 from drake_disasm.learning.random_numbers import Purpose, seed_for
 from drake_disasm.learning.training import Training, TrainingSpec
+from drake_disasm.logs import LogWriter, flat_columns
 from drake_disasm.mdp import REWARD_TERMS, Outcome
 from drake_disasm.policies import save_policy
 from drake_disasm.task.episode import EpisodeSummary
@@ -43,18 +45,11 @@ _SHOWN = 20  # latest episodes over which progress is averaged
 _PATIENCE = 10.0  # s until the workers of a killed run have noticed
 
 
-class EpisodeLog(Protocol):
-    """Writes the rows of each episode."""
-
-    def write(self, number: int, columns: Columns) -> None:
-        """Writes episode `number`, if it is not there yet."""
-
-
 def run_trainings(
     trainings: Sequence[Training],
     make: Callable[[], Environments | None],
     folders: Sequence[Path],
-    logs: Sequence[EpisodeLog | None] | None = None,
+    logs: Sequence[LogWriter] = (),
     progress: Progress = ignore_progress,
 ) -> None:
     """Trains to the end, continuing from the folders' checkpoints where there are any.
@@ -63,7 +58,7 @@ def run_trainings(
         trainings: fresh.
         make: makes the environments, see `TrainingLoop`; not called if all is done.
         folders: of each.
-        logs: of each; get its episodes before their checkpoint is written.
+        logs: of each, or none; get its episodes before their checkpoint is written.
         progress: called after each round.
 
     Raises:
@@ -86,11 +81,12 @@ def run_trainings(
             progress(_update(trainings))
 
 
-def _write(log: EpisodeLog | None, training: Training, ended: Ended) -> None:
+def _write(log: LogWriter, training: Training, ended: Ended) -> None:
+    """Writes episodes, unless a run that was killed had written them."""
     first = len(training.summaries) - len(ended)
     for number, (_, columns) in enumerate(ended, first):
-        if log and columns is not None:
-            log.write(number, columns)
+        if columns is not None and number >= log.next_number:
+            log.write_episode(flat_columns("transitions", columns))
 
 
 def _update(trainings: Sequence[Training]) -> ProgressUpdate:
@@ -128,6 +124,7 @@ def finish(
         The content of `result.json`.
     """
     seeds = [seed_for(spec.seed, Purpose.VALIDATION, i) for i in range(validation)]
+    assert isinstance(training.agent, ActorCritic)  # what a spec makes
     policy = trained_policy(training.agent.network(), spec, provenance)
     figures = validate_policy(policy, spec.scenario, spec.station, seeds, progress)
     evaluation = dataclasses.asdict(figures)

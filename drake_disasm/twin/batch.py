@@ -8,7 +8,13 @@ import numpy as np
 from drake_disasm.common.arrays import Array, array_like, namespace, to_numpy
 from drake_disasm.common.rotations import Pose
 from drake_disasm.devices.ft_sensor import quantise
-from drake_disasm.mdp import BoltState, outcomes, reward_terms
+from drake_disasm.mdp import (
+    BoltState,
+    is_terminated,
+    is_truncated,
+    outcomes,
+    reward_terms,
+)
 from drake_disasm.scenario import Scenario, draw, with_values
 from drake_disasm.systems.imprecision import clamped
 from drake_disasm.systems.pose_target import executed_pose, moved_poses
@@ -49,12 +55,22 @@ class BatchResult:
     reward_terms: dict[str, Array]
     outcome: Array
     has_failed: Array
-    failure: list[str]
+    failure: Sequence[str]
 
     @property
     def reward(self) -> Array:
         """Sum of the terms (n,)."""
         return sum(self.reward_terms.values())
+
+    @property
+    def terminated(self) -> Array:
+        """Whether the task itself ended each episode (n,)."""
+        return is_terminated(self.outcome) & ~self.has_failed
+
+    @property
+    def truncated(self) -> Array:
+        """Whether the step limit ended it, or the simulation failed (n,)."""
+        return is_truncated(self.outcome) | self.has_failed
 
 
 class BatchedTwin:

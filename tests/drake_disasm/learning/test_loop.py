@@ -4,11 +4,20 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
+from gymnasium.envs.classic_control import PendulumEnv
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers import TimeLimit
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.learning.environments import TwinRows, make_environments
+from drake_disasm.learning.actor_critic import ActorCritic
+from drake_disasm.learning.environments import (
+    GymnasiumRows,
+    TwinRows,
+    make_environments,
+)
 from drake_disasm.learning.experiment import Experiment
 from drake_disasm.learning.hyperparameters import preset
 from drake_disasm.learning.loop import Ended, TrainingLoop
@@ -17,6 +26,7 @@ from drake_disasm.mdp import Outcome
 from drake_disasm.scenario import load_scenario
 from drake_disasm.twin.batch import BatchedTwin
 from tests.drake_disasm.conftest import without_imprecision
+from tests.refusals import refused
 
 _OVERRIDES = ["contact.model=impact", "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"]
 _OVERRIDES += ["task.steps=4", "task.max_translation=0.002"]
@@ -153,6 +163,48 @@ def test_what_has_no_batch_is_refused(changes: dict[str, Any], words: str) -> No
     dataclasses.replace(plain, lockstep=True)
     with pytest.raises(DisasmError, match=words):
         dataclasses.replace(plain, **changes)
+
+
+def _pendulums(mode: AutoresetMode = AutoresetMode.NEXT_STEP) -> SyncVectorEnv:
+    make = lambda: TimeLimit(PendulumEnv(), 5)  # noqa: E731
+    return SyncVectorEnv([make] * 2, autoreset_mode=mode)
+
+
+def _on_pendulums() -> TrainingLoop:
+    rows = GymnasiumRows(_pendulums())
+    config = _spec(schedule="every_step").config
+    agent = ActorCritic(config, 0, False, *rows.sizes)
+    training = Training(agent, config, seed=0, sizes=rows.sizes)
+    return TrainingLoop(rows, [training])
+
+
+def test_a_vector_environment_of_gymnasium_is_trained_in(tmp_path: Path) -> None:
+    """With three numbers that are seen and one that is chosen; it resumes."""
+    whole, first, second = (_on_pendulums() for _ in range(3))
+    ended = _ended(whole)[0]
+    assert [(s.steps, s.outcome) for s, _ in ended] == [(5, Outcome.STEP_LIMIT)] * 5
+    assert all(s.reward < 0.0 and columns is None for s, columns in ended)
+    first.run_round()
+    first.trainings[0].save(tmp_path / "c.npz")
+    second.trainings[0].restore(tmp_path / "c.npz")
+    _ended(second)
+    one, other = whole.trainings[0], second.trainings[0]
+    for a, b in zip(_bits(one), _bits(other), strict=True):
+        np.testing.assert_array_equal(a, b)
+    rows = one.replay.contents()[0]
+    assert rows.shape == (25, 10) and not rows[:, -2].any()
+    np.testing.assert_array_equal(rows[2, :3], rows[0, 5:8])  # the step after
+    torque = _pendulums()
+    torque.reset(seed=[summary.seed for summary, _ in ended[:2]])
+    observation, *_ = torque.step(2.0 * rows[:2, 3:4])  # within [-2, 2] N m
+    np.testing.assert_allclose(observation, rows[:2, 5:8], atol=1e-6)
+
+
+def test_a_vector_environment_that_does_not_fit_is_refused() -> None:
+    with refused("AutoresetMode.NEXT_STEP"):
+        GymnasiumRows(_pendulums(AutoresetMode.SAME_STEP))
+    with refused("action_space: Discrete(2)", "flatten"):
+        GymnasiumRows(gymnasium.make_vec("CartPole-v1", 2, "sync"))
 
 
 def _side_by_side(**changes: Any) -> list[TrainingSpec]:
