@@ -185,7 +185,8 @@ class GymnasiumRows:
                 f"autoreset_mode: {mode} loses an episode's end; make the environment "
                 "with AutoresetMode.NEXT_STEP"
             )
-        self._envs = RescaleAction(envs, np.float32(-1.0), np.float32(1.0))
+        one = np.ones(self.sizes[1], envs.single_action_space.dtype)
+        self._envs = RescaleAction(envs, -one, one)
         self.count = envs.num_envs
 
     def begin(self, rows: np.ndarray, seeds: Sequence[int]) -> np.ndarray:

@@ -73,24 +73,24 @@ class Experiment:
         Raises:
             DisasmError: says what to give instead.
         """
-        acts = not self.logs
-        if self.lockstep and (self.envs > 1 or self.station != "twin" or not acts):
+        several, on_twin = self.envs > 1, self.station == "twin"
+        if self.lockstep and (several or self.logs or not on_twin):
             raise DisasmError(
                 "lockstep: agents side by side have one environment each, on a batch "
                 "of twins; leave out `envs`, `station` and logs to learn from, or "
                 "`lockstep`"
             )
-        if self.envs > 1 and self.station != "twin":
+        if several and not on_twin:
             raise DisasmError(
                 f"envs: station '{self.station}' has no batch; give `station` twin, or "
                 "one of `envs`"
             )
-        if self.envs > 1 and not acts:
+        if several and self.logs:
             raise DisasmError(
                 f"envs: {self.envs} episodes at a time, but learning from logs runs "
                 "none; leave `envs` out"
             )
-        if self.device != "numpy" and acts and self.envs == 1:
+        if self.device != "numpy" and not (several or self.logs):
             raise DisasmError(
                 f"device: '{self.device}' computes for many episodes at a time; give "
                 "`envs`, or leave `device` out"

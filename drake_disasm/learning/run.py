@@ -156,16 +156,21 @@ def _figures(summaries: list[EpisodeSummary]) -> dict[str, Any]:
 def write_episodes(path: Path, summaries: list[EpisodeSummary]) -> None:
     """Writes one row per episode as CSV."""
     text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    plain = [f.name for f in dataclasses.fields(EpisodeSummary)]
-    plain = [name for name in plain if name not in ("reward_terms", "outcome")]
-    terms = [f"reward.{name}" for name in REWARD_TERMS]
-    writer.writerow(["episode", *plain, "outcome", "reward", *terms])
-    for number, s in enumerate(summaries):
-        row = [number, *(getattr(s, name) for name in plain), s.outcome.label]
-        row += [s.reward, *(s.reward_terms.get(name, 0.0) for name in REWARD_TERMS)]
-        writer.writerow(row)
+    rows = [_row(number, summary) for number, summary in enumerate(summaries)]
+    names = list(_row(0, EpisodeSummary(0)))
+    writer = csv.DictWriter(text, names, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
     write_text(path, text.getvalue())
+
+
+def _row(number: int, s: EpisodeSummary) -> dict[str, Any]:
+    plain = dataclasses.asdict(s)
+    for name in ("reward_terms", "outcome"):
+        del plain[name]
+    terms = {f"reward.{name}": s.reward_terms.get(name, 0.0) for name in REWARD_TERMS}
+    whole = {"outcome": s.outcome.label, "reward": s.reward}
+    return {"episode": number} | plain | whole | terms
 
 
 def read_episodes(path: Path) -> list[dict[str, Any]]:

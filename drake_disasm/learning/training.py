@@ -10,7 +10,6 @@ import dataclasses
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -159,7 +158,10 @@ class Training:
         """
         notes = load_checkpoint(path, self.agent, self._stored_memory(), _NOTES)
         try:
-            self.summaries = [_summary(row) for row in notes["episodes"]]
+            self.summaries = [
+                EpisodeSummary(**(row | {"outcome": Outcome(row["outcome"])}))
+                for row in notes["episodes"]
+            ]
         except (ValueError, TypeError) as error:
             raise DisasmError(f"{path}: has odd notes ({error}); {AGAIN}") from None
         self.rounds, self.seconds = notes["rounds"], notes["seconds"]
@@ -212,9 +214,8 @@ class Training:
     def noise(self, first: int, count: int) -> Callable[[], Array]:
         """Returns what draws a step's noise (count, a) for episodes from `first` on."""
         if self.device == "numpy":
-            one_by_one = [
-                self.generator(Purpose.EXPLORATION, first + i) for i in range(count)
-            ]
+            numbers = range(first, first + count)
+            one_by_one = [self.generator(Purpose.EXPLORATION, n) for n in numbers]
             return lambda: np.stack(
                 [g.standard_normal(self._actions, np.float32) for g in one_by_one]
             )
@@ -275,7 +276,3 @@ def action_map(scenario: Scenario, config: Hyperparameters) -> ActionMap:
         return ActionMap(bounds * share)
     scale = np.minimum(bounds, _CORRECTION * share)
     return ActionMap(scale, make_policy(config.base, scenario))
-
-
-def _summary(row: dict[str, Any]) -> EpisodeSummary:
-    return EpisodeSummary(**(row | {"outcome": Outcome(row["outcome"])}))

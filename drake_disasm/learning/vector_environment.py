@@ -241,12 +241,14 @@ def _arrays(rows: BatchResult) -> list[np.ndarray]:
 def _infos(rows: BatchResult, which: np.ndarray | None = None) -> dict[str, Any]:
     """Returns gymnasium's infos of the environments of a mask (n,); None: all."""
     mask = np.ones(len(rows.outcome), bool) if which is None else which
+    pairs = zip(rows.failure, rows.has_failed, strict=True)
+    failure = [why if has_failed else None for why, has_failed in pairs]
     values: dict[str, Any] = {
         "reward_terms": _with_masks(rows.reward_terms, mask),
         "wrench": rows.observation[:, 6:],
         "outcome": np.where(rows.has_failed, "failed", _LABELS[rows.outcome]),
         "is_success": rows.outcome == Outcome.SUCCESS,
-        "failure": np.where(rows.has_failed, np.array(rows.failure, object), None),
+        "failure": np.array(failure, object),
     }
     return _with_masks(values, mask)
 
