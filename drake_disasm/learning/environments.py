@@ -188,9 +188,20 @@ class GymnasiumRows:
         one = np.ones(self.sizes[1], envs.single_action_space.dtype)
         self._envs = RescaleAction(envs, -one, one)
         self.count = envs.num_envs
+        self._runs = np.zeros(self.count, bool)
 
     def begin(self, rows: np.ndarray, seeds: Sequence[int]) -> np.ndarray:
-        """Resets all rows."""
+        """Resets all rows.
+
+        Raises:
+            DisasmError: an episode runs in one.
+        """
+        if self._runs.any():
+            raise DisasmError(
+                "trainings: all rows of a vector environment begin together; give each "
+                "training an environment of its own"
+            )
+        self._runs[rows] = True
         every = np.zeros(self.count, np.int64)
         every[rows] = seeds
         seed: Any = every.tolist()  # which gymnasium's wrappers don't declare
@@ -201,6 +212,7 @@ class GymnasiumRows:
         """Steps them."""
         actions = actions.astype(self._envs.single_action_space.dtype)
         observation, reward, terminated, truncated, infos = self._envs.step(actions)
+        self._runs &= ~(terminated | truncated)
         won = np.asarray(infos.get("is_success", np.zeros(self.count)), bool)
         ends = np.where(won, Outcome.SUCCESS, Outcome.WORKSPACE)
         cut = np.where(truncated, Outcome.STEP_LIMIT, Outcome.RUNNING)

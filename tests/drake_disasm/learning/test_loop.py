@@ -203,6 +203,10 @@ def test_a_vector_environment_of_gymnasium_is_trained_in(tmp_path: Path) -> None
 def test_a_vector_environment_that_does_not_fit_is_refused() -> None:
     with refused("AutoresetMode.NEXT_STEP"):
         GymnasiumRows(_pendulums(AutoresetMode.SAME_STEP))
+    rows = GymnasiumRows(_pendulums())
+    rows.begin(np.arange(1), [3])
+    with refused("begin together", "of its own"):  # another training's
+        rows.begin(np.arange(1, 2), [4])
     with refused("action_space: Discrete(2)", "flatten"):
         GymnasiumRows(gymnasium.make_vec("CartPole-v1", 2, "sync"))
 
