@@ -83,13 +83,16 @@ def _policy() -> Subject:
 
 def _checkpoint() -> Subject:
     from drake_disasm.learning.checkpoint import CHECKPOINT  # PyTorch takes seconds
+    from drake_disasm.learning.environments import make_environments
     from drake_disasm.learning.hyperparameters import Hyperparameters
-    from drake_disasm.learning.training import Training, TrainingSpec
+    from drake_disasm.learning.loop import TrainingLoop
+    from drake_disasm.learning.training import TrainingSpec, make_training
 
     scenario = load_scenario("chapter3", ["task.steps=4"])
     config = Hyperparameters(hidden=[4], replay=20, batch=4)
-    training = Training(TrainingSpec(scenario, "twin", config, 0, compiled=False))
-    training.run_episode()
+    spec = TrainingSpec(scenario, "twin", config, 0, compiled=False)
+    training = make_training(spec)
+    TrainingLoop(make_environments([spec]), [training]).run_round()
     path = new_folder() / "c.npz"
     training.save(path)
     return file_subject(

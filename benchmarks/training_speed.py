@@ -4,9 +4,10 @@ import time
 from typing import Any
 
 from drake_disasm.learning.environment import DisassemblyEnv
+from drake_disasm.learning.environments import make_environments
 from drake_disasm.learning.hyperparameters import Hyperparameters, override, preset
-from drake_disasm.learning.lockstep import LockstepTrainings
-from drake_disasm.learning.training import Training, TrainingSpec
+from drake_disasm.learning.loop import TrainingLoop
+from drake_disasm.learning.training import TrainingSpec, make_training
 from drake_disasm.scenario import load_scenario
 
 SEEDS = 64
@@ -21,12 +22,12 @@ def beside_sb3() -> tuple[float, float | None]:
     DDPG with the thesis's numbers, 150 episodes on the diagram's twin, updates after
     each episode; the reference is None if it is not installed.
     """
-    training = _training("chapter4", 0, preset("chapter4", "ddpg"))
+    spec = _spec("chapter4", 0, preset("chapter4", "ddpg"))
     start = time.perf_counter()
-    _run(training)
+    _run([spec])
     ours = time.perf_counter() - start
     try:
-        return ours, _sb3(training.spec.config)
+        return ours, _sb3(spec.config)
     except ImportError:
         return ours, None
 
@@ -38,27 +39,24 @@ def side_by_side() -> tuple[float, float]:
     contact, by two of them.
     """
     config = override(preset("chapter3", "ddpg"), [f"episodes={_FEW}"])
-    _run(_training("chapter3", SEEDS, override(config, ["episodes=2"])))  # compiles
+    _run([_spec("chapter3", SEEDS, override(config, ["episodes=2"]))])  # compiles
     start = time.perf_counter()
     for seed in range(_ON_DIAGRAMS):
-        _run(_training("chapter3", seed, config))
+        _run([_spec("chapter3", seed, config)])
     alone = (time.perf_counter() - start) * SEEDS / _ON_DIAGRAMS
     start = time.perf_counter()
-    batch = LockstepTrainings(
-        [_training("chapter3", seed, config) for seed in range(SEEDS)]
-    )
-    while batch.unfinished:
-        batch.run_episodes()
+    _run([_spec("chapter3", seed, config) for seed in range(SEEDS)])
     return time.perf_counter() - start, alone
 
 
-def _training(scenario: str, seed: int, config: Hyperparameters) -> Training:
-    return Training(TrainingSpec(load_scenario(scenario), "twin", config, seed))
+def _spec(scenario: str, seed: int, config: Hyperparameters) -> TrainingSpec:
+    return TrainingSpec(load_scenario(scenario), "twin", config, seed)
 
 
-def _run(training: Training) -> None:
-    while len(training.summaries) < training.spec.config.episodes:
-        training.run_episode()
+def _run(specs: list[TrainingSpec]) -> None:
+    loop = TrainingLoop(make_environments(specs), [make_training(s) for s in specs])
+    while loop.unfinished:
+        loop.run_round()
 
 
 def _sb3(config: Hyperparameters) -> float:

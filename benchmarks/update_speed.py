@@ -43,12 +43,12 @@ def measure_updates(name: str) -> tuple[float, float | None]:
 
 
 def _ours(name: str) -> Callable[[int], None]:
-    from drake_disasm.learning.agent import Agent
+    from drake_disasm.learning.actor_critic import ActorCritic
     from drake_disasm.learning.hyperparameters import preset
     from drake_disasm.learning.replay import WIDTH, Replay
 
     config = preset(name, "ddpg")
-    agent, replay = Agent(config, seed=0), Replay(_TRANSITIONS)
+    agent, replay = ActorCritic(config, seed=0), Replay(_TRANSITIONS)
     generator = np.random.default_rng(0)
     rows = generator.standard_normal((_TRANSITIONS, WIDTH)).astype(np.float32)
     rows[:, -2:] = 0.0, 1.0

@@ -84,17 +84,27 @@ class Outcome(enum.IntEnum):
     @property
     def terminated(self) -> bool:
         """Whether the task itself ended the episode, well or badly."""
-        return self not in (self.RUNNING, self.STEP_LIMIT)
+        return is_terminated(self)
 
     @property
     def truncated(self) -> bool:
         """Whether only the step limit ended it."""
-        return self is self.STEP_LIMIT
+        return is_truncated(self)
 
     @property
     def label(self) -> str:
         """The name as people read it."""
         return self.name.lower().replace("_", " ")
+
+
+def is_terminated(outcomes: Any) -> Any:
+    """Returns whether the task itself ended episodes, of numbers of `Outcome`."""
+    return (outcomes != Outcome.RUNNING) & (outcomes != Outcome.STEP_LIMIT)
+
+
+def is_truncated(outcomes: Any) -> Any:
+    """Returns whether only the step limit ended them."""
+    return outcomes == Outcome.STEP_LIMIT
 
 
 @dataclasses.dataclass(frozen=True)

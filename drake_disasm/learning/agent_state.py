@@ -9,9 +9,6 @@ from torch.utils._pytree import tree_map
 from drake_disasm.learning.adam import Moments, no_moments
 from drake_disasm.learning.hyperparameters import Hyperparameters
 from drake_disasm.learning.networks import Critics, Layers, make_layers
-from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
-
-_STATES, _ACTIONS = len(STATE_NAMES), len(ACTION_NAMES)
 
 
 class AgentState(NamedTuple):
@@ -35,8 +32,10 @@ class AgentState(NamedTuple):
     entropy_moments: Moments
 
 
-def make_state(config: Hyperparameters, seed: int) -> AgentState:
-    """Returns a fresh agent; the same seed gives the same bits.
+def make_state(
+    config: Hyperparameters, seed: int, states: int, actions: int
+) -> AgentState:
+    """Returns a fresh agent for so many states and actions; equal seeds, equal bits.
 
     No two of its tensors are one, as in any later state: torch would compile the first
     update for itself, and where another agent has more networks it fails to say why
@@ -44,11 +43,11 @@ def make_state(config: Hyperparameters, seed: int) -> AgentState:
     """
     generator = torch.Generator().manual_seed(seed)
     soft = config.algorithm == "sac"
-    outputs = 2 * _ACTIONS if soft else _ACTIONS
-    actor = make_layers([_STATES, *config.hidden, outputs], generator)
+    outputs = 2 * actions if soft else actions
+    actor = make_layers([states, *config.hidden, outputs], generator)
     if config.base:
-        actor = _quiet(actor, config.log_sigma if soft else 0.0)
-    sizes = [_STATES + _ACTIONS, *config.hidden, 1]
+        actor = _quiet(actor, actions, config.log_sigma if soft else 0.0)
+    sizes = [states + actions, *config.hidden, 1]
     critics = tuple(
         make_layers(sizes, generator, config.layer_norm) for _ in range(config.critics)
     )
@@ -67,15 +66,16 @@ def make_state(config: Hyperparameters, seed: int) -> AgentState:
     return copied
 
 
-def _quiet(actor: Layers, log_sigma: float) -> Layers:
+def _quiet(actor: Layers, actions: int, log_sigma: float) -> Layers:
     """Returns the actor with a last layer so small that its output is nearly zero.
 
     Args:
         actor: as drawn.
+        actions: how many it chooses.
         log_sigma: initial value of SAC's log sigmas.
     """
     last = {name: 0.01 * value for name, value in actor[-1].items()}
-    last["bias"][_ACTIONS:] += log_sigma
+    last["bias"][actions:] += log_sigma
     return (*actor[:-1], last)
 
 

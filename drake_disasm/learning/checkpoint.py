@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
-from torch.utils._pytree import tree_flatten, tree_unflatten
 
 from drake_disasm.common.archive import (
     ArchiveKind,
@@ -49,8 +47,7 @@ def save_checkpoint(
     """
     rows, following = replay.contents()
     own = {"updates": agent.updates, "following": following, "notes": notes}
-    arrays = {name: leaf.numpy() for name, leaf in _leaves(agent).items()}
-    save_archive(path, arrays | {"replay": rows}, own)
+    save_archive(path, agent.arrays() | {"replay": rows}, own)
 
 
 def load_checkpoint(
@@ -71,10 +68,10 @@ def load_checkpoint(
     arrays, own = load_archive(path, CHECKPOINT)
     with _named(path):
         check_like(own, {"updates": 0, "following": 0, "notes": example})
-        rows = _rows(arrays)
+        rows = _rows(arrays, replay.width)
         _check_state(agent, arrays)
         replay.restore(rows, own["following"])
-    _restore_state(agent, arrays)
+    agent.restore(arrays)
     agent.updates = own["updates"]
     return own["notes"]
 
@@ -89,11 +86,11 @@ def load_agent(path: Path, agent: Agent) -> None:
     with _named(path):
         _rows(arrays)
         _check_state(agent, arrays)
-    _restore_state(agent, arrays)
+    agent.restore(arrays)
 
 
-def load_memory(path: Path) -> Replay:
-    """Returns the replay memory of a training, to draw from.
+def load_memory(path: Path, device: str = "numpy") -> Replay:
+    """Returns the replay memory of a training, to draw from, on a device.
 
     Raises:
         DisasmError: the file is damaged.
@@ -101,7 +98,7 @@ def load_memory(path: Path) -> Replay:
     arrays, _ = load_archive(path, CHECKPOINT)
     with _named(path):
         rows = _rows(arrays)
-        replay = Replay(max(1, len(rows)))
+        replay = Replay(max(1, len(rows)), device=device)
         replay.restore(rows, 0)
     return replay
 
@@ -115,32 +112,21 @@ def _named(path: Path) -> Iterator[None]:
         raise DisasmError(f"{path}: {error}") from None
 
 
-def _rows(arrays: Arrays) -> np.ndarray:
+def _rows(arrays: Arrays, width: int = WIDTH) -> np.ndarray:
     """Takes the memory's rows out of the arrays, and returns them."""
-    wanted = {"replay": ArraySpec("float32", (None, WIDTH))}
+    wanted = {"replay": ArraySpec("float32", (None, width))}
     found = {"replay": arrays.pop("replay")} if "replay" in arrays else {}
     check_arrays(found, wanted, AGAIN)
     return found["replay"]
 
 
-def _leaves(agent: Agent) -> dict[str, torch.Tensor]:
-    leaves, _ = tree_flatten(agent.state)
-    return {f"state_{i:03d}": leaf for i, leaf in enumerate(leaves)}
-
-
 def _check_state(agent: Agent, arrays: Arrays) -> None:
     """Refuses arrays that are not the state of an agent like this one."""
-    leaves = _leaves(agent)
+    leaves = agent.arrays()
     for name, leaf in leaves.items():
-        if name in arrays and arrays[name].shape != tuple(leaf.shape):
+        if name in arrays and arrays[name].shape != leaf.shape:
             raise DisasmError(_OTHER.format(f"{name} of {arrays[name].shape}"))
     if len(arrays) != len(leaves):
         raise DisasmError(_OTHER.format(f"{len(arrays)} arrays, not {len(leaves)}"))
-    wanted = {n: ArraySpec(str(leaf.numpy().dtype)) for n, leaf in leaves.items()}
+    wanted = {n: ArraySpec(str(leaf.dtype)) for n, leaf in leaves.items()}
     check_arrays(arrays, wanted, AGAIN)
-
-
-def _restore_state(agent: Agent, arrays: Arrays) -> None:
-    _, structure = tree_flatten(agent.state)
-    found = [torch.from_numpy(arrays[name]) for name in _leaves(agent)]
-    agent.state = tree_unflatten(found, structure)

@@ -34,11 +34,10 @@ def remember(
         config: of the agent, for the scales of the state.
     """
     scaled = observations / np.array(config.observation_scale)
-    states = [BoltState.from_vector(s) for s in observations]
-    task, geometry = scenario.task, TaskGeometry.of(scenario)
-    for k, action in enumerate(actions):
-        terms = reward_terms(states[k], states[k + 1], task, geometry)
-        reward = sum(terms.values())
-        chosen = action_map.from_action(observations[k], action)
-        last = k == len(actions) - 1
-        replay.add(scaled[k], chosen, reward, scaled[k + 1], terminated and last)
+    before, after = (
+        BoltState.from_vector(observations[k:][: len(actions)]) for k in (0, 1)
+    )
+    terms = reward_terms(before, after, scenario.task, TaskGeometry.of(scenario))
+    chosen = action_map.from_action(observations[:-1], actions)
+    ends = np.arange(1, len(actions) + 1) == len(actions)
+    replay.add(scaled[:-1], chosen, sum(terms.values()), scaled[1:], terminated & ends)

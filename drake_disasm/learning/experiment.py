@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import read_json, write_json
 from drake_disasm.common.finished_work import is_resumed, refuse_difference
 from drake_disasm.learning.hyperparameters import Hyperparameters
@@ -21,7 +22,10 @@ from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.learning.training import TrainingSpec
 from drake_disasm.scenario import Scenario, scenario_to_mapping
+from drake_disasm.twin.refusals import make_like
 
+#: Episodes at a time from which on their rows are not logged.
+MOST_RECORDED = 1024
 _AGAIN = "delete it, and resume the training"
 _FIGURES = ("episodes", "successes", "performance", "mean_force", "peak_force", "steps")
 _EVALUATION = dict.fromkeys(_FIGURES, 0.0)
@@ -34,7 +38,7 @@ class Experiment:
     """What all seeds of a training have in common.
 
     Attributes:
-        scenario, station, config, compiled, threads, envs: as in TrainingSpec.
+        scenario, station, config, compiled, threads, envs, device: as in TrainingSpec.
         lockstep: whether seeds are trained side by side, on a batch of twins.
         preset: name of the hyper-parameters that `config` started from.
         validation: greedy episodes after each training, for its result.
@@ -61,6 +65,42 @@ class Experiment:
     provenance: dict[str, Any] = dataclasses.field(default_factory=dict)
     envs: int = 1
     lockstep: bool = False
+    device: str = "numpy"
+
+    def __post_init__(self) -> None:
+        """Refuses several episodes at a time, or a device, where there is no batch.
+
+        Raises:
+            DisasmError: says what to give instead.
+        """
+        several, on_twin = self.envs > 1, self.station == "twin"
+        if self.lockstep and (several or self.logs or not on_twin):
+            raise DisasmError(
+                "lockstep: agents side by side have one environment each, on a batch "
+                "of twins; leave out `envs`, `station` and logs to learn from, or "
+                "`lockstep`"
+            )
+        if several and not on_twin:
+            raise DisasmError(
+                f"envs: station '{self.station}' has no batch; give `station` twin, or "
+                "one of `envs`"
+            )
+        if several and self.logs:
+            raise DisasmError(
+                f"envs: {self.envs} episodes at a time, but learning from logs runs "
+                "none; leave `envs` out"
+            )
+        if self.device != "numpy" and not (several or self.logs):
+            raise DisasmError(
+                f"device: '{self.device}' computes for many episodes at a time; give "
+                "`envs`, or leave `device` out"
+            )
+        make_like(self.device)
+
+    @property
+    def is_recorded(self) -> bool:
+        """Whether each episode's rows go into a log; of many they would fill a disk."""
+        return not self.logs and self.envs < MOST_RECORDED
 
     @property
     def is_batched(self) -> bool:
@@ -77,6 +117,7 @@ class Experiment:
             self.compiled,
             self.threads,
             self.envs,
+            self.device,
         )
 
     def to_mapping(self) -> dict[str, Any]:
@@ -110,11 +151,11 @@ def open_experiment(experiment: Experiment, folder: Path, resume: bool) -> Exper
 def _with_station(found: dict[str, Any]) -> dict[str, Any]:
     """Returns a training's plain data; an older one called the station "model".
 
-    And it had one environment, and a process for each seed.
+    And it had one environment, no device, and a process for each seed.
     """
     if "model" in found:
         found["station"] = found.pop("model")
-    return {"envs": 1, "lockstep": False} | found
+    return {"envs": 1, "lockstep": False, "device": "numpy"} | found
 
 
 def read_training(folder: Path, example: dict[str, Any]) -> dict[str, Any]:

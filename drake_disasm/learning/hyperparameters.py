@@ -36,7 +36,9 @@ class Hyperparameters:
         "updates after each episode (algorithm 3.1) or each step (5.1)",
         choices=SCHEDULES,
     )
-    updates_per_step: int = quantity(1, "1", "gradient updates", low=1, high=100)
+    updates_per_step: float = quantity(
+        1.0, "1", "gradient updates for each step of an episode", low=1e-6, high=100
+    )
     warmup_episodes: int = quantity(
         0, "1", "first episodes, before updates start", low=0, high=10_000
     )
@@ -182,7 +184,7 @@ def _best(algorithm: str) -> Hyperparameters:
     """
     own = dataclasses.asdict(_variant(algorithm)) | {
         "episodes": 150,
-        "updates_per_step": 2,
+        "updates_per_step": 2.0,
         "hidden": [64, 64],
         "layer_norm": True,
         "critics": 2,

@@ -10,13 +10,16 @@ from drake_disasm.common.executors import WorkerPool
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.learning.checkpoint import load_memory
 from drake_disasm.learning.dataset import remember
+from drake_disasm.learning.environments import (
+    Environments,
+    make_environments,
+)
 from drake_disasm.learning.experiment import Experiment, seed_folder
-from drake_disasm.learning.lockstep import LockstepTraining
 from drake_disasm.learning.replay import Replay
-from drake_disasm.learning.run import learn_offline, run_in_lockstep, run_training
-from drake_disasm.learning.training import Recorded, Training, action_map
+from drake_disasm.learning.run import finish, run_trainings
+from drake_disasm.learning.training import Training, action_map, make_training
 from drake_disasm.learning.warm_start import start_checkpoint, start_hash
-from drake_disasm.logs import LogWriter, flat_columns, read_logs
+from drake_disasm.logs import LogWriter, read_logs
 from drake_disasm.logs.transitions import observations
 from drake_disasm.task.recording import transitions_header
 from drake_disasm.twin.batch import with_impact
@@ -80,30 +83,35 @@ def train_seeds(
 
 def _train_in_lockstep(jobs: Sequence[SeedJob], progress: Progress) -> None:
     """Trains some seeds side by side; `train_seed` finishes each."""
-    trainings = [_training(job) for job in jobs]
-    logs = [_Log(job) for job in jobs]
-    run_in_lockstep(trainings, [job.folder for job in jobs], logs, progress)
+    _run(jobs, [_training(job) for job in jobs], progress)
 
 
-class _Log:
-    """Writes each episode to the seed's log, once."""
+def _run(
+    jobs: Sequence[SeedJob], trainings: Sequence[Training], progress: Progress
+) -> None:
+    """Trains jobs to the end, in the same environments."""
+    experiment = jobs[0].experiment
+    specs = [job.experiment.spec(job.seed) for job in jobs]
 
-    def __init__(self, job: SeedJob) -> None:
-        experiment = job.experiment
-        scenario = experiment.scenario
-        if experiment.is_batched:
-            scenario = with_impact(scenario)
-        header = transitions_header(
-            scenario,
-            experiment.station,
-            experiment.provenance | {"seed": job.seed},
-        )
-        self._writer = LogWriter(job.folder / "log", header, resume=True)
+    def make() -> Environments | None:
+        """Makes the environments; logs to learn from need none."""
+        if experiment.logs:
+            return None
+        return make_environments(specs, experiment.lockstep, experiment.is_recorded)
 
-    def write(self, number: int, recorded: Recorded) -> None:
-        """Writes the episode, unless a run that was killed had written it."""
-        if number >= self._writer.next_number:
-            self._writer.write_episode(flat_columns("transitions", recorded.columns()))
+    logs = [_log(job) for job in jobs if experiment.is_recorded]
+    run_trainings(trainings, make, [job.folder for job in jobs], logs, progress)
+
+
+def _log(job: SeedJob) -> LogWriter:
+    """Returns what writes the seed's log, or goes on with it."""
+    experiment = job.experiment
+    scenario = experiment.scenario
+    if experiment.is_batched:
+        scenario = with_impact(scenario)
+    provenance = experiment.provenance | {"seed": job.seed}
+    header = transitions_header(scenario, experiment.station, provenance)
+    return LogWriter(job.folder / "log", header, resume=True)
 
 
 def train_seed(job: SeedJob, progress: Progress) -> dict[str, Any]:
@@ -122,20 +130,20 @@ def train_seed(job: SeedJob, progress: Progress) -> dict[str, Any]:
         provenance["start"] = {
             experiment.start: start_hash(experiment.start, job.seed),
         }
-    training = _training(job)
+    training, spec = _training(job), experiment.spec(job.seed)
+    _run([job], [training], progress)
     end = (provenance, experiment.validation, progress)
-    if experiment.logs:
-        updates = experiment.updates or training.replay.size
-        return learn_offline(training, job.folder, updates, *end)
-    return run_training(training, job.folder, _Log(job), *end)
+    return finish(training, spec, job.folder, *end)
 
 
 def _training(job: SeedJob) -> Training:
     """Returns the training of a seed, at its beginning."""
     experiment = job.experiment
     dataset = _memory(experiment, experiment.logs)
-    kind = LockstepTraining if experiment.envs > 1 else Training
-    training = kind(experiment.spec(job.seed), _demonstrations(job), dataset)
+    updates = experiment.updates or (dataset.size if dataset else 0)
+    training = make_training(
+        experiment.spec(job.seed), _demonstrations(job), dataset, updates
+    )
     if experiment.start:
         training.start_from(start_checkpoint(experiment.start, job.seed))
     return training
@@ -147,7 +155,8 @@ def _demonstrations(job: SeedJob) -> Replay | None:
     shown = _memory(experiment, experiment.demonstrations)
     if shown or not (experiment.start and experiment.config.demonstrations):
         return shown
-    return load_memory(start_checkpoint(experiment.start, job.seed))
+    path = start_checkpoint(experiment.start, job.seed)
+    return load_memory(path, experiment.device)
 
 
 def _memory(experiment: Experiment, folders: Collection[str]) -> Replay | None:
@@ -156,7 +165,8 @@ def _memory(experiment: Experiment, folders: Collection[str]) -> Replay | None:
     if not folders:
         return None
     episodes = [e for log in read_logs(folders) for e in log.episodes]
-    replay = Replay(sum(episode.rows - 1 for episode in episodes))
+    count = sum(episode.rows - 1 for episode in episodes)
+    replay = Replay(count, device=experiment.device)
     actions = action_map(scenario, config)
     for episode in episodes:
         remember(

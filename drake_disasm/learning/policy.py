@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from drake_disasm.learning.training import Training
+from drake_disasm.learning.training import TrainingSpec, action_map
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 from drake_disasm.policies import (
     LearnedPolicy,
@@ -15,19 +15,21 @@ from drake_disasm.policies import (
 )
 
 
-def trained_policy(training: Training, provenance: dict[str, Any]) -> LearnedPolicy:
+def trained_policy(
+    network: Network, spec: TrainingSpec, provenance: dict[str, Any]
+) -> LearnedPolicy:
     """Returns the greedy policy of a training.
 
     Args:
-        training: at any episode.
+        network: of its agent, at any episode.
+        spec: of the training.
         provenance: command, date, seed, versions, commit.
     """
-    spec = training.spec
     task = spec.scenario.task
     return LearnedPolicy(
-        network=_greedy(training.agent.network()),
+        network=_greedy(network),
         observation_scale=np.array(spec.config.observation_scale),
-        action_map=training.action_map,
+        action_map=action_map(spec.scenario, spec.config),
         description=PolicyDescription(
             agent=spec.config.algorithm,
             preset=provenance.get("preset", ""),

@@ -2,16 +2,21 @@
 
 from typing import NamedTuple
 
+import array_api_compat
 import numpy as np
+import torch
 from torch import Tensor
 
+from drake_disasm.common.arrays import Array, array_like, namespace, to_numpy
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.text import shown
+from drake_disasm.learning.random_numbers import Random
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 
-_STATES, _ACTIONS = len(STATE_NAMES), len(ACTION_NAMES)
-#: Numbers in one transition; the last is its weight in a batch.
-WIDTH = 2 * _STATES + _ACTIONS + 3
+#: Numbers that the task's agents see and choose.
+STATES, ACTIONS = len(STATE_NAMES), len(ACTION_NAMES)
+#: Numbers in one transition of the task; the last is its weight in a batch.
+WIDTH = 2 * STATES + ACTIONS + 3
 # A row drawn twice is computed once, with twice the weight: the same gradient on fewer
 # rows. It pays where matrix products dominate, and costs a search for equal draws.
 _MERGED_FROM = 1000  # rows of a batch
@@ -22,8 +27,8 @@ class Batch(NamedTuple):
     """Transitions as the updates see them.
 
     Attributes:
-        observation, next_observation: (n, 12) scaled.
-        action: (n, 6) in [-1, 1], before imprecision (algorithm 3.2).
+        observation, next_observation: (n, s) scaled.
+        action: (n, a) in [-1, 1], before imprecision (algorithm 3.2).
         reward: (n,).
         terminated: (n,) 1 where the task itself ended, which cuts the bootstrap;
             0 elsewhere, at a time limit too.
@@ -38,9 +43,9 @@ class Batch(NamedTuple):
     weight: Tensor
 
 
-def split(rows: Tensor) -> Batch:
-    """Returns the columns of rows (n, WIDTH)."""
-    s, a = _STATES, _ACTIONS
+def split(rows: Tensor, states: int = STATES) -> Batch:
+    """Returns the columns of rows (n, 2 s + a + 3), of s observed numbers."""
+    s, a = states, rows.shape[1] - 2 * states - 3
     return Batch(
         rows[:, :s],
         rows[:, s : s + a],
@@ -56,42 +61,66 @@ class Replay:
 
     Attributes:
         size: transitions held.
+        width: numbers in each.
 
     Args:
         capacity: transitions kept; a new one then replaces the oldest.
+        states, actions: how many numbers are observed and chosen.
+        device: "numpy", or where tensors are.
     """
 
-    def __init__(self, capacity: int) -> None:
-        self._rows = np.zeros((capacity, WIDTH), dtype=np.float32)
+    def __init__(
+        self,
+        capacity: int,
+        states: int = STATES,
+        actions: int = ACTIONS,
+        device: str = "numpy",
+    ) -> None:
+        self._states, self.width = states, 2 * states + actions + 3
+        shape = capacity, self.width
+        self._rows: Array = np.zeros(shape, np.float32)
+        if device != "numpy":
+            self._rows = torch.zeros(shape, device=device)
         self._next = 0
         self.size = 0
 
     def add(
         self,
-        observation: np.ndarray,
-        action: np.ndarray,
-        reward: float,
-        next_observation: np.ndarray,
-        terminated: bool,
+        observation: Array,
+        action: Array,
+        reward: Array,
+        next_observation: Array,
+        terminated: Array,
+        which: Array | slice = slice(None),
     ) -> None:
-        """Stores one transition; arguments as in `Batch`, without the first axis."""
-        row = self._rows[self._next]
-        row[:_STATES] = observation
-        row[_STATES : _STATES + _ACTIONS] = action
-        row[_STATES + _ACTIONS] = reward
-        row[_STATES + _ACTIONS + 1 : -2] = next_observation
-        row[-2:] = terminated, 1.0
-        self._next = (self._next + 1) % len(self._rows)
-        self.size = min(self.size + 1, len(self._rows))
+        """Stores transitions; arguments as in `Batch`.
 
-    def sample(self, count: int, generator: np.random.Generator) -> np.ndarray:
-        """Returns rows (n, WIDTH) of `count` draws with replacement.
+        Args:
+            observation, action, reward, next_observation, terminated: of each.
+            which: (n,) mask of those that are stored.
+        """
+        s, capacity = self._states, len(self._rows)
+        xp, device = namespace(self._rows), array_api_compat.device(self._rows)
+        shape = len(observation), self.width
+        rows = xp.empty(shape, dtype=xp.float32, device=device)
+        rows[:, :s], rows[:, -s - 2 : -2] = observation, next_observation
+        rows[:, s : -s - 3], rows[:, -s - 3] = action, reward
+        rows[:, -2], rows[:, -1] = terminated, 1.0
+        rows = rows[which][-capacity:]
+        places = xp.arange(len(rows), device=device)
+        self._rows[(places + self._next) % capacity] = rows
+        self._next = (self._next + len(rows)) % capacity
+        self.size = min(self.size + len(rows), capacity)
 
-        In large batches equal draws are merged: then n < count, and the weights say
-        how often each row was drawn.
+    def sample(self, count: int, generator: Random) -> Array:
+        """Returns rows (n, width) of `count` draws with replacement.
+
+        In large batches of NumPy equal draws are merged: then n < count, and the
+        weights say how often each row was drawn.
         """
         chosen = generator.integers(self.size, size=count)
-        if count < _MERGED_FROM or self.size < _MERGED_OUT_OF:
+        is_few = count < _MERGED_FROM or self.size < _MERGED_OUT_OF
+        if is_few or not isinstance(chosen, np.ndarray):
             return self._rows[chosen]
         chosen, times = np.unique(chosen, return_counts=True)
         rows = self._rows[chosen]
@@ -99,8 +128,8 @@ class Replay:
         return rows
 
     def contents(self) -> tuple[np.ndarray, int]:
-        """Returns the rows held (size, WIDTH) and where the next one goes."""
-        return self._rows[: self.size], self._next
+        """Returns the rows held (size, width) and where the next one goes."""
+        return to_numpy(self._rows[: self.size]), self._next
 
     def restore(self, rows: np.ndarray, following: int) -> None:
         """Restores the result of `contents`.
@@ -108,10 +137,10 @@ class Replay:
         Raises:
             DisasmError: the rows don't fit in here.
         """
-        if len(rows) > len(self._rows) or rows.shape[1:] != (WIDTH,):
+        if len(rows) > len(self._rows) or rows.shape[1:] != (self.width,):
             raise DisasmError(
                 f"has a memory of {rows.shape}, which does not fit one of "
-                f"{self._rows.shape}; resume with the hyper-parameters that the "
+                f"{tuple(self._rows.shape)}; resume with the hyper-parameters that the "
                 "training was started with"
             )
         if not 0 <= following < len(self._rows):
@@ -120,4 +149,4 @@ class Replay:
                 "start anew"
             )
         self.size, self._next = len(rows), following
-        self._rows[: self.size] = rows
+        self._rows[: self.size] = array_like(rows, self._rows)

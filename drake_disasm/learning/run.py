@@ -16,25 +16,24 @@ import csv
 import dataclasses
 import io
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.file_lock import try_lock
 from drake_disasm.common.files import make_folder, read_text, write_json, write_text
 from drake_disasm.common.plain_data import check_like
-from drake_disasm.common.progress import Progress, ProgressUpdate
+from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.common.text import clipped
+from drake_disasm.learning.actor_critic import ActorCritic
+from drake_disasm.learning.environments import Environments
 from drake_disasm.learning.evaluation import summed_up, validate_policy
-from drake_disasm.learning.lockstep import LockstepTrainings
+from drake_disasm.learning.loop import Ended, TrainingLoop
 from drake_disasm.learning.policy import trained_policy
-from drake_disasm.learning.training import (
-    Purpose,
-    Recorded,
-    Training,
-    seed_for,
-)
+from drake_disasm.learning.random_numbers import Purpose, seed_for
+from drake_disasm.learning.training import Training, TrainingSpec
+from drake_disasm.logs import LogWriter, flat_columns
 from drake_disasm.mdp import REWARD_TERMS, Outcome
 from drake_disasm.policies import save_policy
 from drake_disasm.task.episode import EpisodeSummary
@@ -46,69 +45,24 @@ _SHOWN = 20  # latest episodes over which progress is averaged
 _PATIENCE = 10.0  # s until the workers of a killed run have noticed
 
 
-class EpisodeLog(Protocol):
-    """Writes the rows of each episode."""
-
-    def write(self, number: int, recorded: Recorded) -> None:
-        """Writes episode `number`, if it is not there yet."""
-
-
-def run_training(
-    training: Training,
-    folder: Path,
-    log: EpisodeLog,
-    provenance: dict[str, Any],
-    validation: int,
-    progress: Progress,
-) -> dict[str, Any]:
-    """Trains to the end, continuing from the folder's checkpoint if there is one.
-
-    Args:
-        training: fresh.
-        folder: of this seed.
-        log: gets each episode before its checkpoint is written.
-        provenance: where the policy is from.
-        validation: greedy episodes at the end.
-        progress: called after each episode, or each round of them, and each greedy
-            one.
-
-    Returns:
-        The content of `result.json`.
-
-    Raises:
-        DisasmError: another program is training in the folder; a damaged checkpoint.
-    """
-    make_folder(folder)
-    with _locked(folder):
-        checkpoint = folder / _CHECKPOINT
-        if checkpoint.exists():
-            training.restore(checkpoint)
-        while len(training.summaries) < training.spec.config.episodes:
-            first = len(training.summaries)
-            for number, (_, recorded) in enumerate(training.run_episodes(), first):
-                log.write(number, recorded)
-            training.save(checkpoint)
-            progress(_update(training))
-        return finish(training, folder, provenance, validation, progress)
-
-
-def run_in_lockstep(
+def run_trainings(
     trainings: Sequence[Training],
+    make: Callable[[], Environments | None],
     folders: Sequence[Path],
-    logs: Sequence[EpisodeLog],
-    progress: Progress,
+    logs: Sequence[LogWriter] = (),
+    progress: Progress = ignore_progress,
 ) -> None:
-    """Trains side by side, on a batch of twins, up to the last checkpoint of each.
-
-    `run_training` then finishes each of them.
+    """Trains to the end, continuing from the folders' checkpoints where there are any.
 
     Args:
         trainings: fresh.
-        folders, logs: of each.
-        progress: called after each round of episodes.
+        make: makes the environments, see `TrainingLoop`; not called if all is done.
+        folders: of each.
+        logs: of each, or none; get its episodes before their checkpoint is written.
+        progress: called after each round.
 
     Raises:
-        DisasmError: see `run_training`.
+        DisasmError: another program is training in a folder; a damaged checkpoint.
     """
     with contextlib.ExitStack() as stack:
         for training, folder in zip(trainings, folders, strict=True):
@@ -116,70 +70,62 @@ def run_in_lockstep(
             stack.enter_context(_locked(folder))
             if (folder / _CHECKPOINT).exists():
                 training.restore(folder / _CHECKPOINT)
-        batch = LockstepTrainings(trainings)
-        while batch.unfinished:
-            for number, recorded in batch.run_episodes().items():
-                training = trainings[number]
-                logs[number].write(len(training.summaries) - 1, recorded)
-                training.save(folders[number] / _CHECKPOINT)
-            progress(_update(*trainings))
+        if all(training.is_finished for training in trainings):
+            return
+        loop = TrainingLoop(make(), trainings)
+        while loop.unfinished:
+            for number, ended in loop.run_round().items():
+                if logs:
+                    _write(logs[number], trainings[number], ended)
+                trainings[number].save(folders[number] / _CHECKPOINT)
+            progress(_update(trainings))
 
 
-def _update(*trainings: Training) -> ProgressUpdate:
-    """Returns how far online trainings are, and how their latest episodes went."""
+def _write(log: LogWriter, training: Training, ended: Ended) -> None:
+    """Writes episodes, unless a run that was killed had written them."""
+    first = len(training.summaries) - len(ended)
+    for number, (_, columns) in enumerate(ended, first):
+        if columns is not None and number >= log.next_number:
+            log.write_episode(flat_columns("transitions", columns))
+
+
+def _update(trainings: Sequence[Training]) -> ProgressUpdate:
+    """Returns how far trainings are, and how their latest episodes went."""
+    done = sum(training.done for training in trainings)
+    total = sum(training.config.episodes for training in trainings)
     latest = [s for training in trainings for s in training.summaries[-_SHOWN:]]
+    if not latest:
+        return ProgressUpdate("training", done, total)
     won = sum(s.outcome is Outcome.SUCCESS for s in latest)
-    return ProgressUpdate(
-        "training",
-        sum(len(training.summaries) for training in trainings),
-        sum(training.spec.config.episodes for training in trainings),
-        f"success {won}/{len(latest)}",
-        sum(s.reward for s in latest) / len(latest),
-    )
-
-
-def learn_offline(
-    training: Training,
-    folder: Path,
-    updates: int,
-    provenance: dict[str, Any],
-    validation: int,
-    progress: Progress,
-) -> dict[str, Any]:
-    """Learns from what the training's memory holds, without acting (thesis 3.4.2).
-
-    Args:
-        training: fresh, with its dataset.
-        updates: gradient updates to do, in as many rounds as there would be episodes.
-        folder, provenance, validation, progress: as in `run_training`.
-    """
-    make_folder(folder)
-    parts = training.spec.config.episodes
-    with _locked(folder):
-        checkpoint = folder / _CHECKPOINT
-        if checkpoint.exists():
-            training.restore(checkpoint)
-        while training.rounds < parts:
-            done, next_ = (
-                updates * i // parts for i in (training.rounds, training.rounds + 1)
-            )
-            training.run_round(next_ - done)
-            training.save(checkpoint)
-            progress(ProgressUpdate("training", training.rounds, parts))
-        return finish(training, folder, provenance, validation, progress)
+    reward = sum(s.reward for s in latest) / len(latest)
+    note = f"success {won}/{len(latest)}"
+    return ProgressUpdate("training", done, total, note, reward)
 
 
 def finish(
     training: Training,
+    spec: TrainingSpec,
     folder: Path,
     provenance: dict[str, Any],
     validation: int,
     progress: Progress,
 ) -> dict[str, Any]:
-    """Validates the trained policy, and writes policy, episodes and result."""
-    spec = training.spec
+    """Validates a trained policy, and writes policy, episodes and result.
+
+    Args:
+        training: at its end.
+        spec: of it.
+        folder: of the seed.
+        provenance: where the policy is from.
+        validation: greedy episodes.
+        progress: called after each of them.
+
+    Returns:
+        The content of `result.json`.
+    """
     seeds = [seed_for(spec.seed, Purpose.VALIDATION, i) for i in range(validation)]
-    policy = trained_policy(training, provenance)
+    assert isinstance(training.agent, ActorCritic)  # what a spec makes
+    policy = trained_policy(training.agent.network(), spec, provenance)
     figures = validate_policy(policy, spec.scenario, spec.station, seeds, progress)
     evaluation = dataclasses.asdict(figures)
     description = dataclasses.replace(policy.description, evaluation=evaluation)
@@ -210,16 +156,21 @@ def _figures(summaries: list[EpisodeSummary]) -> dict[str, Any]:
 def write_episodes(path: Path, summaries: list[EpisodeSummary]) -> None:
     """Writes one row per episode as CSV."""
     text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    plain = [f.name for f in dataclasses.fields(EpisodeSummary)]
-    plain = [name for name in plain if name not in ("reward_terms", "outcome")]
-    terms = [f"reward.{name}" for name in REWARD_TERMS]
-    writer.writerow(["episode", *plain, "outcome", "reward", *terms])
-    for number, s in enumerate(summaries):
-        row = [number, *(getattr(s, name) for name in plain), s.outcome.label]
-        row += [s.reward, *(s.reward_terms.get(name, 0.0) for name in REWARD_TERMS)]
-        writer.writerow(row)
+    rows = [_row(number, summary) for number, summary in enumerate(summaries)]
+    names = list(_row(0, EpisodeSummary(0)))
+    writer = csv.DictWriter(text, names, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
     write_text(path, text.getvalue())
+
+
+def _row(number: int, s: EpisodeSummary) -> dict[str, Any]:
+    plain = dataclasses.asdict(s)
+    for name in ("reward_terms", "outcome"):
+        del plain[name]
+    terms = {f"reward.{name}": s.reward_terms.get(name, 0.0) for name in REWARD_TERMS}
+    whole = {"outcome": s.outcome.label, "reward": s.reward}
+    return {"episode": number} | plain | whole | terms
 
 
 def read_episodes(path: Path) -> list[dict[str, Any]]:

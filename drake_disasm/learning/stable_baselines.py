@@ -12,12 +12,11 @@
     agent.learn(20_000)
 """
 
-from collections.abc import Callable
 from typing import Any, NoReturn
 
 import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import DictInfoToList
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvIndices,
@@ -56,9 +55,8 @@ class DisassemblyVecEnv(VecEnv):
         scenario: Scenarios = "removal",
         device: str = "auto",
     ) -> None:
-        self.envs = DisassemblyVectorEnv(
-            num_envs, scenario, device=device, autoreset_mode=AutoresetMode.SAME_STEP
-        )
+        self.envs = DisassemblyVectorEnv(num_envs, scenario, device=device)
+        self._listing = DictInfoToList(self.envs)
         self._actions = np.zeros((num_envs, 6))
         super().__init__(
             num_envs,
@@ -83,10 +81,10 @@ class DisassemblyVecEnv(VecEnv):
                 "one dictionary for all"
             )
         unseeded = all(seed is None for seed in self._seeds)
-        observation, infos = self.envs.reset(
-            seed=None if unseeded else self._seeds, options=options or None
+        observation, self.reset_infos = self._listing.reset(
+            seed=None if unseeded else self._seeds,  # type: ignore[arg-type]
+            options=options or None,
         )
-        self.reset_infos = _by_environment(infos, self.num_envs)
         self._reset_seeds()
         self._reset_options()
         return observation
@@ -101,16 +99,14 @@ class DisassemblyVecEnv(VecEnv):
         Returns:
             Observations (n, 12), rewards (n,), whether episodes ended (n,), and infos.
         """
-        observation, reward, terminated, truncated, found = self.envs.step(
+        observation, reward, terminated, truncated, infos = self._listing.step(
             self._actions
         )
         ended = terminated | truncated
-        infos = _by_environment(found, self.num_envs)
-        if ended.any():
-            final = _by_environment(found["final_info"], self.num_envs)
-            for i in np.flatnonzero(ended):
-                self.reset_infos[i], infos[i] = infos[i], final[i]
-                infos[i]["terminal_observation"] = found["final_obs"][i]
+        for i in np.flatnonzero(ended):
+            last = infos[i].pop("final_info")
+            last["terminal_observation"] = infos[i].pop("final_obs")
+            self.reset_infos[i], infos[i] = infos[i], last
         for info, is_cut in zip(infos, truncated & ~terminated, strict=True):
             info["TimeLimit.truncated"] = bool(is_cut)
         return observation, reward.astype(np.float32), ended, infos
@@ -161,17 +157,3 @@ class DisassemblyVecEnv(VecEnv):
     ) -> list[bool]:
         """Returns False for each environment: no wrapper is around a single one."""
         return [False for _ in self._get_indices(indices)]
-
-
-def _by_environment(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:
-    """Returns gymnasium's infos of a batch as one dictionary for each environment."""
-    terms = infos["reward_terms"]
-    names = [name for name in terms if not name.startswith("_")]
-    columns: dict[str, Callable[[int], Any]] = {
-        "reward_terms": lambda i: {name: float(terms[name][i]) for name in names},
-        "wrench": lambda i: infos["wrench"][i],
-        "outcome": lambda i: infos["outcome"][i],
-        "is_success": lambda i: bool(infos["is_success"][i]),
-        "failure": lambda i: infos["failure"][i],
-    }
-    return [{key: at(i) for key, at in columns.items()} for i in range(count)]

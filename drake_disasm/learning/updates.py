@@ -42,12 +42,12 @@ def update_deterministic(
 
     Args:
         state: before.
-        rows: (n, WIDTH) transitions.
-        noise: (n, 6) standard normal, for the target's action.
+        rows: (n, 2 s + a + 3) transitions.
+        noise: (n, a) standard normal, for the target's action.
         config: rates, discount and the like.
         with_actor: whether actor and targets are updated, too (every `policy_delay`).
     """
-    batch = split(rows)
+    batch = split(rows, state.actor[0]["weight"].shape[1])
     limit = config.target_noise_limit
     action = torch.tanh(evaluate(state.target_actor, batch.next_observation))
     shake = (config.target_noise * noise).clamp(-limit, limit)
@@ -78,12 +78,12 @@ def update_soft(
 
     Args:
         state, rows, config: as in `update_deterministic`.
-        noise: (n, 12) standard normal: for the actions at the states, then for
+        noise: (n, 2 a) standard normal: for the actions at the states, then for
             those at the next states.
         with_actor: whether actor and entropy coefficient are updated, too.
     """
-    batch = split(rows)
-    now, then = noise[:, :6], noise[:, 6:]
+    batch = split(rows, state.actor[0]["weight"].shape[1])
+    now, then = noise.chunk(2, dim=1)
     entropy = state.log_entropy.exp()
     action, log_density = sample_action(state.actor, batch.next_observation, then)
     value = least_q(state.target_critics, batch.next_observation, action)
@@ -99,7 +99,8 @@ def update_soft(
 
         gradient, (_, density) = grad_and_value(actor_loss, has_aux=True)(state.actor)
         if config.adapt_entropy:
-            state = _move_entropy(state, density, config)
+            surplus = batch.action.shape[1] - density
+            state = _move_entropy(state, surplus, config)
         state = _move_actor(state, gradient, config)
     targets = mixed(state.critics, state.target_critics, config.tau)
     return state._replace(target_critics=targets), loss
@@ -108,12 +109,12 @@ def update_soft(
 def sample_action(
     actor: Layers, observation: Tensor, noise: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Returns SAC's actions (n, 6) and the logarithm of their density (n,).
+    """Returns SAC's actions (n, a) and the logarithm of their density (n,).
 
     Args:
-        actor: gives mean and log sigma, (n, 12).
-        observation: (n, 12) scaled.
-        noise: (n, 6) standard normal.
+        actor: gives mean and log sigma, (n, 2 a).
+        observation: (n, s) scaled.
+        noise: (n, a) standard normal.
     """
     mean, log_sigma = evaluate(actor, observation).chunk(2, dim=1)
     log_sigma = log_sigma.clamp(*LOG_SIGMA)
@@ -167,13 +168,12 @@ def _move_actor(
 
 
 def _move_entropy(
-    state: AgentState, log_density: Tensor, config: Hyperparameters
+    state: AgentState, surplus: Tensor, config: Hyperparameters
 ) -> AgentState:
-    """Adapts the entropy coefficient until the mean of log density () is 6."""
-    surplus = 6.0 - log_density.detach()
+    """Adapts the entropy coefficient until the mean log density has no surplus ()."""
     log_entropy, moments = descend(
         state.log_entropy,
-        surplus,
+        surplus.detach(),
         state.entropy_moments,
         config.actor_rate,
         config.adam_epsilon,

@@ -37,11 +37,11 @@ from drake_disasm.twin.batch import BatchedTwin, BatchResult, with_impact
 from drake_disasm.twin.refusals import refuse_count
 from drake_disasm.twin.starts import NextEpisodes
 
+#: Where a batch computes.
+DEVICES = ("auto", "numpy", "cpu", "cuda")
 _MODES = (AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP)
 _WORTH_A_GPU = 1024  # environments: with fewer, starting its kernels takes longer
 _UNITS = ("m",) * 3 + ("rad",) * 3 + ("N",) * 3 + ("N m",) * 3
-_TERMINATED = np.array([outcome.terminated for outcome in Outcome])
-_TRUNCATED = np.array([outcome.truncated for outcome in Outcome])
 _LABELS = np.array([outcome.label for outcome in Outcome], dtype=object)
 
 Scenarios = Scenario | str | Path | Sequence[Scenario | str | Path]
@@ -94,14 +94,19 @@ class DisassemblyVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
                 f"station: '{station}' has no batch; use twin, or num_envs of "
                 'gymnasium\'s own with vectorization_mode="sync"'
             )
-        self._mode = _mode_of(autoreset_mode)
+        self._mode = AutoresetMode(autoreset_mode)
+        if self._mode not in _MODES:
+            names = " or ".join(mode.value for mode in _MODES)
+            raise DisasmError(
+                f"autoreset_mode: {self._mode.value} is not here; use {names}"
+            )
         self.metadata = {
             "render_modes": [],
             "autoreset_mode": self._mode,
             "observation_units": dict(zip(STATE_NAMES, _UNITS, strict=True)),
             "action_units": dict(zip(ACTION_NAMES, _UNITS[:6], strict=True)),
         }
-        self.num_envs, self._device = num_envs, _device_of(device, num_envs)
+        self.num_envs, self._device = num_envs, choose_device(device, num_envs)
         self._given = _scenarios_of(scenario, num_envs)
         self._build(self._given)
         bounds = np.max([action_bounds(s.task) for s in self._given], axis=0)
@@ -142,8 +147,8 @@ class DisassemblyVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         seeds = self._seed_all(seed)
         self._next = NextEpisodes(self.twin, self._generators)
         self._has_ended = np.zeros(self.num_envs, bool)
-        rows = _Rows.beginning(to_numpy(self.twin.reset(seeds)))
-        return rows.observation.astype(np.float32), rows.infos()
+        rows = _beginning(to_numpy(self.twin.reset(seeds)))
+        return rows.observation.astype(np.float32), _infos(rows)
 
     def step(
         self, actions: np.ndarray
@@ -160,7 +165,7 @@ class DisassemblyVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
                 f"actions: are of shape {actions.shape}; give {wanted}, "
                 "[dx dy dz du dv dw] in m and rad"
             )
-        rows = _Rows.of(self.twin.step(actions))
+        rows = _in_numpy(self.twin.step(actions))
         if self._has_ended.any():  # in the step before: its action was for nothing
             self._begin_next(self._has_ended, rows)
         reward, terminated, truncated = rows.reward, rows.terminated, rows.truncated
@@ -169,143 +174,102 @@ class DisassemblyVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         if self._mode is AutoresetMode.NEXT_STEP:
             self._has_ended = ended
         elif ended.any():
-            infos = rows.final(ended)
+            infos = _final(rows, ended)
             self._begin_next(ended, rows)
-        infos |= rows.infos()
         observation = rows.observation.astype(np.float32)
-        return observation, reward, terminated, truncated, infos
+        return observation, reward, terminated, truncated, infos | _infos(rows)
 
-    def _begin_next(self, ended: np.ndarray, rows: "_Rows") -> None:
+    def _begin_next(self, ended: np.ndarray, rows: BatchResult) -> None:
         """Starts the next episodes where one has ended (n,)."""
         if self._next is None:
             raise DisasmError("step: nothing was reset; call reset first")
         which = np.flatnonzero(ended)
         seeds, episodes = self._next.take(which)
-        observation = to_numpy(self.twin.start(which, seeds, episodes))
-        rows.begin(which, observation[which])
+        begun = _beginning(to_numpy(self.twin.start(which, seeds, episodes)))
+        for values, first in zip(_arrays(rows), _arrays(begun), strict=True):
+            values[which] = first[which]
 
     def _seed_all(self, seed: int | list[int | None] | None) -> list[int]:
         """Returns the seeds of all episodes; makes the generators of those to come."""
         count = self.num_envs
-        seeds: list[int | None] = [None] * count
+        given: list[int | None] = [None] * count
         if isinstance(seed, list):
-            seeds = list(seed)
+            given = seed
         elif seed is not None:
-            seeds = [seed + i for i in range(count)]
-        if len(seeds) != count:
+            given = [seed + i for i in range(count)]
+        if len(given) != count:
             raise DisasmError(
-                f"seed: {len(seeds)} seeds for {count} environments; give one for each"
+                f"seed: {len(given)} seeds for {count} environments; give one for each"
             )
-        if not self._generators:
-            self._generators = [seeding.np_random(None)[0] for _ in range(count)]
-        for i, given in enumerate(seeds):
-            if given is not None:
-                self._generators[i] = seeding.np_random(given)[0]
+        old = self._generators or [seeding.np_random(None)[0] for _ in range(count)]
+        self._generators = [
+            before if one is None else seeding.np_random(one)[0]
+            for before, one in zip(old, given, strict=True)
+        ]
         return [
-            int(generator.integers(2**31)) if given is None else given
-            for given, generator in zip(seeds, self._generators, strict=True)
+            int(generator.integers(2**31)) if one is None else one
+            for one, generator in zip(given, self._generators, strict=True)
         ]
 
 
-@dataclasses.dataclass
-class _Rows:
-    """What a step returns of n environments, in NumPy.
+def _in_numpy(result: BatchResult) -> BatchResult:
+    """Returns a step in NumPy, in memory of its own."""
+    return BatchResult(
+        np.array(to_numpy(result.observation)),
+        np.array(to_numpy(result.place)),
+        {n: np.array(to_numpy(t)) for n, t in result.reward_terms.items()},
+        np.array(to_numpy(result.outcome)),
+        np.array(to_numpy(result.has_failed)),
+        result.failure,
+    )
 
-    Attributes:
-        observation: (n, 12).
-        reward_terms: (n,) by name.
-        outcome: (n,) numbers of Outcome.
-        failure: (n,) why the simulation failed, or None.
-    """
 
-    observation: np.ndarray
-    reward_terms: dict[str, np.ndarray]
-    outcome: np.ndarray
-    failure: np.ndarray
+def _beginning(observation: np.ndarray) -> BatchResult:
+    """Returns the rows of episodes that begin with observations (n, 12)."""
+    count = len(observation)
+    terms = {name: np.zeros(count) for name in REWARD_TERMS}
+    outcome, failed = np.full(count, Outcome.RUNNING), np.zeros(count, bool)
+    place, failure = np.zeros((count, 3)), [""] * count
+    return BatchResult(np.array(observation), place, terms, outcome, failed, failure)
 
-    @classmethod
-    def of(cls, result: BatchResult) -> "_Rows":
-        """Returns those of a step."""
-        failure = np.full(len(result.failure), None, dtype=object)
-        for row, reason in enumerate(result.failure):
-            failure[row] = reason or None
-        terms = {n: np.array(to_numpy(t)) for n, t in result.reward_terms.items()}
-        observation = np.array(to_numpy(result.observation))
-        return cls(observation, terms, np.array(to_numpy(result.outcome)), failure)
 
-    @classmethod
-    def beginning(cls, observation: np.ndarray) -> "_Rows":
-        """Returns those of episodes that begin."""
-        count = len(observation)
-        terms = {name: np.zeros(count) for name in REWARD_TERMS}
-        running = np.zeros(count, np.int64)
-        return cls(np.array(observation), terms, running, np.full(count, None))
+def _arrays(rows: BatchResult) -> list[np.ndarray]:
+    terms = rows.reward_terms.values()
+    return [rows.observation, rows.place, *terms, rows.outcome, rows.has_failed]
 
-    def begin(self, which: np.ndarray, observation: np.ndarray) -> None:
-        """Replaces some rows by those of episodes that begin."""
-        self.observation[which] = observation
-        for term in self.reward_terms.values():
-            term[which] = 0.0
-        self.outcome[which], self.failure[which] = Outcome.RUNNING, None
 
-    @property
-    def reward(self) -> np.ndarray:
-        """Sum of the terms (n,)."""
-        return np.array(sum(self.reward_terms.values()))
+def _infos(rows: BatchResult, which: np.ndarray | None = None) -> dict[str, Any]:
+    """Returns gymnasium's infos of the environments of a mask (n,); None: all."""
+    mask = np.ones(len(rows.outcome), bool) if which is None else which
+    pairs = zip(rows.failure, rows.has_failed, strict=True)
+    failure = [why if has_failed else None for why, has_failed in pairs]
+    values: dict[str, Any] = {
+        "reward_terms": _with_masks(rows.reward_terms, mask),
+        "wrench": rows.observation[:, 6:],
+        "outcome": np.where(rows.has_failed, "failed", _LABELS[rows.outcome]),
+        "is_success": rows.outcome == Outcome.SUCCESS,
+        "failure": np.array(failure, object),
+    }
+    return _with_masks(values, mask)
 
-    @property
-    def _has_failed(self) -> np.ndarray:
-        return np.array([reason is not None for reason in self.failure])
 
-    @property
-    def terminated(self) -> np.ndarray:
-        """Whether the task itself ended the episode (n,)."""
-        return _TERMINATED[self.outcome] & ~self._has_failed
-
-    @property
-    def truncated(self) -> np.ndarray:
-        """Whether the step limit ended it, or the simulation failed (n,)."""
-        return _TRUNCATED[self.outcome] | self._has_failed
-
-    def infos(self, which: np.ndarray | None = None) -> dict[str, Any]:
-        """Returns gymnasium's infos of the environments of a mask (n,); None: all."""
-        mask = np.ones(len(self.outcome), bool) if which is None else which
-        values: dict[str, Any] = {
-            "reward_terms": _with_masks(self.reward_terms, mask),
-            "wrench": self.observation[:, 6:],
-            "outcome": np.where(self._has_failed, "failed", _LABELS[self.outcome]),
-            "is_success": self.outcome == Outcome.SUCCESS,
-            "failure": self.failure,
-        }
-        return _with_masks(values, mask)
-
-    def final(self, ended: np.ndarray) -> dict[str, Any]:
-        """Returns what gymnasium's infos have of episodes that have ended (n,)."""
-        observations = np.full(len(ended), None, dtype=object)
-        for row in np.flatnonzero(ended):
-            observations[row] = self.observation[row].astype(np.float32)
-        values = {"final_obs": observations, "final_info": self.infos(ended)}
-        return _with_masks(values, ended)
+def _final(rows: BatchResult, ended: np.ndarray) -> dict[str, Any]:
+    """Returns what gymnasium's infos have of episodes that have ended (n,)."""
+    observations = np.full(len(ended), None, dtype=object)
+    for row in np.flatnonzero(ended):
+        observations[row] = rows.observation[row].astype(np.float32)
+    values = {"final_obs": observations, "final_info": _infos(rows, ended)}
+    return _with_masks(values, ended)
 
 
 def _with_masks(values: dict[str, Any], mask: np.ndarray) -> dict[str, Any]:
     """Returns copies of values with gymnasium's masks, `_key` for each key."""
-    found: dict[str, Any] = {}
-    for key, value in values.items():
-        found[key] = value.copy()
-        found[f"_{key}"] = mask.copy()
-    return found
+    masks = {f"_{key}": mask.copy() for key in values}
+    return {key: value.copy() for key, value in values.items()} | masks
 
 
-def _mode_of(mode: AutoresetMode | str) -> AutoresetMode:
-    found = AutoresetMode(mode)
-    if found not in _MODES:
-        names = " or ".join(m.value for m in _MODES)
-        raise DisasmError(f"autoreset_mode: {found.value} is not here; use {names}")
-    return found
-
-
-def _device_of(name: str, count: int) -> str:
+def choose_device(name: str, count: int) -> str:
+    """Returns the device of a batch; of "auto" see `DisassemblyVectorEnv`."""
     if name != "auto":
         return name
     if count < _WORTH_A_GPU:  # torch need not even be loaded
@@ -320,17 +284,13 @@ def _device_of(name: str, count: int) -> str:
 def _scenarios_of(given: Scenarios, count: int) -> list[Scenario]:
     """Returns a scenario for each environment, with IMPACT contact."""
     if isinstance(given, Scenario | str | Path):
-        return [_loaded(given)] * count
+        return [with_impact(scenario_of(given))] * count
     if len(given) != count:
         raise DisasmError(
             f"scenario: {len(given)} scenarios for {count} environments; give one for "
             "each, or one for all"
         )
-    return [_loaded(scenario) for scenario in given]
-
-
-def _loaded(given: Scenario | str | Path) -> Scenario:
-    return with_impact(scenario_of(given))
+    return [with_impact(scenario_of(scenario)) for scenario in given]
 
 
 def _observation_space(scenarios: Sequence[Scenario]) -> gymnasium.spaces.Box:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from drake_disasm.common.arrays import Array, array_like
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 from drake_disasm.policies.scripted import Admittance, Straight
@@ -89,27 +90,32 @@ class ActionMap:
     action_scale: np.ndarray
     base: Straight | Admittance | None = None
 
-    def to_action(self, observation: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """Returns the action (6,) [m, rad] of a choice (6,) in [-1, 1].
+    def to_action(self, observation: Array, chosen: Array) -> Array:
+        """Returns the actions (..., 6) [m, rad] of choices (..., 6) in [-1, 1].
 
         Args:
-            observation: (12,) the state, in SI units.
-            chosen: (6,) in [-1, 1].
+            observation: (..., 12) the states, in SI units.
+            chosen: in [-1, 1].
         """
-        action = self.action_scale * chosen
+        scale = self.action_scale
+        if not isinstance(chosen, np.ndarray):
+            scale = array_like(scale, observation)
+        action = scale * chosen
         return action if self.base is None else action + self.base(observation)
 
     def from_action(self, observation: np.ndarray, action: np.ndarray) -> np.ndarray:
-        """Returns the choice (6,) float32 that comes nearest to an action.
+        """Returns the choices (..., 6) float32 that come nearest to actions.
 
         Args:
-            observation: (12,) the state, in SI units.
-            action: (6,) [m, rad].
+            observation: (..., 12) the states, in SI units.
+            action: (..., 6) [m, rad].
         """
         if self.base is not None:
             action = action - self.base(observation)
         free = self.action_scale > 0.0
-        chosen = np.divide(action, self.action_scale, out=np.zeros(6), where=free)
+        chosen = np.divide(
+            action, self.action_scale, out=np.zeros(action.shape), where=free
+        )
         return np.clip(chosen, -1.0, 1.0).astype(np.float32)
 
 

@@ -3,10 +3,12 @@
 import dataclasses
 from typing import Self
 
+import array_api_compat
 import numpy as np
 
 from drake_disasm.cell.grip import bolt_compliance
 from drake_disasm.cell.twin_parameters import bolt_stiffness
+from drake_disasm.common.arrays import Array, at_most, namespace
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.scenario import Scenario
@@ -29,9 +31,13 @@ class Straight:
 
     speed: float = 0.001
 
-    def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """Returns the action (6,) for any observation (12,)."""
-        return np.array([self.speed, 0.0, 0.0, 0.0, 0.0, 0.0])
+    def __call__(self, observation: Array) -> Array:
+        """Returns the actions (..., 6) for any observations (..., 12)."""
+        xp, device = namespace(observation), array_api_compat.device(observation)
+        shape = (*observation.shape[:-1], 6)
+        action = xp.zeros(shape, dtype=xp.float64, device=device)
+        action[..., 0] = self.speed
+        return action
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,17 +105,19 @@ class Admittance:
             grip_compliance=grip_compliance,
         )
 
-    def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """Returns the action (6,) for an observation (12,)."""
-        y, f, t = observation[1], observation[6:9], observation[9:12]
+    def __call__(self, observation: Array) -> Array:
+        """Returns the actions (..., 6) for observations (..., 12)."""
+        y, f, t = observation[..., 1], observation[..., 6:9], observation[..., 9:12]
+        xp = namespace(observation)
         move, turn = self.yield_compliance * f, self.rotation_compliance * t
-        lifting = y + self.grip_compliance * f[1] > self.lifted
-        if not lifting or f[1] < -_HELD * self.lift:
-            move[0] = min(self.speed, self.push_compliance * (self.push + f[0]))
-        if lifting or f[0] < -self.stop:
-            lift = self.lift_compliance * (self.lift + f[1])
-            move[1] = min(self.lift_speed, lift)
-        return np.concatenate([move, turn])
+        fx, fy = f[..., 0], f[..., 1]
+        is_lifting = y + self.grip_compliance * fy > self.lifted
+        pushes = ~is_lifting | (fy < -_HELD * self.lift)
+        push = at_most(self.speed, self.push_compliance * (self.push + fx))
+        lift = at_most(self.lift_speed, self.lift_compliance * (self.lift + fy))
+        move[..., 0] = xp.where(pushes, push, move[..., 0])
+        move[..., 1] = xp.where(is_lifting | (fx < -self.stop), lift, move[..., 1])
+        return xp.concat([move, turn], axis=-1)
 
 
 #: The scripted policies, by name.

@@ -2,8 +2,9 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
+from drake_disasm.common.arrays import Array, as_number, at_least, to_numpy
 from drake_disasm.common.errors import DivergedError, UnreachableError
 from drake_disasm.common.progress import Progress, ProgressUpdate
 from drake_disasm.effects import Effect
@@ -15,7 +16,7 @@ _MM = 1000.0
 
 @dataclasses.dataclass
 class EpisodeSummary:
-    """One row of the table that a run ends with.
+    """One row of the table that a run ends with; or n of them, each field (n,).
 
     Attributes:
         seed: of the episode.
@@ -46,19 +47,51 @@ class EpisodeSummary:
         """Sum of all terms over the episode."""
         return sum(self.reward_terms.values())
 
-    def add(self, result: StepResult) -> None:
-        """Takes one more step into account."""
+    def add(self, result: Any, counts: Array | bool = True) -> None:
+        """Takes one more step into account.
+
+        Args:
+            result: a StepResult; of n episodes its fields have them as first axis.
+            counts: (n,) whether each has taken that step; their outcomes are the
+                caller's to keep.
+        """
         state = BoltState.from_vector(result.observation)
-        self.steps += 1
+        self.steps = self.steps + counts
         for name, value in result.reward_terms.items():
-            self.reward_terms[name] = self.reward_terms.get(name, 0.0) + value
-        self.travel = max(self.travel, float(result.place[0]))
-        self.rise = max(self.rise, float(result.place[1]))
-        self.max_force = max(self.max_force, state.force)
-        self.max_torque = max(self.max_torque, state.torque)
-        self.mean_force += (state.force - self.mean_force) / self.steps
-        self.mean_torque += (state.torque - self.mean_torque) / self.steps
-        self.outcome = result.outcome
+            self.reward_terms[name] = self.reward_terms.get(name, 0.0) + counts * value
+        for name, value in (
+            ("travel", as_number(result.place[..., 0])),
+            ("rise", as_number(result.place[..., 1])),
+            ("max_force", state.force),
+            ("max_torque", state.torque),
+        ):
+            setattr(self, name, at_least(getattr(self, name), counts * value))
+        steps = at_least(1, self.steps)
+        for name, value in (("mean_force", state.force), ("mean_torque", state.torque)):
+            mean = getattr(self, name)
+            setattr(self, name, mean + counts * (value - mean) / steps)
+        if counts is True:
+            self.outcome = result.outcome
+
+    def apart(self, seeds: Sequence[int]) -> "list[EpisodeSummary]":
+        """Returns n summaries, one by one.
+
+        Args:
+            seeds: of each.
+        """
+        plain = [f.name for f in dataclasses.fields(self)]
+        plain = [name for name in plain if name not in ("seed", "reward_terms")]
+        columns = {name: to_numpy(getattr(self, name)).tolist() for name in plain}
+        columns["outcome"] = [Outcome(number) for number in columns["outcome"]]
+        terms = {n: to_numpy(v).tolist() for n, v in self.reward_terms.items()}
+        return [
+            EpisodeSummary(
+                seed=seed,
+                reward_terms={name: values[i] for name, values in terms.items()},
+                **{name: values[i] for name, values in columns.items()},
+            )
+            for i, seed in enumerate(seeds)
+        ]
 
 
 class Recorder(Protocol):

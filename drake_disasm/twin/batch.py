@@ -8,7 +8,13 @@ import numpy as np
 from drake_disasm.common.arrays import Array, array_like, namespace, to_numpy
 from drake_disasm.common.rotations import Pose
 from drake_disasm.devices.ft_sensor import quantise
-from drake_disasm.mdp import BoltState, outcomes, reward_terms
+from drake_disasm.mdp import (
+    BoltState,
+    is_terminated,
+    is_truncated,
+    outcomes,
+    reward_terms,
+)
 from drake_disasm.scenario import Scenario, draw, with_values
 from drake_disasm.systems.imprecision import clamped
 from drake_disasm.systems.pose_target import executed_pose, moved_poses
@@ -39,20 +45,32 @@ class BatchResult:
         place: (n, 3) of the bolts, as in `StepResult` [m].
         reward_terms: the weighted terms by name, (n,) each.
         outcome: (n,) numbers of `mdp.Outcome`.
-        failure: (n) why the simulation of an environment failed, or "" where it did
-            not. Its observation is the one before, its reward zero.
+        has_failed: (n,) whether its simulation failed. Its observation is the one
+            before, its reward zero.
+        failure: (n) why, or "".
     """
 
     observation: Array
     place: Array
     reward_terms: dict[str, Array]
     outcome: Array
-    failure: list[str]
+    has_failed: Array
+    failure: Sequence[str]
 
     @property
     def reward(self) -> Array:
         """Sum of the terms (n,)."""
         return sum(self.reward_terms.values())
+
+    @property
+    def terminated(self) -> Array:
+        """Whether the task itself ended each episode (n,)."""
+        return is_terminated(self.outcome) & ~self.has_failed
+
+    @property
+    def truncated(self) -> Array:
+        """Whether the step limit ended it, or the simulation failed (n,)."""
+        return is_truncated(self.outcome) | self.has_failed
 
 
 class BatchedTwin:
@@ -202,17 +220,18 @@ class BatchedTwin:
         terms = {name: xp.where(has_failed, 0.0, term) for name, term in terms.items()}
         ends = outcomes(states[1], episodes.steps, numbers.task, numbers.geometry)
         reasons = self._reasons(has_failed, is_finite, is_solved)
-        return BatchResult(
-            after, numbers.geometry.place(states[1]), terms, ends, reasons
-        )
+        place = numbers.geometry.place(states[1])
+        return BatchResult(after, place, terms, ends, has_failed, reasons)
 
     def _reasons(
         self, has_failed: Array, is_finite: Array, is_solved: Array
     ) -> list[str]:
         """Returns why environments failed (n)."""
-        reasons = [""] * self.count
+        reasons, failed = [""] * self.count, np.flatnonzero(to_numpy(has_failed))
+        if not len(failed):
+            return reasons
         fine, solved = to_numpy(is_finite), to_numpy(is_solved)
-        for row in np.flatnonzero(to_numpy(has_failed)):
+        for row in failed:
             reason = "contact has thrown the bolt away; its stiffness can't be right"
             if not fine[row]:
                 reason = "its action is not finite"

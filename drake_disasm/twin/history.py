@@ -1,6 +1,5 @@
 """What happened in the episodes of a batch, in the layout of a log of transitions."""
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -8,27 +7,10 @@ from scipy.spatial.transform import Rotation
 
 from drake_disasm.common.arrays import to_numpy
 from drake_disasm.common.rotations import Pose
-from drake_disasm.mdp import REWARD_TERMS, Outcome
+from drake_disasm.mdp import REWARD_TERMS, is_terminated, is_truncated
 from drake_disasm.twin.batch import BatchedTwin, BatchResult
 
 _NO_STEP = ("action", "action_executed", *(f"reward.{n}" for n in REWARD_TERMS))
-_TERMINATED = np.array([outcome.terminated for outcome in Outcome])
-_TRUNCATED = np.array([outcome.truncated for outcome in Outcome])
-
-
-@dataclasses.dataclass(frozen=True)
-class RecordedEpisode:
-    """An episode of one environment, as `task.recording.EpisodeRecorder` has it.
-
-    Attributes:
-        rows: the quantities, each (T + 1,) or (T + 1, n).
-    """
-
-    rows: dict[str, np.ndarray]
-
-    def columns(self) -> dict[str, np.ndarray]:
-        """Returns the quantities."""
-        return self.rows
 
 
 class BatchHistory:
@@ -69,11 +51,11 @@ class BatchHistory:
             "action_executed": self._twin.action_executed,
         } | terms
         self._steps.append({name: _copied(value) for name, value in step.items()})
-        failed = np.array([bool(why) for why in result.failure])
+        failed = to_numpy(result.has_failed)
         self._measured.append(self._measure(to_numpy(result.outcome), failed))
 
-    def episode(self, row: int, steps: int) -> RecordedEpisode:
-        """Returns the episode of an environment.
+    def episode(self, row: int, steps: int) -> dict[str, np.ndarray]:
+        """Returns the episode of an environment as `EpisodeRecorder.columns` does.
 
         Args:
             row: its number.
@@ -92,7 +74,7 @@ class BatchHistory:
         rows["q"] = np.zeros((count, 0))
         for parameter, value in self._drawn[row].items():
             rows[f"extra.{parameter}"] = np.full(count, value)
-        return RecordedEpisode(rows)
+        return rows
 
     def _measure(
         self, outcome: np.ndarray, failed: np.ndarray | bool = False
@@ -103,8 +85,8 @@ class BatchHistory:
             "X_GB_commanded": _pose_vectors(twin.episodes.commanded),
             "wrench": _copied(twin.observation[:, 6:]),
             "ft_sensor": _copied(twin.reading),
-            "terminated": _TERMINATED[outcome],
-            "truncated": _TRUNCATED[outcome],
+            "terminated": is_terminated(outcome),
+            "truncated": is_truncated(outcome),
         }
         for name, values in found.items():  # a failed simulation stays as it was
             broken = ~np.isfinite(values.reshape(twin.count, -1)).all(axis=1) | failed

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from drake_disasm.learning.training import Purpose, seed_for
+from drake_disasm.learning.random_numbers import Purpose, seed_for
 from drake_disasm.scenario import load_scenario
 from sysid.studies.results import mean_of, rate
 from sysid.studies.runner import SeedResult, finished, test_path

@@ -23,8 +23,8 @@ from typing import Any, ClassVar, Literal
 from drake_disasm.learning.experiment import read_result, seed_folder
 from drake_disasm.learning.hyperparameters import Hyperparameters, override
 from drake_disasm.learning.learning_curve import plot_learning_curves
+from drake_disasm.learning.random_numbers import Purpose, seed_for
 from drake_disasm.learning.run import read_episodes
-from drake_disasm.learning.training import Purpose, seed_for
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.scenario.schema import Range
 from sysid.acceptance import DRAWS

@@ -16,6 +16,8 @@ PRINTED = {
     "cartesian_command": ["1.00        10.00"],
     "outside_force": ["bolt           -4.9", "-52.5"],
     "own_policy": ["twin        12", "cell        12"],
+    "own_environment": ["last  eight episodes: mean reward  -0."],
+    "own_agent": ["12      359", "24      686"],
     "own_effect": ["MagneticCatch  confirmed  force = ", "[MagneticCatch(force=3.9"],
     "gymnasium_sb3": ["200 steps in ", "steps/s", "outcome: "],
     "own_log_model": ["JointCoulombFriction.pivot  confirmed", "size = 0.150"],

@@ -13,6 +13,7 @@ from pathlib import Path
 from drake_disasm.common import options, program
 from drake_disasm.common.cluster import executor_for
 from drake_disasm.learning.experiment import (
+    MOST_RECORDED,
     Experiment,
     open_experiment,
     write_summary,
@@ -24,7 +25,7 @@ from drake_disasm.learning.hyperparameters import (
     preset,
 )
 from drake_disasm.learning.jobs import seed_jobs, train_seeds
-from drake_disasm.learning.lockstep import refuse_envs
+from drake_disasm.learning.vector_environment import DEVICES, choose_device
 from drake_disasm.learning.warm_start import check_start
 from drake_disasm.scenario import load_scenario
 from drake_disasm_cli import common
@@ -37,6 +38,9 @@ _EXAMPLES = """examples:
   drake-disasm train --agent ddpg --preset chapter3 --scenario chapter3 \\
       --seeds 64 --lockstep --out out/many                 all on batches of twins
   drake-disasm train --scenario removal_randomised --out out/randomised
+  drake-disasm train --scenario removal_randomised --envs 16384 --device cuda \\
+      --episodes 200000 --hyper updates_per_step=0.001 replay=1000000 batch=4096 \\
+      --out out/gpu
   drake-disasm train --agent sac --preset chapter4 --out out/sac \\
       --hyper layer_norm=true 'hidden=[64, 64]'
   drake-disasm train --log out/chapter3/seed_000/log --scenario chapter3 \\
@@ -78,9 +82,18 @@ def _add_batch_argument(add: Callable[..., object]) -> None:
         default=1,
         metavar="N",
         help="episodes at a time, on a batch of twins with IMPACT contact; validation "
-        "stays on the diagram of the scenario (default: 1, on the diagram)",
+        "stays on the diagram of the scenario (default: 1, on the diagram). From "
+        f"{MOST_RECORDED} on no log is written, only episodes.csv; updates_per_step "
+        "then wants to be less than 1",
     )
-
+    add(
+        "--device",
+        choices=DEVICES,
+        default="auto",
+        help="cpu, cuda: where tensors stay from the step to the update, for --envs "
+        "and --log; numpy: rows one by one, each with its own random numbers; auto: "
+        "cuda if it is there and there are 1024 --envs, else numpy (default: auto)",
+    )
     add(
         "--lockstep",
         action="store_true",
@@ -206,7 +219,6 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
     overrides = list(args.overrides)
     if args.psi is not None:
         overrides.append(f"imprecision={args.psi}")
-    refuse_envs(args.envs, args.station, not args.log, args.lockstep)
     changes = list(args.hyper)
     if args.episodes is not None:
         changes.append(f"episodes={args.episodes}")
@@ -223,6 +235,7 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
         demonstrations=_hashes(args.demonstrations),
         start=str(args.start_from or ""),
         envs=args.envs,
+        device=choose_device(args.device, args.envs),
         lockstep=args.lockstep,
         provenance=program.provenance("drake-disasm train", arguments, args.first_seed),
     )

@@ -11,7 +11,7 @@ from torch.utils._pytree import tree_leaves
 
 from drake_disasm.common.archive import Arrays, pack, unpack
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.learning.agent import Agent
+from drake_disasm.learning.actor_critic import ActorCritic
 from drake_disasm.learning.checkpoint import (
     CHECKPOINT,
     load_agent,
@@ -26,20 +26,20 @@ CONFIG = Hyperparameters(hidden=[4], replay=20)
 NOTES = {"episodes": [1, 2]}
 
 
-def _agent(seed: int = 0) -> Agent:
-    return Agent(CONFIG, seed, compiled=False)
+def _agent(seed: int = 0) -> ActorCritic:
+    return ActorCritic(CONFIG, seed, compiled=False)
 
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     replay = Replay(20)
-    for _ in range(9):
-        replay.add(np.ones(12), np.zeros(6), 1.0, np.ones(12), False)
+    ones = np.ones((9, 12))
+    replay.add(ones, np.zeros((9, 6)), 1.0, ones, False)
     save_checkpoint(tmp_path / "c.npz", _agent(), replay, NOTES)
     return tmp_path / "c.npz"
 
 
-def _load(path: Path) -> tuple[Agent, Replay]:
+def _load(path: Path) -> tuple[ActorCritic, Replay]:
     agent, replay = _agent(seed=1), Replay(20)
     assert load_checkpoint(path, agent, replay, {"episodes": [0]}) == NOTES
     return agent, replay

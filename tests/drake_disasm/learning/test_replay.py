@@ -6,9 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from drake_disasm.learning.dataset import remember
+from drake_disasm.learning.environments import make_environments
 from drake_disasm.learning.hyperparameters import preset
+from drake_disasm.learning.loop import TrainingLoop
 from drake_disasm.learning.replay import WIDTH, Replay
-from drake_disasm.learning.training import Training, TrainingSpec, action_map
+from drake_disasm.learning.training import TrainingSpec, action_map, make_training
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.logs.transitions import observations
 from drake_disasm.scenario import load_scenario
@@ -20,7 +22,8 @@ SCENARIO = load_scenario("chapter3", ["imprecision=0.0002", "task.steps=12"])
 def _filled(count: int, capacity: int = 5000) -> Replay:
     replay = Replay(capacity)
     for i in range(count):
-        replay.add(np.full(12, i), np.zeros(6), float(i), np.full(12, i + 1), i % 2 > 0)
+        state = np.full((1, 12), i)
+        replay.add(state, np.zeros((1, 6)), float(i), state + 1, i % 2 > 0)
     return replay
 
 
@@ -51,7 +54,7 @@ def test_contents_restore_the_ring() -> None:
     old, new = _filled(7, capacity=5), Replay(5)
     new.restore(*old.contents())
     for replay in (old, new):
-        replay.add(np.zeros(12), np.zeros(6), -1.0, np.zeros(12), False)
+        replay.add(np.zeros((1, 12)), np.zeros((1, 6)), -1.0, np.zeros((1, 12)), False)
     np.testing.assert_array_equal(old.contents()[0], new.contents()[0])
     for shape in ((9, WIDTH), (3, WIDTH - 1)):
         with refused("does not fit"):
@@ -61,12 +64,15 @@ def test_contents_restore_the_ring() -> None:
 def test_a_log_teaches_what_was_lived_through(tmp_path: Path) -> None:
     changes = {"hidden": [4], "base": "admittance", "exploration": 0.0002}
     config = dataclasses.replace(preset("chapter3"), **changes)
-    training = Training(TrainingSpec(SCENARIO, "twin", config, 3, compiled=False))
+    spec = TrainingSpec(SCENARIO, "twin", config, 3, compiled=False)
+    training = make_training(spec)
+    loop = TrainingLoop(make_environments([spec]), [training])
     header = LogHeader("transitions", "chapter3", {}, period=0.1)
     writer = LogWriter(tmp_path / "log", header)
     for _ in range(2):
-        _, recorder = training.run_episode()
-        writer.write_episode(flat_columns("transitions", recorder.columns()))
+        [(_, columns)] = loop.run_round()[0]
+        assert columns
+        writer.write_episode(flat_columns("transitions", columns))
     memory = Replay(100)
     for episode in read_log(tmp_path / "log").episodes:
         actions, end = episode["action"][:-1], bool(episode["terminated"][-1])

@@ -1,30 +1,40 @@
 """Training: schedules, what is remembered, and going on bit for bit."""
 
 import dataclasses
+import functools
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import torch
-from torch.utils._pytree import tree_leaves
 
 from drake_disasm.common.errors import DivergedError, UnreachableError
 from drake_disasm.common.progress import ProgressUpdate, ignore_progress
 from drake_disasm.learning import run
+from drake_disasm.learning.actor_critic import ActorCritic
 from drake_disasm.learning.dataset import remember
+from drake_disasm.learning.environments import DiagramRow
 from drake_disasm.learning.evaluation import validate_policy
 from drake_disasm.learning.experiment import Experiment
-from drake_disasm.learning.hyperparameters import preset
+from drake_disasm.learning.hyperparameters import Hyperparameters, preset
 from drake_disasm.learning.jobs import seed_jobs, train_seed
+from drake_disasm.learning.loop import TrainingLoop
 from drake_disasm.learning.networks import q_value
 from drake_disasm.learning.policy import trained_policy
 from drake_disasm.learning.replay import Replay
 from drake_disasm.learning.run import read_episodes
-from drake_disasm.learning.training import Training, TrainingSpec, action_map
+from drake_disasm.learning.training import (
+    Training,
+    TrainingSpec,
+    action_map,
+    make_training,
+)
 from drake_disasm.logs import read_log
-from drake_disasm.policies import Admittance, make_policy
+from drake_disasm.mdp import action_bounds
+from drake_disasm.policies import Admittance, LearnedPolicy, make_policy
 from drake_disasm.scenario import load_scenario
+from drake_disasm.task.episode import EpisodeSummary
 from drake_disasm.task.simulation import TaskSimulation
 from tests.refusals import refused
 
@@ -32,17 +42,35 @@ SCENARIO = load_scenario("chapter3", ["imprecision=0.0003", "task.steps=6"])
 
 
 def _training(
-    algorithm: str = "ddpg", memories: dict[str, Replay] | None = None, **changes: Any
+    algorithm: str = "ddpg", memories: dict[str, Any] | None = None, **changes: Any
 ) -> Training:
     small = {"hidden": [8], "batch": 16, "exploration": 0.0003} | changes
     config = dataclasses.replace(preset("chapter3", algorithm), **small)
-    spec = TrainingSpec(SCENARIO, "twin", config, seed=5, compiled=False)
-    return Training(spec, **(memories or {}))
+    return make_training(_spec(config), **(memories or {}))
+
+
+def _spec(config: Hyperparameters) -> TrainingSpec:
+    return TrainingSpec(SCENARIO, "twin", config, seed=5, compiled=False)
+
+
+@functools.cache
+def _diagram() -> DiagramRow:
+    return DiagramRow(SCENARIO, "twin")
+
+
+def _run(training: Training, episodes: int = 1) -> tuple[EpisodeSummary, Any]:
+    """Runs episodes on the diagram; returns the last one and its columns."""
+    loop = TrainingLoop(_diagram(), [training])
+    return [loop.run_round()[0][0] for _ in range(episodes)][-1]
 
 
 def _bits(training: Training) -> list[np.ndarray]:
-    leaves = [leaf.numpy() for leaf in tree_leaves(training.agent.state)]
-    return [*leaves, training.replay.contents()[0]]
+    return [*training.agent.arrays().values(), training.replay.contents()[0]]
+
+
+def _policy(training: Training) -> LearnedPolicy:
+    assert isinstance(training.agent, ActorCritic)
+    return trained_policy(training.agent.network(), _spec(training.config), {})
 
 
 def _assert_same_bits(one: Training, other: Training) -> None:
@@ -65,23 +93,21 @@ def _demonstrations(training_map: Any, config: Any) -> Replay:
 ])  # fmt: skip
 def test_a_restored_training_goes_on_bit_for_bit(algorithm, changes, tmp_path):
     whole, first, second = (_training(algorithm, **changes) for _ in range(3))
-    for _ in range(3):
-        whole.run_episode()
-    for _ in range(2):
-        first.run_episode()
+    _run(whole, 3)
+    _run(first, 2)
     first.save(tmp_path / "c.npz")
     second.restore(tmp_path / "c.npz")
-    second.run_episode()
+    _run(second)
     assert second.summaries == whole.summaries
     _assert_same_bits(whole, second)
-    other = Training(dataclasses.replace(whole.spec, seed=6))
-    assert other.run_episode()[0] != whole.summaries[0]
+    other = make_training(dataclasses.replace(_spec(whole.config), seed=6))
+    assert _run(other)[0] != whole.summaries[0]
 
 
 @pytest.mark.parametrize(("schedule", "per_step"), [("delayed", 3), ("every_step", 2)])
 def test_updates_are_counted_per_step(schedule: str, per_step: int) -> None:
     training = _training(schedule=schedule, updates_per_step=per_step)
-    summary, _ = training.run_episode()
+    summary, _ = _run(training)
     assert training.agent.updates == per_step * summary.steps
     assert training.replay.size == summary.steps
 
@@ -93,7 +119,7 @@ def test_the_delayed_schedule_acts_with_one_policy_for_an_episode() -> None:
         training = _training(
             schedule=schedule, actor_rate=0.1, batch=4, exploration=1e-5
         )
-        training.run_episode()
+        _run(training)
         actions[schedule] = training.replay.contents()[0][:, 12:18]
     np.testing.assert_array_equal(actions["delayed"][0], actions["every_step"][0])
     assert not np.array_equal(actions["delayed"][-1], actions["every_step"][-1])
@@ -101,9 +127,8 @@ def test_the_delayed_schedule_acts_with_one_policy_for_an_episode() -> None:
 
 def test_what_is_remembered_is_the_action_before_imprecision() -> None:
     training = _training()
-    _, recorder = training.run_episode()
-    columns, rows = recorder.columns(), training.replay.contents()[0]
-    bounds = training.env.simulation.bounds
+    _, columns = _run(training)
+    rows, bounds = training.replay.contents()[0], action_bounds(SCENARIO.task)
     chosen = rows[:, 12:18] * bounds
     np.testing.assert_allclose(chosen, columns["action"][:-1], atol=1e-8)
     assert np.abs(chosen - columns["action_executed"][:-1])[:, :3].max() > 1e-5
@@ -126,7 +151,7 @@ def test_a_step_that_the_arm_can_not_do_ends_the_episode_and_not_the_training(
 
     monkeypatch.setattr(TaskSimulation, "step", one_is_too_far)
     experiment = Experiment(
-        SCENARIO, "twin", "chapter3", _training(episodes=2).spec.config, validation=1
+        SCENARIO, "twin", "chapter3", _training(episodes=2).config, validation=1
     )
     experiment = dataclasses.replace(experiment, compiled=False)
     [job] = seed_jobs(experiment, [5], tmp_path)
@@ -142,7 +167,7 @@ def test_a_step_that_the_arm_can_not_do_ends_the_episode_and_not_the_training(
 
 
 def test_progress_goes_on_through_the_greedy_episodes(tmp_path: Path) -> None:
-    config = _training(episodes=2).spec.config
+    config = _training(episodes=2).config
     experiment = Experiment(SCENARIO, "twin", "chapter3", config, validation=3)
     [job] = seed_jobs(dataclasses.replace(experiment, compiled=False), [0], tmp_path)
     told: list[ProgressUpdate] = []
@@ -155,25 +180,22 @@ def test_progress_goes_on_through_the_greedy_episodes(tmp_path: Path) -> None:
 
 def test_exploration_shrinks_by_episode_and_without_it_nothing_is_random() -> None:
     training = _training(exploration=0.003, exploration_decay=0.5)
-    assert [training.explorer(n).sigma for n in range(3)] == pytest.approx(
-        [1.0, 0.5, 0.25]
-    )
+    assert [training.sigma(n) for n in range(3)] == pytest.approx([1.0, 0.5, 0.25])
     calm = _training(exploration=0.0)
-    observation = np.zeros(12)
-    network = calm.agent.network()
-    output = network(observation.astype(np.float32))
-    chosen = calm.agent.explore(output, 0.0, np.random.default_rng(0))
-    np.testing.assert_array_equal(chosen, np.tanh(output))
+    assert isinstance(calm.agent, ActorCritic)
+    seen = np.zeros((1, 12), np.float32)
+    chosen = calm.agent.explore(seen, calm.noise(0, 1)(), np.float32(calm.sigma(0)))
+    np.testing.assert_array_equal(chosen[0], np.tanh(calm.agent.network()(seen[0])))
 
 
 def test_a_residual_begins_as_its_base_policy_and_stays_near_it() -> None:
     training = _training("sac", base="admittance", residual=[0.1] * 6)
     base = make_policy("admittance", SCENARIO)
     assert isinstance(base, Admittance)
-    policy = trained_policy(training, {})
+    policy = _policy(training)
     observation = np.random.default_rng(2).normal(size=12) * 1e-3
     difference = policy(observation) - base(observation)
-    bounds = training.env.simulation.bounds
+    bounds = action_bounds(SCENARIO.task)
     assert (np.abs(difference) < 0.01 * bounds).all()
     for sign in (-1.0, 1.0):
         action = training.action_map.to_action(np.zeros(12), sign * np.ones(6))
@@ -189,44 +211,48 @@ def test_corrections_are_as_long_whatever_the_bounds() -> None:
 
 def test_demonstrations_fill_their_share_of_each_batch() -> None:
     plain = _training()
-    shown = _demonstrations(plain.action_map, plain.spec.config)
+    shown = _demonstrations(plain.action_map, plain.config)
     shown._rows[:, 18] = 77.0  # a reward that only demonstrations have
     training = _training(memories={"demonstrations": shown}, demonstrations=0.25)
-    training.run_episode()
+    _run(training)
     batch = training._batch(np.random.default_rng(0))
     assert batch.shape[0] == 16 and (batch[:, 18] == 77.0).sum() == 4
 
 
 def test_learning_from_a_dataset_alone_resumes_bit_for_bit(tmp_path: Path) -> None:
     plain = _training()
-    data = _demonstrations(plain.action_map, plain.spec.config)
-    whole, first, second = (_training(memories={"dataset": data}) for _ in range(3))
-    for _ in range(4):
-        whole.run_round(5)
-    assert whole.agent.updates == 20 and not whole.summaries
+    data = _demonstrations(plain.action_map, plain.config)
+    dataset = {"dataset": data, "updates": 22}
+    whole, first, second = (_training(memories=dataset, episodes=4) for _ in range(3))
+    loop = TrainingLoop(None, [whole])
+    while loop.unfinished:
+        loop.run_round()
+    assert whole.agent.updates == 22 and not whole.summaries
     for _ in range(2):
-        first.run_round(5)
+        TrainingLoop(None, [first]).run_round()
+    assert first.agent.updates == 11
     first.save(tmp_path / "c.npz")
     second.restore(tmp_path / "c.npz")
     assert second.replay.size == data.size
     for _ in range(2):
-        second.run_round(5)
+        TrainingLoop(None, [second]).run_round()
     _assert_same_bits(whole, second)
 
 
 def test_a_dataset_teaches_the_critic_the_value_that_it_holds() -> None:
     """One state, one action, reward 1, terminated: Q must become 1."""
     memory = Replay(1)
-    memory.add(np.zeros(12), np.zeros(6), 1.0, np.zeros(12), True)
+    memory.add(np.zeros((1, 12)), np.zeros((1, 6)), 1.0, np.zeros((1, 12)), True)
     training = _training(memories={"dataset": memory}, critic_rate=0.01)
-    training.run_round(400)
+    training.learn(400, np.random.default_rng(0))
+    assert isinstance(training.agent, ActorCritic)
     q = q_value(training.agent.state.critics[0], torch.zeros(1, 12), torch.zeros(1, 6))
     assert float(q) == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_damaged_checkpoint_or_anothers_is_refused(tmp_path: Path) -> None:
     training, path = _training(), tmp_path / "c.npz"
-    training.run_episode()
+    _run(training)
     training.save(path)
     with refused("other networks"):
         _training(hidden=[9]).restore(path)
@@ -240,16 +266,14 @@ def test_a_damaged_checkpoint_or_anothers_is_refused(tmp_path: Path) -> None:
 
 def test_a_start_from_elsewhere_takes_the_agent_and_nothing_else(tmp_path):
     first = _training("td3")
-    for _ in range(2):
-        first.run_episode()
+    _run(first, 2)
     first.save(tmp_path / "c.npz")
     second = _training("td3")
     second.start_from(tmp_path / "c.npz")
-    states = [tree_leaves(t.agent.state) for t in (first, second)]
-    for a, b in zip(*states, strict=True):
-        np.testing.assert_array_equal(a.numpy(), b.numpy())
+    for a, b in zip(*(t.agent.arrays().values() for t in (first, second)), strict=True):
+        np.testing.assert_array_equal(a, b)
     assert second.replay.size == 0 and not second.summaries
-    assert second.run_episode()[0] != _training("td3").run_episode()[0]
+    assert _run(second)[0] != _run(_training("td3"))[0]
 
 
 def test_a_folder_is_trained_in_by_one_program_at_a_time(tmp_path, monkeypatch):
@@ -264,8 +288,7 @@ def test_a_folder_is_trained_in_by_one_program_at_a_time(tmp_path, monkeypatch):
 def test_validation_does_not_disturb_the_training() -> None:
     calm, watched = _training(), _training()
     for _ in range(2):
-        calm.run_episode()
-        watched.run_episode()
-        policy = trained_policy(watched, {})
-        validate_policy(policy, SCENARIO, "twin", [1, 2])
+        _run(calm)
+        _run(watched)
+        validate_policy(_policy(watched), SCENARIO, "twin", [1, 2])
     _assert_same_bits(calm, watched)

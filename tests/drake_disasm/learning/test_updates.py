@@ -12,7 +12,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from torch.utils._pytree import tree_leaves
 
-from drake_disasm.learning.agent import Agent
+from drake_disasm.learning.actor_critic import ActorCritic
 from drake_disasm.learning.agent_state import AgentState
 from drake_disasm.learning.environment import DisassemblyEnv
 from drake_disasm.learning.hyperparameters import Hyperparameters, preset
@@ -103,7 +103,7 @@ def _pairs(reference: Any, state: AgentState) -> Iterator[tuple[Any, Any]]:
                 yield getattr(module, name).data, layer[name]
 
 
-def _share_noise(agent: Agent, monkeypatch: pytest.MonkeyPatch) -> None:
+def _share_noise(agent: ActorCritic, monkeypatch: pytest.MonkeyPatch) -> None:
     """Makes agent and reference use the same noise, wherever each draws it."""
     noise = torch.from_numpy(np.random.default_rng(5).standard_normal((20, 12))).float()
     now, then = noise[:, :6], noise[:, 6:]
@@ -139,7 +139,7 @@ def test_updates_are_those_of_stable_baselines3(algorithm, changes, env, monkeyp
     config = dataclasses.replace(
         preset("chapter3", algorithm), tau=0.3, batch=20, **changes
     )
-    agent = Agent(config, seed=1, compiled=False)
+    agent = ActorCritic(config, seed=1, compiled=False)
     reference = _reference(algorithm, config, env)
     for theirs, own in _pairs(reference, agent.state):
         theirs.copy_(own)
@@ -162,7 +162,7 @@ def test_a_compiled_update_is_the_same_law(algorithm: str) -> None:
     config = dataclasses.replace(
         preset("chapter3", algorithm), layer_norm=True, hidden=[16], critics=2
     )
-    agents = [Agent(config, seed=1, compiled=c) for c in (False, True)]
+    agents = [ActorCritic(config, seed=1, compiled=c) for c in (False, True)]
     for rows in _batches(4):
         for agent in agents:
             agent.learn(rows, np.random.default_rng(7))
@@ -181,7 +181,7 @@ def test_termination_cuts_the_bootstrap_and_nothing_else_does() -> None:
         rows[:, 31] = other[:, 31] = terminated
         critics = []
         for batch in (rows, other):
-            agent = Agent(config, seed=1, compiled=False)
+            agent = ActorCritic(config, seed=1, compiled=False)
             agent.learn(batch, np.random.default_rng(0))
             critics.append(agent.state.critics[0][0]["weight"])
         assert torch.equal(*critics) is equal
@@ -197,7 +197,7 @@ def test_merged_draws_give_the_gradient_of_the_repeated_ones(algorithm: str) -> 
     repeated[:, -1] = 1.0
     agents = []
     for rows in (merged, repeated):
-        agent = Agent(config, seed=1, compiled=False)
+        agent = ActorCritic(config, seed=1, compiled=False)
         agent._noise = lambda count, _: torch.zeros(count, 12 if agent._soft else 6)  # type: ignore[method-assign]  # noqa: B023
         agent.learn(rows, np.random.default_rng(0))
         agents.append(torch.utils._pytree.tree_leaves(agent.state))
@@ -208,7 +208,7 @@ def test_merged_draws_give_the_gradient_of_the_repeated_ones(algorithm: str) -> 
 @pytest.mark.parametrize("algorithm", ["ddpg", "td3", "sac"])
 def test_no_two_tensors_of_a_state_are_one(algorithm: str) -> None:
     """Fresh or later: torch compiles one graph, and can tell agents apart."""
-    agent = Agent(preset("chapter3", algorithm), 0, compiled=False)
+    agent = ActorCritic(preset("chapter3", algorithm), 0, compiled=False)
     generator = np.random.default_rng(0)
     for rows in _batches(2):
         tensors = [t for t in tree_leaves(agent.state) if isinstance(t, torch.Tensor)]

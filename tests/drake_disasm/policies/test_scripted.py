@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import torch
 
 from drake_disasm.cell.twin_parameters import bolt_stiffness
 from drake_disasm.mdp import action_bounds
@@ -21,6 +22,18 @@ def test_straight_answers_the_same_to_anything() -> None:
     observation = np.random.default_rng(0).normal(size=12)
     expected = [0.002, 0, 0, 0, 0, 0]
     np.testing.assert_array_equal(Straight(0.002)(observation), expected)
+
+
+@pytest.mark.parametrize("name", SCRIPTED)
+def test_rows_are_answered_as_one_by_one(name: str) -> None:
+    """Of NumPy to the bit, and as tensors."""
+    policy = make_policy(name)
+    scale = np.array([1e-3] * 3 + [1e-2] * 3 + [8.0] * 3 + [0.1] * 3)
+    rows = scale * np.random.default_rng(1).normal(size=(200, 12))
+    expected = np.stack([policy(row) for row in rows])
+    np.testing.assert_array_equal(policy(rows), expected)
+    tensors = policy(torch.from_numpy(rows))
+    np.testing.assert_allclose(tensors.numpy(), expected, rtol=1e-12)
 
 
 def test_admittance_yields_in_the_direction_of_the_wrench() -> None:

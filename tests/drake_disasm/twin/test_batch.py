@@ -142,7 +142,7 @@ def test_a_bolt_that_is_thrown_away_ends_its_episode_alone():
     assert "thrown" in result.failure[0] and not result.failure[1]
     assert np.abs(result.observation[:, :3]).max() < 1.0
     assert result.reward[0] == 0.0
-    recorded = history.episode(0, 1).columns()
+    recorded = history.episode(0, 1)
     assert np.abs(recorded["X_GB_measured"]).max() < 2.0
 
 
@@ -153,7 +153,7 @@ def test_an_episode_whose_start_has_failed_is_recorded_in_numbers():
     twin.episodes.commanded.p[1] = np.nan
     history.begin(np.array([1]))
     history.add(twin.step(np.zeros((2, 6))))
-    assert np.isfinite(history.episode(1, 1).columns()["X_GB_commanded"]).all()
+    assert np.isfinite(history.episode(1, 1)["X_GB_commanded"]).all()
 
 
 @dataclasses.dataclass
