@@ -35,7 +35,6 @@ from drake_disasm.stations.wiring import export_ready_device, export_required
 from drake_disasm.systems.bolt_environment import BoltEnvironment
 from drake_disasm.systems.optional_input import OptionalInput
 from drake_disasm.twin.arm_step import ArmStep
-from drake_disasm.twin.conditions import ImpactConditions
 from drake_disasm.twin.plant import SETTLING_TIME
 
 _MATERIAL_FIELDS = ("friction", "modulus", "head_modulus", "dissipation")
@@ -139,17 +138,6 @@ class TwinStation(SimulatedStation):
         weight = self.X_WG.rotation().inverse() @ (self.payload_mass * self.g_W)
         found = deflection(parameters.grip, parameters.p_BoTo_B, weight, wrench)
         return np.asarray(found)
-
-    def impact_conditions(self, context: Context) -> ImpactConditions:
-        """Returns the present inputs of the IMPACT law.
-
-        Raises:
-            DisasmError: the contact is hydroelastic.
-        """
-        if not isinstance(self.contact, ImpactContactForce):
-            raise DisasmError("contact.model: is hydroelastic; set it to impact")
-        system = self.contact.system
-        return system.conditions(self.part_context(system, context))
 
     def _take_as_default(self, settled: Context) -> None:
         """Lets the arm begin where it has given way to a load on the bolt."""
