@@ -88,10 +88,10 @@ def test_what_a_scenario_gives_does_not_depend_on_the_others():
     ]
     scenarios = [with_values(TURNED, each) for each in values]
     given = [steps(TURNED).select(np.arange(COUNT) < n) for n in (24, 7, 1, 12)]
-    together = ImpactReplay(scenarios, coarse=True)
+    together = ImpactReplay(scenarios)
     found = together.transitions(given)
     for i, scenario in enumerate(scenarios):
-        alone = ImpactReplay([scenario], coarse=True)
+        alone = ImpactReplay([scenario])
         [expected] = alone.transitions([given[i]])
         np.testing.assert_allclose(found[i], expected, rtol=1e-9, atol=1e-11)
         zeros = together.reading_at_zeroing[i], alone.reading_at_zeroing[0]
