@@ -110,11 +110,11 @@ class Fit:
         """Residuals (rows, channels) in units of all that is known to be uncertain.
 
         Of the stated error, and of what predictions depend on that no reading shows,
-        see `LogModel.begin_error`. A fit does not weigh by the latter: whatever makes
-        predictions uncertain would then fit well.
+        see `SimulatedModel.begin_error`. A fit does not weigh by the latter: whatever
+        makes predictions uncertain would then fit well.
         """
-        residual = self.linearisation.residual
-        error = self.model.begin_error(self.theta)
+        residual, simulation = self.linearisation.residual, self.model.simulation
+        error = simulation.begin_error(self.theta) if simulation else None
         return residual if error is None else residual / np.hypot(1.0, error)
 
     @property
@@ -244,7 +244,8 @@ class Fit:
         One Gauss-Newton step towards the optimum of the same model in finer time
         steps. No interval of rows sees such an error.
         """
-        linear, finer = self.linearisation, self.model.refined()
+        linear, simulation = self.linearisation, self.model.simulation
+        finer = simulation.refined() if simulation else None
         if finer is None or not len(linear.u):
             return np.zeros_like(linear.u)
         fine = self.model.measurements.weighted(finer.predictions(self.theta))

@@ -75,14 +75,12 @@ def model_of(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
         "joint_torque_static": _joint_torques,
         "joint_response": _joint_response,
     }
+    if choice.trust_urdf and make.get(kind) is not _joint_torques:
+        raise DisasmError(
+            f"{logs[0].folder}: a log of kind '{kind}' has no rigid bodies to "
+            "identify; `trust_urdf` is for joint_motion and joint_torque_static"
+        )
     model = make.get(kind, _twin)(logs, choice)
-    if choice.trust_urdf:
-        if not isinstance(model, JointMotionModel):
-            raise DisasmError(
-                f"{logs[0].folder}: a log of kind '{kind}' has no rigid bodies to "
-                "identify; `trust_urdf` is for joint_motion and joint_torque_static"
-            )
-        model = model.trusting_urdf()
     return _with_noise(model, dict(choice.noise))
 
 
@@ -132,7 +130,8 @@ def _joint_torques(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
     make = JointTorqueStaticModel if is_rest else JointMotionModel
     model = make(logs, choice.urdf, known)
     names = [request.name for request in choice.requests]
-    return model.only(names) if names else model
+    model = model.only(names) if names else model
+    return model.trusting_urdf() if choice.trust_urdf else model
 
 
 def _joint_response(logs: Sequence[Log], choice: ModelChoice) -> LogModel:

@@ -252,7 +252,7 @@ class JointMotionModel(LogModel):
 
     @property
     def urdf(self) -> str:
-        """Where the arm's URDF is, as the logs or the caller say."""
+        """See LogModel: as the logs or the caller say."""
         return self._urdf
 
     @property
@@ -310,18 +310,11 @@ class JointMotionModel(LogModel):
 
     @property
     def signed_order(self) -> SignedOrder:
-        """In which order, and with which signs, the torques are explained by far best.
-
-        As written, unless another one leaves less than half.
-        """
+        """See LogModel."""
         return TorqueFits(self._motion, self.measurements.values).signed_order()
 
     def exchanged_motions(self, most: float) -> tuple[tuple[int, int], float] | None:
-        """Returns the two joints whose motions are exchanged; None if there are none.
-
-        Args:
-            most: share of the error that is left may be, for a change to be one.
-        """
+        """See LogModel."""
         fits = TorqueFits(self._motion, self.measurements.values)
         arm = self._arm_under(np.array(self._gravity))
         return fits.exchanged_motions(arm.regressor, most)

@@ -23,7 +23,7 @@ from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.base import Array
-from sysid.models.bookkeeping import Bookkeeping
+from sysid.models.bookkeeping import Bookkeeping, Poses
 from sysid.models.joint_motion import JointMotionModel, Motion
 from sysid.models.motion_bookkeeping import TorqueFits
 from sysid.models.regressor import ArmDynamics, BaseSet, base_set
@@ -77,11 +77,11 @@ class JointTorqueStaticModel(JointMotionModel):
         self._has_time = all("time" in e for log in logs for e in log.episodes)
 
     @property
-    def clock(self) -> Array | None:
-        """Time (rows,) of each row [s]; None: only an order is known."""
-        return self._motion.time if self._has_time else None
+    def poses(self) -> Poses | None:
+        """See LogModel; None where only an order is known, and no time."""
+        return Poses(self._motion.time, self._turned_by) if self._has_time else None
 
-    def turned(self, rows: NDArray[np.int64], others: NDArray[np.int64]) -> Array:
+    def _turned_by(self, rows: NDArray[np.int64], others: NDArray[np.int64]) -> Array:
         """Returns by how much some joint differs (n,) between rows [rad or m]."""
         q = self._motion.q
         return np.asarray(np.abs(q[rows] - q[others]).max(axis=1))

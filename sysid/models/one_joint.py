@@ -13,7 +13,7 @@ from scipy.optimize import lsq_linear
 
 from drake_disasm.common.resources import ONE_JOINT_MODELS
 from drake_disasm.logs import Episode
-from sysid.models.base import Assumption
+from sysid.models.bookkeeping import Assumption
 from sysid.models.channel_grams import FAR_BETTER
 from sysid.models.gravity_estimate import friction_columns
 from sysid.models.regressor import INERTIAL, ArmDynamics, BaseSet

@@ -8,7 +8,6 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     Effect,
     EnvironmentEffect,
@@ -28,12 +27,13 @@ from drake_disasm.scenario.names import find_field
 from drake_disasm.twin import NO_BALANCE
 from drake_disasm.twin.steps import Steps
 from sysid.models.base import Array, PredictionError, even_chunks
+from sysid.models.bookkeeping import Frame
 from sysid.models.commands import bolt_path, twin_coordinates
 from sysid.models.grip_observer import GripObserver, Led
 from sysid.models.late_pose import LatePoses
 from sysid.models.replays import DiagramReplays, ImpactReplays, Replayed
-from sysid.models.scenario_model import ScenarioModel
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
+from sysid.models.simulated_model import FAILURES, SimulatedModel
 from sysid.models.transitions import Transitions, measured_states
 from sysid.models.validity import Validity
 from sysid.parameters import Parameter
@@ -46,12 +46,11 @@ _N_PER_MM = 1e-3  # of N/m
 _DRAWS = 4  # of where steps begin: a standard deviation is then known to a third
 _PASSES = 4  # but the first of those steps alone whose begin has surely changed
 _KEPT = 64  # steps of that many parameter sets
-_FAILURES = (RuntimeError, DisasmError, ValueError)  # of a simulation
 _T = TypeVar("_T")
 _RUN = 6  # rows that follow each other in a thinned log: 0.6 s
 
 
-class TwinModel(ScenarioModel):
+class TwinModel(SimulatedModel):
     """The twin replays measured commands; the states that follow are compared.
 
     Channels are the bolt's pose in G (x, y, z, u, v, w) and the processed wrench,
@@ -68,7 +67,6 @@ class TwinModel(ScenarioModel):
     effect_types = (EnvironmentEffect, MotionEffect, PoseEffect, SensorEffect)
     residual_effect = SensorResidualModel
     held_out_share = 0.25
-    has_commands = True
     setting = "task"
 
     def __init__(
@@ -104,36 +102,16 @@ class TwinModel(ScenarioModel):
         self._begun: dict[str, Transitions] = {}
         self._executed: dict[str, tuple[Steps, LatePoses | None]] = {}
 
-    def predict(self, theta: Array, rows: slice) -> Array:
-        """See LogModel."""
-        return self.read(theta, rows, self.simulate(theta, rows))
-
-    def simulate(self, theta: Array, rows: slice) -> Array:
+    def _simulated(self, thetas: Array, rows: slice) -> list[Array | str]:
         """Returns the states, the wrench at the sensor, and the reading at zeroing.
 
-        (len(rows), 18), as the sensor would read them without effects.
+        (len(rows), 18) of each parameter set, as the sensor would read them without
+        effects; or that contact finds no balance.
         """
-        [found] = self.simulate_all(theta[None], rows)
-        if isinstance(found, str):
-            raise PredictionError(found)
-        return found
-
-    def simulate_all(self, thetas: Array, rows: slice) -> list[Array | str]:
-        """See LogModel."""
-        try:
-            found = self._simulated(thetas, rows)
-        except _FAILURES as error:
-            if len(thetas) > 1:  # it is not said of which
-                return super().simulate_all(thetas, rows)
-            return [" ".join(str(error).split())]
+        found = [
+            self._at_sensor_and_zero(*own, rows) for own in self._led(thetas, rows)
+        ]
         return [each if np.isfinite(each).all() else NO_BALANCE for each in found]
-
-    def _simulated(self, thetas: Array, rows: slice) -> list[Array]:
-        """Returns what `simulate` gives of parameter sets (k, p).
-
-        NaN where contact finds no balance.
-        """
-        return [self._at_sensor_and_zero(*own, rows) for own in self._led(thetas, rows)]
 
     def _led(
         self, thetas: Array, rows: slice
@@ -156,7 +134,7 @@ class TwinModel(ScenarioModel):
     ) -> Array:
         """Returns the states and the reading at zeroing (len(rows), 18)."""
         states = begun.of_encoders(found.states, steps, rows)
-        states = self.at_sensor(states)
+        states = at_sensor(states, self.reading.X_SB)
         states[:, 6:] += self._transitions.sway[rows]
         zero = self.reading.zeroed(found.reading_at_zeroing)
         return np.hstack([states, np.broadcast_to(zero, (len(states), 6))])
@@ -231,21 +209,23 @@ class TwinModel(ScenarioModel):
         return self.replace(scenario=_with_impact_as_stiff(self.scenario))
 
     def refined(self) -> Self | None:
-        """See LogModel: without coarse steps."""
+        """See SimulatedModel: without coarse steps."""
         is_coarse = self.coarse and self._has_impact and not self.rollout
         return self.replace(coarse=False) if is_coarse else None
 
-    def begun(self, theta: Array) -> Self:
+    def with_begins(self, theta: Array | None) -> Self:
         """See LogModel: steps begin where the wrench says, without sensor effects.
 
         And where the model has the grip at the end of the step before: `GripObserver`.
         """
+        if theta is None:
+            return self.replace(_begins_vary=True)
         effects = sensor_chain(self.scenario_at(theta).effects)
         whole = self._whole.begun(effects, self.reading)
         if not self.rollout:
             try:
                 whole = self._observed(theta, whole)
-            except _FAILURES:  # steps begin as the wrench says
+            except FAILURES:  # steps begin as the wrench says
                 return self
         if whole is self._whole:
             return self
@@ -262,7 +242,7 @@ class TwinModel(ScenarioModel):
         Args:
             theta: (p,) values of `parameters`.
         """
-        model = self.surrogate().begun(theta)
+        model = self.surrogate().with_begins(theta)
         if model.rollout or model.costly:
             return None
         try:
@@ -273,8 +253,8 @@ class TwinModel(ScenarioModel):
         return Validity(share, model._transitions.most_give())
 
     def begin_error(self, theta: Array) -> Array | None:
-        """See LogModel: of how far the grip gives, see `validity`."""
-        model = self.surrogate().begun(theta)
+        """See SimulatedModel: of how far the grip gives, see `validity`."""
+        model = self.surrogate().with_begins(theta)
         if model.rollout or model.costly:
             return None
         try:
@@ -346,12 +326,8 @@ class TwinModel(ScenarioModel):
         give, states = (np.concatenate(part) for part in zip(*parts, strict=True))
         return Led(give, states)
 
-    def varying(self) -> Self:
-        """See LogModel: steps begin where the wrench says, at each parameter set."""
-        return self.replace(_begins_vary=True)
-
-    def displaced(self, displacement: Array, push: Array) -> Self:
-        """See LogModel."""
+    def with_displacement(self, displacement: Array, push: Array) -> Self:
+        """See SimulatedModel."""
         begin = self._transitions.ends_before(displacement)
         ends = np.stack([begin, displacement + push], axis=1)
         return self.replace(_displacement=ends)
@@ -360,13 +336,15 @@ class TwinModel(ScenarioModel):
         """See LogModel: time, place, action and force at the beginning of a step."""
         return self._transitions.covariates()
 
-    def at_bolt(self, states: Array) -> Array:
-        """Returns states (n, 12) with the wrench at Bo in G, of channels (n, 12)."""
-        return at_bolt(states, self.reading.X_SB)
-
-    def at_sensor(self, states: Array) -> Array:
-        """Returns channels (n, 12), of states (n, 12) with the wrench at Bo in G."""
-        return at_sensor(states, self.reading.X_SB)
+    def frames(self, rows: NDArray[np.int64]) -> list[Frame]:
+        """See LogModel."""
+        X_SB = self.reading.X_SB
+        in_table = Frame(
+            "wrench, in G at Bo",
+            lambda v: at_bolt(v, X_SB),
+            lambda v: at_sensor(v, X_SB),
+        )
+        return [in_table, Frame("ft_sensor, in S at So")]
 
     def _reported(
         self,

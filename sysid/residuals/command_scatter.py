@@ -169,7 +169,7 @@ def fit_command_scatter(fitter: Fitter, fit: Fit) -> CommandScatter | None:
         fit: with all effects on the mean.
     """
     at_noise = fit.objective <= fitter.settings.max_objective_at_noise
-    if not fit.model.has_commands or at_noise:
+    if fit.model.simulation is None or at_noise:
         return None
     likelihood, displaced = _likeliest(fitter, fit)
     std = likelihood.best()
@@ -291,7 +291,10 @@ class _Steps:
     ) -> Array:
         """Returns residuals (n, c) of steps that end elsewhere (n, 3), from here on."""
         scale = _SCALE
-        there = model.displaced(self.displaced * scale, (ends - self.displaced) * scale)
+        assert model.simulation is not None
+        there = model.simulation.with_displacement(
+            self.displaced * scale, (ends - self.displaced) * scale
+        )
         if rows is not None:
             there = there.of_rows(rows)
         objective = Objective(there, self.fitter.workers, self.fitter.huber_delta)

@@ -140,7 +140,7 @@ class _Rows:
     def held_out(cls, fit: Fit, rows: LogModel) -> "_Rows":
         """Returns rows that a fit has not seen, predicted by it."""
         model, _ = extended(rows, fit.effects, with_shapes=True)
-        model = model.begun(fit.theta)
+        model = model.with_begins(fit.theta)
         missing = model.measurements.values - model.predictions(fit.theta)
         inputs = model.residual_inputs(fit.theta)
         return cls(model, inputs, missing, model.measurements.episode)

@@ -91,7 +91,7 @@ def test_what_is_within_the_noise_is_not_believed_and_the_rest_almost():
 def test_steps_begin_where_the_bolt_is(dragged):
     log, scenario, give = dragged
     model = TwinModel([log], scenario, ())
-    begun = model.begun(_NOTHING)
+    begun = model.with_begins(_NOTHING)
     episode = model._whole.episodes[0]
     errors = [
         _give(each._whole, episode.grip, episode.offset.rest[:3]) - give
@@ -105,21 +105,21 @@ def test_steps_begin_where_the_bolt_is(dragged):
 def test_at_the_truth_a_strong_drag_leaves_the_noise(dragged):
     log, scenario, _ = dragged
     model = TwinModel([log], scenario, (), coarse=False)
-    before, after = (_residual(m)[:, 6:] for m in (model, model.begun(_NOTHING)))
+    before, after = (_residual(m)[:, 6:] for m in (model, model.with_begins(_NOTHING)))
     assert rms(before) > 5.0 and rms(after) < 1.3
 
 
 def test_a_thinned_log_begins_as_the_whole_does(dragged):
     log, scenario, _ = dragged
     model = TwinModel([log], scenario, ())
-    thin, whole = model.thin(2).begun(_NOTHING), model.begun(_NOTHING)
+    thin, whole = model.thin(2).with_begins(_NOTHING), model.with_begins(_NOTHING)
     rows = thin._transitions.rows
     parts = thin._transitions.steps.wrench, whole._transitions.steps.wrench[rows]
     assert np.abs(np.subtract(*parts))[:, :3].max() < 0.3
     np.testing.assert_array_equal(
         whole.thin(2)._transitions.steps.wrench, whole._transitions.steps.wrench[rows]
     )
-    assert whole.begun(_NOTHING) is whole
+    assert whole.with_begins(_NOTHING) is whole
 
 
 def test_where_a_model_leads_nowhere_steps_begin_as_the_wrench_says(dragged):
@@ -128,7 +128,7 @@ def test_where_a_model_leads_nowhere_steps_begin_as_the_wrench_says(dragged):
     model = TwinModel([log], scenario, ())
     broken = dataclasses.replace(scenario.lock, neck_diameter=0.011)
     refused = model.replace(scenario=dataclasses.replace(scenario, lock=broken))
-    assert refused.begun(_NOTHING) is refused
+    assert refused.with_begins(_NOTHING) is refused
 
 
 def test_what_a_grip_that_gives_leaves_unknown_is_little_and_less_of_a_stiff_one(
@@ -150,7 +150,7 @@ def test_a_log_that_the_grip_decides_is_out_of_the_models_range(dragged):
     """Of steps as they are; and of ones that no force balances."""
     log, scenario, _ = dragged
     model = TwinModel([log], scenario, ())
-    quiet = model.begun(_NOTHING).validity(_NOTHING)
+    quiet = model.with_begins(_NOTHING).validity(_NOTHING)
     assert quiet is not None and quiet.holds and 1e-3 < quiet.give < 0.02
     rough = dataclasses.replace(scenario, effects=[GrooveFriction(1.5)])
     found = model.replace(scenario=rough).validity(_NOTHING)

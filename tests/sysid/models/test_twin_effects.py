@@ -131,12 +131,16 @@ def test_a_step_begins_where_the_load_has_the_grip_not_the_reading(tmp_path):
     amplitude = Parameter("fz", 0.0, -0.5, 0.5, "", path="effects.0.fz")
     fitted = bare.with_effects([SensorGain()], [amplitude])
     theta = np.array([0.4])
-    plain, begun = fitted.begun(np.zeros(1)), fitted.begun(theta)
-    assert plain.begun(np.zeros(1)) is plain and begun.begun(theta) is begun
-    assert plain.begun(theta) is not plain
+    plain, begun = fitted.with_begins(np.zeros(1)), fitted.with_begins(theta)
+    assert plain.with_begins(np.zeros(1)) is plain and begun.with_begins(theta) is begun
+    assert plain.with_begins(theta) is not plain
     errors = [
         np.sqrt(np.mean((m.predictions(t) - m.measurements.values)[:, :3] ** 2))
-        for m, t in ((plain, theta), (begun, theta), (stated.begun(_NOTHING), _NOTHING))
+        for m, t in (
+            (plain, theta),
+            (begun, theta),
+            (stated.with_begins(_NOTHING), _NOTHING),
+        )
     ]
     assert errors[1] < 0.7 * errors[0]
     np.testing.assert_allclose(errors[1], errors[2], rtol=1e-9)
