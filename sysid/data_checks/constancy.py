@@ -59,8 +59,8 @@ def _dead(model: LogModel, settings: DataSettings) -> list[str]:
 def _dead_in_table(model: LogModel, settings: DataSettings) -> list[str]:
     """Returns the columns of the processed wrench that never change and should."""
     measured = model.measurements
-    table = model.frames(np.arange(measured.rows))[0]
-    if model.simulation is None:
+    table, *others = model.frames(np.arange(measured.rows))
+    if not others or model.affine:
         return []
     still = np.ptp(table.of(measured.values), axis=0) < _ROUNDED * np.ptp(
         measured.values[:, 6:9]

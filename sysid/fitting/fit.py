@@ -18,6 +18,7 @@ from sysid.fitting.candidates import Candidate
 from sysid.fitting.settings import SelectionSettings
 from sysid.identification.linearisation import Linearisation
 from sysid.models.base import LogModel
+from sysid.models.simulated_model import simulation_of
 from sysid.objective import pseudo_residual
 from sysid.parameters import Scaling, nominal_values
 
@@ -113,7 +114,7 @@ class Fit:
         see `SimulatedModel.begin_error`. A fit does not weigh by the latter: whatever
         makes predictions uncertain would then fit well.
         """
-        residual, simulation = self.linearisation.residual, self.model.simulation
+        residual, simulation = self.linearisation.residual, simulation_of(self.model)
         error = simulation.begin_error(self.theta) if simulation else None
         return residual if error is None else residual / np.hypot(1.0, error)
 
@@ -244,7 +245,7 @@ class Fit:
         One Gauss-Newton step towards the optimum of the same model in finer time
         steps. No interval of rows sees such an error.
         """
-        linear, simulation = self.linearisation, self.model.simulation
+        linear, simulation = self.linearisation, simulation_of(self.model)
         finer = simulation.refined() if simulation else None
         if finer is None or not len(linear.u):
             return np.zeros_like(linear.u)

@@ -4,7 +4,7 @@ import abc
 import copy
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,6 @@ from sysid.models.measurements import Measurements
 from sysid.models.signed_order import SignedOrder
 from sysid.models.validity import Validity
 from sysid.parameters import Parameter, by_name, by_path
-
-if TYPE_CHECKING:
-    from sysid.models.simulated_model import SimulatedModel
 
 Array = NDArray[np.float64]
 
@@ -363,11 +360,6 @@ class LogModel(abc.ABC):
 
     def validity(self, theta: Array) -> Validity | None:
         """Returns whether the stated error holds at parameters (p,); None: unknown."""
-        return None
-
-    @property
-    def simulation(self) -> "SimulatedModel | None":
-        """The model itself, if it simulates commanded steps; None: it does not."""
         return None
 
     # How a fit weighs and describes.

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Self
 
 from drake_disasm.common.errors import DisasmError
-from sysid.models.base import Array, PredictionError
+from sysid.models.base import Array, LogModel, PredictionError
 from sysid.models.scenario_model import ScenarioModel
 
 #: Of a simulation.
@@ -18,11 +18,6 @@ class SimulatedModel(ScenarioModel):
     The arm may scatter about its commands, so that steps are displaced from them; and
     how a step begins is not all measured.
     """
-
-    @property
-    def simulation(self) -> "SimulatedModel":
-        """See LogModel."""
-        return self
 
     @abc.abstractmethod
     def refined(self) -> Self | None:
@@ -69,3 +64,8 @@ class SimulatedModel(ScenarioModel):
             if len(thetas) > 1:  # it is not said of which
                 return super().simulate_all(thetas, rows)
             return [" ".join(str(error).split())]
+
+
+def simulation_of(model: LogModel) -> SimulatedModel | None:
+    """Returns a model, if it simulates commanded steps."""
+    return model if isinstance(model, SimulatedModel) else None

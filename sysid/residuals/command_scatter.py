@@ -26,7 +26,7 @@ from sysid.confidence import Z
 from sysid.fitting.fit import Fit
 from sysid.fitting.fitter import Fitter
 from sysid.identification.whiteness import ljung_box
-from sysid.models.base import LogModel
+from sysid.models.simulated_model import SimulatedModel, simulation_of
 from sysid.objective import Objective, pseudo_residual
 
 Array = NDArray[np.float64]
@@ -169,9 +169,11 @@ def fit_command_scatter(fitter: Fitter, fit: Fit) -> CommandScatter | None:
         fit: with all effects on the mean.
     """
     at_noise = fit.objective <= fitter.settings.max_objective_at_noise
-    if fit.model.simulation is None or at_noise:
+    model = simulation_of(fit.model)
+    if model is None or at_noise:
         return None
-    likelihood, displaced = _likeliest(fitter, fit)
+    begin = _Steps(fitter, fit, model, np.zeros((len(fit.linearisation.residual), 3)))
+    likelihood, displaced = _likeliest(begin)
     std = likelihood.best()
     if not std.any() or not _generalises(likelihood, fit.blocks):
         return None
@@ -180,10 +182,9 @@ def fit_command_scatter(fitter: Fitter, fit: Fit) -> CommandScatter | None:
     return _summary(likelihood, std)
 
 
-def _likeliest(fitter: Fitter, fit: Fit) -> tuple[_Likelihood, Array]:
+def _likeliest(steps: "_Steps") -> tuple[_Likelihood, Array]:
     """Returns the likelihood where steps likely led, and where that is (n, 3)."""
     random = np.random.default_rng(0)
-    steps = _Steps(fitter, fit, np.zeros((len(fit.linearisation.residual), 3)))
     likelihood, before = steps.likelihood(), np.full(3, np.inf)
     for _ in range(_ROUNDS):
         std = likelihood.best()
@@ -216,12 +217,13 @@ class _Steps:
     """Steps of a fit as they were likely executed.
 
     Attributes:
-        fitter, fit: whose rows they are.
+        fitter, fit, model: whose rows they are.
         displaced: (n, 3) where they ended, in units of `scatter_scale`.
     """
 
     fitter: Fitter
     fit: Fit
+    model: SimulatedModel
     displaced: Array
 
     def likelihood(self) -> _Likelihood:
@@ -229,7 +231,7 @@ class _Steps:
         r = self._here
         step = _STEP / _SCALE
         ways = step * np.eye(3)[:, None] * np.ones((len(r), 1))
-        surrogate = self.fit.model.surrogate()
+        surrogate = self.model.surrogate()
         columns = [
             self._residual(surrogate, self.displaced + w)
             - self._residual(surrogate, self.displaced - w)
@@ -259,7 +261,7 @@ class _Steps:
                 break
             draws = std * random.standard_normal(target.shape)
             trial = draws if i else target
-            r = self._residual(self.fit.model.surrogate(), trial, rows) + offset[rows]
+            r = self._residual(self.model.surrogate(), trial, rows) + offset[rows]
             losses = self._losses(r, trial[rows], std)
             better = np.flatnonzero(rows)[losses < least[rows]]
             least[rows] = np.minimum(least[rows], losses)
@@ -276,23 +278,22 @@ class _Steps:
 
     def _surrogate_offset(self) -> Array:
         """Returns residuals (n, c) less those that the surrogate leaves."""
-        surrogate = self.fit.model.surrogate()
-        if surrogate is self.fit.model:
+        surrogate = self.model.surrogate()
+        if surrogate is self.model:
             return np.zeros_like(self._here)
         return self._here - self._residual(surrogate, self.displaced)
 
     @functools.cached_property
     def _here(self) -> Array:
         """Residuals (n, c) as displaced: of a costly model they take seconds."""
-        return self._residual(self.fit.model, self.displaced)
+        return self._residual(self.model, self.displaced)
 
     def _residual(
-        self, model: LogModel, ends: Array, rows: NDArray[np.bool_] | None = None
+        self, model: SimulatedModel, ends: Array, rows: NDArray[np.bool_] | None = None
     ) -> Array:
         """Returns residuals (n, c) of steps that end elsewhere (n, 3), from here on."""
         scale = _SCALE
-        assert model.simulation is not None
-        there = model.simulation.with_displacement(
+        there = model.with_displacement(
             self.displaced * scale, (ends - self.displaced) * scale
         )
         if rows is not None:
