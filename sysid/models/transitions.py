@@ -19,10 +19,9 @@ from drake_disasm.scenario import Scenario
 from drake_disasm.twin.steps import Steps
 from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
-from sysid.models.cell_arm import CellArm, Sway
+from sysid.models.cell_motion import lead, sway
 from sysid.models.commands import Commands, twin_coordinates
-from sysid.models.grip_lag import GripLag
-from sysid.models.grip_offset import GripOffset, of_encoders
+from sysid.models.grip_state import GripState, of_encoders
 from sysid.models.idle_readings import IdleReadings
 from sysid.models.late_pose import LatePoses
 from sysid.models.measurements import Channel, Measurements
@@ -69,7 +68,7 @@ class Transitions:
         elsewhere: (rows, 6) by how much the bolt is elsewhere in the grip as a step
             begins, in coordinates.
         seen: (steps, 12) of all steps of the episodes, by how much the grip's springs
-            carry another wrench than `GripLag` says as they begin, and its rates.
+            carry another wrench than `GripState` says as they begin, and its rates.
         period: of the MDP [s].
         p_BoTo_B: (3,) of the twin's coordinates [m].
     """
@@ -102,14 +101,10 @@ class Transitions:
         episodes = [episode for log in logs for episode in log.episodes]
         period = scenario.task.period
         p_BoTo_B = Tool.from_models(scenario).p_BoTo_B
-        twin = BoltCoordinates(p_BoTo_B)
-        rates, grip = ArmRates.of(scenario), GripLag.of(scenario)
         recorded = tuple(
-            RecordedEpisode.of(episode, rates, grip, offset, arm, twin)
-            for log, offset, arm in zip(
-                logs, _offsets(logs, scenario), _arms(logs, scenario), strict=True
-            )
-            for episode in log.episodes
+            episode
+            for log in logs
+            for episode in _recorded(log, scenario, BoltCoordinates(p_BoTo_B))
         )
         noise = np.array([channel.noise for channel in _channels(scenario)][6:])
         idle = tuple(_idle_readings(log, noise, sensing) for log in logs)
@@ -183,12 +178,9 @@ class Transitions:
         return dataclasses.replace(self, steps=steps, seen=self.seen + more)
 
     @property
-    def carried(self) -> Array:
-        """The measured wrench (steps, 6) as all steps of the episodes begin.
-
-        On the bolt at Bo in Gn, see `RecordedEpisode`.
-        """
-        return np.concatenate([each.carried[:-1] for each in self.episodes])
+    def wrench(self) -> Array:
+        """Measured on the bolt at Bo in G (steps, 6) as all steps begin."""
+        return np.concatenate([each.wrench[:-1] for each in self.episodes])
 
     def most_give(self) -> float:
         """Returns by how much the grip gives within a step, at most [m]."""
@@ -238,7 +230,7 @@ class Transitions:
         if not is_late:
             v = np.concatenate([each.begin_rates(path) for each, path in pairs])
             return dataclasses.replace(steps, v=v[self.rows]), None
-        went = [each.rates.path(path, each.carried) for each, path in pairs]
+        went = [each.rates.path(path, each.wrench) for each, path in pairs]
         late = LatePoses.of(went, weights)
         pairs = list(zip(self.episodes, went, strict=True))
         begun = Steps.concatenated(
@@ -418,18 +410,18 @@ def _without_offset(
 
 def _sway(log: Log, scenario: Scenario, sensing: SensorReading) -> Array:
     """Returns what moving loads the sensor with (rows, 6), at So in S."""
-    moves = Sway.of(scenario, station_of(log))
+    station = station_of(log)
     R_SB = sensing.X_SB.rotation().matrix()
     paths = [e["X_GB_commanded"][:, :3] for e in log.episodes]
     rates = [np.diff(path, axis=0) / scenario.task.period for path in paths]
-    return np.concatenate([moves.wrenches(rate, R_SB) for rate in rates])
+    return np.concatenate([sway(scenario, station, rate, R_SB) for rate in rates])
 
 
-def _offsets(logs: Sequence[Log], scenario: Scenario) -> list[GripOffset]:
-    """Returns where the bolt is in the grip, beyond its springs, in each log."""
-    return [GripOffset.of(scenario, station_of(log)) for log in logs]
-
-
-def _arms(logs: Sequence[Log], scenario: Scenario) -> list[CellArm]:
-    """Returns how the arm of each log differs from the twin's."""
-    return [CellArm.of(scenario, station_of(log)) for log in logs]
+def _recorded(
+    log: Log, scenario: Scenario, twin: BoltCoordinates
+) -> list[RecordedEpisode]:
+    """Returns the episodes of a log, in the twin's coordinates."""
+    station = station_of(log)
+    given = ArmRates.of(scenario), GripState.of(scenario, station)
+    ahead = lead(scenario, station)
+    return [RecordedEpisode.of(e, *given, ahead, twin) for e in log.episodes]
