@@ -37,11 +37,11 @@ class GripObserver:
     """Estimates how a step begins from a model of the step before, and the wrench.
 
     Between two readings `GripState` takes the wrench for linear in time. It is not
-    where the force on the bolt jumps as a step begins: a drag that grows with the commanded
-    velocity, friction that turns with the sliding. The springs, which lag by half a
-    step, then carry up to half of the jump more or less. A model of that step has the
-    jump in it. What it misses of the wrench at the step's end is taken to have grown
-    evenly, and is believed as far as it exceeds the sensor's noise: the mean of a
+    where the force on the bolt jumps as a step begins: a drag that grows with the
+    commanded velocity, friction that turns with the sliding. The springs, which lag by
+    half a step, then carry up to half of the jump more or less. A model of that step
+    has the jump in it. What it misses of the wrench at the step's end is taken to have
+    grown evenly, and is believed as far as it exceeds the sensor's noise: the mean of a
     normal variable with an unknown mean, shrunk by its positive part (James and Stein
     1961), b = max(0, 1 - (sigma / m)^2) m of what is missed, m.
 

@@ -62,7 +62,7 @@ class RecordedEpisode:
         return at_sensor(np.hstack([poses, self.wrench]), sensing.X_SB)
 
     def without(self, offset: Array, sensing: SensorReading, p_BoTo_B: Array) -> Self:
-        """Returns the episode with wrenches (n + 1, 6) at So in S taken off."""
+        """Returns the episode with a wrench (6,) at So in S taken off."""
         if not offset.any():
             return self
         states = self.at_sensor(sensing, p_BoTo_B)

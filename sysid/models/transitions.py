@@ -22,7 +22,6 @@ from sysid.models.base import Array
 from sysid.models.cell_motion import lead, sway
 from sysid.models.commands import Commands, twin_coordinates
 from sysid.models.grip_state import GripState, of_encoders
-from sysid.models.idle_readings import IdleReadings
 from sysid.models.late_pose import LatePoses
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.recorded_episode import RecordedEpisode
@@ -45,6 +44,10 @@ FORCE_ERROR = (0.02, 0.15)
 #: hand that yields so far turns by 40 urad. It is no noise, so it counts twice.
 POSE_ERROR = (2e-5, 4e-5)
 
+#: Standard deviations of an average beyond which it is an offset: by chance three times
+#: in a million logs of six channels.
+_OFFSET = 5.0
+
 #: By how much the grip gives, so that a step begins noticeably elsewhere [m, rad]: a
 #: tenth of what encoders repeat.
 _NOTICEABLE = (0.1 * POSE_NOISE[0], 0.1 * POSE_NOISE[1])
@@ -60,7 +63,8 @@ class Transitions:
         rows: (rows,) its number among all transitions of the episodes.
         recorded: whole episodes, in the twin's coordinates.
         logs: (episodes,) number of the log of each.
-        idle: what the readings of each log without a load say of its sensor.
+        at_begin: (logs, 6) what is taken for a load of each log's first readings, on
+            average, at So in S; the rest is the sensor's own.
         episodes: the same, with the wrench as it was before effects on the sensor, and
             without its offset.
         commands: of whole episodes, since effects on the motion have a memory.
@@ -78,7 +82,7 @@ class Transitions:
     rows: NDArray[np.int64]
     recorded: tuple[RecordedEpisode, ...]
     logs: NDArray[np.int64]
-    idle: tuple[IdleReadings, ...]
+    at_begin: Array
     episodes: tuple[RecordedEpisode, ...]
     commands: tuple[Commands, ...]
     sway: Array
@@ -107,9 +111,9 @@ class Transitions:
             for episode in _recorded(log, scenario, BoltCoordinates(p_BoTo_B))
         )
         noise = np.array([channel.noise for channel in _channels(scenario)][6:])
-        idle = tuple(_idle_readings(log, noise, sensing) for log in logs)
+        at_begin = np.array([_load_at_begin(log, noise, sensing) for log in logs])
         sources = np.repeat(np.arange(len(logs)), [len(log.episodes) for log in logs])
-        begun = _without_offset(recorded, sources, idle, sensing, p_BoTo_B)
+        begun = _without_offset(recorded, sources, at_begin, sensing, p_BoTo_B)
         steps = Steps.concatenated([each.steps() for each in begun])
         found = cls(
             steps=steps,
@@ -119,7 +123,7 @@ class Transitions:
             rows=np.arange(len(steps)),
             recorded=recorded,
             logs=sources,
-            idle=idle,
+            at_begin=at_begin,
             episodes=begun,
             commands=tuple(Commands.of(e, period) for e in episodes),
             sway=np.concatenate([_sway(log, scenario, sensing) for log in logs]),
@@ -144,7 +148,9 @@ class Transitions:
         """
         known = [e for e in effects if not isinstance(e, SensorMemoryEffect)]
         before = unread(self.recorded, known, sensing, self.p_BoTo_B)
-        episodes = _without_offset(before, self.logs, self.idle, sensing, self.p_BoTo_B)
+        episodes = _without_offset(
+            before, self.logs, self.at_begin, sensing, self.p_BoTo_B
+        )
         pairs = zip(episodes, self.episodes, strict=True)
         if not any(one.begins_elsewhere(other, _NOTICEABLE) for one, other in pairs):
             return self
@@ -370,22 +376,28 @@ def _refuse_other_logs(log: Log, scenario: Scenario) -> None:
         )
 
 
-def _idle_readings(log: Log, noise: Array, sensing: SensorReading) -> IdleReadings:
-    """Returns what a log's readings without a load say of its sensor.
+def _load_at_begin(log: Log, noise: Array, sensing: SensorReading) -> Array:
+    """Returns what may be a load of an episode's first reading (6,), at So in S.
+
+    Each episode begins without one: what its first reading is beyond chance, on average
+    over the log's episodes, is an offset of the sensor, which moves no bolt. What is
+    within chance is taken for a load: the noise of a reading moves the bolt as far.
 
     Args:
         log: of transitions.
         noise: (6,) of a reading.
         sensing: of the scenario.
     """
-    readings = [at_sensor(observations(e), sensing.X_SB)[:, 6:] for e in log.episodes]
-    return IdleReadings.of(readings, noise, sensing.X_SB.translation())
+    states = np.array([observations(episode)[0] for episode in log.episodes])
+    first = np.mean(at_sensor(states, sensing.X_SB)[:, 6:], axis=0)
+    by_chance = _OFFSET * noise / np.sqrt(len(states))
+    return np.where(np.abs(first) > by_chance, 0.0, first)
 
 
 def _without_offset(
     episodes: Sequence[RecordedEpisode],
     logs: NDArray[np.int64],
-    idle: Sequence[IdleReadings],
+    at_begin: Array,
     sensing: SensorReading,
     p_BoTo_B: Array,
 ) -> tuple[RecordedEpisode, ...]:
@@ -393,18 +405,16 @@ def _without_offset(
 
     Args:
         episodes: with the wrench as it was measured.
-        logs, idle: see `Transitions`.
+        logs, at_begin: see `Transitions`.
         sensing: of the scenario.
         p_BoTo_B: (3,) of the twin's coordinates [m].
     """
-    read = [each.at_sensor(sensing, p_BoTo_B)[:, 6:] for each in episodes]
-    offsets = [
-        each.offsets([read[i] for i in np.flatnonzero(logs == log)])
-        for log, each in enumerate(idle)
-    ]
+    first = np.array([e.at_sensor(sensing, p_BoTo_B)[0, 6:] for e in episodes])
+    means = [first[logs == log].mean(axis=0) for log in range(len(at_begin))]
+    offsets = np.array(means) - at_begin
     return tuple(
-        episode.without(offsets[log][: len(own)], sensing, p_BoTo_B)
-        for episode, own, log in zip(episodes, read, logs, strict=True)
+        episode.without(offsets[log], sensing, p_BoTo_B)
+        for episode, log in zip(episodes, logs, strict=True)
     )
 
 

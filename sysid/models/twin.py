@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -122,9 +121,6 @@ class TwinModel(SimulatedModel):
         steps = [self._displaced(own.select(rows), rows) for own, _ in executed]
         replays = self._replays_at(scenarios)
         found = replays.transitions(steps)
-        if not self.rollout:
-            late = [poses for _, poses in executed]
-            self._carry_on(replays, steps, [each.states for each in found], late, rows)
         begun = [self._begun_at(scenario) for scenario in scenarios]
         went = [own for own, _ in executed]
         return list(zip(found, begun, went, strict=True))
@@ -443,41 +439,6 @@ class TwinModel(SimulatedModel):
     @property
     def _has_impact(self) -> bool:
         return self.scenario.contact.model == "impact"
-
-    def _carry_on(
-        self,
-        replays: ImpactReplays | DiagramReplays,
-        steps: Sequence[Steps],
-        found: Sequence[Array],
-        late: Sequence[LatePoses | None],
-        rows: slice,
-    ) -> None:
-        """Finds the states (n, 12) after steps again whose begin was not measured.
-
-        An episode's last late poses never come in: there a step begins where the one
-        before led, by its prediction.
-
-        Args:
-            replays: of the k twins.
-            steps, found: n of each, and the states after them; changed in place.
-            late: poses of each twin, if they come late.
-            rows: that the steps are.
-        """
-        transitions = self._transitions
-        own = transitions.rows[rows]
-        follows = np.diff(own, prepend=-2) == 1
-        unseen = [0 * own if x is None else x.unseen[own] * follows for x in late]
-        copied = [replace(each, q=each.q.copy(), v=each.v.copy()) for each in steps]
-        for count in range(1, 1 + max(int(u.max(initial=0)) for u in unseen)):
-            which = [np.flatnonzero(u == count) for u in unseen]
-            for each, states, on in zip(copied, found, which, strict=True):
-                q = twin_coordinates(states[on - 1, :6], transitions.p_BoTo_B)
-                each.v[on] = (q - each.q[on - 1]) / transitions.period
-                each.q[on] = q
-            parts = [each.select(on) for each, on in zip(copied, which, strict=True)]
-            again = replays.transitions(parts)
-            for states, on, new in zip(found, which, again, strict=True):
-                states[on] = new.states
 
     def __getstate__(self) -> dict[str, Any]:
         """Leaves out what is quickly found again."""
