@@ -16,7 +16,7 @@ from sysid.models.joint_torque_static import JointTorqueStaticModel
 from sysid.models.response.model import JointResponseModel
 from sysid.models.static_wrench import DEFAULT_PARAMETERS, StaticWrenchModel
 from sysid.models.twin import TwinModel
-from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 
 #: What is compared, by the kind of log; the first is the default.
 OBJECTIVES = {
@@ -46,7 +46,7 @@ class ModelChoice:
 
     objective: str | None = None
     scenario: Scenario | None = None
-    requests: tuple[Request, ...] = ()
+    requests: tuple[ParameterRequest, ...] = ()
     urdf: str | None = None
     coarse: bool = True
     noise: tuple[tuple[str, float], ...] = ()
@@ -118,7 +118,7 @@ def _contact(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
 def _readings(
     kind: type[StaticWrenchModel], logs: Sequence[Log], choice: ModelChoice
 ) -> LogModel:
-    requests = choice.requests or tuple(Request(n) for n in DEFAULT_PARAMETERS)
+    requests = choice.requests or tuple(ParameterRequest(n) for n in DEFAULT_PARAMETERS)
     known = choice.scenario or stated_scenario(logs)
     scenario, parameters = scenario_parameters(known or Scenario(), requests)
     return kind(logs, scenario, parameters, known is not None)

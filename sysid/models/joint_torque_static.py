@@ -26,7 +26,7 @@ from sysid.models.base import Array
 from sysid.models.bookkeeping import Bookkeeping, Poses
 from sysid.models.joint_motion import JointMotionModel, Motion
 from sysid.models.motion_bookkeeping import TorqueFits
-from sysid.models.regressor import ArmDynamics, BaseSet, base_set
+from sysid.models.regressor import ArmRegressor, BaseSet, base_set
 
 #: rad or m: less is noise of an encoder that nobody moved, and before as much dry
 #: friction has not turned: a contact yields before it slides (JointDahlFriction).
@@ -106,13 +106,13 @@ class JointTorqueStaticModel(JointMotionModel):
         ]
 
     @staticmethod
-    def _base_set(arm: ArmDynamics) -> BaseSet:
+    def _base_set(arm: ArmRegressor) -> BaseSet:
         """See JointMotionModel."""
         return base_set(arm.random_regressor(at_rest=True))
 
     @staticmethod
     def _motion_of(
-        arm: ArmDynamics,
+        arm: ArmRegressor,
         base: BaseSet,
         joints: Sequence[str],
         motions: Sequence[Motion],

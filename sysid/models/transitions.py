@@ -23,10 +23,10 @@ from sysid.models.cell_motion import lead, sway
 from sysid.models.commands import Commands, twin_coordinates
 from sysid.models.grip_state import GripState, of_encoders
 from sysid.models.late_pose import LatePoses
+from sysid.models.measured_episode import MeasuredEpisode
 from sysid.models.measurements import Channel, Measurements
-from sysid.models.recorded_episode import RecordedEpisode
 from sysid.models.sensor_reading import SensorReading, at_sensor, station_of
-from sysid.models.unread import unread
+from sysid.models.undo_sensor_effects import undo_sensor_effects
 
 #: Repeatability of a robot's own encoders within an episode, m and rad: below that of
 #: the robot (0.1 mm, against an external frame), above their resolution.
@@ -80,10 +80,10 @@ class Transitions:
     steps: Steps
     before: Array
     rows: NDArray[np.int64]
-    recorded: tuple[RecordedEpisode, ...]
+    recorded: tuple[MeasuredEpisode, ...]
     logs: NDArray[np.int64]
     at_begin: Array
-    episodes: tuple[RecordedEpisode, ...]
+    episodes: tuple[MeasuredEpisode, ...]
     commands: tuple[Commands, ...]
     sway: Array
     elsewhere: Array
@@ -113,8 +113,8 @@ class Transitions:
         noise = np.array([channel.noise for channel in _channels(scenario)][6:])
         at_begin = np.array([_load_at_begin(log, noise, sensing) for log in logs])
         sources = np.repeat(np.arange(len(logs)), [len(log.episodes) for log in logs])
-        begun = _without_offset(recorded, sources, at_begin, sensing, p_BoTo_B)
-        steps = Steps.concatenated([each.steps() for each in begun])
+        started = _without_offset(recorded, sources, at_begin, sensing, p_BoTo_B)
+        steps = Steps.concatenated([each.steps() for each in started])
         found = cls(
             steps=steps,
             before=np.concatenate(
@@ -124,17 +124,19 @@ class Transitions:
             recorded=recorded,
             logs=sources,
             at_begin=at_begin,
-            episodes=begun,
+            episodes=started,
             commands=tuple(Commands.of(e, period) for e in episodes),
             sway=np.concatenate([_sway(log, scenario, sensing) for log in logs]),
-            elsewhere=np.concatenate([each.elsewhere[:-1] for each in begun]),
+            elsewhere=np.concatenate([each.elsewhere[:-1] for each in started]),
             seen=np.zeros((len(steps), 12)),
             period=period,
             p_BoTo_B=p_BoTo_B,
         )
         return dataclasses.replace(found, steps=found._moved(steps.qd, steps.qd_rate))
 
-    def begun(self, effects: Sequence[SensorEffect], sensing: SensorReading) -> Self:
+    def without_effects(
+        self, effects: Sequence[SensorEffect], sensing: SensorReading
+    ) -> Self:
         """Returns the transitions as they begin where effects on the sensor are undone.
 
         By how much the grip gives as a step begins is known from the measured wrench,
@@ -147,27 +149,27 @@ class Transitions:
             sensing: of the scenario.
         """
         known = [e for e in effects if not isinstance(e, SensorMemoryEffect)]
-        before = unread(self.recorded, known, sensing, self.p_BoTo_B)
+        before = undo_sensor_effects(self.recorded, known, sensing, self.p_BoTo_B)
         episodes = _without_offset(
             before, self.logs, self.at_begin, sensing, self.p_BoTo_B
         )
         pairs = zip(episodes, self.episodes, strict=True)
         if not any(one.begins_elsewhere(other, _NOTICEABLE) for one, other in pairs):
             return self
-        begun = Steps.concatenated([e.steps() for e in episodes])
-        begun = dataclasses.replace(
-            begun,
-            wrench=begun.wrench + self.seen[:, :6],
-            give_rate=begun.give_rate + self.seen[:, 6:],
+        steps = Steps.concatenated([e.steps() for e in episodes])
+        steps = dataclasses.replace(
+            steps,
+            wrench=steps.wrench + self.seen[:, :6],
+            give_rate=steps.give_rate + self.seen[:, 6:],
         )
         elsewhere = np.concatenate([each.elsewhere[:-1] for each in episodes])
         found = dataclasses.replace(
             self,
-            steps=begun.select(self.rows),
+            steps=steps.select(self.rows),
             episodes=episodes,
             elsewhere=elsewhere[self.rows],
         )
-        return dataclasses.replace(found, steps=found._moved(begun.qd, begun.qd_rate))
+        return dataclasses.replace(found, steps=found._moved(steps.qd, steps.qd_rate))
 
     def beginning(self, rows: NDArray[np.int64], elastic: Array, rates: Array) -> Self:
         """Returns all transitions, some of which begin with another give of the grip.
@@ -239,11 +241,10 @@ class Transitions:
         went = [each.rates.path(path, each.wrench) for each, path in pairs]
         late = LatePoses.of(went, weights)
         pairs = list(zip(self.episodes, went, strict=True))
-        begun = Steps.concatenated(
+        on_time = Steps.concatenated(
             [e.on_time(path, weights).steps() for e, path in pairs]
-        )
-        begun = begun.select(self.rows)
-        return dataclasses.replace(steps, q=begun.q, v=begun.v), late
+        ).select(self.rows)
+        return dataclasses.replace(steps, q=on_time.q, v=on_time.v), late
 
     def _moved(self, qd: Array, qd_rate: Array) -> Steps:
         """Returns the steps with commands as the arm has them.
@@ -395,12 +396,12 @@ def _load_at_begin(log: Log, noise: Array, sensing: SensorReading) -> Array:
 
 
 def _without_offset(
-    episodes: Sequence[RecordedEpisode],
+    episodes: Sequence[MeasuredEpisode],
     logs: NDArray[np.int64],
     at_begin: Array,
     sensing: SensorReading,
     p_BoTo_B: Array,
-) -> tuple[RecordedEpisode, ...]:
+) -> tuple[MeasuredEpisode, ...]:
     """Returns the episodes without the offset of the sensor in their log.
 
     Args:
@@ -429,9 +430,9 @@ def _sway(log: Log, scenario: Scenario, sensing: SensorReading) -> Array:
 
 def _recorded(
     log: Log, scenario: Scenario, twin: BoltCoordinates
-) -> list[RecordedEpisode]:
+) -> list[MeasuredEpisode]:
     """Returns the episodes of a log, in the twin's coordinates."""
     station = station_of(log)
     given = ArmRates.of(scenario), GripState.of(scenario, station)
     ahead = lead(scenario, station)
-    return [RecordedEpisode.of(e, *given, ahead, twin) for e in log.episodes]
+    return [MeasuredEpisode.of(e, *given, ahead, twin) for e in log.episodes]

@@ -94,11 +94,13 @@ class TwinModel(SimulatedModel):
         self.reading = SensorReading.of(logs, scenario)
         recorded = Transitions.of(logs, scenario, self.reading)
         effects = sensor_chain(scenario.effects)
-        self._whole = self._transitions = recorded.begun(effects, self.reading)
+        self._whole = self._transitions = recorded.without_effects(
+            effects, self.reading
+        )
         self.measurements = measured_states(logs, scenario, self.reading)
         self._begins_vary = False  # with parameters of effects on the sensor
         self._displacement: Array | None = None  # (rows, 2, 3) of begin and end
-        self._begun: dict[str, Transitions] = {}
+        self._transitions_by_sensor: dict[str, Transitions] = {}
         self._executed: dict[str, tuple[Steps, LatePoses | None]] = {}
 
     def _simulated(self, thetas: Array, rows: slice) -> list[Array | str]:
@@ -121,15 +123,15 @@ class TwinModel(SimulatedModel):
         steps = [self._displaced(own.select(rows), rows) for own, _ in executed]
         replays = self._replays_at(scenarios)
         found = replays.transitions(steps)
-        begun = [self._begun_at(scenario) for scenario in scenarios]
+        transitions = [self._transitions_at(scenario) for scenario in scenarios]
         went = [own for own, _ in executed]
-        return list(zip(found, begun, went, strict=True))
+        return list(zip(found, transitions, went, strict=True))
 
     def _at_sensor_and_zero(
-        self, found: Replayed, begun: Transitions, steps: Steps, rows: slice
+        self, found: Replayed, transitions: Transitions, steps: Steps, rows: slice
     ) -> Array:
         """Returns the states and the reading at zeroing (len(rows), 18)."""
-        states = begun.of_encoders(found.states, steps, rows)
+        states = transitions.of_encoders(found.states, steps, rows)
         states = at_sensor(states, self.reading.X_SB)
         states[:, 6:] += self._transitions.sway[rows]
         zero = self.reading.zeroed(found.reading_at_zeroing)
@@ -217,7 +219,7 @@ class TwinModel(SimulatedModel):
         if theta is None:
             return self.replace(_begins_vary=True)
         effects = sensor_chain(self.scenario_at(theta).effects)
-        whole = self._whole.begun(effects, self.reading)
+        whole = self._whole.without_effects(effects, self.reading)
         if not self.rollout:
             try:
                 whole = self._observed(theta, whole)
@@ -355,7 +357,7 @@ class TwinModel(SimulatedModel):
         if not self.rollout:
             p, own = self._transitions.p_BoTo_B, self._transitions.rows[rows]
             q, q_before = (twin_coordinates(x, p) for x in (poses, before))
-            q_begin = steps.q[rows] - self._begun_at(scenario).elsewhere[rows]
+            q_begin = steps.q[rows] - self._transitions_at(scenario).elsewhere[rows]
             return bolt_path(late.at_ends(own, q_before, q_begin, q), p)
         episode, found = self.measurements.episode[rows], np.empty_like(poses)
         for number in np.unique(episode):
@@ -366,28 +368,32 @@ class TwinModel(SimulatedModel):
 
     def _executed_at(self, scenario: Scenario) -> tuple[Steps, LatePoses | None]:
         """Returns the steps as effects have them executed, and late poses, if any."""
-        begun, effects = self._begun_at(scenario), _mean_chain(scenario)
-        weights = pose_weights(scenario.effects, begun.period)
+        transitions, effects = self._transitions_at(scenario), _mean_chain(scenario)
+        weights = pose_weights(scenario.effects, transitions.period)
         sensor = sensor_chain(scenario.effects) if self._begins_vary else ()
         key = repr((effects, weights.tolist(), sensor))
-        return _kept(self._executed, key, lambda: begun.executed(effects, weights))
+        return _kept(
+            self._executed, key, lambda: transitions.executed(effects, weights)
+        )
 
-    def _begun_at(self, scenario: Scenario) -> Transitions:
+    def _transitions_at(self, scenario: Scenario) -> Transitions:
         """Returns the transitions as they begin with a scenario's sensor."""
         if not self._begins_vary:
             return self._transitions
         effects = sensor_chain(scenario.effects)
         return _kept(
-            self._begun,
+            self._transitions_by_sensor,
             repr(effects),
-            lambda: self._transitions.begun(effects, self.reading),
+            lambda: self._transitions.without_effects(effects, self.reading),
         )
 
     def _displaced(self, steps: Steps, rows: slice) -> Steps:
         """Returns steps as the arm scatters about its commands, if it does."""
         if self._displacement is None:
             return steps
-        return _displaced(steps, self._displacement[rows], self._transitions.period)
+        return _with_displacement(
+            steps, self._displacement[rows], self._transitions.period
+        )
 
     @property
     def together(self) -> int:
@@ -442,7 +448,7 @@ class TwinModel(SimulatedModel):
 
     def __getstate__(self) -> dict[str, Any]:
         """Leaves out what is quickly found again."""
-        return self.__dict__ | {"_begun": {}, "_executed": {}}
+        return self.__dict__ | {"_transitions_by_sensor": {}, "_executed": {}}
 
 
 def _kept(found: dict[str, _T], key: str, compute: Callable[[], _T]) -> _T:
@@ -476,7 +482,7 @@ def _mean_chain(scenario: Scenario) -> tuple[MotionEffect, ...]:
     return tuple(e for e in motion_chain(scenario.effects) if not e.is_random)
 
 
-def _displaced(steps: Steps, ends: Array, period: float) -> Steps:
+def _with_displacement(steps: Steps, ends: Array, period: float) -> Steps:
     """Returns steps whose command is displaced by (n, 2, 3) [m] at begin and end."""
     zero = np.zeros((len(steps), 3))
     begin = np.hstack([ends[:, 0], zero])

@@ -15,10 +15,10 @@ from sysid.fitting.candidates import extended
 from sysid.fitting.fit import Fit
 from sysid.models.base import HUBER_DELTA, LogModel
 from sysid.objective import pseudo_residual
-from sysid.residuals.left_over import (
+from sysid.residuals.predictable_residual import (
     FOLDS,
     LEARNER,
-    LeftOver,
+    PredictableResidual,
     contiguous_blocks,
     every_few,
 )
@@ -77,7 +77,7 @@ class ResidualModel:
 
 
 def fit_residual_model(
-    last: Fit, left: Sequence[LeftOver], held_out: LogModel | None
+    last: Fit, left: Sequence[PredictableResidual], held_out: LogModel | None
 ) -> ResidualModel | None:
     """Returns a model of what the effects leave, if it lowers the held-out error.
 

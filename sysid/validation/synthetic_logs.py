@@ -147,7 +147,7 @@ def rollout(
     reading = SensorReading(scenario, Tool.from_models(scenario))
     measured = _Measured(scenario, commanded)
     count, size, _ = commanded.shape
-    # A step begins under the load as the model knows it, see `RecordedEpisode.steps`.
+    # A step begins under the load as the model knows it, see `MeasuredEpisode.steps`.
     is_undone = not any(isinstance(e, SensorMemoryEffect) for e in sensor)
     noise_of_states = np.concatenate([np.zeros_like(noise), noise], axis=2)
     clean, states = np.zeros_like(noise_of_states), noise_of_states.copy()

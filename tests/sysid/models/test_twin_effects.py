@@ -32,7 +32,7 @@ from drake_disasm.task.simulation import TaskSimulation
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.parameters import Parameter
-from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
 from sysid.workers import Workers
@@ -103,7 +103,9 @@ def test_sensor_effects_share_one_simulation(tmp_path, monkeypatch):
     scenario = _scenario("impact")
     _, log = _log(tmp_path / "log", scenario, SensorMounting(ry=0.1))
     names = ["SensorBias.fx", "SensorGain.tz", "contact.friction"]
-    scenario, parameters = scenario_parameters(scenario, [Request(n) for n in names])
+    scenario, parameters = scenario_parameters(
+        scenario, [ParameterRequest(n) for n in names]
+    )
     model = TwinModel([log], scenario, parameters)
     np.testing.assert_array_equal(model.simulated, [False, False, True])
     asked = []
@@ -159,7 +161,9 @@ def test_an_offset_that_the_first_readings_show_moves_no_bolt(tmp_path):
 def test_a_parameter_set_that_fails_leaves_the_others_of_its_batch(tmp_path):
     scenario = _scenario("impact")
     _, log = _log(tmp_path / "log", scenario, SensorMounting(ry=0.1))
-    scenario, parameters = scenario_parameters(scenario, [Request("lock.clearance")])
+    scenario, parameters = scenario_parameters(
+        scenario, [ParameterRequest("lock.clearance")]
+    )
     model = TwinModel([log], scenario, parameters)
     thetas = np.array([[4e-4], [-1.0], [5e-4]])
     assert model.together >= len(thetas)

@@ -20,7 +20,7 @@ from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 
 
 @dataclasses.dataclass(frozen=True)
-class RecordedEpisode:
+class MeasuredEpisode:
     """An episode of n steps as it was recorded, in the twin's coordinates.
 
     Attributes:

@@ -53,7 +53,7 @@ LEARNER = Learner()
 
 
 @dataclass(frozen=True)
-class LeftOver:
+class PredictableResidual:
     """What a flexible learner explains of a channel that the effects leave.
 
     Attributes:
@@ -110,7 +110,7 @@ class _Inputs:
         return type(self)(self.values[mask], self.names)
 
 
-def left_over(fit: Fit) -> list[LeftOver]:
+def predictable_residual(fit: Fit) -> list[PredictableResidual]:
     """Returns what a flexible learner explains of each channel's residual.
 
     Of channels where that is significant (by contiguous folds that were not fitted,
@@ -130,13 +130,15 @@ def left_over(fit: Fit) -> list[LeftOver]:
         gains = np.bincount(blocks, learned.gain).astype(float)
         share = float(gains.sum() / max(np.sum(target**2), 1e-300))
         p = len(measured.channels) * _gained_p(gains)
-        if share < settings.min_left_over or p >= _ALPHA:
+        if share < settings.min_predictable_residual or p >= _ALPHA:
             continue
         if gains.sum() < fit.noticeable(number) ** 2 * len(target):
             continue
         size = float(np.sqrt(np.mean((learned.predicted * sigma[kept, number]) ** 2)))
         needed = learned.depends_on(inputs, target, folds)
-        found.append(LeftOver(channel.name, share, size, channel.unit, needed))
+        found.append(
+            PredictableResidual(channel.name, share, size, channel.unit, needed)
+        )
     return found
 
 
