@@ -27,7 +27,7 @@ _VERDICT: dict[str, Any] = {
     "misfits": [""],
     "contradictions": [{"effect": ""}],
     "left_in_channels": [{"channel": ""}],
-    "predictable_residual": [{"channel": ""}],
+    "left_over": [{"channel": ""}],
     "residual_model": None,
     "errors": {"channels": {}},
 }
@@ -178,7 +178,7 @@ def _reservations(verdict: Mapping[str, Any]) -> Iterator[str]:
     if verdict["contradictions"]:
         kinds = {each["effect"] for each in verdict["contradictions"]}
         yield f"episodes of its log contradict ({', '.join(sorted(kinds))})"
-    left = [*verdict["left_in_channels"], *verdict["predictable_residual"]]
+    left = [*verdict["left_in_channels"], *verdict["left_over"]]
     if channels := dict.fromkeys(each["channel"] for each in left):
         yield f"leaves something unexplained in {', '.join(channels)}"
     elif verdict["ending"] == "partly" and not any(verdict[key] for key in _PARTLY):

@@ -174,7 +174,7 @@ class SelectionSettings:
     )
 
     # What is said of what is left.
-    min_predictable_residual: float = _setting(
+    min_left_over: float = _setting(
         0.1,
         "of a channel's mean squared residual",
         "what a flexible learner explains of rows that it did not see",

@@ -130,7 +130,7 @@ def predictable_residual(fit: Fit) -> list[PredictableResidual]:
         gains = np.bincount(blocks, learned.gain).astype(float)
         share = float(gains.sum() / max(np.sum(target**2), 1e-300))
         p = len(measured.channels) * _gained_p(gains)
-        if share < settings.min_predictable_residual or p >= _ALPHA:
+        if share < settings.min_left_over or p >= _ALPHA:
             continue
         if gains.sum() < fit.noticeable(number) ** 2 * len(target):
             continue

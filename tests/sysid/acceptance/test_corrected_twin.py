@@ -61,7 +61,7 @@ def test_intervals_become_ranges_of_the_effects_that_are_there() -> None:
         ({"misfits": ["rows 3 to 5 touch"]}, "rows 3 to 5"),
         ({"contradictions": [{"effect": "SensorBias"}]}, "SensorBias"),
         ({"left_in_channels": [{"channel": "tz"}]}, "tz"),
-        ({"predictable_residual": [{"channel": "fx"}]}, "fx"),
+        ({"left_over": [{"channel": "fx"}]}, "fx"),
         ({"suggested": ["SensorDrift"]}, "SensorDrift"),
         ({"residual_model": {"effect": "CellResidualModel"}}, "not physical"),
     ],
