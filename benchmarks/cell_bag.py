@@ -22,8 +22,8 @@ from drake_disasm.free_motion.playing import MotionPlayer
 from drake_disasm.free_motion.table import MotionTable
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.logs.importing import (
+    ImportProcessing,
     Known,
-    Processing,
     guessed_map,
     import_recordings,
     read_source,
@@ -157,7 +157,7 @@ def _imported(
     fields = guessed_map(
         read, "joint_motion", Known(movable_joints(str(urdf)), urdf=str(urdf))
     )
-    imported = import_recordings([read], fields, Processing())
+    imported = import_recordings([read], fields, ImportProcessing())
     write_log(imported, [read], fields, folder, {"program": "cell_bag"})
     closed = close_loop(model_of([read_log(folder)], ModelChoice()))
     return closed.verdict, imported.recordings[0].shifts

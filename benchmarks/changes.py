@@ -30,7 +30,7 @@ from drake_disasm.logs import Log, LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.changes import Changes, find_changes
 from sysid.models.joint_motion import JointMotionModel
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 from sysid.validation import null_logs
 
 _SEED = 59_000
@@ -63,7 +63,7 @@ def noise_of(urdf: Path) -> Array:
     """Returns the noise (joints,) of an arm's torques, the same in all its logs."""
     joints = movable_joints(str(urdf))
     _, *states = motion(len(joints), np.random.default_rng(_SEED))
-    tau = ArmDynamics(str(urdf), joints).torques(*states)
+    tau = ArmRegressor(str(urdf), joints).torques(*states)
     return np.asarray(_NOISE * np.sqrt(np.mean(tau**2, axis=0)))
 
 

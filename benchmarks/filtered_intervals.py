@@ -31,8 +31,8 @@ from drake_disasm.effects import (
 from drake_disasm.effects.fields import amplitudes
 from drake_disasm.logs import Log, read_log
 from drake_disasm.logs.importing import (
+    ImportProcessing,
     Known,
-    Processing,
     guessed_map,
     import_recordings,
     read_source,
@@ -42,7 +42,7 @@ from sysid.identification.linearisation import Linearisation, linearise
 from sysid.identification.uncertainty import uncertainty
 from sysid.models.effects import effect_parameter
 from sysid.models.joint_motion import JointMotionModel
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 from sysid.objective import Objective
 from sysid.parameters import Parameter
 
@@ -131,7 +131,7 @@ def recording(
     random = np.random.default_rng(seed)
     time: Array = period * np.arange(float(round(_SECONDS / period)))
     q, v, vd = _fourier(random, time)
-    load = ArmDynamics(str(urdf), JOINTS).torques(q, v, vd)
+    load = ArmRegressor(str(urdf), JOINTS).torques(q, v, vd)
     samples = ArmSamples(JOINTS, q, v, vd, load)
     tau = load + sum(effect.torques(samples) for effect in EFFECTS)
     tau += _NOISE * random.standard_normal(tau.shape)
@@ -178,7 +178,7 @@ def imported(table: Path, urdf: Path, folder: Path, cutoff: float | None) -> Log
     """
     source = read_source(table)
     fields = guessed_map(source, "joint_motion", Known(JOINTS, urdf=str(urdf)))
-    found = import_recordings([source], fields, Processing(cutoff))
+    found = import_recordings([source], fields, ImportProcessing(cutoff))
     write_log(found, [source], fields, folder, {})
     return read_log(folder)
 

@@ -31,8 +31,8 @@ from subject import (
 from drake_disasm.common.archive import Arrays
 from drake_disasm.logs.importing import (
     FieldMap,
+    ImportProcessing,
     Known,
-    Processing,
     Source,
     guessed_map,
     import_recordings,
@@ -79,7 +79,7 @@ def _import(path: Path, kind: str = "joint_motion", known: Known | None = None) 
 
 
 def _write(source: Source, fields: FieldMap) -> None:
-    imported = import_recordings([source], fields, Processing())
+    imported = import_recordings([source], fields, ImportProcessing())
     summary(imported)
     folder = new_folder()
     try:

@@ -40,25 +40,25 @@ from sysid.optimise import BeesAlgorithm, BeesSettings, Box
 from sysid.optimise.bees import Stop
 from sysid.optimise.surrogate import propose
 from sysid.parameters import Parameter
-from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 from sysid.workers import Workers
 
 TRUTH = load_scenario("removal_turned")
 BOUNDS = (
-    Request("contact.friction", 0.0, 0.6),
-    Request("lock.clearance", 2e-4, 8e-4),
-    Request("GroovePose.ry", -0.08, 0.08),
-    Request("GroovePose.z", -5e-4, 5e-4),
-    Request("gripper.stiffness.2", 200.0, 2000.0),
+    ParameterRequest("contact.friction", 0.0, 0.6),
+    ParameterRequest("lock.clearance", 2e-4, 8e-4),
+    ParameterRequest("GroovePose.ry", -0.08, 0.08),
+    ParameterRequest("GroovePose.z", -5e-4, 5e-4),
+    ParameterRequest("gripper.stiffness.2", 200.0, 2000.0),
 )
 #: The thesis's contact in the twin, and the parameters of its table 4.2.
 IMPACT = load_scenario("removal_turned", ["contact.model=impact"])
 IMPACT_BOUNDS = tuple(
-    Request(f"contact.impact.{name}")
+    ParameterRequest(f"contact.impact.{name}")
     for name in ("stiffness", "exponent", "damping", "depth")
 )
-STIFFNESS = Request("contact.impact.stiffness", 10.0, 1e5, scale="log")
-EXPONENT = Request("contact.impact.exponent")
+STIFFNESS = ParameterRequest("contact.impact.stiffness", 10.0, 1e5, scale="log")
+EXPONENT = ParameterRequest("contact.impact.exponent")
 #: Off the truth by some ten times what a log fixes: the valley, not the bottom.
 START = np.array([0.23, 4.3e-4, 0.0365, 2e-5, 650.0])
 EXPLORATION = 1.5e-4  # m
@@ -99,7 +99,7 @@ class Case:
     truth: Scenario
     station: str
     model: Scenario
-    requests: tuple[Request, ...]
+    requests: tuple[ParameterRequest, ...]
     start: np.ndarray
 
     def fitted(self, log: Log, transitions: int, coarse: bool = True) -> TwinModel:
@@ -203,7 +203,8 @@ def measure_steps(args: argparse.Namespace) -> Table:
 def _step(log: Log, time_step: float) -> list[Cell]:
     overrides = [f"simulation.twin_time_step={time_step}"]
     scenario, parameters = scenario_parameters(
-        load_scenario("removal_turned", overrides), [Request("contact.friction")]
+        load_scenario("removal_turned", overrides),
+        [ParameterRequest("contact.friction")],
     )
     objective = Objective(TwinModel([log], scenario, parameters), Workers(), HUBER)
     theta = np.array([parameters[0].nominal])

@@ -25,7 +25,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import FlangePayload
 from drake_disasm.logs import Episode, Log, read_log
 from drake_disasm.logs.importing import (
-    Processing,
+    ImportProcessing,
     import_recordings,
     read_source,
     write_log,
@@ -68,7 +68,7 @@ def real_log(name: str, folder: Path) -> Log:
         }
     )
     source = read_source(data / f"{name}.csv")
-    imported = import_recordings([source], fields, Processing())
+    imported = import_recordings([source], fields, ImportProcessing())
     write_log(imported, [source], fields, folder / name, {})
     return read_log(folder / name)
 

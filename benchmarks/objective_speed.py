@@ -19,7 +19,7 @@ from sysid.identification.linearisation import linearise
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.parameters import nominal_values
-from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 from sysid.workers import Workers
 
 SIZES = (883, 1776)  # the thesis's, for which it gives about ten minutes
@@ -59,7 +59,7 @@ def evaluation_time(
     """
     scenario, parameters = scenario_parameters(
         load_scenario(_SCENARIO, [f"contact.model={contact}"]),
-        [Request(name) for name in PARAMETERS[contact]],
+        [ParameterRequest(name) for name in PARAMETERS[contact]],
     )
     model = TwinModel([read_log(log)], scenario, parameters).first(transitions)
     theta = nominal_values(parameters)

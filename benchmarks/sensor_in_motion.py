@@ -4,7 +4,7 @@
 
 Prints the force (fx, fy, fz) over the commanded rate, along x, y and z in turn: after
 the first step, which begins from rest, and when nothing changes any more [N s/m].
-`sysid/models/cell_arm.py` holds the differences.
+`sysid/models/cell_motion.py` holds the differences.
 """
 
 from collections.abc import Sequence

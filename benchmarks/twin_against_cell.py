@@ -69,7 +69,7 @@ def errors(
             simulation = TaskSimulation(scenario, station, policy)
             with ProgressBar("step") as progress:
                 record_transitions(log, simulation, steps, progress=progress)
-        model = TwinModel([read_log(log)], scenario, ()).begun(nominal_values(()))
+        model = TwinModel([read_log(log)], scenario, ()).with_begins(nominal_values(()))
     measured = model.measurements
     predicted = model.predict(nominal_values(()), slice(0, measured.rows))
     return predicted - measured.values, measured

@@ -147,8 +147,8 @@ def pseudo_residual(residual: Array, huber_delta: float) -> Array:
     size = np.abs(residual)
     if huber_delta == np.inf:
         return residual
-    bent = np.sqrt(np.maximum(2.0 * huber_delta * size - huber_delta**2, 0.0))
-    return np.where(size <= huber_delta, residual, np.sign(residual) * bent)
+    huberised = np.sqrt(np.maximum(2.0 * huber_delta * size - huber_delta**2, 0.0))
+    return np.where(size <= huber_delta, residual, np.sign(residual) * huberised)
 
 
 def huber_weights(residual: Array, huber_delta: float) -> Array:

@@ -20,7 +20,7 @@ _SCALES = ("linear", "log")
 
 
 @dataclasses.dataclass(frozen=True)
-class Request:
+class ParameterRequest:
     """What a user asks of one parameter; None leaves the scenario's own.
 
     Attributes:
@@ -38,7 +38,7 @@ class Request:
     scale: str | None = None
 
 
-def read_requests(words: Sequence[str]) -> list[Request]:
+def read_requests(words: Sequence[str]) -> list[ParameterRequest]:
     """Returns what a command line's names and files ask for.
 
     Args:
@@ -55,7 +55,7 @@ def read_requests(words: Sequence[str]) -> list[Request]:
         for request in (
             _read_file(Path(word))
             if word.endswith((".yaml", ".yml"))
-            else [Request(word)]
+            else [ParameterRequest(word)]
         )
     ]
     names = [request.name for request in requests]
@@ -71,7 +71,7 @@ def read_requests(words: Sequence[str]) -> list[Request]:
 
 
 def scenario_parameters(
-    scenario: Scenario, requests: Sequence[Request]
+    scenario: Scenario, requests: Sequence[ParameterRequest]
 ) -> tuple[Scenario, tuple[Parameter, ...]]:
     """Returns the requested parameters, and the scenario that has them all.
 
@@ -93,7 +93,7 @@ def scenario_parameters(
 
 
 def _parameter(
-    path: str, value: float, metadata: Mapping[str, Any], request: Request
+    path: str, value: float, metadata: Mapping[str, Any], request: ParameterRequest
 ) -> Parameter:
     low = metadata["low"] if request.low is None else request.low
     high = metadata["high"] if request.high is None else request.high
@@ -118,7 +118,7 @@ def _refuse_beyond(
         )
 
 
-def _read_file(path: Path) -> list[Request]:
+def _read_file(path: Path) -> list[ParameterRequest]:
     text = read_text(path, "name a YAML file", bounded_yaml.MOST_BYTES)
     try:
         raw = bounded_yaml.load(text)
@@ -132,7 +132,7 @@ def _read_file(path: Path) -> list[Request]:
     return [_request(clipped(str(name)), entry, path) for name, entry in raw.items()]
 
 
-def _request(name: str, entry: Any, path: Path) -> Request:
+def _request(name: str, entry: Any, path: Path) -> ParameterRequest:
     entry = entry or {}
     if not isinstance(entry, dict):
         raise DisasmError(
@@ -154,7 +154,7 @@ def _request(name: str, entry: Any, path: Path) -> Request:
                 "1e-3 as a text, 1.0e-3 as a number)"
             )
     numbers = {k: float(v) for k, v in entry.items() if k != "scale"}
-    return Request(name, **numbers, scale=entry.get("scale"))
+    return ParameterRequest(name, **numbers, scale=entry.get("scale"))
 
 
 def _is_number(value: Any) -> bool:

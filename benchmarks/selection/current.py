@@ -84,5 +84,7 @@ def _model(folders: tuple[str, ...]) -> LogModel:
 def _error(other: LogModel, fit: Any) -> float:
     """Returns the relative error of a fit on another recording."""
     model, _ = extended(other, fit.effects, with_shapes=True)
-    error = model.begun(fit.theta).predictions(fit.theta) - other.measurements.values
+    error = (
+        model.with_begins(fit.theta).predictions(fit.theta) - other.measurements.values
+    )
     return float(np.linalg.norm(error) / np.linalg.norm(other.measurements.values))

@@ -97,7 +97,7 @@ def _model(folders: Sequence[str]) -> Any:
 
 def _error(other: Any, fit: Any) -> float:
     """Returns the relative error of a fit on another recording."""
-    model, _ = extended(other, fit.effects, with_shapes=True)
+    model: Any = extended(other, fit.effects, with_shapes=True)[0]
     measured = other.measurements.values
     error = model.begun(fit.theta).predictions(fit.theta) - measured
     return float(np.linalg.norm(error) / np.linalg.norm(measured))

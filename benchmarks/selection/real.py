@@ -16,7 +16,7 @@ from drake_disasm.common.files import write_text
 from drake_disasm.logs import Log, LogHeader, LogWriter, read_log
 from drake_disasm.logs.importing import (
     FieldMap,
-    Processing,
+    ImportProcessing,
     import_recordings,
     read_map,
     read_source,
@@ -128,7 +128,7 @@ def _servo(names: tuple[str, ...]) -> Callable[[Path], tuple[Path, ...]]:
 
 def _imported(path: Path, fields: FieldMap, folder: Path, cutoff: float | None) -> Path:
     sources = [read_source(path)]
-    imported = import_recordings(sources, fields, Processing(cutoff))
+    imported = import_recordings(sources, fields, ImportProcessing(cutoff))
     write_log(imported, sources, fields, folder / "log", {"source": str(path)})
     return folder / "log"
 

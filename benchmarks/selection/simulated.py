@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.logs.importing.importer import processing_origin
-from drake_disasm.logs.importing.processing import Processing, process
+from drake_disasm.logs.importing.processing import ImportProcessing, process
 from drake_disasm.logs.importing.recording import Recording
 from selection.answer import Case
 from selection.hidden import Truth, hide, hide_at_all_joints
@@ -196,7 +196,7 @@ def _imported(
     """
     q = np.round(motion.q / _QUANTUM) * _QUANTUM
     recorded = Recording("run", motion.time, {"q": q, "tau": tau})
-    [part], done = process([recorded], Processing(cutoff))
+    [part], done = process([recorded], ImportProcessing(cutoff))
     columns = part.columns
     time = columns["time"] - columns["time"][0]
     origin = {"import": {"processing": processing_origin(done)}}

@@ -19,8 +19,8 @@ from drake_disasm.common.resources import models_dir
 from drake_disasm.common.text import clipped
 from drake_disasm.effects import files_of, find_effect
 from drake_disasm.scenario.effect_tags import tagged
+from drake_disasm.scenario.migrations import upgraded
 from drake_disasm.scenario.names import find_field, resolve
-from drake_disasm.scenario.older import upgraded
 from drake_disasm.scenario.schema import Scenario
 from drake_disasm.scenario.strict_yaml import parse
 from drake_disasm.scenario.validity import validate

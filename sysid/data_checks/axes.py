@@ -9,12 +9,11 @@ import numpy as np
 from drake_disasm.logs.schema import WRENCH
 from sysid.data_checks.expectation import Expectation
 from sysid.data_checks.finding import DataFinding, Severity
-from sysid.data_checks.frames import Frame, frames_of
 from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject
 from sysid.data_checks.units import scale_between, sign_findings
 from sysid.models.base import Array
-from sysid.models.joint_motion import JointMotionModel
+from sysid.models.bookkeeping import Frame
 from sysid.models.signed_order import SignedOrder
 from sysid.models.wrench_bookkeeping import signed_permutations, signed_text
 
@@ -69,7 +68,7 @@ def axes_findings(subject: Subject, expected: Expectation) -> list[DataFinding]:
     measured = subject.model.measurements.values[expected.rows]
     if len(measured) < settings.dead_channel_rows:
         return []
-    frames = frames_of(subject, expected.rows)
+    frames = subject.model.frames(expected.rows)
     is_wrench = not subject.is_of_joints
     changes = _wrench_changes(measured.shape[1] - len(WRENCH), frames)
     if not is_wrench:
@@ -97,8 +96,6 @@ def _exchanged_positions(subject: Subject, expected: Expectation) -> list[DataFi
     As other axes do, the exchange must lower the mean error to a fraction.
     """
     model, settings = subject.model, subject.settings
-    if not isinstance(model, JointMotionModel):
-        return []
     values = model.measurements.values[expected.rows]
     size = np.mean(np.abs(values - values.mean(axis=0)), axis=0) / expected.scale
     left = np.mean(np.abs(expected.residual(values)), axis=0)
@@ -187,11 +184,11 @@ def _wrench_changes(first: int, frames: Sequence[Frame]) -> Iterator[_Change]:
 def _joint_changes(subject: Subject, frame: Frame) -> Iterator[_Change]:
     """Yields another order or other signs of torques; of positions, single ones."""
     model = subject.model
-    if isinstance(model, JointMotionModel):
-        order = model.signed_order
-        if order.steps:
-            text = f"that {order.text(model.joints)}"
-            yield _Change(text, order.matrix, frame, float(order.steps))
+    known = model.signed_order
+    if known is not None:
+        if known.steps:
+            text = f"that {known.text(model.joints)}"
+            yield _Change(text, known.matrix, frame, float(known.steps))
         return
     names = [channel.name for channel in model.measurements.channels]
     for order in SignedOrder.as_written(len(names)).near():

@@ -9,7 +9,6 @@ from sysid.data_checks.finding import DataFinding, Severity, rows_of
 from sysid.data_checks.settings import DEFAULT_DATA_SETTINGS, DataSettings
 from sysid.data_checks.subject import Subject
 from sysid.models.base import Array, LogModel, PredictionError
-from sysid.models.twin import TwinModel
 from sysid.parameters import nominal_values
 
 _QUANTITIES = ("wrench", "ft_sensor", "tau")
@@ -29,8 +28,7 @@ def dead_channels(
     if model.measurements.rows < settings.dead_channel_rows:
         return []
     dead = _dead(model, settings)
-    if isinstance(model, TwinModel):
-        dead = dead or _dead_at_bolt(model, settings)
+    dead = dead or _dead_in_table(model, settings)
     if not dead:
         return []
     what = (
@@ -58,15 +56,18 @@ def _dead(model: LogModel, settings: DataSettings) -> list[str]:
     ]
 
 
-def _dead_at_bolt(model: TwinModel, settings: DataSettings) -> list[str]:
+def _dead_in_table(model: LogModel, settings: DataSettings) -> list[str]:
     """Returns the columns of the processed wrench that never change and should."""
     measured = model.measurements
-    still = np.ptp(model.at_bolt(measured.values), axis=0) < _ROUNDED * np.ptp(
+    table, *others = model.frames(np.arange(measured.rows))
+    if not others or model.affine:
+        return []
+    still = np.ptp(table.of(measured.values), axis=0) < _ROUNDED * np.ptp(
         measured.values[:, 6:9]
     )
     if not still[6:].any():
         return []
-    change = np.ptp(model.at_bolt(_nominal(model)), axis=0)
+    change = np.ptp(table.of(_nominal(model)), axis=0)
     noise = np.repeat([measured.noise[6:9].max(), measured.noise[9:].max()], 3)
     moves = change[6:] > settings.dead_channel_change * noise
     columns = zip(measured.channels[6:], change[6:], still[6:] & moves, strict=True)

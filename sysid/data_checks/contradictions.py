@@ -6,11 +6,9 @@ from numpy.typing import NDArray
 from sysid.data_checks.finding import DataFinding, rows_of
 from sysid.data_checks.settings import DEFAULT_DATA_SETTINGS, DataSettings
 from sysid.models.base import Array, LogModel
-from sysid.models.joint_torque_static import JointTorqueStaticModel
+from sysid.models.bookkeeping import Poses
 from sysid.models.measurements import Measurements
-from sysid.models.static_wrench import StaticWrenchModel
 
-AtRest = StaticWrenchModel | JointTorqueStaticModel
 _SLOW = 8  # cosines over a log: drift, warm-up and a step are made of these
 
 
@@ -31,16 +29,17 @@ def contradicting_rows(
     Returns:
         Findings; rows are numbered in the model's episodes.
     """
-    if not isinstance(model, AtRest) or model.clock is None:
+    poses, measured = model.poses, model.measurements
+    if poses is None:
         return []
-    moving = _moving_rows(model, model.clock, settings)
-    if isinstance(model, JointTorqueStaticModel):
-        return _moving(model.measurements, moving, settings)
-    if model.at_rest:
-        found = _moving(model.measurements, moving, settings)
+    moving = _moving_rows(poses, measured, settings)
+    if poses.R_WS is None:
+        return _moving(measured, moving, settings)
+    if poses.at_rest:
+        found = _moving(measured, moving, settings)
     else:
-        found = _inertial(model, moving, settings)
-    return found + _contact(model, model.clock, ~moving, settings)
+        found = _inertial(poses.R_WS, measured, moving, settings)
+    return found + _contact(poses, poses.R_WS, measured, ~moving, settings)
 
 
 def _moving(
@@ -70,7 +69,10 @@ def _moving_finding(
 
 
 def _inertial(
-    model: StaticWrenchModel, moving: NDArray[np.bool_], settings: DataSettings
+    R_WS: Array,
+    measured: Measurements,
+    moving: NDArray[np.bool_],
+    settings: DataSettings,
 ) -> list[DataFinding]:
     """Returns the finding of rows (n,) that turn, if their forces are off by more.
 
@@ -79,7 +81,7 @@ def _inertial(
     """
     if min(moving.sum(), (~moving).sum()) <= settings.contact_rows:
         return []
-    force, R_WS = model.measurements.values[:, :3], model.orientations
+    force = measured.values[:, :3]
     row = np.arange(len(force), dtype=float)
     left = _fast(force, np.swapaxes(R_WS, 1, 2), row)
     turning, resting = (
@@ -91,21 +93,21 @@ def _inertial(
         f"forces in free space are off by {turning:.2g} N (rms) while the sensor turns "
         f"and by {resting:.2g} N at rest: the load's inertia"
     )
-    return [_moving_finding(model.measurements, moving, what)]
+    return [_moving_finding(measured, moving, what)]
 
 
 def _moving_rows(
-    model: AtRest, clock: Array, settings: DataSettings
+    poses: Poses, measured: Measurements, settings: DataSettings
 ) -> NDArray[np.bool_]:
     """Returns which rows (n,) turn on both sides, as far as there are rows near.
 
     Those that do so once others are left out, too: what remains has none.
     """
-    resting = np.ones(len(clock), dtype=bool)
-    for number in np.unique(model.measurements.episode):
-        own = np.flatnonzero(model.measurements.episode == number)
+    resting = np.ones(len(poses.clock), dtype=bool)
+    for number in np.unique(measured.episode):
+        own = np.flatnonzero(measured.episode == number)
         while len(own):
-            moving = _turning(model, clock, own, settings)
+            moving = _turning(poses, own, settings)
             resting[own[moving]] = False
             if not moving.any():
                 break
@@ -114,7 +116,7 @@ def _moving_rows(
 
 
 def _turning(
-    model: AtRest, clock: Array, rows: NDArray[np.int64], settings: DataSettings
+    poses: Poses, rows: NDArray[np.int64], settings: DataSettings
 ) -> NDArray[np.bool_]:
     """Returns which of some rows (n,) of an episode turn on both sides.
 
@@ -122,24 +124,23 @@ def _turning(
     """
     near, resting = np.zeros((2, len(rows)), dtype=bool)
     for side in (-1, 1):
-        some, still = _still(model, clock, rows[::side], settings)
+        some, still = _still(poses, rows[::side], settings)
         near |= some[::side]
         resting |= (some & still)[::side]
     return near & ~resting
 
 
 def _still(
-    model: AtRest, clock: Array, rows: NDArray[np.int64], settings: DataSettings
+    poses: Poses, rows: NDArray[np.int64], settings: DataSettings
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Returns which rows (n,) have rows before them in the window, and rest in it.
 
     Args:
-        model: of readings at rest.
-        clock: (m,) of all its rows [s].
+        poses: of readings at rest.
         rows: (n,) of an episode, one way or the other.
         settings: thresholds.
     """
-    n, time = len(rows), clock[rows]
+    n, time = len(rows), poses.clock[rows]
     some, still = np.zeros(n, dtype=bool), np.ones(n, dtype=bool)
     for back in range(1, n):
         since = np.abs(time[back:] - time[:-back])
@@ -148,13 +149,14 @@ def _still(
             break
         limit = settings.rest_angle + settings.rest_rate * since
         some[back:] |= near
-        still[back:] &= ~near | (model.turned(rows[back:], rows[:-back]) <= limit)
+        still[back:] &= ~near | (poses.turned(rows[back:], rows[:-back]) <= limit)
     return some, still
 
 
 def _contact(
-    model: StaticWrenchModel,
-    clock: Array,
+    poses: Poses,
+    R_WS: Array,
+    measured: Measurements,
     resting: NDArray[np.bool_],
     settings: DataSettings,
 ) -> list[DataFinding]:
@@ -165,16 +167,15 @@ def _contact(
     if they differ by more than row-to-row noise, and by much of what all orientations
     make.
     """
-    squares = [
-        _changes(
-            model, clock, resting & (model.measurements.episode == number), settings
-        )
-        for number in np.unique(model.measurements.episode)
-    ]
+    squares = []
+    for number in np.unique(measured.episode):
+        own = resting & (measured.episode == number)
+        force, R_SW = measured.values[own, :3], np.swapaxes(R_WS[own], 1, 2)
+        squares.append(_changes(force, R_SW, poses.clock[own], settings))
     changes = np.concatenate(squares)
     if not len(changes):
         return []
-    force = model.measurements.values[resting, :3]
+    force = measured.values[resting, :3]
     varied = float(np.mean((force - force.mean(axis=0)) ** 2))
     changed, noise = float(np.mean(changes)), _step_noise(force)
     is_large = changed > settings.contact_share * varied
@@ -183,34 +184,34 @@ def _contact(
     what = (
         f"forces change by {np.sqrt(changed):.2g} N (rms) at one orientation, and by "
         f"{noise:.2g} N from one row to the next: these are no readings of a load "
-        f"{'at rest' if model.at_rest else 'in free space'}"
+        f"{'at rest' if poses.at_rest else 'in free space'}"
     )
     remedy = (
         "record the raw reading of the sensor in free space, at rest in six or more "
         "orientations"
     )
-    if model.at_rest:
+    if poses.at_rest:
         remedy += "; if it is of a task with contact, import it as `kind` contact"
     return [DataFinding("contact", what, remedy)]
 
 
-def _changes(
-    model: StaticWrenchModel,
-    clock: Array,
-    rows: NDArray[np.bool_],
-    settings: DataSettings,
-) -> Array:
+def _changes(force: Array, R_SW: Array, clock: Array, settings: DataSettings) -> Array:
     """Returns half the squared changes (pairs, 3) of forces at one orientation [N^2].
 
     None, if too few rows have another one with their orientation.
+
+    Args:
+        force: (n, 3) of an episode's rows at rest [N].
+        R_SW: (n, 3, 3).
+        clock: (n,) [s].
+        settings: thresholds.
     """
-    if rows.sum() <= settings.contact_rows:
+    if len(force) <= settings.contact_rows:
         return np.zeros((0, 3))
-    R_SW = np.swapaxes(model.orientations[rows], 1, 2)
     first, second = _pairs(R_SW[:, :, 2], settings)
     if len(np.union1d(first, second)) <= settings.contact_rows:
         return np.zeros((0, 3))
-    left = _fast(model.measurements.values[rows, :3], R_SW, clock[rows])
+    left = _fast(force, R_SW, clock)
     return 0.5 * np.asarray(left[first] - left[second]) ** 2
 
 

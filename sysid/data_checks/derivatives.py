@@ -10,7 +10,6 @@ from sysid.data_checks.finding import DataFinding, Severity, rows_of
 from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject
 from sysid.models.arm_plant import ArmPlant
-from sysid.models.joint_motion import JointMotionModel
 from sysid.models.one_joint import is_one_joint
 
 _PAIRS = (
@@ -81,9 +80,7 @@ def stillness_findings(subject: Subject) -> list[DataFinding]:
 def limit_findings(subject: Subject) -> list[DataFinding]:
     """Finds speeds and accelerations beyond the limits that the URDF states."""
     model = subject.model
-    if subject.kind != "joint_motion" or not isinstance(model, JointMotionModel):
-        return []
-    if is_one_joint(model.urdf):
+    if subject.kind != "joint_motion" or not model.urdf or is_one_joint(model.urdf):
         return []
     plant = ArmPlant.of(model.urdf, model.joints).plant
     found = []

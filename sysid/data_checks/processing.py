@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.cell.tool import Tool
-from drake_disasm.devices.sensor_chain import Payload
 from drake_disasm.logs import Episode
 from drake_disasm.logs.schema import WRENCH
 from drake_disasm.logs.transitions import observations
@@ -14,8 +13,8 @@ from sysid.data_checks.finding import DataFinding, Severity, rows_of
 from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject
 from sysid.models.base import Array
-from sysid.models.sensor_reading import SensorReading
-from sysid.models.twin import TwinModel
+from sysid.models.sensor_reading import SensorReading, at_sensor
+from sysid.parameters import nominal_values
 
 _RAW = "it is the raw reading, neither turned into G nor shifted to Bo"
 _SAME = 1e-6  # of the range: numbers that were copied
@@ -30,9 +29,12 @@ def processing_findings(subject: Subject) -> list[DataFinding]:
     cell's: that which agrees better is taken.
     """
     model = subject.model
-    if not isinstance(model, TwinModel):
+    scenario = model.scenario_at(nominal_values(model.parameters))
+    if subject.kind != "transitions" or scenario is None:
         return []
-    errors = [_errors(subject, carried) for carried in _carried(model)]
+    tool = Tool.from_models(scenario)
+    stations = [SensorReading(scenario, tool, name) for name in ("twin", "cell")]
+    errors = [_errors(subject, reading) for reading in stations]
     error = min(errors, key=lambda parts: float(np.median(np.concatenate(parts))))
     names = [name for name, _ in subject.named()]
     masks = {name: part > 1.0 for name, part in zip(names, error, strict=True)}
@@ -49,18 +51,10 @@ def processing_findings(subject: Subject) -> list[DataFinding]:
     return [DataFinding("processing", what, remedy, severity, rows_of(masks))]
 
 
-def _carried(model: TwinModel) -> list[Payload]:
-    """Returns what may hang on the sensor: of the twin, and of the cell."""
-    scenario = model.scenario
-    tool = Tool.from_models(scenario)
-    stations = ("twin", "cell")
-    return [SensorReading(scenario, tool, station).payload for station in stations]
-
-
-def _errors(subject: Subject, carried: Payload) -> list[Array]:
+def _errors(subject: Subject, reading: SensorReading) -> list[Array]:
     """Returns each episode's contradiction (rows,), in units of what is tolerated."""
     settings, noise = subject.settings, subject.model.measurements.noise[6:]
-    zeros = [_zero(subject, episode, carried) for episode in subject.episodes]
+    zeros = [_zero(episode, reading) for episode in subject.episodes]
     raw = [episode["ft_sensor"] for episode in subject.episodes]
     tolerated = _tolerated(raw, noise, settings)
     return [
@@ -78,12 +72,10 @@ def _tolerated(raw: Sequence[Array], noise: Array, settings: DataSettings) -> Ar
     )
 
 
-def _zero(subject: Subject, episode: Episode, carried: Payload) -> Array:
+def _zero(episode: Episode, reading: SensorReading) -> Array:
     """Returns the zero (rows, 6) of the sensor that each row implies."""
-    model = subject.model
-    assert isinstance(model, TwinModel)
-    states = model.at_sensor(observations(episode))
-    weight = carried.weight(model.reading.orientations(states))
+    states = at_sensor(observations(episode), reading.X_SB)
+    weight = reading.payload.weight(reading.orientations(states))
     return np.asarray(episode["ft_sensor"] - states[:, 6:] - weight)
 
 

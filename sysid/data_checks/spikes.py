@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from sysid.data_checks.expectation import Expectation
 from sysid.data_checks.finding import DataFinding
-from sysid.data_checks.frames import frames_of
 from sysid.data_checks.subject import Subject
 from sysid.data_checks.tails import tail_limit
 from sysid.models.base import Array
@@ -63,7 +62,7 @@ def _columns(subject: Subject, expected: Expectation) -> tuple[Array, Array]:
     """Returns what was measured (rows, channels) in the table's frame, and errors."""
     measured = subject.model.measurements
     explained = measured.values - expected.all_residuals() * expected.scale
-    table = frames_of(subject, np.arange(measured.rows))[0]
+    table = subject.model.frames(np.arange(measured.rows))[0]
     values = table.of(measured.values)
     return values, values - table.of(explained)
 

@@ -8,12 +8,11 @@ import numpy as np
 from drake_disasm.logs import Episode, rotation_matrices, sensor_wrench
 from sysid.data_checks.expectation import Expectation, FittedExpectation
 from sysid.data_checks.finding import DataFinding, Severity
-from sysid.data_checks.frames import frames_of
 from sysid.data_checks.settings import DataSettings
 from sysid.data_checks.subject import Subject
 from sysid.models.base import Array
 from sysid.models.rate_factors import median_reach, rate_factors
-from sysid.models.twin import TwinModel
+from sysid.parameters import nominal_values
 
 #: Quantities of a log of joint motion, each with the one that is its derivative.
 RATES = (("q", "v"), ("v", "vd"))
@@ -43,7 +42,7 @@ def predicted_unit_findings(
     settings, measured = subject.settings, subject.model.measurements
     values = measured.values[expected.rows]
     is_arm = subject.kind in ("joint_motion", "joint_torque_static")
-    table = frames_of(subject, expected.rows)[0]
+    table = subject.model.frames(expected.rows)[0]
     nominal, values = table.of(expected.nominal), table.of(values)
     noise = np.where(np.isnan(measured.noise), np.inf, measured.noise)
     found = []
@@ -126,8 +125,9 @@ def _transitions(subject: Subject) -> list[DataFinding]:
         # The twin replays commanded poses, no actions.
         found += wrong if name == "X_GB_measured" else _as_warnings(wrong)
     reach = float(np.abs(np.concatenate(commanded)).max())
-    if isinstance(model, TwinModel):
-        travel = model.scenario.lock.travel
+    scenario = model.scenario_at(nominal_values(model.parameters))
+    if scenario is not None:
+        travel = scenario.lock.travel
         if reach > settings.pose_reach * travel:
             what = f"X_GB_commanded reaches {reach:.3g} m, the bolt travels {travel} m"
             found.append(_finding(what))

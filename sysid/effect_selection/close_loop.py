@@ -219,7 +219,7 @@ def close_loop(
     misfits = [f"{each.what} ({each.remedy})" for each in contradicting_rows(base)]
     verdict = judge(found, errors, scatter, misfits, written)
     if learn_residual and not is_late:
-        learned = fit_residual_model(found.last, verdict.left_over, held_out)
+        learned = fit_residual_model(found.last, verdict.predictable_residual, held_out)
         verdict = dataclasses.replace(verdict, residual_model=learned)
     return ClosedLoop(verdict, errors, found, scatter)
 

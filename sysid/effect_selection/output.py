@@ -79,7 +79,7 @@ def _verdict(found: Verdict) -> dict[str, Any]:
         "invalid": found.invalid,
         "misfits": list(found.misfits),
         "written": [dataclasses.asdict(each) for each in found.written],
-        "left_over": [dataclasses.asdict(each) for each in found.left_over],
+        "left_over": [dataclasses.asdict(each) for each in found.predictable_residual],
         "residual_model": _residual_model(found.residual_model),
     }
 

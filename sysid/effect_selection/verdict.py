@@ -26,7 +26,10 @@ from sysid.parameters import Scaling
 from sysid.residuals.channel_checks import ChannelFinding, channel_findings
 from sysid.residuals.command_scatter import CommandScatter
 from sysid.residuals.held_out import HeldOut
-from sysid.residuals.left_over import LeftOver, left_over
+from sysid.residuals.predictable_residual import (
+    PredictableResidual,
+    predictable_residual,
+)
 from sysid.residuals.residual_model import ResidualModel
 from sysid.residuals.whiteness import correlated_channels
 
@@ -111,7 +114,7 @@ class Verdict:
             NaN if that means nothing.
         findings: what is left in single channels.
         limits: how large effects that are not named would have to be to be found.
-        left_over: what a flexible learner explains of what the effects leave.
+        predictable_residual: what a flexible learner explains of what effects leave.
         residual_model: learned in their place; not physical. None if it gains little.
         single_strokes: joints of ambiguous effects that make a single stroke.
         misfits: rows that contradict the kind of log, in words.
@@ -132,7 +135,7 @@ class Verdict:
     relative_error: float = float("nan")
     findings: tuple[ChannelFinding, ...] = ()
     limits: tuple[DetectionLimit, ...] = field(default=(), repr=False)
-    left_over: tuple[LeftOver, ...] = ()
+    predictable_residual: tuple[PredictableResidual, ...] = ()
     residual_model: ResidualModel | None = None
     single_strokes: tuple[str, ...] = ()
     misfits: tuple[str, ...] = ()
@@ -193,7 +196,7 @@ def judge(
     """
     last = found.last
     white = scatter.left_of(last) if scatter else last
-    left = left_over(white) if found.is_complete else []
+    left = predictable_residual(white) if found.is_complete else []
     placed = _ordered(found.standings) + _of_scatter(scatter)
     names = last.model.measurements.names
     verdict = Verdict(
@@ -233,7 +236,7 @@ def _ending(found: Verdict, last: Fit) -> Ending:
         found.contradictions
         or found.excess
         or found.findings
-        or found.left_over
+        or found.predictable_residual
         or found.misfits
         or found.invalid
         or found.suggested

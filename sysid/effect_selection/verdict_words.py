@@ -323,7 +323,7 @@ def _left(verdict: Verdict) -> list[str]:
     else:
         names = _once([each.channel for each in verdict.findings])
         clauses.append(f"something in {enumeration(names)}")
-    if learned := verdict.left_over:
+    if learned := verdict.predictable_residual:
         share = "up to " * (len(learned) > 1)
         share += _rounded(100.0 * max(each.share for each in learned), 2)
         channels = enumeration([each.channel for each in learned])

@@ -129,7 +129,7 @@ def _stated(
     return tuple(found.values())
 
 
-class Workspace:
+class CollisionFreeSpace:
     """Clearance of an arm's links from each other, and their height over a floor.
 
     By the collision geometry of its URDF, whatever pairs that filters; links that a

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
-from sysid.experiment_design.arm_limits import JointLimits, Workspace
+from sysid.experiment_design.arm_limits import CollisionFreeSpace, JointLimits
 from sysid.experiment_design.fourier import FourierMotion
 from sysid.experiment_design.information import (
     ArmExperiment,
@@ -95,7 +95,7 @@ class Design:
 def design_motion(
     experiment: ArmExperiment,
     limits: JointLimits,
-    workspace: Workspace,
+    workspace: CollisionFreeSpace,
     settings: DesignSettings,
     progress: Progress = ignore_progress,
 ) -> Design:
@@ -164,7 +164,7 @@ class _Search:
         self,
         experiment: ArmExperiment,
         limits: JointLimits,
-        workspace: Workspace,
+        workspace: CollisionFreeSpace,
         settings: DesignSettings,
     ) -> None:
         self._experiment, self._limits = experiment, limits

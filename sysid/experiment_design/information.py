@@ -18,7 +18,7 @@ from drake_disasm.effects import (
 from sysid.confidence import Z
 from sysid.models.arm_motion import IN_TORQUES, ArmMotion
 from sysid.models.effects import at_null
-from sysid.models.regressor import ArmDynamics, base_set
+from sysid.models.regressor import ArmRegressor, base_set
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class ArmExperiment:
         duration: float,
     ) -> None:
         self.joints = tuple(joints)
-        self._arm = ArmDynamics(urdf, joints)
+        self._arm = ArmRegressor(urdf, joints)
         self._base = base_set(self._arm.random_regressor())
         self._noise = noise
         self._amplitudes = _amplitudes(kinds, self.joints, duration)

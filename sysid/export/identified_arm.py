@@ -29,7 +29,7 @@ from sysid.fitting.fit import Fit
 from sysid.identification.uncertainty import block_length
 from sysid.models.base import LogModel
 from sysid.models.joint_motion import JointMotionModel
-from sysid.models.regressor import INERTIAL, ArmDynamics, BaseSet
+from sysid.models.regressor import INERTIAL, ArmRegressor, BaseSet
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ class IdentifiedArm:
     urdf: str
     gravity: tuple[float, float, float]
     joints: dict[str, JointNumbers]
-    arm: ArmDynamics
+    arm: ArmRegressor
     base: BaseSet
     bodies: ConsistentInertia
     payload: Link | None
@@ -172,7 +172,7 @@ def exportable(model: LogModel) -> JointMotionModel:
 
 
 def _bodies(
-    arm: ArmDynamics,
+    arm: ArmRegressor,
     base: BaseSet,
     beta: Array,
     covariance: Array,

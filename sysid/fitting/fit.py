@@ -18,6 +18,7 @@ from sysid.fitting.candidates import Candidate
 from sysid.fitting.settings import SelectionSettings
 from sysid.identification.linearisation import Linearisation
 from sysid.models.base import LogModel
+from sysid.models.simulated_model import simulation_of
 from sysid.objective import pseudo_residual
 from sysid.parameters import Scaling, nominal_values
 
@@ -110,11 +111,11 @@ class Fit:
         """Residuals (rows, channels) in units of all that is known to be uncertain.
 
         Of the stated error, and of what predictions depend on that no reading shows,
-        see `LogModel.begin_error`. A fit does not weigh by the latter: whatever makes
-        predictions uncertain would then fit well.
+        see `SimulatedModel.begin_error`. A fit does not weigh by the latter: whatever
+        makes predictions uncertain would then fit well.
         """
-        residual = self.linearisation.residual
-        error = self.model.begin_error(self.theta)
+        residual, simulation = self.linearisation.residual, simulation_of(self.model)
+        error = simulation.begin_error(self.theta) if simulation else None
         return residual if error is None else residual / np.hypot(1.0, error)
 
     @property
@@ -244,7 +245,8 @@ class Fit:
         One Gauss-Newton step towards the optimum of the same model in finer time
         steps. No interval of rows sees such an error.
         """
-        linear, finer = self.linearisation, self.model.refined()
+        linear, simulation = self.linearisation, simulation_of(self.model)
+        finer = simulation.refined() if simulation else None
         if finer is None or not len(linear.u):
             return np.zeros_like(linear.u)
         fine = self.model.measurements.weighted(finer.predictions(self.theta))

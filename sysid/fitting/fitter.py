@@ -99,17 +99,17 @@ class Fitter:
         model, _ = extended(self.base, effects, with_shapes=True)
         begin = (start.values if start else {}) | dict(values or {})
         theta = np.array([begin.get(p.name, p.nominal) for p in model.parameters])
-        model = model.begun(theta)
+        model = model.with_begins(theta)
         known = None
         if start and derivatives is not None:
             u = Scaling(model.parameters).to_unit(theta)
             known = _extended_linearisation(start, model, u, derivatives)
         found = self._fit_of(effects, model, theta, known)
-        if found.model.begun(found.theta) is found.model:
+        if found.model.with_begins(found.theta) is found.model:
             return found
         theta = self._settled(effects, theta)
-        found = self._fit_of(effects, model.varying(), theta, is_minimum=True)
-        return dataclasses.replace(found, model=model.begun(theta))
+        found = self._fit_of(effects, model.with_begins(None), theta, is_minimum=True)
+        return dataclasses.replace(found, model=model.with_begins(theta))
 
     def _settled(self, effects: tuple[Candidate, ...], theta: Array) -> Array:
         """Returns parameters (p,) that fit where the model begins with them.
@@ -143,11 +143,11 @@ class Fitter:
         Each fit takes for known where the model begins with the last; the way there is
         halved if it does not fit better from where it begins itself.
         """
-        value = self._value_begun_at(model, theta)
+        value = self._value_with_begins(model, theta)
         for _ in range(self.settings.fits_begun_again):
-            found = self._fit_of(effects, model.begun(theta), theta).theta
+            found = self._fit_of(effects, model.with_begins(theta), theta).theta
             for tried in (found, 0.5 * (theta + found)):
-                reached = self._value_begun_at(model, tried)
+                reached = self._value_with_begins(model, tried)
                 if reached < value:
                     break
             else:
@@ -157,9 +157,9 @@ class Fitter:
                 break
         return theta
 
-    def _value_begun_at(self, model: LogModel, theta: Array) -> float:
+    def _value_with_begins(self, model: LogModel, theta: Array) -> float:
         """Returns the objective at parameters (p,) of a model that begins with them."""
-        return float(self.objective(model.begun(theta))(theta[None])[0])
+        return float(self.objective(model.with_begins(theta))(theta[None])[0])
 
     def _fit_of(
         self,

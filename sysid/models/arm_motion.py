@@ -24,7 +24,7 @@ from drake_disasm.logs import Episode
 from sysid.models.base import Array
 from sysid.models.link_torques import LinkTorques
 from sysid.models.path_memory import PathMemory
-from sysid.models.regressor import ArmDynamics, BaseSet
+from sysid.models.regressor import ArmRegressor, BaseSet
 
 #: Effects that show in the torques of a motion: what `ArmMotion` knows.
 IN_TORQUES = (
@@ -96,7 +96,7 @@ class ArmMotion:
     @classmethod
     def of(
         cls,
-        arm: ArmDynamics,
+        arm: ArmRegressor,
         base: BaseSet,
         joints: Sequence[str],
         episodes: Sequence[Episode | Mapping[str, Array]],

@@ -4,7 +4,6 @@ import abc
 import copy
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Effect
 from drake_disasm.scenario import Scenario
-from sysid.models.bookkeeping import Bookkeeping
+from sysid.models.bookkeeping import Assumption, Bookkeeping, Frame, Poses
 from sysid.models.effects import (
     at_null,
     field_of,
@@ -22,6 +21,7 @@ from sysid.models.effects import (
     within_travel,
 )
 from sysid.models.measurements import Measurements
+from sysid.models.signed_order import SignedOrder
 from sysid.models.validity import Validity
 from sysid.parameters import Parameter, by_name, by_path
 
@@ -34,19 +34,6 @@ HUBER_DELTA = 3.0
 
 class PredictionError(Exception):
     """A model can't be evaluated at these parameters: the simulation failed."""
-
-
-@dataclass(frozen=True)
-class Assumption:
-    """What a model takes for granted: the logs don't say it, or say otherwise.
-
-    Attributes:
-        what: in words, with the reason.
-        remedy: what to do.
-    """
-
-    what: str
-    remedy: str
 
 
 class LogModel(abc.ABC):
@@ -89,8 +76,6 @@ class LogModel(abc.ABC):
         makes_contact: whether predictions may change at once, where contact is made or
             lost: derivatives far from the data then promise nothing, and effects are
             compared by fits.
-        has_commands: whether rows are commanded steps of an arm, which `displaced`
-            can move: the arm may then scatter about its commands.
         setting: in which its logs are recorded, and others should be: "task" for steps
             of the task, "rest" for an arm at rest; "" for any.
         shown_elsewhere: classes of effects that other kinds of logs show: one of its
@@ -106,7 +91,6 @@ class LogModel(abc.ABC):
     effect_types: ClassVar[tuple[type[Effect], ...]] = ()
     held_out_share: ClassVar[float] = 0.0
     makes_contact: ClassVar[bool] = True
-    has_commands: ClassVar[bool] = False
     setting: ClassVar[str] = ""
     shown_elsewhere: ClassVar[tuple[type[Effect], ...]] = ()
     is_of_changes: ClassVar[bool] = False
@@ -299,10 +283,6 @@ class LogModel(abc.ABC):
         """
         return self
 
-    def refined(self) -> Self | None:
-        """Returns the same model in finer time steps; None if it takes none coarser."""
-        return None
-
     def chunks(self) -> list[slice]:
         """Returns the rows of each piece of work that an evaluation consists of."""
         return [slice(0, self.measurements.rows)]
@@ -366,47 +346,21 @@ class LogModel(abc.ABC):
         parts = [self.simulate(theta, rows) for rows in self.chunks()]
         return self.read(theta, slice(0, self.measurements.rows), np.concatenate(parts))
 
-    def begun(self, theta: Array) -> Self:
-        """Returns the same model with its inputs as they are at parameters (p,).
+    def with_begins(self, theta: Array | None) -> Self:
+        """Returns the same model with steps that begin as they do at parameters (p,).
 
-        Inputs that are measured through what the parameters describe: predictions then
-        take the rest of them as given. Itself, if that makes no noticeable difference.
-        """
-        return self
+        How a step begins is measured through what the parameters describe: predictions
+        then take it as given. Itself, if that makes no noticeable difference.
 
-    def varying(self) -> Self:
-        """Returns the same model with inputs as they are at whatever parameters.
-
-        Its derivatives are those of `begun` along the parameters.
+        Args:
+            theta: None: as they do at whatever parameters a prediction is asked for.
+                Derivatives are then those along the parameters.
         """
         return self
 
     def validity(self, theta: Array) -> Validity | None:
         """Returns whether the stated error holds at parameters (p,); None: unknown."""
         return None
-
-    def begin_error(self, theta: Array) -> Array | None:
-        """Returns by how much predictions are off for what no reading shows.
-
-        (rows, channels) standard deviations in units of the stated error, beyond which
-        they come, at parameters (p,); None if that is nothing, or unknown.
-        """
-        return None
-
-    def displaced(self, displacement: Array, push: Array) -> Self:
-        """Returns the same model with each step displaced from its command.
-
-        Args:
-            displacement: (rows, 3) of the step's end, where the next one begins, in G
-                [m].
-            push: (rows, 3) of the end further, of which the next knows nothing [m].
-
-        Raises:
-            DisasmError: the model's rows are no commanded steps.
-        """
-        raise DisasmError(
-            f"{type(self).__name__}: has no commands to displace; ask has_commands"
-        )
 
     # How a fit weighs and describes.
 
@@ -444,6 +398,44 @@ class LogModel(abc.ABC):
             theta: (p,) values of `parameters`.
         """
         return {}
+
+    # What checks of the data ask.
+
+    @property
+    def urdf(self) -> str | None:
+        """Where the arm's URDF is; None if there is none."""
+        return None
+
+    @property
+    def poses(self) -> Poses | None:
+        """In which rows were read that should be at rest; None: they need not be."""
+        return None
+
+    def frames(self, rows: NDArray[np.int64]) -> list[Frame]:
+        """Returns the frame of the log's table, then the model's own, if another.
+
+        Args:
+            rows: (n,) numbers of those that the frames are for.
+        """
+        return [Frame()]
+
+    @property
+    def signed_order(self) -> SignedOrder | None:
+        """In which order, and with which signs, channels are explained by far best.
+
+        As written, unless another one leaves less than half. None: it is not known.
+        """
+        return None
+
+    def exchanged_motions(self, most: float) -> tuple[tuple[int, int], float] | None:
+        """Returns the two joints whose motions are exchanged, and what is left.
+
+        None if there are none.
+
+        Args:
+            most: share of the error that is left may be, for a change to be one.
+        """
+        return None
 
     def bookkeeping(self) -> list[Bookkeeping[Self]]:
         """Returns how the log may have been written otherwise than it says.

@@ -1,9 +1,60 @@
 """How a log was written, where that would explain it: signs, orders, frames, clocks."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 Model = TypeVar("Model", covariant=True)
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """What a model takes for granted: the logs don't say it, or say otherwise.
+
+    Attributes:
+        what: in words, with the reason.
+        remedy: what to do.
+    """
+
+    what: str
+    remedy: str
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame in which channels may have been written, and where torques are about.
+
+    Attributes:
+        name: in words; empty where there is no other.
+        of: takes the model's channels (n, channels) to it.
+        back: from it.
+    """
+
+    name: str = ""
+    of: Callable[[Array], Array] = np.asarray
+    back: Callable[[Array], Array] = np.asarray
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Poses in which rows were read, which tell whether they were read at rest.
+
+    Attributes:
+        clock: (rows,) since each log began [s].
+        turned: by how much two rows differ (n,), of their numbers (n,) [rad or m].
+        R_WS: (rows, 3, 3) of a sensor; None for the joints of an arm.
+        at_rest: whether the log says that nothing moves in any row.
+    """
+
+    clock: Array
+    turned: Callable[[Rows, Rows], Array]
+    R_WS: Array | None = None
+    at_rest: bool = True
 
 
 @dataclass(frozen=True)

@@ -161,22 +161,18 @@ class ChangedModel(LogModel):
             newer=self.newer.of_rows(mask[count:]),
         )
 
-    def begun(self, theta: Array) -> Self:
+    def with_begins(self, theta: Array | None) -> Self:
         """See LogModel."""
-        full = self.with_frozen(theta)
-        known = self.known.begun(full[: self._own_count])
-        newer = self.newer.begun(full)
-        if known is self.known and newer is self.newer:
-            return self
-        return self.replace(known=known, newer=newer)
-
-    def varying(self) -> Self:
-        """See LogModel."""
-        return self.replace(known=self.known.varying(), newer=self.newer.varying())
+        full = None if theta is None else self.with_frozen(theta)
+        own = None if full is None else full[: self._own_count]
+        return self._of(self.known.with_begins(own), self.newer.with_begins(full))
 
     def surrogate(self) -> Self:
         """See LogModel."""
-        known, newer = self.known.surrogate(), self.newer.surrogate()
+        return self._of(self.known.surrogate(), self.newer.surrogate())
+
+    def _of(self, known: LogModel, newer: LogModel) -> Self:
+        """Returns the same of other models; itself, if they are its own."""
         if known is self.known and newer is self.newer:
             return self
         return self.replace(known=known, newer=newer)

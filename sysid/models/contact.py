@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.logs import Log, rotation_matrices, sensor_wrench
 from drake_disasm.scenario import Scenario
-from sysid.models.base import Array, Assumption
+from sysid.models.base import Array
+from sysid.models.bookkeeping import Assumption
 from sysid.models.free_space import FreeSpace, free_space
 from sysid.models.measurements import episode_names, rows_of_logs
 from sysid.models.static_wrench import StaticWrenchModel

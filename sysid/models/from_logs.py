@@ -16,7 +16,7 @@ from sysid.models.joint_torque_static import JointTorqueStaticModel
 from sysid.models.response.model import JointResponseModel
 from sysid.models.static_wrench import DEFAULT_PARAMETERS, StaticWrenchModel
 from sysid.models.twin import TwinModel
-from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 
 #: What is compared, by the kind of log; the first is the default.
 OBJECTIVES = {
@@ -46,7 +46,7 @@ class ModelChoice:
 
     objective: str | None = None
     scenario: Scenario | None = None
-    requests: tuple[Request, ...] = ()
+    requests: tuple[ParameterRequest, ...] = ()
     urdf: str | None = None
     coarse: bool = True
     noise: tuple[tuple[str, float], ...] = ()
@@ -75,14 +75,12 @@ def model_of(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
         "joint_torque_static": _joint_torques,
         "joint_response": _joint_response,
     }
+    if choice.trust_urdf and make.get(kind) is not _joint_torques:
+        raise DisasmError(
+            f"{logs[0].folder}: a log of kind '{kind}' has no rigid bodies to "
+            "identify; `trust_urdf` is for joint_motion and joint_torque_static"
+        )
     model = make.get(kind, _twin)(logs, choice)
-    if choice.trust_urdf:
-        if not isinstance(model, JointMotionModel):
-            raise DisasmError(
-                f"{logs[0].folder}: a log of kind '{kind}' has no rigid bodies to "
-                "identify; `trust_urdf` is for joint_motion and joint_torque_static"
-            )
-        model = model.trusting_urdf()
     return _with_noise(model, dict(choice.noise))
 
 
@@ -120,7 +118,7 @@ def _contact(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
 def _readings(
     kind: type[StaticWrenchModel], logs: Sequence[Log], choice: ModelChoice
 ) -> LogModel:
-    requests = choice.requests or tuple(Request(n) for n in DEFAULT_PARAMETERS)
+    requests = choice.requests or tuple(ParameterRequest(n) for n in DEFAULT_PARAMETERS)
     known = choice.scenario or stated_scenario(logs)
     scenario, parameters = scenario_parameters(known or Scenario(), requests)
     return kind(logs, scenario, parameters, known is not None)
@@ -132,7 +130,8 @@ def _joint_torques(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
     make = JointTorqueStaticModel if is_rest else JointMotionModel
     model = make(logs, choice.urdf, known)
     names = [request.name for request in choice.requests]
-    return model.only(names) if names else model
+    model = model.only(names) if names else model
+    return model.trusting_urdf() if choice.trust_urdf else model
 
 
 def _joint_response(logs: Sequence[Log], choice: ModelChoice) -> LogModel:

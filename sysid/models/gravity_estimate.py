@@ -16,11 +16,11 @@ from sysid.models.channel_grams import (
     is_lower,
     jackknife_error,
 )
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 
 Array = NDArray[np.float64]
 #: Gives an arm under a gravity (3,) in the base's frame.
-ArmUnder = Callable[[Array], ArmDynamics]
+ArmUnder = Callable[[Array], ArmRegressor]
 
 #: Base tilts up to here are an effect of their own.
 _MOST_TILT = next(f.metadata["high"] for f in fields(ArmTilt) if f.name == "rx")

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from sysid.models.base import Array
-from sysid.models.grip_lag import GripLag
+from sysid.models.grip_state import GripState
 from sysid.models.sensor_reading import at_bolt
 from sysid.models.transitions import Transitions
 
@@ -36,24 +36,22 @@ class Led:
 class GripObserver:
     """Estimates how a step begins from a model of the step before, and the wrench.
 
-    Between two readings `GripLag` takes the wrench for linear in time. It is not where
-    the force on the bolt jumps as a step begins: a drag that grows with the commanded
-    velocity, friction that turns with the sliding. The springs, which lag by half a
-    step, then carry up to half of the jump more or less. A model of that step has the
-    jump in it. What it misses of the wrench at the step's end is taken to have grown
-    evenly, and is believed as far as it exceeds the sensor's noise: the mean of a
+    Between two readings `GripState` takes the wrench for linear in time. It is not
+    where the force on the bolt jumps as a step begins: a drag that grows with the
+    commanded velocity, friction that turns with the sliding. The springs, which lag by
+    half a step, then carry up to half of the jump more or less. A model of that step
+    has the jump in it. What it misses of the wrench at the step's end is taken to have
+    grown evenly, and is believed as far as it exceeds the sensor's noise: the mean of a
     normal variable with an unknown mean, shrunk by its positive part (James and Stein
     1961), b = max(0, 1 - (sigma / m)^2) m of what is missed, m.
 
     Attributes:
         grip: that lags.
-        weight: (3,) that its springs carry at the start, in Gn [N].
         noise: (6,) of the sensor's readings.
         X_SB: the bolt in the sensor's frame.
     """
 
-    grip: GripLag
-    weight: Array
+    grip: GripState
     noise: Array
     X_SB: RigidTransform
 
@@ -66,8 +64,7 @@ class GripObserver:
             noise: (6,) of the sensor's readings.
             X_SB: the bolt in the sensor's frame.
         """
-        episode = whole.episodes[0]
-        return cls(episode.grip, episode.offset.rest[:3], noise, X_SB)
+        return cls(whole.episodes[0].grip, noise, X_SB)
 
     def corrected(
         self, whole: Transitions, ends: NDArray[np.int64], led: Led, read: Array
@@ -91,18 +88,20 @@ class GripObserver:
         ends, missed, give = ends[is_known], missed[is_known], led.give[is_known]
         read = read[ends]
         believed = shrunk(missed, self.noise)
-        elastic = self.grip.carried(give, self.weight)
+        elastic = self.grip.carried(give)
         elastic += self.grip.after_growth(self._on_bolt(read, believed))
-        wrench = whole.carried[ends] - self._on_bolt(read, missed - believed)
+        wrench = whole.wrench[ends] - self._on_bolt(read, missed - believed)
         return whole.beginning(ends, elastic, self.grip.rates(elastic, wrench))
 
     def change(self, one: Transitions, other: Transitions) -> Array:
         """Returns how differently the grip begins (n, 6), in units of what is known.
 
-        That is the standard deviation of what `GripLag` makes of noise, at the pads.
+        That is the standard deviation of what `GripState` makes of noise, at the pads.
         """
         change = (one.steps.wrench - other.steps.wrench) @ self.grip.to_grip.T
-        return np.asarray(change / self.grip.scatter(self.noise, self.X_SB))
+        return np.asarray(
+            change / self.grip.scatter(self.noise, self.X_SB, of_growth=False)
+        )
 
     def changed(self, one: Transitions, other: Transitions) -> NDArray[np.bool_]:
         """Returns which steps (n,) surely begin differently."""
@@ -117,7 +116,7 @@ class GripObserver:
             whole: all transitions.
             signs: (steps, 6) to which side, along and about the axes of the pads.
         """
-        sigma = self.grip.scatter_of_growth(_OF_NOISE * self.noise, self.X_SB)
+        sigma = self.grip.scatter(_OF_NOISE * self.noise, self.X_SB, of_growth=True)
         away = self.grip.from_pads(signs * sigma)
         rates = self.grip.rates(away, np.zeros_like(away))
         steps, every = whole.steps, np.arange(len(whole.steps))

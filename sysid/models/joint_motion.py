@@ -40,7 +40,7 @@ from sysid.models.rate_factors import (
     rate_text,
     right_rates,
 )
-from sysid.models.regressor import ArmDynamics, BaseSet, base_set
+from sysid.models.regressor import ArmRegressor, BaseSet, base_set
 from sysid.models.signed_order import SignedOrder
 from sysid.parameters import Parameter
 
@@ -95,13 +95,13 @@ class JointMotionModel(LogModel):
         self._urdf = arm_urdf(logs, urdf)
         x, y, z = UniformGravityFieldElement().gravity_vector().tolist()
         self._gravity = (x, y, z)
-        arm = ArmDynamics(self._urdf, header.joints)
+        arm = ArmRegressor(self._urdf, header.joints)
         base = self._base_set(arm)
         self._inertia = None
         if is_one_joint(self._urdf):
             self.assumptions = (assumption_of(self._urdf),)
             self._inertia = likely_inertia(arm, base, episodes)
-            arm = ArmDynamics(self._urdf, header.joints, self._gravity, self._inertia)
+            arm = ArmRegressor(self._urdf, header.joints, self._gravity, self._inertia)
         self._scenario = scenario or Scenario()
         self._effects = tuple(self._scenario.effects)
         refuse_other_joints(self._effects, header.joints)
@@ -133,13 +133,13 @@ class JointMotionModel(LogModel):
         return episodes
 
     @staticmethod
-    def _base_set(arm: ArmDynamics) -> BaseSet:
+    def _base_set(arm: ArmRegressor) -> BaseSet:
         """Returns the inertial parameters that the kind of log can reveal."""
         return base_set(arm.random_regressor())
 
     @staticmethod
     def _motion_of(
-        arm: ArmDynamics,
+        arm: ArmRegressor,
         base: BaseSet,
         joints: Sequence[str],
         motions: Sequence[Motion],
@@ -235,7 +235,7 @@ class JointMotionModel(LogModel):
         """Whether all base parameters vary: none was frozen."""
         return self._own_parameters is None
 
-    def rigid_bodies(self) -> tuple[ArmDynamics, BaseSet]:
+    def rigid_bodies(self) -> tuple[ArmRegressor, BaseSet]:
         """Returns the arm's nominal bodies, and which combinations of them vary."""
         arm = self._arm_under(np.array(self._gravity))
         return arm, self._base_set(arm)
@@ -252,7 +252,7 @@ class JointMotionModel(LogModel):
 
     @property
     def urdf(self) -> str:
-        """Where the arm's URDF is, as the logs or the caller say."""
+        """See LogModel: as the logs or the caller say."""
         return self._urdf
 
     @property
@@ -289,7 +289,7 @@ class JointMotionModel(LogModel):
         return self.freeze(rest)
 
     def _base_parameters(
-        self, arm: ArmDynamics, base: BaseSet
+        self, arm: ArmRegressor, base: BaseSet
     ) -> tuple[Parameter, ...]:
         """Returns base parameters with bounds wide enough for any real arm."""
         size = np.sqrt(np.mean(self._motion.Y**2, axis=(0, 1)))
@@ -310,18 +310,11 @@ class JointMotionModel(LogModel):
 
     @property
     def signed_order(self) -> SignedOrder:
-        """In which order, and with which signs, the torques are explained by far best.
-
-        As written, unless another one leaves less than half.
-        """
+        """See LogModel."""
         return TorqueFits(self._motion, self.measurements.values).signed_order()
 
     def exchanged_motions(self, most: float) -> tuple[tuple[int, int], float] | None:
-        """Returns the two joints whose motions are exchanged; None if there are none.
-
-        Args:
-            most: share of the error that is left may be, for a change to be one.
-        """
+        """See LogModel."""
         fits = TorqueFits(self._motion, self.measurements.values)
         arm = self._arm_under(np.array(self._gravity))
         return fits.exchanged_motions(arm.regressor, most)
@@ -474,9 +467,9 @@ class JointMotionModel(LogModel):
         lost = TorqueFits(model._motion, self.measurements.values).lost()
         yield Bookkeeping(name, what, remedy, model, 2 * int(gravity.any())), lost
 
-    def _arm_under(self, gravity: Array) -> ArmDynamics:
+    def _arm_under(self, gravity: Array) -> ArmRegressor:
         under = tuple(gravity.tolist())
-        return ArmDynamics(self._urdf, self.joints, under, self._inertia)
+        return ArmRegressor(self._urdf, self.joints, under, self._inertia)
 
     def _rewritten(
         self,

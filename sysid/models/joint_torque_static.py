@@ -23,10 +23,10 @@ from drake_disasm.logs import Log
 from drake_disasm.scenario import Scenario
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.base import Array
-from sysid.models.bookkeeping import Bookkeeping
+from sysid.models.bookkeeping import Bookkeeping, Poses
 from sysid.models.joint_motion import JointMotionModel, Motion
 from sysid.models.motion_bookkeeping import TorqueFits
-from sysid.models.regressor import ArmDynamics, BaseSet, base_set
+from sysid.models.regressor import ArmRegressor, BaseSet, base_set
 
 #: rad or m: less is noise of an encoder that nobody moved, and before as much dry
 #: friction has not turned: a contact yields before it slides (JointDahlFriction).
@@ -77,11 +77,11 @@ class JointTorqueStaticModel(JointMotionModel):
         self._has_time = all("time" in e for log in logs for e in log.episodes)
 
     @property
-    def clock(self) -> Array | None:
-        """Time (rows,) of each row [s]; None: only an order is known."""
-        return self._motion.time if self._has_time else None
+    def poses(self) -> Poses | None:
+        """See LogModel; None where only an order is known, and no time."""
+        return Poses(self._motion.time, self._turned_by) if self._has_time else None
 
-    def turned(self, rows: NDArray[np.int64], others: NDArray[np.int64]) -> Array:
+    def _turned_by(self, rows: NDArray[np.int64], others: NDArray[np.int64]) -> Array:
         """Returns by how much some joint differs (n,) between rows [rad or m]."""
         q = self._motion.q
         return np.asarray(np.abs(q[rows] - q[others]).max(axis=1))
@@ -106,13 +106,13 @@ class JointTorqueStaticModel(JointMotionModel):
         ]
 
     @staticmethod
-    def _base_set(arm: ArmDynamics) -> BaseSet:
+    def _base_set(arm: ArmRegressor) -> BaseSet:
         """See JointMotionModel."""
         return base_set(arm.random_regressor(at_rest=True))
 
     @staticmethod
     def _motion_of(
-        arm: ArmDynamics,
+        arm: ArmRegressor,
         base: BaseSet,
         joints: Sequence[str],
         motions: Sequence[Motion],

@@ -18,7 +18,6 @@ from drake_disasm.effects import reported_poses
 from sysid.models.base import Array
 
 _PASSES = 3  # the first alone is an interpolation
-_NEARLY = 0.1  # of a step, by which a pose may come in after an episode's end
 
 
 def on_time(measured: Array, path: Array, weights: Array) -> Array:
@@ -49,14 +48,11 @@ class LatePoses:
     Attributes:
         moved: (steps, 6) how far the arm moves in each.
         index: (steps,) number of each in its episode.
-        unseen: (steps,) how many steps, this one included, have begun since the last
-            one whose begin is measured before the episode ends.
         weights: (m,) of poses in the one that is reported.
     """
 
     moved: Array
     index: NDArray[np.int64]
-    unseen: NDArray[np.int64]
     weights: Array
 
     @classmethod
@@ -64,14 +60,7 @@ class LatePoses:
         """Returns that of the arm's paths (n + 1, 6), one for each episode."""
         moved = [np.diff(path, axis=0) for path in paths]
         index = [np.arange(len(each)) for each in moved]
-        lag = float(np.arange(len(weights)) @ weights)
-        unseen = [k - int(len(k) - lag + _NEARLY) for k in index]
-        return cls(
-            np.concatenate(moved),
-            np.concatenate(index),
-            np.maximum(np.concatenate(unseen), 0),
-            weights,
-        )
+        return cls(np.concatenate(moved), np.concatenate(index), weights)
 
     def at_ends(
         self, rows: NDArray[np.int64], before: Array, begins: Array, ends: Array

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from sysid.models.base import Array
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 
 _SHIFT = 1e-4  # rad or m by which a link is moved at most for the derivative
 _WINDOW = 0.1  # s in which a load is a polynomial: it follows up to some 15 Hz
@@ -39,7 +39,7 @@ class LinkTorques:
         joints: their names.
         time, episode: (n,) of the samples [s].
         motion: (3, n, joints) q, v, vd.
-        gravity, inertia: of the arm, see ArmDynamics.
+        gravity, inertia: of the arm, see ArmRegressor.
     """
 
     def __init__(
@@ -101,14 +101,14 @@ class LinkTorques:
         step = _SHIFT / largest
         linked = self._motion[:, rows].copy()
         linked[:, :, i] -= step * behind[:, rows]
-        arm = ArmDynamics(*self._arm)
+        arm = ArmRegressor(*self._arm)
         return (arm.torques(*linked) - self._loads(rows)) / step
 
     def _loads(self, rows: NDArray[np.int64]) -> Array:
         """Returns the torques (rows, joints) by the URDF."""
         asked = rows[np.isnan(self._load[rows, 0])]
         if len(asked):
-            arm = ArmDynamics(*self._arm)
+            arm = ArmRegressor(*self._arm)
             self._load[asked] = arm.torques(*self._motion[:, asked])
         return self._load[rows]
 

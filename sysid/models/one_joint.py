@@ -13,10 +13,10 @@ from scipy.optimize import lsq_linear
 
 from drake_disasm.common.resources import ONE_JOINT_MODELS
 from drake_disasm.logs import Episode
-from sysid.models.base import Assumption
+from sysid.models.bookkeeping import Assumption
 from sysid.models.channel_grams import FAR_BETTER
 from sysid.models.gravity_estimate import friction_columns
-from sysid.models.regressor import INERTIAL, ArmDynamics, BaseSet
+from sysid.models.regressor import INERTIAL, ArmRegressor, BaseSet
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def assumption_of(urdf: str) -> Assumption:
 
 
 def likely_inertia(
-    arm: ArmDynamics,
+    arm: ArmRegressor,
     base: BaseSet,
     episodes: Sequence[Episode | Mapping[str, Array]],
 ) -> Array:

@@ -28,7 +28,7 @@ _EXCITATION = 200  # random states, to see which parameters matter
 _RANK = 1e-8  # of the largest diagonal element
 
 
-class ArmDynamics:
+class ArmRegressor:
     """tau = Y(q, v, vd) pi for an arm of a URDF, by Drake's kinematics.
 
     tau are the joint torques that the motion takes, Drake's

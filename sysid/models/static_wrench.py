@@ -25,7 +25,7 @@ from drake_disasm.logs.refusal import refusal
 from drake_disasm.logs.schema import WRENCH
 from drake_disasm.scenario import Scenario
 from sysid.models.base import Array
-from sysid.models.bookkeeping import Bookkeeping
+from sysid.models.bookkeeping import Bookkeeping, Frame, Poses
 from sysid.models.channel_grams import likely
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.scenario_model import ScenarioModel
@@ -133,15 +133,26 @@ class StaticWrenchModel(ScenarioModel):
         """R_WS (rows, 3, 3) of the readings."""
         return self._R_WS
 
-    def turned(self, rows: NDArray[np.int64], others: NDArray[np.int64]) -> Array:
+    def frames(self, rows: NDArray[np.int64]) -> list[Frame]:
+        """See LogModel: readings may be written in W."""
+        if not self._in_W:
+            return [Frame()]
+        R_WS = self._R_WS[rows]
+        R_SW = R_WS.swapaxes(1, 2)
+        in_W = Frame("in W", lambda v: _rotated(R_WS, v), lambda v: _rotated(R_SW, v))
+        return [in_W, Frame("in S")]
+
+    @property
+    def poses(self) -> Poses | None:
+        """See LogModel; None where only an order is known, and no time."""
+        if not self._has_time:
+            return None
+        return Poses(self._time, self._turned, self._R_WS, self.at_rest)
+
+    def _turned(self, rows: NDArray[np.int64], others: NDArray[np.int64]) -> Array:
         """Returns the angle (n,) between the orientations of rows [rad]."""
         trace = np.einsum("nij,nij->n", self._R_WS[rows], self._R_WS[others])
         return np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
-
-    @property
-    def clock(self) -> Array | None:
-        """Time (rows,) since each log began [s]; None: only an order is known."""
-        return self._time if self._has_time else None
 
     @property
     def duration(self) -> float:
@@ -242,6 +253,11 @@ class StaticWrenchModel(ScenarioModel):
     def select_rows(self, mask: NDArray[np.bool_]) -> Self:
         """See LogModel."""
         return self.replace(_R_WS=self._R_WS[mask], _time=self._time[mask])
+
+
+def _rotated(R: Array, wrench: Array) -> Array:
+    """Returns wrenches (n, 6) turned by (n, 3, 3)."""
+    return np.einsum("nij,nkj->nki", R, wrench.reshape(-1, 2, 3)).reshape(-1, 6)
 
 
 def _payload(scenario: Scenario) -> Payload:

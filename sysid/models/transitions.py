@@ -19,16 +19,14 @@ from drake_disasm.scenario import Scenario
 from drake_disasm.twin.steps import Steps
 from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
-from sysid.models.cell_arm import CellArm, Sway
+from sysid.models.cell_motion import lead, sway
 from sysid.models.commands import Commands, twin_coordinates
-from sysid.models.grip_lag import GripLag
-from sysid.models.grip_offset import GripOffset, of_encoders
-from sysid.models.idle_readings import IdleReadings
+from sysid.models.grip_state import GripState, of_encoders
 from sysid.models.late_pose import LatePoses
+from sysid.models.measured_episode import MeasuredEpisode
 from sysid.models.measurements import Channel, Measurements
-from sysid.models.recorded_episode import RecordedEpisode
 from sysid.models.sensor_reading import SensorReading, at_sensor, station_of
-from sysid.models.unread import unread
+from sysid.models.undo_sensor_effects import undo_sensor_effects
 
 #: Repeatability of a robot's own encoders within an episode, m and rad: below that of
 #: the robot (0.1 mm, against an external frame), above their resolution.
@@ -46,6 +44,10 @@ FORCE_ERROR = (0.02, 0.15)
 #: hand that yields so far turns by 40 urad. It is no noise, so it counts twice.
 POSE_ERROR = (2e-5, 4e-5)
 
+#: Standard deviations of an average beyond which it is an offset: by chance three times
+#: in a million logs of six channels.
+_OFFSET = 5.0
+
 #: By how much the grip gives, so that a step begins noticeably elsewhere [m, rad]: a
 #: tenth of what encoders repeat.
 _NOTICEABLE = (0.1 * POSE_NOISE[0], 0.1 * POSE_NOISE[1])
@@ -61,7 +63,8 @@ class Transitions:
         rows: (rows,) its number among all transitions of the episodes.
         recorded: whole episodes, in the twin's coordinates.
         logs: (episodes,) number of the log of each.
-        idle: what the readings of each log without a load say of its sensor.
+        at_begin: (logs, 6) what is taken for a load of each log's first readings, on
+            average, at So in S; the rest is the sensor's own.
         episodes: the same, with the wrench as it was before effects on the sensor, and
             without its offset.
         commands: of whole episodes, since effects on the motion have a memory.
@@ -69,7 +72,7 @@ class Transitions:
         elsewhere: (rows, 6) by how much the bolt is elsewhere in the grip as a step
             begins, in coordinates.
         seen: (steps, 12) of all steps of the episodes, by how much the grip's springs
-            carry another wrench than `GripLag` says as they begin, and its rates.
+            carry another wrench than `GripState` says as they begin, and its rates.
         period: of the MDP [s].
         p_BoTo_B: (3,) of the twin's coordinates [m].
     """
@@ -77,10 +80,10 @@ class Transitions:
     steps: Steps
     before: Array
     rows: NDArray[np.int64]
-    recorded: tuple[RecordedEpisode, ...]
+    recorded: tuple[MeasuredEpisode, ...]
     logs: NDArray[np.int64]
-    idle: tuple[IdleReadings, ...]
-    episodes: tuple[RecordedEpisode, ...]
+    at_begin: Array
+    episodes: tuple[MeasuredEpisode, ...]
     commands: tuple[Commands, ...]
     sway: Array
     elsewhere: Array
@@ -102,20 +105,16 @@ class Transitions:
         episodes = [episode for log in logs for episode in log.episodes]
         period = scenario.task.period
         p_BoTo_B = Tool.from_models(scenario).p_BoTo_B
-        twin = BoltCoordinates(p_BoTo_B)
-        rates, grip = ArmRates.of(scenario), GripLag.of(scenario)
         recorded = tuple(
-            RecordedEpisode.of(episode, rates, grip, offset, arm, twin)
-            for log, offset, arm in zip(
-                logs, _offsets(logs, scenario), _arms(logs, scenario), strict=True
-            )
-            for episode in log.episodes
+            episode
+            for log in logs
+            for episode in _recorded(log, scenario, BoltCoordinates(p_BoTo_B))
         )
         noise = np.array([channel.noise for channel in _channels(scenario)][6:])
-        idle = tuple(_idle_readings(log, noise, sensing) for log in logs)
+        at_begin = np.array([_load_at_begin(log, noise, sensing) for log in logs])
         sources = np.repeat(np.arange(len(logs)), [len(log.episodes) for log in logs])
-        begun = _without_offset(recorded, sources, idle, sensing, p_BoTo_B)
-        steps = Steps.concatenated([each.steps() for each in begun])
+        started = _without_offset(recorded, sources, at_begin, sensing, p_BoTo_B)
+        steps = Steps.concatenated([each.steps() for each in started])
         found = cls(
             steps=steps,
             before=np.concatenate(
@@ -124,18 +123,20 @@ class Transitions:
             rows=np.arange(len(steps)),
             recorded=recorded,
             logs=sources,
-            idle=idle,
-            episodes=begun,
+            at_begin=at_begin,
+            episodes=started,
             commands=tuple(Commands.of(e, period) for e in episodes),
             sway=np.concatenate([_sway(log, scenario, sensing) for log in logs]),
-            elsewhere=np.concatenate([each.elsewhere[:-1] for each in begun]),
+            elsewhere=np.concatenate([each.elsewhere[:-1] for each in started]),
             seen=np.zeros((len(steps), 12)),
             period=period,
             p_BoTo_B=p_BoTo_B,
         )
         return dataclasses.replace(found, steps=found._moved(steps.qd, steps.qd_rate))
 
-    def begun(self, effects: Sequence[SensorEffect], sensing: SensorReading) -> Self:
+    def without_effects(
+        self, effects: Sequence[SensorEffect], sensing: SensorReading
+    ) -> Self:
         """Returns the transitions as they begin where effects on the sensor are undone.
 
         By how much the grip gives as a step begins is known from the measured wrench,
@@ -148,25 +149,27 @@ class Transitions:
             sensing: of the scenario.
         """
         known = [e for e in effects if not isinstance(e, SensorMemoryEffect)]
-        before = unread(self.recorded, known, sensing, self.p_BoTo_B)
-        episodes = _without_offset(before, self.logs, self.idle, sensing, self.p_BoTo_B)
+        before = undo_sensor_effects(self.recorded, known, sensing, self.p_BoTo_B)
+        episodes = _without_offset(
+            before, self.logs, self.at_begin, sensing, self.p_BoTo_B
+        )
         pairs = zip(episodes, self.episodes, strict=True)
         if not any(one.begins_elsewhere(other, _NOTICEABLE) for one, other in pairs):
             return self
-        begun = Steps.concatenated([e.steps() for e in episodes])
-        begun = dataclasses.replace(
-            begun,
-            wrench=begun.wrench + self.seen[:, :6],
-            give_rate=begun.give_rate + self.seen[:, 6:],
+        steps = Steps.concatenated([e.steps() for e in episodes])
+        steps = dataclasses.replace(
+            steps,
+            wrench=steps.wrench + self.seen[:, :6],
+            give_rate=steps.give_rate + self.seen[:, 6:],
         )
         elsewhere = np.concatenate([each.elsewhere[:-1] for each in episodes])
         found = dataclasses.replace(
             self,
-            steps=begun.select(self.rows),
+            steps=steps.select(self.rows),
             episodes=episodes,
             elsewhere=elsewhere[self.rows],
         )
-        return dataclasses.replace(found, steps=found._moved(begun.qd, begun.qd_rate))
+        return dataclasses.replace(found, steps=found._moved(steps.qd, steps.qd_rate))
 
     def beginning(self, rows: NDArray[np.int64], elastic: Array, rates: Array) -> Self:
         """Returns all transitions, some of which begin with another give of the grip.
@@ -183,12 +186,9 @@ class Transitions:
         return dataclasses.replace(self, steps=steps, seen=self.seen + more)
 
     @property
-    def carried(self) -> Array:
-        """The measured wrench (steps, 6) as all steps of the episodes begin.
-
-        On the bolt at Bo in Gn, see `RecordedEpisode`.
-        """
-        return np.concatenate([each.carried[:-1] for each in self.episodes])
+    def wrench(self) -> Array:
+        """Measured on the bolt at Bo in G (steps, 6) as all steps begin."""
+        return np.concatenate([each.wrench[:-1] for each in self.episodes])
 
     def most_give(self) -> float:
         """Returns by how much the grip gives within a step, at most [m]."""
@@ -238,14 +238,13 @@ class Transitions:
         if not is_late:
             v = np.concatenate([each.begin_rates(path) for each, path in pairs])
             return dataclasses.replace(steps, v=v[self.rows]), None
-        went = [each.rates.path(path, each.carried) for each, path in pairs]
+        went = [each.rates.path(path, each.wrench) for each, path in pairs]
         late = LatePoses.of(went, weights)
         pairs = list(zip(self.episodes, went, strict=True))
-        begun = Steps.concatenated(
+        on_time = Steps.concatenated(
             [e.on_time(path, weights).steps() for e, path in pairs]
-        )
-        begun = begun.select(self.rows)
-        return dataclasses.replace(steps, q=begun.q, v=begun.v), late
+        ).select(self.rows)
+        return dataclasses.replace(steps, q=on_time.q, v=on_time.v), late
 
     def _moved(self, qd: Array, qd_rate: Array) -> Steps:
         """Returns the steps with commands as the arm has them.
@@ -378,58 +377,62 @@ def _refuse_other_logs(log: Log, scenario: Scenario) -> None:
         )
 
 
-def _idle_readings(log: Log, noise: Array, sensing: SensorReading) -> IdleReadings:
-    """Returns what a log's readings without a load say of its sensor.
+def _load_at_begin(log: Log, noise: Array, sensing: SensorReading) -> Array:
+    """Returns what may be a load of an episode's first reading (6,), at So in S.
+
+    Each episode begins without one: what its first reading is beyond chance, on average
+    over the log's episodes, is an offset of the sensor, which moves no bolt. What is
+    within chance is taken for a load: the noise of a reading moves the bolt as far.
 
     Args:
         log: of transitions.
         noise: (6,) of a reading.
         sensing: of the scenario.
     """
-    readings = [at_sensor(observations(e), sensing.X_SB)[:, 6:] for e in log.episodes]
-    return IdleReadings.of(readings, noise, sensing.X_SB.translation())
+    states = np.array([observations(episode)[0] for episode in log.episodes])
+    first = np.mean(at_sensor(states, sensing.X_SB)[:, 6:], axis=0)
+    by_chance = _OFFSET * noise / np.sqrt(len(states))
+    return np.where(np.abs(first) > by_chance, 0.0, first)
 
 
 def _without_offset(
-    episodes: Sequence[RecordedEpisode],
+    episodes: Sequence[MeasuredEpisode],
     logs: NDArray[np.int64],
-    idle: Sequence[IdleReadings],
+    at_begin: Array,
     sensing: SensorReading,
     p_BoTo_B: Array,
-) -> tuple[RecordedEpisode, ...]:
+) -> tuple[MeasuredEpisode, ...]:
     """Returns the episodes without the offset of the sensor in their log.
 
     Args:
         episodes: with the wrench as it was measured.
-        logs, idle: see `Transitions`.
+        logs, at_begin: see `Transitions`.
         sensing: of the scenario.
         p_BoTo_B: (3,) of the twin's coordinates [m].
     """
-    read = [each.at_sensor(sensing, p_BoTo_B)[:, 6:] for each in episodes]
-    offsets = [
-        each.offsets([read[i] for i in np.flatnonzero(logs == log)])
-        for log, each in enumerate(idle)
-    ]
+    first = np.array([e.at_sensor(sensing, p_BoTo_B)[0, 6:] for e in episodes])
+    means = [first[logs == log].mean(axis=0) for log in range(len(at_begin))]
+    offsets = np.array(means) - at_begin
     return tuple(
-        episode.without(offsets[log][: len(own)], sensing, p_BoTo_B)
-        for episode, own, log in zip(episodes, read, logs, strict=True)
+        episode.without(offsets[log], sensing, p_BoTo_B)
+        for episode, log in zip(episodes, logs, strict=True)
     )
 
 
 def _sway(log: Log, scenario: Scenario, sensing: SensorReading) -> Array:
     """Returns what moving loads the sensor with (rows, 6), at So in S."""
-    moves = Sway.of(scenario, station_of(log))
+    station = station_of(log)
     R_SB = sensing.X_SB.rotation().matrix()
     paths = [e["X_GB_commanded"][:, :3] for e in log.episodes]
     rates = [np.diff(path, axis=0) / scenario.task.period for path in paths]
-    return np.concatenate([moves.wrenches(rate, R_SB) for rate in rates])
+    return np.concatenate([sway(scenario, station, rate, R_SB) for rate in rates])
 
 
-def _offsets(logs: Sequence[Log], scenario: Scenario) -> list[GripOffset]:
-    """Returns where the bolt is in the grip, beyond its springs, in each log."""
-    return [GripOffset.of(scenario, station_of(log)) for log in logs]
-
-
-def _arms(logs: Sequence[Log], scenario: Scenario) -> list[CellArm]:
-    """Returns how the arm of each log differs from the twin's."""
-    return [CellArm.of(scenario, station_of(log)) for log in logs]
+def _recorded(
+    log: Log, scenario: Scenario, twin: BoltCoordinates
+) -> list[MeasuredEpisode]:
+    """Returns the episodes of a log, in the twin's coordinates."""
+    station = station_of(log)
+    given = ArmRates.of(scenario), GripState.of(scenario, station)
+    ahead = lead(scenario, station)
+    return [MeasuredEpisode.of(e, *given, ahead, twin) for e in log.episodes]

@@ -2,13 +2,11 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
     Effect,
     EnvironmentEffect,
@@ -28,12 +26,13 @@ from drake_disasm.scenario.names import find_field
 from drake_disasm.twin.contact_step import NO_BALANCE
 from drake_disasm.twin.steps import Steps
 from sysid.models.base import Array, PredictionError, even_chunks
+from sysid.models.bookkeeping import Frame
 from sysid.models.commands import bolt_path, twin_coordinates
 from sysid.models.grip_observer import GripObserver, Led
 from sysid.models.late_pose import LatePoses
 from sysid.models.replays import DiagramReplays, ImpactReplays, Replayed
-from sysid.models.scenario_model import ScenarioModel
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
+from sysid.models.simulated_model import FAILURES, SimulatedModel
 from sysid.models.transitions import Transitions, measured_states
 from sysid.models.validity import Validity
 from sysid.parameters import Parameter
@@ -46,12 +45,11 @@ _N_PER_MM = 1e-3  # of N/m
 _DRAWS = 4  # of where steps begin: a standard deviation is then known to a third
 _PASSES = 4  # but the first of those steps alone whose begin has surely changed
 _KEPT = 64  # steps of that many parameter sets
-_FAILURES = (RuntimeError, DisasmError, ValueError)  # of a simulation
 _T = TypeVar("_T")
 _RUN = 6  # rows that follow each other in a thinned log: 0.6 s
 
 
-class TwinModel(ScenarioModel):
+class TwinModel(SimulatedModel):
     """The twin replays measured commands; the states that follow are compared.
 
     Channels are the bolt's pose in G (x, y, z, u, v, w) and the processed wrench,
@@ -68,7 +66,6 @@ class TwinModel(ScenarioModel):
     effect_types = (EnvironmentEffect, MotionEffect, PoseEffect, SensorEffect)
     residual_effect = SensorResidualModel
     held_out_share = 0.25
-    has_commands = True
     setting = "task"
 
     def __init__(
@@ -97,43 +94,25 @@ class TwinModel(ScenarioModel):
         self.reading = SensorReading.of(logs, scenario)
         recorded = Transitions.of(logs, scenario, self.reading)
         effects = sensor_chain(scenario.effects)
-        self._whole = self._transitions = recorded.begun(effects, self.reading)
+        self._whole = self._transitions = recorded.without_effects(
+            effects, self.reading
+        )
         self.measurements = measured_states(logs, scenario, self.reading)
         self._begins_vary = False  # with parameters of effects on the sensor
         self._displacement: Array | None = None  # (rows, 2, 3) of begin and end
-        self._begun: dict[str, Transitions] = {}
+        self._transitions_by_sensor: dict[str, Transitions] = {}
         self._executed: dict[str, tuple[Steps, LatePoses | None]] = {}
 
-    def predict(self, theta: Array, rows: slice) -> Array:
-        """See LogModel."""
-        return self.read(theta, rows, self.simulate(theta, rows))
-
-    def simulate(self, theta: Array, rows: slice) -> Array:
+    def _simulated(self, thetas: Array, rows: slice) -> list[Array | str]:
         """Returns the states, the wrench at the sensor, and the reading at zeroing.
 
-        (len(rows), 18), as the sensor would read them without effects.
+        (len(rows), 18) of each parameter set, as the sensor would read them without
+        effects; or that contact finds no balance.
         """
-        [found] = self.simulate_all(theta[None], rows)
-        if isinstance(found, str):
-            raise PredictionError(found)
-        return found
-
-    def simulate_all(self, thetas: Array, rows: slice) -> list[Array | str]:
-        """See LogModel."""
-        try:
-            found = self._simulated(thetas, rows)
-        except _FAILURES as error:
-            if len(thetas) > 1:  # it is not said of which
-                return super().simulate_all(thetas, rows)
-            return [" ".join(str(error).split())]
+        found = [
+            self._at_sensor_and_zero(*own, rows) for own in self._led(thetas, rows)
+        ]
         return [each if np.isfinite(each).all() else NO_BALANCE for each in found]
-
-    def _simulated(self, thetas: Array, rows: slice) -> list[Array]:
-        """Returns what `simulate` gives of parameter sets (k, p).
-
-        NaN where contact finds no balance.
-        """
-        return [self._at_sensor_and_zero(*own, rows) for own in self._led(thetas, rows)]
 
     def _led(
         self, thetas: Array, rows: slice
@@ -144,19 +123,16 @@ class TwinModel(ScenarioModel):
         steps = [self._displaced(own.select(rows), rows) for own, _ in executed]
         replays = self._replays_at(scenarios)
         found = replays.transitions(steps)
-        if not self.rollout:
-            late = [poses for _, poses in executed]
-            self._carry_on(replays, steps, [each.states for each in found], late, rows)
-        begun = [self._begun_at(scenario) for scenario in scenarios]
+        transitions = [self._transitions_at(scenario) for scenario in scenarios]
         went = [own for own, _ in executed]
-        return list(zip(found, begun, went, strict=True))
+        return list(zip(found, transitions, went, strict=True))
 
     def _at_sensor_and_zero(
-        self, found: Replayed, begun: Transitions, steps: Steps, rows: slice
+        self, found: Replayed, transitions: Transitions, steps: Steps, rows: slice
     ) -> Array:
         """Returns the states and the reading at zeroing (len(rows), 18)."""
-        states = begun.of_encoders(found.states, steps, rows)
-        states = self.at_sensor(states)
+        states = transitions.of_encoders(found.states, steps, rows)
+        states = at_sensor(states, self.reading.X_SB)
         states[:, 6:] += self._transitions.sway[rows]
         zero = self.reading.zeroed(found.reading_at_zeroing)
         return np.hstack([states, np.broadcast_to(zero, (len(states), 6))])
@@ -231,21 +207,23 @@ class TwinModel(ScenarioModel):
         return self.replace(scenario=_with_impact_as_stiff(self.scenario))
 
     def refined(self) -> Self | None:
-        """See LogModel: without coarse steps."""
+        """See SimulatedModel: without coarse steps."""
         is_coarse = self.coarse and self._has_impact and not self.rollout
         return self.replace(coarse=False) if is_coarse else None
 
-    def begun(self, theta: Array) -> Self:
+    def with_begins(self, theta: Array | None) -> Self:
         """See LogModel: steps begin where the wrench says, without sensor effects.
 
         And where the model has the grip at the end of the step before: `GripObserver`.
         """
+        if theta is None:
+            return self.replace(_begins_vary=True)
         effects = sensor_chain(self.scenario_at(theta).effects)
-        whole = self._whole.begun(effects, self.reading)
+        whole = self._whole.without_effects(effects, self.reading)
         if not self.rollout:
             try:
                 whole = self._observed(theta, whole)
-            except _FAILURES:  # steps begin as the wrench says
+            except FAILURES:  # steps begin as the wrench says
                 return self
         if whole is self._whole:
             return self
@@ -262,7 +240,7 @@ class TwinModel(ScenarioModel):
         Args:
             theta: (p,) values of `parameters`.
         """
-        model = self.surrogate().begun(theta)
+        model = self.surrogate().with_begins(theta)
         if model.rollout or model.costly:
             return None
         try:
@@ -273,8 +251,8 @@ class TwinModel(ScenarioModel):
         return Validity(share, model._transitions.most_give())
 
     def begin_error(self, theta: Array) -> Array | None:
-        """See LogModel: of how far the grip gives, see `validity`."""
-        model = self.surrogate().begun(theta)
+        """See SimulatedModel: of how far the grip gives, see `validity`."""
+        model = self.surrogate().with_begins(theta)
         if model.rollout or model.costly:
             return None
         try:
@@ -346,12 +324,8 @@ class TwinModel(ScenarioModel):
         give, states = (np.concatenate(part) for part in zip(*parts, strict=True))
         return Led(give, states)
 
-    def varying(self) -> Self:
-        """See LogModel: steps begin where the wrench says, at each parameter set."""
-        return self.replace(_begins_vary=True)
-
-    def displaced(self, displacement: Array, push: Array) -> Self:
-        """See LogModel."""
+    def with_displacement(self, displacement: Array, push: Array) -> Self:
+        """See SimulatedModel."""
         begin = self._transitions.ends_before(displacement)
         ends = np.stack([begin, displacement + push], axis=1)
         return self.replace(_displacement=ends)
@@ -360,13 +334,15 @@ class TwinModel(ScenarioModel):
         """See LogModel: time, place, action and force at the beginning of a step."""
         return self._transitions.covariates()
 
-    def at_bolt(self, states: Array) -> Array:
-        """Returns states (n, 12) with the wrench at Bo in G, of channels (n, 12)."""
-        return at_bolt(states, self.reading.X_SB)
-
-    def at_sensor(self, states: Array) -> Array:
-        """Returns channels (n, 12), of states (n, 12) with the wrench at Bo in G."""
-        return at_sensor(states, self.reading.X_SB)
+    def frames(self, rows: NDArray[np.int64]) -> list[Frame]:
+        """See LogModel."""
+        X_SB = self.reading.X_SB
+        in_table = Frame(
+            "wrench, in G at Bo",
+            lambda v: at_bolt(v, X_SB),
+            lambda v: at_sensor(v, X_SB),
+        )
+        return [in_table, Frame("ft_sensor, in S at So")]
 
     def _reported(
         self,
@@ -381,7 +357,7 @@ class TwinModel(ScenarioModel):
         if not self.rollout:
             p, own = self._transitions.p_BoTo_B, self._transitions.rows[rows]
             q, q_before = (twin_coordinates(x, p) for x in (poses, before))
-            q_begin = steps.q[rows] - self._begun_at(scenario).elsewhere[rows]
+            q_begin = steps.q[rows] - self._transitions_at(scenario).elsewhere[rows]
             return bolt_path(late.at_ends(own, q_before, q_begin, q), p)
         episode, found = self.measurements.episode[rows], np.empty_like(poses)
         for number in np.unique(episode):
@@ -392,28 +368,32 @@ class TwinModel(ScenarioModel):
 
     def _executed_at(self, scenario: Scenario) -> tuple[Steps, LatePoses | None]:
         """Returns the steps as effects have them executed, and late poses, if any."""
-        begun, effects = self._begun_at(scenario), _mean_chain(scenario)
-        weights = pose_weights(scenario.effects, begun.period)
+        transitions, effects = self._transitions_at(scenario), _mean_chain(scenario)
+        weights = pose_weights(scenario.effects, transitions.period)
         sensor = sensor_chain(scenario.effects) if self._begins_vary else ()
         key = repr((effects, weights.tolist(), sensor))
-        return _kept(self._executed, key, lambda: begun.executed(effects, weights))
+        return _kept(
+            self._executed, key, lambda: transitions.executed(effects, weights)
+        )
 
-    def _begun_at(self, scenario: Scenario) -> Transitions:
+    def _transitions_at(self, scenario: Scenario) -> Transitions:
         """Returns the transitions as they begin with a scenario's sensor."""
         if not self._begins_vary:
             return self._transitions
         effects = sensor_chain(scenario.effects)
         return _kept(
-            self._begun,
+            self._transitions_by_sensor,
             repr(effects),
-            lambda: self._transitions.begun(effects, self.reading),
+            lambda: self._transitions.without_effects(effects, self.reading),
         )
 
     def _displaced(self, steps: Steps, rows: slice) -> Steps:
         """Returns steps as the arm scatters about its commands, if it does."""
         if self._displacement is None:
             return steps
-        return _displaced(steps, self._displacement[rows], self._transitions.period)
+        return _with_displacement(
+            steps, self._displacement[rows], self._transitions.period
+        )
 
     @property
     def together(self) -> int:
@@ -466,44 +446,9 @@ class TwinModel(ScenarioModel):
     def _has_impact(self) -> bool:
         return self.scenario.contact.model == "impact"
 
-    def _carry_on(
-        self,
-        replays: ImpactReplays | DiagramReplays,
-        steps: Sequence[Steps],
-        found: Sequence[Array],
-        late: Sequence[LatePoses | None],
-        rows: slice,
-    ) -> None:
-        """Finds the states (n, 12) after steps again whose begin was not measured.
-
-        An episode's last late poses never come in: there a step begins where the one
-        before led, by its prediction.
-
-        Args:
-            replays: of the k twins.
-            steps, found: n of each, and the states after them; changed in place.
-            late: poses of each twin, if they come late.
-            rows: that the steps are.
-        """
-        transitions = self._transitions
-        own = transitions.rows[rows]
-        follows = np.diff(own, prepend=-2) == 1
-        unseen = [0 * own if x is None else x.unseen[own] * follows for x in late]
-        copied = [replace(each, q=each.q.copy(), v=each.v.copy()) for each in steps]
-        for count in range(1, 1 + max(int(u.max(initial=0)) for u in unseen)):
-            which = [np.flatnonzero(u == count) for u in unseen]
-            for each, states, on in zip(copied, found, which, strict=True):
-                q = twin_coordinates(states[on - 1, :6], transitions.p_BoTo_B)
-                each.v[on] = (q - each.q[on - 1]) / transitions.period
-                each.q[on] = q
-            parts = [each.select(on) for each, on in zip(copied, which, strict=True)]
-            again = replays.transitions(parts)
-            for states, on, new in zip(found, which, again, strict=True):
-                states[on] = new.states
-
     def __getstate__(self) -> dict[str, Any]:
         """Leaves out what is quickly found again."""
-        return self.__dict__ | {"_begun": {}, "_executed": {}}
+        return self.__dict__ | {"_transitions_by_sensor": {}, "_executed": {}}
 
 
 def _kept(found: dict[str, _T], key: str, compute: Callable[[], _T]) -> _T:
@@ -537,7 +482,7 @@ def _mean_chain(scenario: Scenario) -> tuple[MotionEffect, ...]:
     return tuple(e for e in motion_chain(scenario.effects) if not e.is_random)
 
 
-def _displaced(steps: Steps, ends: Array, period: float) -> Steps:
+def _with_displacement(steps: Steps, ends: Array, period: float) -> Steps:
     """Returns steps whose command is displaced by (n, 2, 3) [m] at begin and end."""
     zero = np.zeros((len(steps), 3))
     begin = np.hstack([ends[:, 0], zero])

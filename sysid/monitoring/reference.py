@@ -22,7 +22,7 @@ from sysid.models import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.monitoring.plain_effects import candidates_of, mappings_of
 from sysid.motor_constants import given_constants
-from sysid.scenario_parameters import Request
+from sysid.scenario_parameters import ParameterRequest
 
 #: In `result.json`; and what a reader of this version understands.
 KEY, LAYOUT = "as_reference", 1
@@ -178,7 +178,7 @@ class Reference:
         scenario = raw["scenario"]
         choice = ModelChoice(
             scenario=scenario_from_mapping(scenario) if scenario else None,
-            requests=tuple(Request(**each) for each in raw["requests"]),
+            requests=tuple(ParameterRequest(**each) for each in raw["requests"]),
             urdf=raw["urdf"],
             fixed=True,
             trust_urdf=raw["trust_urdf"],

@@ -207,7 +207,7 @@ class Statistics:
             with_own: whether derivatives by these are wanted.
         """
         values = np.array([self.reference.values[p.name] for p in model.parameters])
-        model = model.begun(values)
+        model = model.with_begins(values)
         changed = _changeable(self.reference, model, self.changes)
         linear = self._linearised(changed, nominal_values(changed.parameters))
         slope = Scaling(changed.parameters).slope(nominal_values(changed.parameters))

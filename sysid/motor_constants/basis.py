@@ -11,7 +11,7 @@ from sysid.models.arm_logs import arm_urdf, refuse_other_logs
 from sysid.models.arm_motion import ArmMotion
 from sysid.models.channel_grams import FAR_BETTER
 from sysid.models.gravity_estimate import friction_columns
-from sysid.models.regressor import ArmDynamics, base_set
+from sysid.models.regressor import ArmRegressor, base_set
 from sysid.motor_constants.constants import (
     MotorConstants,
     has_currents,
@@ -98,7 +98,7 @@ def _recorded(
             "constants to identify"
         )
     joints, path = logs[0].header.joints, arm_urdf(logs, urdf)
-    arm = ArmDynamics(path, joints)
+    arm = ArmRegressor(path, joints)
     episodes = [episode for log in logs for episode in log.episodes]
     motion = ArmMotion.of(arm, base_set(arm.random_regressor()), joints, episodes)
     current = np.concatenate([episode["current"] for episode in episodes])

@@ -12,7 +12,7 @@ import numpy as np
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
-from sysid.models.base import Assumption
+from sysid.models.bookkeeping import Assumption
 
 Interval = tuple[float, float]
 

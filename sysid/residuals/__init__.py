@@ -2,7 +2,7 @@
 
 held_out                            errors on rows that were not fitted
 whiteness, channel_checks           correlation, excess, lines, outlying rows
-left_over, residual_model           what a flexible learner finds, and its model
+predictable_residual, residual_model  what a flexible learner finds, and its model
 command_scatter                     scatter about commands, an effect on variances
 residual_diagnosis                  numbers of each channel, for reports
 """

@@ -26,7 +26,7 @@ from sysid.confidence import Z
 from sysid.fitting.fit import Fit
 from sysid.fitting.fitter import Fitter
 from sysid.identification.whiteness import ljung_box
-from sysid.models.base import LogModel
+from sysid.models.simulated_model import SimulatedModel, simulation_of
 from sysid.objective import Objective, pseudo_residual
 
 Array = NDArray[np.float64]
@@ -89,15 +89,15 @@ class _Likelihood:
     def rows(self, std: Array) -> tuple[Array, Array]:
         """Returns twice the negative log likelihood (n,), and the squares (n,) in it.
 
-        A row's rms residual is bent as by Huber's loss.
+        A row's rms residual is huberised as by Huber's loss.
         """
         M, b, mean = self._posterior(std)
         taken = np.einsum("ni,ni->n", b, mean)
         squares = np.einsum("nc,nc->n", self.r, self.r) - taken
         channels = self.r.shape[1]
         level = np.sqrt(np.maximum(squares, 0.0) / channels)
-        bent = channels * pseudo_residual(level, self.huber_delta) ** 2
-        return bent + np.linalg.slogdet(M)[1], bent
+        huberised = channels * pseudo_residual(level, self.huber_delta) ** 2
+        return huberised + np.linalg.slogdet(M)[1], huberised
 
     def best(self) -> Array:
         """Returns the standard deviations (3,) of the greatest likelihood.
@@ -169,21 +169,22 @@ def fit_command_scatter(fitter: Fitter, fit: Fit) -> CommandScatter | None:
         fit: with all effects on the mean.
     """
     at_noise = fit.objective <= fitter.settings.max_objective_at_noise
-    if not fit.model.has_commands or at_noise:
+    model = simulation_of(fit.model)
+    if model is None or at_noise:
         return None
-    likelihood, displaced = _likeliest(fitter, fit)
+    begin = _Steps(fitter, fit, model, np.zeros((len(fit.linearisation.residual), 3)))
+    likelihood, displacement = _likeliest(begin)
     std = likelihood.best()
     if not std.any() or not _generalises(likelihood, fit.blocks):
         return None
-    if _is_dependent(fit, displaced[:, std > 0.0]):
+    if _is_dependent(fit, displacement[:, std > 0.0]):
         return None
     return _summary(likelihood, std)
 
 
-def _likeliest(fitter: Fitter, fit: Fit) -> tuple[_Likelihood, Array]:
+def _likeliest(steps: "_Steps") -> tuple[_Likelihood, Array]:
     """Returns the likelihood where steps likely led, and where that is (n, 3)."""
     random = np.random.default_rng(0)
-    steps = _Steps(fitter, fit, np.zeros((len(fit.linearisation.residual), 3)))
     likelihood, before = steps.likelihood(), np.full(3, np.inf)
     for _ in range(_ROUNDS):
         std = likelihood.best()
@@ -193,7 +194,7 @@ def _likeliest(fitter: Fitter, fit: Fit) -> tuple[_Likelihood, Array]:
         target = likelihood.displacements(std)
         steps = steps.improved(std, target, random)
         likelihood, before = steps.likelihood(), std
-    return likelihood, steps.displaced
+    return likelihood, steps.displacement
 
 
 def _summary(likelihood: _Likelihood, std: Array) -> CommandScatter:
@@ -216,27 +217,28 @@ class _Steps:
     """Steps of a fit as they were likely executed.
 
     Attributes:
-        fitter, fit: whose rows they are.
-        displaced: (n, 3) where they ended, in units of `scatter_scale`.
+        fitter, fit, model: whose rows they are.
+        displacement: (n, 3) where they ended, in units of `scatter_scale`.
     """
 
     fitter: Fitter
     fit: Fit
-    displaced: Array
+    model: SimulatedModel
+    displacement: Array
 
     def likelihood(self) -> _Likelihood:
         """Returns residuals without scatter, and derivatives there."""
         r = self._here
         step = _STEP / _SCALE
         ways = step * np.eye(3)[:, None] * np.ones((len(r), 1))
-        surrogate = self.fit.model.surrogate()
+        surrogate = self.model.surrogate()
         columns = [
-            self._residual(surrogate, self.displaced + w)
-            - self._residual(surrogate, self.displaced - w)
+            self._residual(surrogate, self.displacement + w)
+            - self._residual(surrogate, self.displacement - w)
             for w in ways
         ]
         J = np.stack(columns, axis=-1) / (2.0 * step)
-        r = r - np.einsum("nci,ni->nc", J, self.displaced)
+        r = r - np.einsum("nci,ni->nc", J, self.displacement)
         return _Likelihood(r, J, self.fitter.huber_delta)
 
     def improved(
@@ -249,7 +251,7 @@ class _Steps:
             target: (n, 3) the likeliest displacements, were the steps linear.
             random: draws others, for steps that are missed by far.
         """
-        found, all_rows = self.displaced.copy(), np.ones(len(target), bool)
+        found, all_rows = self.displacement.copy(), np.ones(len(target), bool)
         offset = self._surrogate_offset()
         least = self._losses(self._here, found, std)
         for i in range(_DRAWS):
@@ -259,39 +261,41 @@ class _Steps:
                 break
             draws = std * random.standard_normal(target.shape)
             trial = draws if i else target
-            r = self._residual(self.fit.model.surrogate(), trial, rows) + offset[rows]
+            r = self._residual(self.model.surrogate(), trial, rows) + offset[rows]
             losses = self._losses(r, trial[rows], std)
             better = np.flatnonzero(rows)[losses < least[rows]]
             least[rows] = np.minimum(least[rows], losses)
             found[better] = trial[better]
-        return dataclasses.replace(self, displaced=found)
+        return dataclasses.replace(self, displacement=found)
 
     def _losses(self, r: Array, ends: Array, std: Array) -> Array:
         """Returns the losses (m,) of steps with residuals (m, c) and ends (m, 3)."""
         level = np.sqrt(np.mean(r**2, axis=1))
-        bent = pseudo_residual(level, self.fitter.huber_delta) ** 2
+        huberised = pseudo_residual(level, self.fitter.huber_delta) ** 2
         least = _LEAST
         unlikely = ends / np.maximum(std, least)
-        return self._channels * bent + np.sum(unlikely**2, axis=1)
+        return self._channels * huberised + np.sum(unlikely**2, axis=1)
 
     def _surrogate_offset(self) -> Array:
         """Returns residuals (n, c) less those that the surrogate leaves."""
-        surrogate = self.fit.model.surrogate()
-        if surrogate is self.fit.model:
+        surrogate = self.model.surrogate()
+        if surrogate is self.model:
             return np.zeros_like(self._here)
-        return self._here - self._residual(surrogate, self.displaced)
+        return self._here - self._residual(surrogate, self.displacement)
 
     @functools.cached_property
     def _here(self) -> Array:
         """Residuals (n, c) as displaced: of a costly model they take seconds."""
-        return self._residual(self.fit.model, self.displaced)
+        return self._residual(self.model, self.displacement)
 
     def _residual(
-        self, model: LogModel, ends: Array, rows: NDArray[np.bool_] | None = None
+        self, model: SimulatedModel, ends: Array, rows: NDArray[np.bool_] | None = None
     ) -> Array:
         """Returns residuals (n, c) of steps that end elsewhere (n, 3), from here on."""
         scale = _SCALE
-        there = model.displaced(self.displaced * scale, (ends - self.displaced) * scale)
+        there = model.with_displacement(
+            self.displacement * scale, (ends - self.displacement) * scale
+        )
         if rows is not None:
             there = there.of_rows(rows)
         objective = Objective(there, self.fitter.workers, self.fitter.huber_delta)
@@ -318,14 +322,14 @@ def _generalises(likelihood: _Likelihood, blocks: NDArray[np.int64]) -> bool:
     return float(wilcoxon(gains, alternative="greater").pvalue) < _ALPHA
 
 
-def _is_dependent(fit: Fit, displaced: Array) -> bool:
+def _is_dependent(fit: Fit, displacement: Array) -> bool:
     """Returns whether displacements (n, axes) depend on anything: then no scatter.
 
     On the step before, on a mean, or on what a step began with.
     """
     covariates = [c for c in fit.model.covariates(0).values() if np.ptp(c) > 0.0]
     p = []
-    for d in displaced.T:
+    for d in displacement.T:
         p += [ljung_box(d), float(ttest_1samp(d, 0.0).pvalue)]
         p += [float(pearsonr(d, c).pvalue) for c in covariates]
     return min(p) * len(p) < _ALPHA

@@ -182,7 +182,7 @@ def contiguous_folds(episode: NDArray[np.int64], count: int) -> NDArray[np.int64
 
 def _predicted(test: LogModel, fit: Fit) -> Array:
     model, _ = extended(test, fit.effects, with_shapes=True)
-    return model.begun(fit.theta).predictions(fit.theta)
+    return model.with_begins(fit.theta).predictions(fit.theta)
 
 
 def _linearly_predicted(fit: Fit, folds: NDArray[np.int64]) -> Array:

@@ -15,10 +15,10 @@ from sysid.fitting.candidates import extended
 from sysid.fitting.fit import Fit
 from sysid.models.base import HUBER_DELTA, LogModel
 from sysid.objective import pseudo_residual
-from sysid.residuals.left_over import (
+from sysid.residuals.predictable_residual import (
     FOLDS,
     LEARNER,
-    LeftOver,
+    PredictableResidual,
     contiguous_blocks,
     every_few,
 )
@@ -77,7 +77,7 @@ class ResidualModel:
 
 
 def fit_residual_model(
-    last: Fit, left: Sequence[LeftOver], held_out: LogModel | None
+    last: Fit, left: Sequence[PredictableResidual], held_out: LogModel | None
 ) -> ResidualModel | None:
     """Returns a model of what the effects leave, if it lowers the held-out error.
 
@@ -140,7 +140,7 @@ class _Rows:
     def held_out(cls, fit: Fit, rows: LogModel) -> "_Rows":
         """Returns rows that a fit has not seen, predicted by it."""
         model, _ = extended(rows, fit.effects, with_shapes=True)
-        model = model.begun(fit.theta)
+        model = model.with_begins(fit.theta)
         missing = model.measurements.values - model.predictions(fit.theta)
         inputs = model.residual_inputs(fit.theta)
         return cls(model, inputs, missing, model.measurements.episode)

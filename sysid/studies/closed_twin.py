@@ -22,7 +22,7 @@ from sysid.effect_selection.output import to_mapping
 from sysid.identification.identify import identify
 from sysid.identification.settings import SearchSettings, Settings
 from sysid.models.from_logs import ModelChoice, model_of
-from sysid.scenario_parameters import Request
+from sysid.scenario_parameters import ParameterRequest
 
 _TRANSITIONS = 440  # of the log
 _EXPLORATION = 1.5e-4  # m, of `admittance` while it is recorded
@@ -121,7 +121,7 @@ class ClosedTwin:
 
     def _identified(self, log: Log, progress: Progress) -> Scenario:
         """Returns the nominal twin with its parameters fitted to the log."""
-        requests = tuple(Request(name) for name in _PARAMETERS)
+        requests = tuple(ParameterRequest(name) for name in _PARAMETERS)
         choice = ModelChoice(scenario=with_impact(self.nominal), requests=requests)
         settings = Settings(
             search=SearchSettings(evaluations=_EVALUATIONS), unidentifiable="freeze"

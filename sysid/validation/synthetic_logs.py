@@ -33,7 +33,7 @@ from drake_disasm.twin.steps import Steps
 from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
 from sysid.models.commands import twin_coordinates
-from sysid.models.grip_lag import GripLag
+from sysid.models.grip_state import GripState
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 
 _FORWARD, _BACK = 2.2e-3, -1.2e-3  # m per step, on average
@@ -147,7 +147,7 @@ def rollout(
     reading = SensorReading(scenario, Tool.from_models(scenario))
     measured = _Measured(scenario, commanded)
     count, size, _ = commanded.shape
-    # A step begins under the load as the model knows it, see `Transitions.begun`.
+    # A step begins under the load as the model knows it, see `MeasuredEpisode.steps`.
     is_undone = not any(isinstance(e, SensorMemoryEffect) for e in sensor)
     noise_of_states = np.concatenate([np.zeros_like(noise), noise], axis=2)
     clean, states = np.zeros_like(noise_of_states), noise_of_states.copy()
@@ -202,7 +202,7 @@ class _Measured:
     """
 
     def __init__(self, scenario: Scenario, commanded: Array) -> None:
-        self._rates, self._grip = ArmRates.of(scenario), GripLag.of(scenario)
+        self._rates, self._grip = ArmRates.of(scenario), GripState.of(scenario)
         self._p_BoTo_B = Tool.from_models(scenario).p_BoTo_B
         self._q, self._wrench = np.zeros((2, *commanded.shape))
         self._v, self._elastic = np.zeros((2, len(commanded), 6))

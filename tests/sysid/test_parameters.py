@@ -4,7 +4,11 @@ import pytest
 from drake_disasm.effects import GroovePose
 from drake_disasm.scenario import load_scenario
 from sysid.parameters import Parameter, Scaling, by_path
-from sysid.scenario_parameters import Request, read_requests, scenario_parameters
+from sysid.scenario_parameters import (
+    ParameterRequest,
+    read_requests,
+    scenario_parameters,
+)
 from tests.refusals import refused
 
 REMOVAL = load_scenario("removal")
@@ -49,7 +53,7 @@ def test_names_reach_sections_lists_and_effects():
         "lock.clearance",
         "contact.modulus",
     ]
-    _, found = scenario_parameters(REMOVAL, [Request(n) for n in names])
+    _, found = scenario_parameters(REMOVAL, [ParameterRequest(n) for n in names])
     friction, stiffness, clearance, modulus = found
     assert (friction.nominal, friction.low, friction.high) == (0.2, 0.0, 2.0)
     assert stiffness.nominal == 600.0 and stiffness.log_scale
@@ -58,7 +62,7 @@ def test_names_reach_sections_lists_and_effects():
 
 
 def test_an_effect_that_is_not_there_is_added_at_its_null_value():
-    requests = [Request("GroovePose.ry"), Request("GroovePose.z")]
+    requests = [ParameterRequest("GroovePose.ry"), ParameterRequest("GroovePose.z")]
     scenario, (turn, shift) = scenario_parameters(REMOVAL, requests)
     assert scenario.effects == [GroovePose()] and REMOVAL.effects == []
     assert (turn.name, turn.path) == ("GroovePose.ry", "effects.0.ry")
@@ -67,7 +71,7 @@ def test_an_effect_that_is_not_there_is_added_at_its_null_value():
 
 def test_an_effect_that_is_there_is_used():
     scenario, (turn,) = scenario_parameters(
-        load_scenario("removal_turned"), [Request("GroovePose.ry")]
+        load_scenario("removal_turned"), [ParameterRequest("GroovePose.ry")]
     )
     assert len(scenario.effects) == 1 and turn.nominal == pytest.approx(0.0349066)
 
@@ -75,13 +79,13 @@ def test_an_effect_that_is_there_is_used():
 @pytest.mark.parametrize(
     ("request_", "message"),
     [
-        (Request("contact.fricton"), "did you mean 'friction'"),
-        (Request("GroovePse.ry"), "did you mean 'GroovePose'"),
-        (Request("GroovePose.rw"), "known: rx, ry"),
-        (Request("lock"), "not a number"),
-        (Request("gripper.stiffness.6"), "count from 0"),
-        (Request("lock.clearance", high=0.5), "go beyond"),
-        (Request("contact.friction", low=0.3), "nominal"),
+        (ParameterRequest("contact.fricton"), "did you mean 'friction'"),
+        (ParameterRequest("GroovePse.ry"), "did you mean 'GroovePose'"),
+        (ParameterRequest("GroovePose.rw"), "known: rx, ry"),
+        (ParameterRequest("lock"), "not a number"),
+        (ParameterRequest("gripper.stiffness.6"), "count from 0"),
+        (ParameterRequest("lock.clearance", high=0.5), "go beyond"),
+        (ParameterRequest("contact.friction", low=0.3), "nominal"),
     ],
 )
 def test_refuses_what_is_not_there_or_cannot_be(request_, message):

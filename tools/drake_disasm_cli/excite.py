@@ -24,7 +24,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_text
 from drake_disasm.free_motion.cell_urdf import cell_urdf
 from drake_disasm.scenario import load_scenario
-from sysid.experiment_design.arm_limits import JointLimits, Workspace
+from sysid.experiment_design.arm_limits import CollisionFreeSpace, JointLimits
 from sysid.experiment_design.design import DesignSettings, design_motion
 from sysid.experiment_design.information import ArmExperiment, arm_effects
 from sysid.experiment_design.output import TABLE, summary, write_design
@@ -161,7 +161,7 @@ def _design(args: argparse.Namespace, arguments: Sequence[str], urdf: str) -> No
     """Designs the motion of a URDF's arm, and writes it."""
     joints = tuple(args.joints or movable_joints(urdf))
     limits = JointLimits.of_urdf(urdf, joints, args.acceleration, args.margin)
-    workspace = Workspace(urdf, joints, limits)
+    workspace = CollisionFreeSpace(urdf, joints, limits)
     if not workspace.has_geometry:
         print("the URDF has no collision geometry: collisions are not looked for")
     noise = args.torque_noise * np.array(limits.effort)

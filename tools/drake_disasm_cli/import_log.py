@@ -26,9 +26,9 @@ from drake_disasm.logs import KINDS
 from drake_disasm.logs.header import HEADER_NAME, read_header
 from drake_disasm.logs.importing import (
     FieldMap,
+    ImportProcessing,
     Known,
     NoGuessError,
-    Processing,
     Source,
     guessed_map,
     import_recordings,
@@ -204,7 +204,7 @@ def main(arguments: Sequence[str]) -> int:
     imported = import_recordings(
         sources,
         fields,
-        Processing(args.cutoff, args.decimate, tuple(args.between)),
+        ImportProcessing(args.cutoff, args.decimate, tuple(args.between)),
         shifts=not args.keep_shifts,
         accept=args.accept_left_out,
         even=not args.keep_stamps,

@@ -4,7 +4,7 @@
 
     source = read_source(Path("run.mcap"))
     fields = guessed_map(source, "joint_motion", Known(joints, urdf="arm.urdf"))
-    imported = import_recordings([source], fields, Processing())
+    imported = import_recordings([source], fields, ImportProcessing())
     write_log(imported, [source], fields, Path("out/log"), {})
 """
 
@@ -16,15 +16,15 @@ from drake_disasm.logs.importing.guess import (
     map_to_fill_in,
 )
 from drake_disasm.logs.importing.importer import Imported, import_recordings, write_log
-from drake_disasm.logs.importing.processing import Processing
+from drake_disasm.logs.importing.processing import ImportProcessing
 from drake_disasm.logs.importing.source import Source, read_source
 
 __all__ = [
     "FieldMap",
+    "ImportProcessing",
     "Imported",
     "Known",
     "NoGuessError",
-    "Processing",
     "Source",
     "guessed_map",
     "import_recordings",

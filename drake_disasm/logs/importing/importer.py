@@ -16,7 +16,12 @@ from drake_disasm.common.resources import ONE_JOINT_MODELS
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns
 from drake_disasm.logs.importing.field_map import FieldMap, quantity_of
 from drake_disasm.logs.importing.orientations import JOINTS, normalised
-from drake_disasm.logs.importing.processing import Done, Processed, Processing, process
+from drake_disasm.logs.importing.processing import (
+    Done,
+    ImportProcessing,
+    Processed,
+    process,
+)
 from drake_disasm.logs.importing.recording import Recording, check_share, recordings_of
 from drake_disasm.logs.importing.signals import LowPass, clock_of
 from drake_disasm.logs.importing.source import Source
@@ -85,7 +90,7 @@ class Imported:
 def import_recordings(
     sources: Sequence[Source],
     fields: FieldMap,
-    processing: Processing,
+    processing: ImportProcessing,
     shifts: bool = True,
     accept: bool = False,
     even: bool = True,

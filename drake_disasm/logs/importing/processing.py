@@ -33,7 +33,7 @@ _BRIDGED = 0.25  # of the cut-off's period: so long a gap hides nothing of what 
 
 
 @dataclasses.dataclass(frozen=True)
-class Processing:
+class ImportProcessing:
     """What is done to recorded signals.
 
     Attributes:
@@ -122,7 +122,7 @@ class _Stretch:
 
 
 def process(
-    recordings: Sequence[Recording], processing: Processing
+    recordings: Sequence[Recording], processing: ImportProcessing
 ) -> tuple[list[Processed], Done]:
     """Returns rows of a `joint_motion` log, and what was done to make them.
 
@@ -221,7 +221,9 @@ def _spectra(found: Sequence[_Stretch], period: float) -> tuple[MotionSpectrum, 
 
 
 def _cutoff_of(
-    spectra: Sequence[Sequence[MotionSpectrum]], period: float, processing: Processing
+    spectra: Sequence[Sequence[MotionSpectrum]],
+    period: float,
+    processing: ImportProcessing,
 ) -> float:
     """Returns the cut-off [Hz] that is wanted, or that the motion asks for."""
     cutoff = processing.cutoff

@@ -21,7 +21,8 @@ from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
 from sysid.models.arm_logs import arm_urdf, refuse_other_joints, refuse_other_logs
 from sysid.models.arm_plant import ArmPlant
-from sysid.models.base import Array, Assumption, LogModel
+from sysid.models.base import Array, LogModel
+from sysid.models.bookkeeping import Assumption
 from sysid.models.effects import one_way_joints, travel_of
 from sysid.models.joint_units import in_units_of_joints, prismatic_unit
 from sysid.models.measurements import Channel, Measurements

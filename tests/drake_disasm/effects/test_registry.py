@@ -14,7 +14,7 @@ from drake_disasm.common import executors
 from drake_disasm.common.executors import WorkerPool
 from drake_disasm.logs import read_log
 from drake_disasm.task.simulation import TaskSimulation
-from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 from tests.drake_disasm.conftest import QUIET
 from tests.refusals import refusal
 from tests.tools.programs import run_program
@@ -91,7 +91,9 @@ def test_a_registered_effect_comes_last_and_everywhere(tmp_path: Path) -> None:
     ):
         override = f"effects=[!Own {own_effect}]"
         assert words in refusal(sc.load_scenario, "removal", [override])
-    added, (parameter,) = scenario_parameters(sc.Scenario(), [Request("Own.fx")])
+    added, (parameter,) = scenario_parameters(
+        sc.Scenario(), [ParameterRequest("Own.fx")]
+    )
     assert added.effects == [own()] and parameter.high == 1.0
 
 

@@ -11,7 +11,7 @@ from drake_disasm.effects import (
 from drake_disasm.scenario import Scenario, load_scenario, validate, with_values
 from drake_disasm.scenario.names import find_field, resolve
 from drake_disasm.scenario.schema import Range
-from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 from tests.refusals import refused
 
 #: Names with the paths that they stand for in removal_turned, which lists a GroovePose.
@@ -57,7 +57,7 @@ def _by_range(name: str, value: float) -> Scenario:
 
 def _by_parameter(name: str, value: float) -> Scenario:
     scenario = load_scenario("removal_turned")
-    scenario, (parameter,) = scenario_parameters(scenario, [Request(name)])
+    scenario, (parameter,) = scenario_parameters(scenario, [ParameterRequest(name)])
     return with_values(scenario, {parameter.path: value})
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from drake_disasm.logs import Log, read_log, write_static_wrench
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
 from tests.sysid.models.arm import JOINTS, write_motion_log, write_two_link_arm
@@ -64,7 +64,7 @@ def arm_log(tmp_path_factory) -> Log:
             q[:, joint] += size * np.sin(phase)
             v[:, joint] += size * omega * np.cos(phase)
             vd[:, joint] -= size * omega**2 * np.sin(phase)
-    arm = ArmDynamics(str(urdf), JOINTS)
+    arm = ArmRegressor(str(urdf), JOINTS)
     tau = arm.regressor(q, v, vd) @ arm.inertia + 0.3 * np.sign(v) + 0.1 * v
     tau += 0.02 * np.random.default_rng(0).standard_normal(tau.shape)
     columns = {"time": time, "q": q, "v": v, "vd": vd, "tau": tau}

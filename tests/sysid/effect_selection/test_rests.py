@@ -9,7 +9,7 @@ from sysid.effect_selection.close_loop import close_loop
 from sysid.effect_selection.experiments import separating
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_torque_static import arrivals
-from sysid.scenario_parameters import Request
+from sysid.scenario_parameters import ParameterRequest
 from tests.sysid.models.arm import JOINTS, write_two_link_arm
 from tests.sysid.models.rests import (
     GRAVITY,
@@ -83,7 +83,7 @@ def test_the_iiwa_at_rest_names_a_payload_beside_the_masses_of_the_urdf(tmp_path
     mass, moment = 1.0, [0.02, -0.03, 0.1]
     q = iiwa_poses(40, seed=5)
     tau = iiwa_weight(q, mass=mass, first_moment=moment)
-    only = (Request("iiwa_link_2.mx"),)
+    only = (ParameterRequest("iiwa_link_2.mx"),)
     found = close_loop(iiwa_model(tmp_path / "log", q, tau, seed=5, requests=only))
     assert found.verdict.confirmed == ("FlangePayload",)
     (payload,) = found.last.model.effects_at(found.last.theta)

@@ -22,13 +22,13 @@ from sysid.effect_selection.verdict_words import (
 )
 from sysid.models import Channel, LogModel, Measurements
 from sysid.residuals.channel_checks import ChannelFinding
-from sysid.residuals.left_over import LeftOver
+from sysid.residuals.predictable_residual import PredictableResidual
 from tests.sysid.effect_selection.verdicts import ERRORS, made_verdict
 
 _LAG, _FRICTION = ("SensorLag",), tuple(f"JointCoulombFriction.j{i}" for i in range(3))
 _AGAINST = (Contradiction(("a", "b"), "SensorBias", 0.5),)
 _SINE = (ChannelFinding("fx", "periodic at 1.3 Hz (90 %)"),)
-_LEFT = (LeftOver("fx", 0.4, 0.1, "N", ("velocity", "time")),)
+_LEFT = (PredictableResidual("fx", 0.4, 0.1, "N", ("velocity", "time")),)
 _LIMITS = (
     DetectionLimit("SensorLag", "fx", 0.01, "s", 0.1),
     DetectionLimit("GrooveBend", "k", None, "1/m", 3.0),
@@ -43,7 +43,7 @@ _SIGN = (Written("TorqueSign", "j1 has the other sign", "flip it"),)
         ("too short", (), {"limits": _LIMITS}, ["too short", "1 of 2", "GrooveBend"]),
         ("none", (), {"is_provisional": True}, ["So far"]),
         ("explained", _FRICTION, {}, [in_words(_FRICTION[0]), "from 10 to 1 %"]),
-        ("partly", _LAG, {"left_over": _LEFT}, ["40 %", "fx", "velocity"]),
+        ("partly", _LAG, {"predictable_residual": _LEFT}, ["40 %", "fx", "velocity"]),
         ("partly", _LAG, {"relative_error": 0.49}, ["large"]),
         ("partly", _LAG, {"invalid": "drag is too strong"}, ["drag is too strong"]),
         ("unexplained", _LAG, {"excess": 3.14}, ["no effect is confirmed", "3.1"]),
@@ -64,7 +64,7 @@ def _mixed():
     """Returns a verdict with an effect of each standing, at several joints."""
     ties = ((), (Tie("JointLoadFriction.j0 and ArmTilt", "weights; turns"),), ())
     names = ("SensorLag", "JointCoulombFriction.j0", "SensorBias")
-    found = made_verdict("partly", names, ties, left_over=_LEFT)
+    found = made_verdict("partly", names, ties, predictable_residual=_LEFT)
     reason = "2 of 4 parts ask"
     bias = dataclasses.replace(found.standings[2], status="suggested", reason=reason)
     return dataclasses.replace(found, standings=(*found.standings[:2], bias))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid.experiment_design.arm_limits import JointLimits, Workspace
+from sysid.experiment_design.arm_limits import CollisionFreeSpace, JointLimits
 from sysid.experiment_design.fourier import FourierMotion
 from tests.refusals import refused
 from tests.sysid.models.arm import JOINTS, write_two_link_arm
@@ -75,7 +75,7 @@ def test_a_motion_grows_up_to_its_first_limit_and_not_beyond(folding):
 
 def test_clearance_is_the_distance_of_links_that_no_joint_connects(folding):
     limits = JointLimits.of_urdf(folding, JOINTS, 5.0, 0.0)
-    workspace = Workspace(folding, JOINTS, limits)
+    workspace = CollisionFreeSpace(folding, JOINTS, limits)
     assert workspace.has_geometry
     straight, folded = np.zeros(2), np.array([0.0, 3.0])
     far, near = workspace.clearance(np.stack([straight, folded]))
@@ -90,7 +90,7 @@ def test_clearance_is_the_distance_of_links_that_no_joint_connects(folding):
 
 def test_an_iiwa_that_folds_is_found_though_its_urdf_filters_that():
     limits = JointLimits.of_urdf(_IIWA, _IIWA_JOINTS, 5.0, 0.0)
-    workspace = Workspace(_IIWA, _IIWA_JOINTS, limits)
+    workspace = CollisionFreeSpace(_IIWA, _IIWA_JOINTS, limits)
     folded = np.array([0.0, 2.09, 0.0, -2.09, 0.0, 2.09, 0.0])
     upright, close = workspace.clearance(np.stack([np.zeros(7), folded]))
     assert upright > close

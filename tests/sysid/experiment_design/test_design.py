@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid.experiment_design.arm_limits import JointLimits, Workspace
+from sysid.experiment_design.arm_limits import CollisionFreeSpace, JointLimits
 from sysid.experiment_design.design import DesignSettings, design_motion
 from sysid.experiment_design.information import (
     ArmExperiment,
@@ -39,7 +39,7 @@ def limits(urdf) -> JointLimits:
 
 @pytest.fixture(scope="module")
 def design(urdf, experiment, limits):
-    workspace = Workspace(urdf, JOINTS, limits)
+    workspace = CollisionFreeSpace(urdf, JOINTS, limits)
     return design_motion(experiment, limits, workspace, _SETTINGS)
 
 
@@ -104,6 +104,8 @@ def test_the_condition_number_is_the_scaled_regressors():
 def test_a_floor_above_the_arm_is_refused(urdf, experiment, limits):
     high = DesignSettings(duration=8.0, harmonics=4, starts=2, iterations=1, floor=5.0)
     with refused("no motion", "`floor`"):
-        design_motion(experiment, limits, Workspace(urdf, JOINTS, limits), high)
+        design_motion(
+            experiment, limits, CollisionFreeSpace(urdf, JOINTS, limits), high
+        )
     with refused("did you mean 'JointCoulombFriction'"):
         ArmExperiment(urdf, JOINTS, ["JointCoulombFrictoin"], _NOISE, 8.0)

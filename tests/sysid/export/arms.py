@@ -16,7 +16,7 @@ from sysid.fitting.fit import Fit
 from sysid.fitting.fitter import Fitter
 from sysid.fitting.settings import DEFAULT_SETTINGS
 from sysid.models.joint_motion import JointMotionModel
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 from sysid.workers import Workers
 from tests.sysid.models.arm import write_two_link_arm
 
@@ -75,7 +75,7 @@ def fitted(
         size: of the difference.
     """
     time, q, v, vd = smooth(len(joints))
-    arm = ArmDynamics(urdf, joints)
+    arm = ArmRegressor(urdf, joints)
     pi = changed(arm.inertia, size)
     columns = {"time": time, "q": q, "v": v, "vd": vd, "tau": 0.0 * q}
     header = LogHeader("joint_motion", "excite", {}, joints=tuple(joints), urdf=urdf)

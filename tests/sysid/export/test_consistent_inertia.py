@@ -11,14 +11,14 @@ from sysid.export.consistent_inertia import (
     inertial_of,
     pseudo_inertia,
 )
-from sysid.models.regressor import ArmDynamics, base_set
+from sysid.models.regressor import ArmRegressor, base_set
 from tests.refusals import refused
 from tests.sysid.export.arms import IIWA, IIWA_JOINTS, changed
 
 
 @functools.cache
-def iiwa() -> tuple[ArmDynamics, np.ndarray]:
-    arm = ArmDynamics(IIWA, IIWA_JOINTS)
+def iiwa() -> tuple[ArmRegressor, np.ndarray]:
+    arm = ArmRegressor(IIWA, IIWA_JOINTS)
     base = base_set(arm.random_regressor())
     return arm, base.matrix(len(arm.inertia))
 

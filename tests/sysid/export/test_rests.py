@@ -9,7 +9,7 @@ from sysid.export import make_exports
 from sysid.fitting.fitter import Fitter
 from sysid.fitting.settings import DEFAULT_SETTINGS
 from sysid.models.joint_torque_static import JointTorqueStaticModel
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 from sysid.workers import Workers
 from tests.sysid.export.arms import Closed, changed, two_links
 from tests.sysid.models.arm import JOINTS
@@ -19,9 +19,9 @@ def test_an_arm_known_at_rest_keeps_what_rest_does_not_show(tmp_path):
     urdf = two_links(tmp_path / "arm.urdf")
     generator = np.random.default_rng(0)
     q = generator.uniform(-2.0, 2.0, (60, 2))
-    arm = ArmDynamics(urdf, JOINTS)
+    arm = ArmRegressor(urdf, JOINTS)
     pi = changed(arm.inertia, 0.1)
-    tau = ArmDynamics(urdf, JOINTS, None, None).regressor(q, 0 * q, 0 * q) @ pi
+    tau = ArmRegressor(urdf, JOINTS, None, None).regressor(q, 0 * q, 0 * q) @ pi
     tau += 1.5 * np.sign(np.diff(q, axis=0, prepend=q[:1])) * [0.0, 1.0]
     tau += 1e-4 * generator.normal(size=tau.shape)
     columns = {"order": np.arange(60.0), "q": q, "tau": tau}

@@ -29,8 +29,8 @@ class _Begun(LogModel):
     def select_rows(self, mask: NDArray[np.bool_]) -> Self:
         return self.replace()
 
-    def begun(self, theta: Array) -> Self:
-        taken = float(theta[0])
+    def with_begins(self, theta: Array | None) -> Self:
+        taken = self.taken if theta is None else float(theta[0])
         if abs(taken - self.taken) < 1e-6:
             return self
         return self.replace(taken=taken)

@@ -20,7 +20,7 @@ from drake_disasm.scenario import Scenario
 from sysid.effect_selection.close_loop import close_loop
 from sysid.models.effects import at_null
 from sysid.models.joint_motion import JointMotionModel
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 from tests.sysid.models.arm import (
     JOINTS,
     smooth_motion,
@@ -59,7 +59,7 @@ def urdf(tmp_path):
 def test_a_late_torque_is_that_of_an_earlier_motion(urdf, tmp_path):
     late, log = -0.0012, _log(tmp_path, urdf, [])
     time = log.episodes[0]["time"]
-    arm = ArmDynamics(str(urdf), JOINTS)
+    arm = ArmRegressor(str(urdf), JOINTS)
     q, v, vd = smooth_motion(time - late)
     expected = arm.regressor(q, v, vd) @ arm.inertia
     inner = slice(5, -5)  # at its ends the log has no earlier or later motion
@@ -85,7 +85,7 @@ def test_a_tilted_base_sees_another_gravity(urdf, tmp_path):
     log = _log(tmp_path, urdf, [])
     rx, ry = 1e-4, -2e-4
     found = _torque(_model(log, [ArmTilt(rx, ry)])) - _torque(_model(log, []))
-    arm = ArmDynamics(str(urdf), JOINTS)
+    arm = ArmRegressor(str(urdf), JOINTS)
     before = arm.random_regressor() @ arm.inertia
     plant: MultibodyPlant = arm._plant
     R_WB = RotationMatrix.MakeXRotation(rx) @ RotationMatrix.MakeYRotation(ry)

@@ -5,19 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 import sensor_in_motion
-from pydrake.math import RigidTransform
 
-from drake_disasm.cell.coordinates import BoltCoordinates
-from drake_disasm.cell.twin_parameters import twin_of
-from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.effects import SensorBias, SensorGainDrift
 from drake_disasm.logs import Log
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
-from drake_disasm.twin.arm_step import ArmStep
-from sysid.models.cell_arm import CellArm, Sway
+from sysid.models.cell_motion import sway
 from sysid.models.transitions import FORCE_ERROR, POSE_ERROR
 from sysid.models.twin import TwinModel
 from sysid.objective import rms
@@ -87,72 +82,19 @@ def test_a_log_of_the_twin_has_none(cell_log):
     np.testing.assert_array_equal(measured.sigma, measured.noise)
 
 
-def test_the_compliance_is_that_of_the_arms_posture():
-    """At stop B, along x, the arm is 4 micrometres stiffer per newton than at A."""
-    arm, twin = CellArm.of(_SCENARIO, "cell"), twin_of(_SCENARIO)
-    q, push, none = (
-        np.array([[0.06, 0, 0, 0, 0, 0]]),
-        np.array([[-3.0, 0, 0, 0, 0, 0]]),
-        np.zeros((1, 3)),
-    )
-    X_GB = BoltCoordinates(twin.p_BoTo_B).pose(q[0])
-    here, there = (
-        np.linalg.inv(twin_of(_SCENARIO, X).arm.K) for X in (RigidTransform(), X_GB)
-    )
-    expected = (there - here) @ velocity_shift(twin.p_BoTo_B).T @ push[0]
-    found = arm.shifts(q, push, none)[0]
-    np.testing.assert_allclose(found[:3], expected[:3], rtol=1e-6, atol=1e-12)
-    assert 3e-6 < abs(found[0]) < 2e-5
-    assert not arm.shifts(0.0 * q, push, none).any()
-    assert not CellArm.of(_SCENARIO, "twin").shifts(q, push, none).any()
-
-
-def test_the_arm_carries_a_moment_of_what_the_springs_have_moved():
-    arm, twin = CellArm.of(_SCENARIO, "cell"), twin_of(_SCENARIO)
-    moment, at_A = np.array([[0.0, 0.0, 0.05]]), np.zeros((1, 6))
-    turned = np.linalg.solve(twin.arm.K, [0.0, 0.0, 0.0, 0.0, 0.0, 0.05])
-    found = arm.shifts(at_A, at_A, moment)[0]
-    np.testing.assert_allclose(found[:3], turned[:3], atol=1e-15)
-    np.testing.assert_allclose(found[3:], turned[[5, 4, 3]], atol=1e-15)
-
-
-def test_a_rate_that_comes_late_is_a_command_elsewhere():
-    """The arm ends a step where a late rate of the same command has it."""
-    arm, twin, h = CellArm.of(_SCENARIO, "cell"), twin_of(_SCENARIO), 0.1
-    late = _SCENARIO.arm.control_period
-    short, rest = (ArmStep.of(twin.arm, twin.grip, t) for t in (late, h - late))
-    whole, rate = ArmStep.of(twin.arm, twin.grip, h), 0.01 * np.eye(6)[1]
-
-    def command(time: float, rate_told: np.ndarray) -> np.ndarray:
-        return np.hstack([rate * time, rate_told])[None]
-
-    at_begin = short.ahead(np.zeros((1, 12)), command(late, rate))
-    # What the damper would have done with the rate that is not there yet.
-    missing = late * np.linalg.solve(twin.arm.M, twin.arm.D)[1, 1] * rate[1]
-    at_begin[0, 7] -= missing
-    expected = rest.ahead(at_begin, command(h, rate))[0, 1]
-    told = command(h, rate)
-    told[0, :6] += arm.ahead(np.array([np.zeros(6), rate]))[1] - arm.lead * rate
-    found = whole.ahead(np.zeros((1, 12)), told)[0, 1]
-    even = whole.ahead(np.zeros((1, 12)), command(h, rate))[0, 1]
-    assert found == pytest.approx(expected, abs=0.3 * abs(even - expected))
-
-
 def test_the_sway_is_what_cell_and_twin_read_of_free_motion():
     scenario = load_scenario("removal", sensor_in_motion.QUIET)
     first, steady = (
         sensor_in_motion.responses(TaskSimulation(scenario, "cell"), 2, 3e-5)
         - sensor_in_motion.responses(TaskSimulation(scenario, "twin"), 2, 3e-5)
     )[:, 2]
-    sway = Sway.of(_SCENARIO, "cell")
-    assert sway.steady[2] == pytest.approx(steady, abs=0.2)
-    assert sway.change[2] == pytest.approx(first - steady, abs=0.3)
     rates = np.array([[0.0, 0.0, 2e-3]] * 3)
     R_SB = np.array([[-1.0, 0, 0], [0, 0, -1], [0, -1, 0]])
     expected = -2e-3 * np.array([first, steady, steady])  # z of G is -y of S
-    np.testing.assert_allclose(sway.wrenches(rates, R_SB)[:, 1], expected, atol=1e-3)
-    for other in (Sway.of(_SCENARIO, "twin"), Sway.of(_IMPEDANCE, "cell")):
-        assert not other.wrenches(rates, R_SB).any()
+    found = sway(_SCENARIO, "cell", rates, R_SB)[:, 1]
+    np.testing.assert_allclose(found, expected, atol=1e-3)
+    for other, station in ((_SCENARIO, "twin"), (_IMPEDANCE, "cell")):
+        assert not sway(other, station, rates, R_SB).any()
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ def test_stated_rows_are_read_with_their_times_in_the_log(tmp_path):
     later = dataclasses.replace(ten, free=~ten.free, time=ten.time + 100.0)
     made = model(write_task(tmp_path / "log", later, states_free=True))
     np.testing.assert_array_equal(made.measurements.values, later.wrench[later.free])
-    np.testing.assert_allclose(made.clock, ten.time[later.free])
+    np.testing.assert_allclose(made.poses.clock, ten.time[later.free])
     [rows] = made.rows_in_use.values()
     np.testing.assert_array_equal(rows, np.flatnonzero(later.free))
 

@@ -15,7 +15,7 @@ from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.scenario import Scenario
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.path_memory import PathMemory
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 from tests.sysid.models.arm import JOINTS, smooth_motion, write_two_link_arm
 from tests.sysid.models.fitted import fitted
 
@@ -44,7 +44,7 @@ def _log(folder, urdf, episodes=1, friction=(0.0, 0.002), spring=(0.0, 0.0)):
             for k, dq in enumerate(np.diff(q[:, 1])):
                 F[k + 1] = F[k] + (size * abs(dq) / dq - F[k]) * abs(dq) / slip
             q, v, vd = (x[::50] * SLOW**n for n, x in enumerate((q, v, vd)))
-            tau = ArmDynamics(str(urdf), JOINTS).torques(q, v, vd)
+            tau = ArmRegressor(str(urdf), JOINTS).torques(q, v, vd)
             tau[:, 1] += F[::50] + spring[0] * q[:, 1] + spring[1]
             tau += NOISE * random.normal(size=tau.shape)
             columns = {"time": fine[::50], "q": q, "v": v, "vd": vd, "tau": tau}

@@ -14,7 +14,7 @@ from drake_disasm.effects import (
 )
 from drake_disasm.logs import Log, read_log
 from drake_disasm.logs.importing import (
-    Processing,
+    ImportProcessing,
     import_recordings,
     read_map,
     read_source,
@@ -31,7 +31,7 @@ def _rokae(folder) -> Log:
     fields = read_map(source / "map.yaml")
     fields = dataclasses.replace(fields, urdf=str(source / "rokae7.urdf"))
     sources = [read_source(source / "run.csv")]
-    imported = import_recordings(sources, fields, Processing(6.0))
+    imported = import_recordings(sources, fields, ImportProcessing(6.0))
     write_log(imported, sources, fields, folder / "log", {})
     return read_log(folder / "log")
 

@@ -10,7 +10,7 @@ from drake_disasm.scenario import Scenario
 from sysid.effect_selection.close_loop import close_loop
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.link_torques import time_derivatives
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 from tests.sysid.models.arm import (
     JOINTS,
     smooth_motion,
@@ -44,7 +44,7 @@ def _behind_springs(folder, urdf, compliances) -> Log:
     """
     time = _PERIOD * np.arange(_ROWS)
     linked = smooth_motion(time)
-    tau = ArmDynamics(str(urdf), JOINTS).torques(*linked)
+    tau = ArmRegressor(str(urdf), JOINTS).torques(*linked)
     ahead = make_interp_spline(time, tau * compliances, k=5)
     q, v, vd = (part + ahead.derivative(k)(time) for k, part in enumerate(linked))
     noise = _NOISE * np.random.default_rng(0).normal(size=tau.shape)

@@ -6,7 +6,7 @@ import pytest
 from drake_disasm.effects import EncoderError, JointElasticity
 from drake_disasm.scenario import Scenario
 from sysid.models.joint_motion import JointMotionModel
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 from tests.sysid.models.arm import (
     JOINTS,
     smooth_motion,
@@ -28,7 +28,7 @@ def _log(folder, urdf, offset=0.0, scale=0.0, noise=0.0, joint="elbow"):
     """An arm's torques, and the motion as a joint's encoder reads it."""
     at = np.array([name == joint for name in JOINTS])
     motion = smooth_motion(_TIME)
-    tau = ArmDynamics(str(urdf), JOINTS).torques(*motion)
+    tau = ArmRegressor(str(urdf), JOINTS).torques(*motion)
     tau += noise * np.random.default_rng(0).normal(size=tau.shape)
     read = [x * (1.0 + scale * at) for x in motion]
     read[0] = read[0] + offset * at

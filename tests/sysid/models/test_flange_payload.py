@@ -12,7 +12,7 @@ from sysid.effect_selection.close_loop import close_loop
 from sysid.fitting.candidates import candidates
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
-from sysid.scenario_parameters import Request
+from sysid.scenario_parameters import ParameterRequest
 from tests.sysid.models.arm import write_motion_log, write_two_link_arm
 from tests.sysid.models.test_joint_motion import drakes_torques, states
 
@@ -50,7 +50,7 @@ def test_a_payload_is_drakes_point_mass_and_a_candidate_of_the_arm(log: Log) -> 
 
 
 def test_closing_the_loop_finds_it_beside_the_arm_of_the_urdf(log: Log) -> None:
-    model = model_of([log], ModelChoice(requests=(Request("upper.Izz"),)))
+    model = model_of([log], ModelChoice(requests=(ParameterRequest("upper.Izz"),)))
     assert isinstance(model, JointMotionModel)
     found = close_loop(model)
     assert found.verdict.names == ("FlangePayload",)

@@ -16,8 +16,8 @@ from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 from drake_disasm.task.simulation import TaskSimulation
-from sysid.models.grip_lag import GripLag
 from sysid.models.grip_observer import shrunk
+from sysid.models.grip_state import GripState
 from sysid.models.transitions import Transitions
 from sysid.models.twin import TwinModel
 from sysid.objective import rms
@@ -60,25 +60,26 @@ def _residual(model: TwinModel) -> np.ndarray:
     return model.measurements.weighted(model.predictions(_NOTHING))
 
 
-def _give(begun: Transitions, lag: GripLag, weight: np.ndarray) -> np.ndarray:
+def _give(begun: Transitions, grip: GripState) -> np.ndarray:
     wrench = begun.steps.wrench
-    return np.asarray(deflection(lag.springs, begun.p_BoTo_B, weight, wrench))
+    return np.asarray(deflection(grip.springs, begun.p_BoTo_B, grip.rest[:3], wrench))
 
 
 def test_the_springs_wrench_is_that_which_has_them_give():
-    lag, random = GripLag.of(_SCENARIO), np.random.default_rng(0)
+    grip, random = GripState.of(_SCENARIO), np.random.default_rng(0)
     wrench = random.uniform(-1, 1, (5, 6)) * ([5.0] * 3 + [0.2] * 3)
-    weight, p_BoTo_B = np.array([0.1, -0.2, -3.0]), twin_of(_SCENARIO).p_BoTo_B
-    give = deflection(lag.springs, p_BoTo_B, weight, wrench)
-    np.testing.assert_allclose(lag.carried(give, weight), wrench, atol=1e-12)
+    grip = dataclasses.replace(grip, rest=np.array([0.1, -0.2, -3.0, 0.0, 0.0, 0.0]))
+    p_BoTo_B = twin_of(_SCENARIO).p_BoTo_B
+    give = deflection(grip.springs, p_BoTo_B, grip.rest[:3], wrench)
+    np.testing.assert_allclose(grip.carried(give), wrench, atol=1e-12)
 
 
 def test_noise_scatters_the_springs_wrench_as_stated():
-    lag, random = GripLag.of(_SCENARIO), np.random.default_rng(0)
+    grip, random = GripState.of(_SCENARIO), np.random.default_rng(0)
     noise = np.array([0.1] * 3 + [0.01] * 3)
     read = noise * random.standard_normal((4000, 6))
-    found = np.std(lag.along(read) @ lag.to_grip.T, axis=0)
-    stated = lag.scatter(noise, RigidTransform())
+    found = np.std(grip.elastic(read) @ grip.to_grip.T, axis=0)
+    stated = grip.scatter(noise, RigidTransform(), of_growth=False)
     np.testing.assert_allclose(found, stated, rtol=0.05)
 
 
@@ -91,12 +92,9 @@ def test_what_is_within_the_noise_is_not_believed_and_the_rest_almost():
 def test_steps_begin_where_the_bolt_is(dragged):
     log, scenario, give = dragged
     model = TwinModel([log], scenario, ())
-    begun = model.begun(_NOTHING)
-    episode = model._whole.episodes[0]
-    errors = [
-        _give(each._whole, episode.grip, episode.offset.rest[:3]) - give
-        for each in (model, begun)
-    ]
+    begun = model.with_begins(_NOTHING)
+    grip = model._whole.episodes[0].grip
+    errors = [_give(each._whole, grip) - give for each in (model, begun)]
     before, after = (np.sqrt(np.mean(e[:, :3] ** 2, axis=0)) for e in errors)
     assert before[0] > 2e-4 and after[0] < 0.25 * before[0]
     assert np.all(after < 2e-4)  # the noise of the force along y alone gives 0.25 mm
@@ -105,21 +103,21 @@ def test_steps_begin_where_the_bolt_is(dragged):
 def test_at_the_truth_a_strong_drag_leaves_the_noise(dragged):
     log, scenario, _ = dragged
     model = TwinModel([log], scenario, (), coarse=False)
-    before, after = (_residual(m)[:, 6:] for m in (model, model.begun(_NOTHING)))
+    before, after = (_residual(m)[:, 6:] for m in (model, model.with_begins(_NOTHING)))
     assert rms(before) > 5.0 and rms(after) < 1.3
 
 
 def test_a_thinned_log_begins_as_the_whole_does(dragged):
     log, scenario, _ = dragged
     model = TwinModel([log], scenario, ())
-    thin, whole = model.thin(2).begun(_NOTHING), model.begun(_NOTHING)
+    thin, whole = model.thin(2).with_begins(_NOTHING), model.with_begins(_NOTHING)
     rows = thin._transitions.rows
     parts = thin._transitions.steps.wrench, whole._transitions.steps.wrench[rows]
     assert np.abs(np.subtract(*parts))[:, :3].max() < 0.3
     np.testing.assert_array_equal(
         whole.thin(2)._transitions.steps.wrench, whole._transitions.steps.wrench[rows]
     )
-    assert whole.begun(_NOTHING) is whole
+    assert whole.with_begins(_NOTHING) is whole
 
 
 def test_where_a_model_leads_nowhere_steps_begin_as_the_wrench_says(dragged):
@@ -128,7 +126,7 @@ def test_where_a_model_leads_nowhere_steps_begin_as_the_wrench_says(dragged):
     model = TwinModel([log], scenario, ())
     broken = dataclasses.replace(scenario.lock, neck_diameter=0.011)
     refused = model.replace(scenario=dataclasses.replace(scenario, lock=broken))
-    assert refused.begun(_NOTHING) is refused
+    assert refused.with_begins(_NOTHING) is refused
 
 
 def test_what_a_grip_that_gives_leaves_unknown_is_little_and_less_of_a_stiff_one(
@@ -150,7 +148,7 @@ def test_a_log_that_the_grip_decides_is_out_of_the_models_range(dragged):
     """Of steps as they are; and of ones that no force balances."""
     log, scenario, _ = dragged
     model = TwinModel([log], scenario, ())
-    quiet = model.begun(_NOTHING).validity(_NOTHING)
+    quiet = model.with_begins(_NOTHING).validity(_NOTHING)
     assert quiet is not None and quiet.holds and 1e-3 < quiet.give < 0.02
     rough = dataclasses.replace(scenario, effects=[GrooveFriction(1.5)])
     found = model.replace(scenario=rough).validity(_NOTHING)

@@ -17,7 +17,7 @@ from sysid.fitting.candidates import Candidate, extended
 from sysid.identification import SearchSettings, Settings, identify
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
-from sysid.models.regressor import ArmDynamics, base_set, body_regressor
+from sysid.models.regressor import ArmRegressor, base_set, body_regressor
 from tests.refusals import refused
 from tests.sysid.models.arm import JOINTS, write_motion_log, write_two_link_arm
 from tests.sysid.real_data import write_arm, write_motion
@@ -57,7 +57,7 @@ def motion_log(folder, urdf, noise=0.0, n=300, drop=()):
 
 
 def test_the_regressor_is_drakes_inverse_dynamics(urdf):
-    arm = ArmDynamics(str(urdf), JOINTS)
+    arm = ArmRegressor(str(urdf), JOINTS)
     q, v, vd = states(30)
     tau = arm.regressor(q, v, vd) @ arm.inertia
     np.testing.assert_allclose(tau, drakes_torques(urdf, q, v, vd), atol=1e-12)
@@ -65,8 +65,8 @@ def test_the_regressor_is_drakes_inverse_dynamics(urdf):
 
 def test_the_order_of_joints_is_the_logs(urdf):
     q, v, vd = states(5)
-    forth = ArmDynamics(str(urdf), JOINTS).regressor(q, v, vd)
-    back = ArmDynamics(str(urdf), JOINTS[::-1])
+    forth = ArmRegressor(str(urdf), JOINTS).regressor(q, v, vd)
+    back = ArmRegressor(str(urdf), JOINTS[::-1])
     swapped = back.regressor(q[:, ::-1], v[:, ::-1], vd[:, ::-1])
     np.testing.assert_allclose(swapped[:, ::-1], forth)
 
@@ -79,7 +79,7 @@ def test_a_point_mass_at_rest_weighs_what_it_weighs():
 
 
 def test_the_base_set_predicts_all_that_the_full_one_does(urdf):
-    arm = ArmDynamics(str(urdf), JOINTS)
+    arm = ArmRegressor(str(urdf), JOINTS)
     base = base_set(arm.random_regressor())
     assert len(base.independent) < 20 and len(base.independent) >= 9
     q, v, vd = states(20, seed=5)

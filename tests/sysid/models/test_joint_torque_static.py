@@ -9,7 +9,7 @@ import drake_disasm.effects as fx
 from drake_disasm.scenario import Scenario
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_torque_static import JointTorqueStaticModel, arrivals
-from sysid.scenario_parameters import Request
+from sysid.scenario_parameters import ParameterRequest
 from tests.refusals import refused
 from tests.sysid.models.arm import JOINTS, write_motion_log, write_two_link_arm
 from tests.sysid.models.rests import (
@@ -72,7 +72,7 @@ def test_the_iiwa_is_held_by_what_drake_says_and_shows_no_inertias(tmp_path):
     assert len(model.parameters) == 12  # the arm stands upright: none of joint 1
     assert not any(".I" in p.doc for p in model.parameters)
     with refused("at rest", "inertias"):
-        model_of([log], ModelChoice(requests=(Request("iiwa_link_3.Izz"),)))
+        model_of([log], ModelChoice(requests=(ParameterRequest("iiwa_link_3.Izz"),)))
 
 
 def test_half_the_difference_from_both_sides_is_friction_and_the_mean_weight(

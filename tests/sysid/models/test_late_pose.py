@@ -46,15 +46,3 @@ def test_steps_that_are_not_predicted_go_by_the_model_and_not_across_episodes():
     found = late.at_ends(rows, before, true[[4, 5, 0]], true[[5, 6, 1]])
     moved = [path[4] - path[3], true[5] - true[4], np.zeros(6)]
     np.testing.assert_allclose(found, moved, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("delay", "unseen"),
-    [(0.1, [0, 0, 0]), (0.13, [0, 0, 1]), (0.3, [0, 1, 2])],
-)
-def test_the_last_begins_are_never_measured(delay, unseen):
-    path, _ = _paths()
-    late = LatePoses.of([path, path], PoseDelay(delay).weights(_PERIOD))
-    for end in (_STEPS, 2 * _STEPS):
-        assert late.unseen[end - 3 : end].tolist() == unseen
-    assert late.unseen.sum() == 2 * sum(unseen)

@@ -14,7 +14,7 @@ from drake_disasm.effects import (
 )
 from drake_disasm.logs import read_log
 from drake_disasm.logs.importing import (
-    Processing,
+    ImportProcessing,
     guessed_map,
     import_recordings,
     read_source,
@@ -24,7 +24,7 @@ from drake_disasm.logs.importing.importer import low_pass_of
 from drake_disasm.scenario import Scenario
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.log_filters import LogFilter, log_filters
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 from tests.sysid.models.arm import JOINTS, write_two_link_arm
 from tests.sysid.models.fitted import fitted
 
@@ -39,14 +39,14 @@ def log(tmp_path_factory):
     urdf = write_two_link_arm(folder / "two.urdf")
     time = PERIOD * np.arange(4000)
     q, v, vd = swing(time)
-    tau = ArmDynamics(str(urdf), JOINTS).torques(q, v, vd)
+    tau = ArmRegressor(str(urdf), JOINTS).torques(q, v, vd)
     tau += np.array(SIZES) * np.tanh(v / DRY[0].creep)
     tau += NOISE * np.random.default_rng(0).standard_normal(tau.shape)
     np.savez(folder / "run.npz", time=time, q=q, tau=tau)
     source = read_source(folder / "run.npz")
     fields = guessed_map(source, "joint_motion")
     fields = dataclasses.replace(fields, urdf=str(urdf), joints=JOINTS)
-    found = import_recordings([source], fields, Processing(cutoff=CUTOFF))
+    found = import_recordings([source], fields, ImportProcessing(cutoff=CUTOFF))
     write_log(found, [source], fields, folder / "log", {})
     return read_log(folder / "log")
 

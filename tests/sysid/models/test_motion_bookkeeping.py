@@ -10,7 +10,7 @@ from sysid.effect_selection.close_loop import close_loop
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_motion import JointMotionModel
 from sysid.models.motion_bookkeeping import TorqueFits
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 from sysid.models.signed_order import SignedOrder
 from sysid.parameters import nominal_values
 from tests.sysid.models.arm import JOINTS, write_motion_log, write_two_link_arm
@@ -36,7 +36,7 @@ def write(folder, gravity=None, lateness=0.0, friction=1.0) -> Log:
     folder.mkdir(exist_ok=True)
     urdf = write_two_link_arm(folder / "two.urdf")
     time = 0.01 * np.arange(800)
-    arm = ArmDynamics(str(urdf), JOINTS, gravity)
+    arm = ArmRegressor(str(urdf), JOINTS, gravity)
     q, v, vd = motion(time - lateness)
     tau = arm.regressor(q, v, vd) @ arm.inertia
     tau += friction * (0.3 * np.sign(v) + 0.1 * v)
@@ -159,7 +159,7 @@ def test_torques_without_gravity_are_explained_by_a_model_without(tmp_path):
     arm = way.model
     still = arm.predictions(nominal_values(arm.parameters))
     q, v, vd = motion(0.01 * np.arange(800))
-    weightless = ArmDynamics(log.header.urdf, JOINTS, (0.0, 0.0, 0.0))
+    weightless = ArmRegressor(log.header.urdf, JOINTS, (0.0, 0.0, 0.0))
     np.testing.assert_allclose(still, weightless.torques(q, v, vd), atol=1e-9)
 
 

@@ -143,12 +143,6 @@ def test_identifies_the_effect_with_defaults_alone(model):
     assert found.scenario is None and found.held_out is None
 
 
-def test_it_has_no_commands_to_displace(model):
-    assert not model.has_commands
-    with refused("has no commands"):
-        model.displaced(np.zeros((400, 3)), np.zeros((400, 3)))
-
-
 def test_predictions_of_another_shape_are_refused(model):
     class Wide(Pendulum):
         def predict(self, theta, rows):

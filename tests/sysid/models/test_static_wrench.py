@@ -9,7 +9,7 @@ from sysid.identification import SearchSettings, Settings, identify
 from sysid.identification.noise import with_estimated_noise
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.static_wrench import DEFAULT_PARAMETERS, StaticWrenchModel
-from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 from sysid.workers import Workers
 from tests.refusals import refused
 from tests.sysid.real_data import write_static
@@ -33,7 +33,7 @@ def synthetic(folder, noise=0.0, poses=20, payload=(0.0, (0.0, 0.0, 0.0))):
 
 
 def make(log, names=DEFAULT_PARAMETERS, scenario=None, known=False):
-    requests = [Request(n) for n in names]
+    requests = [ParameterRequest(n) for n in names]
     scenario, parameters = scenario_parameters(scenario or Scenario(), requests)
     return StaticWrenchModel([log], scenario, parameters, known)
 

@@ -11,7 +11,7 @@ from sysid.identification.gauss_newton import gauss_newton
 from sysid.models import PredictionError
 from sysid.models.twin import TwinModel, at_sensor
 from sysid.objective import Objective
-from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 from sysid.workers import Workers
 from tests.refusals import refused
 
@@ -19,7 +19,9 @@ NAMES = ("contact.friction", "lock.clearance", "GroovePose.ry")
 
 
 def make(log, scenario, names=NAMES, **options) -> TwinModel:
-    scenario, parameters = scenario_parameters(scenario, [Request(n) for n in names])
+    scenario, parameters = scenario_parameters(
+        scenario, [ParameterRequest(n) for n in names]
+    )
     return TwinModel([log], scenario, parameters, **options)
 
 

@@ -32,7 +32,7 @@ from drake_disasm.task.simulation import TaskSimulation
 from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.parameters import Parameter
-from sysid.scenario_parameters import Request, scenario_parameters
+from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
 from sysid.workers import Workers
@@ -103,7 +103,9 @@ def test_sensor_effects_share_one_simulation(tmp_path, monkeypatch):
     scenario = _scenario("impact")
     _, log = _log(tmp_path / "log", scenario, SensorMounting(ry=0.1))
     names = ["SensorBias.fx", "SensorGain.tz", "contact.friction"]
-    scenario, parameters = scenario_parameters(scenario, [Request(n) for n in names])
+    scenario, parameters = scenario_parameters(
+        scenario, [ParameterRequest(n) for n in names]
+    )
     model = TwinModel([log], scenario, parameters)
     np.testing.assert_array_equal(model.simulated, [False, False, True])
     asked = []
@@ -131,12 +133,16 @@ def test_a_step_begins_where_the_load_has_the_grip_not_the_reading(tmp_path):
     amplitude = Parameter("fz", 0.0, -0.5, 0.5, "", path="effects.0.fz")
     fitted = bare.with_effects([SensorGain()], [amplitude])
     theta = np.array([0.4])
-    plain, begun = fitted.begun(np.zeros(1)), fitted.begun(theta)
-    assert plain.begun(np.zeros(1)) is plain and begun.begun(theta) is begun
-    assert plain.begun(theta) is not plain
+    plain, begun = fitted.with_begins(np.zeros(1)), fitted.with_begins(theta)
+    assert plain.with_begins(np.zeros(1)) is plain and begun.with_begins(theta) is begun
+    assert plain.with_begins(theta) is not plain
     errors = [
         np.sqrt(np.mean((m.predictions(t) - m.measurements.values)[:, :3] ** 2))
-        for m, t in ((plain, theta), (begun, theta), (stated.begun(_NOTHING), _NOTHING))
+        for m, t in (
+            (plain, theta),
+            (begun, theta),
+            (stated.with_begins(_NOTHING), _NOTHING),
+        )
     ]
     assert errors[1] < 0.7 * errors[0]
     np.testing.assert_allclose(errors[1], errors[2], rtol=1e-9)
@@ -155,7 +161,9 @@ def test_an_offset_that_the_first_readings_show_moves_no_bolt(tmp_path):
 def test_a_parameter_set_that_fails_leaves_the_others_of_its_batch(tmp_path):
     scenario = _scenario("impact")
     _, log = _log(tmp_path / "log", scenario, SensorMounting(ry=0.1))
-    scenario, parameters = scenario_parameters(scenario, [Request("lock.clearance")])
+    scenario, parameters = scenario_parameters(
+        scenario, [ParameterRequest("lock.clearance")]
+    )
     model = TwinModel([log], scenario, parameters)
     thetas = np.array([[4e-4], [-1.0], [5e-4]])
     assert model.together >= len(thetas)

@@ -15,8 +15,8 @@ from drake_disasm.free_motion.cell_urdf import cell_urdf
 from drake_disasm.logs import Log, read_log
 from drake_disasm.logs.importing import (
     FieldMap,
+    ImportProcessing,
     Known,
-    Processing,
     guessed_map,
     import_recordings,
     read_map,
@@ -63,7 +63,7 @@ _FIELDS = {
 }
 
 
-_RAW = Processing(cutoff=5.0)
+_RAW = ImportProcessing(cutoff=5.0)
 
 
 def _fields(**columns: Any) -> FieldMap:
@@ -80,13 +80,13 @@ def _csv(path: Path, names: Sequence[str], *columns: np.ndarray) -> Source:
 def _guessed_log(source: Source, kind: str, folder: Path) -> Log:
     """Returns the log that is made of a source by a guessed map."""
     fields = guessed_map(source, kind)
-    found = import_recordings([source], fields, Processing())
+    found = import_recordings([source], fields, ImportProcessing())
     write_log(found, [source], fields, folder, {})
     return read_log(folder)
 
 
 def _imported(path: Path, fields: FieldMap, **options: Any) -> Any:
-    return import_recordings([read_source(path)], fields, Processing(**options))
+    return import_recordings([read_source(path)], fields, ImportProcessing(**options))
 
 
 def test_units_scales_and_signs_make_SI(tmp_path: Path) -> None:
@@ -158,7 +158,7 @@ def test_a_bag_s_clocks_are_brought_together(tmp_path: Path, mcap: bool) -> None
     record_arm(tmp_path / "bag", shift=0.012, mcap=mcap)
     source = read_source(tmp_path / "bag")
     fields = guessed_map(source, "joint_motion", Known(("shoulder", "elbow")))
-    found = import_recordings([source], fields, Processing())
+    found = import_recordings([source], fields, ImportProcessing())
     shift = found.recordings[0].shifts["/ft"]
     assert shift.seconds == pytest.approx(-0.012, abs=1e-3)
     assert shift.low < shift.seconds < shift.high and shift.is_seen
@@ -183,7 +183,7 @@ def test_streams_with_nothing_in_common_show_no_shift(tmp_path: Path) -> None:
             for values in stream.channels.values():
                 values[:] = random.standard_normal(len(values))
     fields = guessed_map(source, "joint_motion")
-    found = import_recordings([source], fields, Processing())
+    found = import_recordings([source], fields, ImportProcessing())
     assert not found.recordings[0].shifts["/ft"].is_seen
 
 
@@ -223,7 +223,7 @@ def test_rows_of_another_topic_in_a_table_are_no_lost_rows(tmp_path: Path) -> No
 def test_a_log_says_what_was_done(tmp_path: Path) -> None:
     path = _table(tmp_path / "run.npz", kt=1.0)
     source, fields = read_source(path), parse_map(_FIELDS)
-    found = import_recordings([source], fields, Processing())
+    found = import_recordings([source], fields, ImportProcessing())
     write_log(found, [source], fields, tmp_path / "log", {"command": "x"})
     log = read_log(tmp_path / "log")
     origin = log.header.provenance["import"]
@@ -250,7 +250,7 @@ def test_a_single_joint_needs_no_urdf(
     columns = {"q": {"from": "angle.0", **q}, "tau": {"from": "current.0", **tau}}
     one = {"joints": ["a"], "urdf": urdf, "columns": columns}
     fields = parse_map(_FIELDS | one)
-    found = import_recordings([source], fields, Processing())
+    found = import_recordings([source], fields, ImportProcessing())
     write_log(found, [source], fields, tmp_path / "log", {})
     expected = ONE_JOINT_MODELS[how] if how else str(Path(urdf).resolve())
     assert read_log(tmp_path / "log").header.urdf == expected
@@ -378,7 +378,9 @@ def test_recordings_at_two_rates_get_one(tmp_path: Path) -> None:
     paths = _table(tmp_path / "a.npz", kt=1.0), tmp_path / "b.npz"
     _table(paths[1], rows=2500, period=0.004, kt=1.0)
     sources = [read_source(path) for path in paths]
-    found = import_recordings(sources, parse_map(_FIELDS), Processing(cutoff=20.0))
+    found = import_recordings(
+        sources, parse_map(_FIELDS), ImportProcessing(cutoff=20.0)
+    )
     for episode in found.episodes:
         begin = found.done.reach * found.period / found.done.decimation
         _, v, _ = motion((begin + episode["time"])[:, None])

@@ -10,8 +10,8 @@ import pyarrow.parquet  # type: ignore[import-untyped]
 import pytest
 
 from drake_disasm.logs.importing import (
+    ImportProcessing,
     Known,
-    Processing,
     guessed_map,
     import_recordings,
     read_source,
@@ -167,7 +167,7 @@ def test_what_is_left_out_is_named_where_it_is_missed(tmp_path: Path) -> None:
         assert said in refusal(_guess, read_source(path))
     path.write_text("time,q1,tau1\n" + "".join(rows))
     source = read_source(path)
-    message = refusal(import_recordings, [source], _guess(source), Processing())
+    message = refusal(import_recordings, [source], _guess(source), ImportProcessing())
     assert "torques that are not in the map: 'tau1' holds text" in message
 
 
@@ -212,13 +212,13 @@ def test_lerobot_s_names_and_units_are_its_metadata_s(tmp_path: Path) -> None:
     channels = tuple(f"observation.state.{i}" for i in (2, 1, 0))
     assert fields.columns["q"].channels == channels
     assert "observation.images.top" in source.streams[0].left_out
-    message = refusal(import_recordings, [source], fields, Processing())
+    message = refusal(import_recordings, [source], fields, ImportProcessing())
     assert "normalised units; give its file of calibration" in message
     motor = {"range_min": 1000, "range_max": 3048}  # half a turn
     path = tmp_path / "arm.json"
     path.write_text(json.dumps(dict.fromkeys(joints, motor)))
     known = calibrated(fields, source, str(path))
-    [episode] = import_recordings([source], known, Processing()).episodes
+    [episode] = import_recordings([source], known, ImportProcessing()).episodes
     # 100 is a quarter of a turn from the middle, and half a turn of a gripper.
     expected = 0.5 * _Q[:, [2, 1, 0]] * np.pi * np.array([1.0, 0.5, 0.5])
     np.testing.assert_allclose(episode["q"], expected, atol=1e-12)
@@ -264,7 +264,7 @@ def test_a_ur_s_table_without_names_has_its_controller_s_constants(
     source = _ur(path, blocks=3)
     fields = _guess(source, preset=preset)
     assert "tau" not in fields.columns and fields.columns["current"].unit == "A"
-    [episode] = import_recordings([source], fields, Processing()).episodes
+    [episode] = import_recordings([source], fields, ImportProcessing()).episodes
     assert "current" in episode and "tau" not in episode
     message = refusal(_ur, path, swap=True)
     assert "preset 'rtde' does not fit: column 7 is not the velocity" in message
@@ -319,9 +319,9 @@ def test_torques_that_are_there_are_not_left_out(tmp_path: Path) -> None:
     source = _table(tmp_path / "run.csv", t=_TIME, q=_Q[:, 0], tau=_Q[:, 1])
     whole = _guess(source)
     fields = FieldMap("joint_motion", {"q": whole.columns["q"]}, "t", joints=("a",))
-    message = refusal(import_recordings, [source], fields, Processing())
+    message = refusal(import_recordings, [source], fields, ImportProcessing())
     assert "has torques that are not in the map: tau" in message
-    assert import_recordings([source], fields, Processing(), accept=True).rows
+    assert import_recordings([source], fields, ImportProcessing(), accept=True).rows
 
 
 def _rests(path: Path, **clock: Any) -> Source:
@@ -346,7 +346,7 @@ def test_torques_at_rest_are_guessed_with_times_or_an_order(
     fields = _guess(source, "joint_torque_static")
     assert (fields.time, fields.time_unit) == (channel, unit)
     assert fields.columns["q"].channels == ("q0", "q1")
-    [episode] = import_recordings([source], fields, Processing()).episodes
+    [episode] = import_recordings([source], fields, ImportProcessing()).episodes
     np.testing.assert_allclose(episode["tau"], _Q[:20, 2:4], atol=1e-8)
     assert set(episode) == {"q", "tau", "order" if unit == "1" else "time"}
 

@@ -12,8 +12,8 @@ from drake_disasm.common.spatial import pose_to_vector, rotation_vector
 from drake_disasm.logs import read_log
 from drake_disasm.logs.importing import (
     FieldMap,
+    ImportProcessing,
     Known,
-    Processing,
     guessed_map,
     import_recordings,
     map_to_fill_in,
@@ -78,7 +78,7 @@ def _map(width: int, **column: Any) -> dict[str, Any]:
 
 def _imported(source: Source, fields: Any) -> Any:
     fields = fields if isinstance(fields, FieldMap) else parse_map(fields)
-    [episode] = import_recordings([source], fields, Processing()).episodes
+    [episode] = import_recordings([source], fields, ImportProcessing()).episodes
     return episode["R_WS"]
 
 
@@ -172,7 +172,7 @@ def test_a_pose_has_a_position_before_its_orientation(tmp_path: Path) -> None:
         {"kind": "transitions", "time": {"from": "t"}, "columns": columns}
     )
     source = read_source(tmp_path / "run.npz")
-    [episode] = import_recordings([source], fields, Processing()).episodes
+    [episode] = import_recordings([source], fields, ImportProcessing()).episodes
     np.testing.assert_allclose(episode["X_GB_measured"][:, :3], position)
     _assert_same(episode["X_GB_measured"][:, 3:], _WXYZ)
 
@@ -183,7 +183,7 @@ def test_orientations_follow_from_joints(tmp_path: Path) -> None:
     source = _readings(tmp_path / "run.csv", np.column_stack([turns, turns]))
     fields = _map(2, **{"as": "joints", "frame": "tool0"})
     arm = {"urdf": str(tmp_path / "arm.urdf"), "joints": ["turn", "lift"]}
-    found = import_recordings([source], parse_map(fields | arm), Processing())
+    found = import_recordings([source], parse_map(fields | arm), ImportProcessing())
     half = 0.5 * turns[:, None]
     by_x = np.hstack([np.cos(half), np.sin(half), 0.0 * half, 0.0 * half])
     about_x = [RotationMatrix(RollPitchYaw(turn, 0.0, 0.0)) for turn in turns]
@@ -276,7 +276,9 @@ def test_joints_of_another_topic_are_interpolated(tmp_path: Path) -> None:
             "R_WS": {"from": joints, "as": "joints", "frame": "hand"},
         },
     }
-    [episode] = import_recordings([source], parse_map(fields), Processing()).episodes
+    [episode] = import_recordings(
+        [source], parse_map(fields), ImportProcessing()
+    ).episodes
     half = 0.5 * turn * (episode["time"] + 0.1)
     expected = np.column_stack([np.cos(half), np.sin(half), 0.0 * half, 0.0 * half])
     _assert_same(episode["R_WS"], expected, 1e-6)

@@ -7,7 +7,7 @@ import pytest
 
 from drake_disasm.logs import read_log
 from drake_disasm.logs.importing import (
-    Processing,
+    ImportProcessing,
     guessed_map,
     import_recordings,
     read_source,
@@ -54,7 +54,7 @@ def _log(folder: Path, **columns: np.ndarray):
     np.savez(folder / "run.npz", time=TIME, **columns)
     source = read_source(folder / "run.npz")
     fields = guessed_map(source, "joint_motion")
-    found = import_recordings([source], fields, Processing())
+    found = import_recordings([source], fields, ImportProcessing())
     write_log(found, [source], fields, folder / "log", {})
     return read_log(folder / "log"), summary(found), found.done
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drake_disasm.logs.importing import (
+    ImportProcessing,
     Known,
-    Processing,
     guessed_map,
     import_recordings,
     read_map,
@@ -29,7 +29,7 @@ def _source(path: Path, **arrays: Any) -> Source:
 
 
 def _imported(source: Source, fields: FieldMap, **options: Any) -> Any:
-    return import_recordings([source], fields, Processing(cutoff=5.0), **options)
+    return import_recordings([source], fields, ImportProcessing(cutoff=5.0), **options)
 
 
 def test_a_rate_stands_in_for_times(tmp_path: Path) -> None:
@@ -68,14 +68,14 @@ def test_readings_at_rest_may_have_an_order(tmp_path: Path) -> None:
     columns = dict(zip(names, table, strict=True))
     source = _source(tmp_path / "a.npz", order=2.0 * np.arange(9), **columns)
     fields = guessed_map(source, "static_wrench")
-    [episode] = import_recordings([source], fields, Processing()).episodes
+    [episode] = import_recordings([source], fields, ImportProcessing()).episodes
     np.testing.assert_array_equal(episode["order"], 2.0 * np.arange(9))
     assert parse_map({"kind": "static_wrench", "columns": {"order": "n"}}).time == "n"
     source = _source(tmp_path / "b.npz", **columns)  # that of the rows
     fields = guessed_map(source, "static_wrench")
     (tmp_path / "map.yaml").write_text(fields.to_yaml())
     fields = read_map(tmp_path / "map.yaml")
-    [episode] = import_recordings([source], fields, Processing()).episodes
+    [episode] = import_recordings([source], fields, ImportProcessing()).episodes
     np.testing.assert_array_equal(episode["order"], np.arange(9.0))
 
 
@@ -141,7 +141,7 @@ def test_late_stamps_do_not_make_accelerations(tmp_path: Path) -> None:
     _, stamps, q = _late(2e-3, 0.02, of_sampling=False)
     source = _source(tmp_path / "run.npz", t=stamps, q=q[:, 1])
     fields = parse_map(_Q | {"time": {"from": "t"}})
-    options = Processing(cutoff=20.0)
+    options = ImportProcessing(cutoff=20.0)
     found = import_recordings([source], fields, options, accept=True)
     assert "stamps are of arrival" in found.recordings[0].evened.words()
     worst = max(np.abs(each["vd"]).max() for each in found.episodes)

@@ -12,7 +12,7 @@ from drake_disasm.effects import (
     JointViscousFriction,
     RotorInertia,
 )
-from sysid.models.regressor import ArmDynamics
+from sysid.models.regressor import ArmRegressor
 from sysid.models.response.drive import Drive, DriveSettings, Inputs
 from sysid.models.response.near_motion import Bodies
 from sysid.models.response.rigid_bodies import RigidBodies
@@ -171,7 +171,7 @@ def test_a_payload_takes_what_the_regressor_says(tmp_path):
     urdf = write_two_link_arm(tmp_path / "two.urdf")
     urdf.write_text(urdf.read_text().replace("</robot>", f"{FLANGE}</robot>"))
     arm = Arm(JOINTS, Bodies(RigidBodies(str(urdf), JOINTS), False))
-    dynamics = ArmDynamics(str(urdf), JOINTS)
+    dynamics = ArmRegressor(str(urdf), JOINTS)
     payload = FlangePayload(0.7, 0.02, -0.03, 0.1)
     tilt = ArmTilt(0.02, -0.05)
     q, v, vd = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 20, 2))

@@ -13,41 +13,37 @@ from drake_disasm.logs.transitions import observations
 from drake_disasm.twin.steps import Steps
 from sysid.models.arm_rates import ArmRates
 from sysid.models.base import Array
-from sysid.models.cell_arm import CellArm
 from sysid.models.commands import bolt_path
-from sysid.models.grip_lag import GripLag
-from sysid.models.grip_offset import GripOffset
+from sysid.models.grip_state import GripState
 from sysid.models.late_pose import on_time
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 
 
 @dataclasses.dataclass(frozen=True)
-class RecordedEpisode:
+class MeasuredEpisode:
     """An episode of n steps as it was recorded, in the twin's coordinates.
 
     Attributes:
         measured, commanded: (n + 1, 6) coordinates.
         wrench: (n + 1, 6) measured on the bolt at Bo in G.
-        rates, grip, offset: that tell what no encoder measures.
-        arm: how it differs from the twin's.
+        rates, grip: that tell what no encoder measures.
+        lead: of the arm's command [s].
     """
 
     measured: Array
     commanded: Array
     wrench: Array
     rates: ArmRates
-    grip: GripLag
-    offset: GripOffset
-    arm: CellArm
+    grip: GripState
+    lead: float
 
     @classmethod
     def of(
         cls,
         episode: Episode,
         rates: ArmRates,
-        grip: GripLag,
-        offset: GripOffset,
-        arm: CellArm,
+        grip: GripState,
+        lead: float,
         twin: BoltCoordinates,
     ) -> Self:
         """Returns a log's episode."""
@@ -57,8 +53,7 @@ class RecordedEpisode:
             observations(episode)[:, 6:],
             rates,
             grip,
-            offset,
-            arm,
+            lead,
         )
 
     def at_sensor(self, sensing: SensorReading, p_BoTo_B: Array) -> Array:
@@ -67,7 +62,7 @@ class RecordedEpisode:
         return at_sensor(np.hstack([poses, self.wrench]), sensing.X_SB)
 
     def without(self, offset: Array, sensing: SensorReading, p_BoTo_B: Array) -> Self:
-        """Returns the episode with wrenches (n + 1, 6) at So in S taken off."""
+        """Returns the episode with a wrench (6,) at So in S taken off."""
         if not offset.any():
             return self
         states = self.at_sensor(sensing, p_BoTo_B)
@@ -87,29 +82,12 @@ class RecordedEpisode:
         Args:
             rates: (n, 6) commanded, in coordinates.
         """
-        return self.arm.ahead(rates) + self._by_load[:-1]
-
-    @functools.cached_property
-    def _by_load(self) -> Array:
-        """By how much the command is elsewhere (n + 1, 6) whatever it is."""
-        moment = self.offset.moved_moment(self.measured, self.wrench)
-        shifts = self.arm.shifts(self.measured, self.carried, moment)
-        return shifts + self.elsewhere
+        return self.lead * rates + self.elsewhere[:-1]
 
     @functools.cached_property
     def elsewhere(self) -> Array:
-        """By how much the bolt is elsewhere in the grip (n + 1, 6): see GripOffset."""
-        return self.offset.along(self.measured, self.wrench)
-
-    @functools.cached_property
-    def carried(self) -> Array:
-        """The wrench (n + 1, 6) on the bolt at Bo in G, had the arm not turned.
-
-        The pads' lever to Bo turns with it; with this one the load on the grip is what
-        it is with the lever of the start.
-        """
-        at_grip = self.offset.at_grip(self.measured, self.wrench)
-        return np.asarray(np.linalg.solve(self.grip.to_grip, at_grip.T).T)
+        """By how much the bolt is elsewhere in the grip (n + 1, 6): see GripState."""
+        return self.grip.elsewhere(self.measured, self.wrench)
 
     def on_time(self, path: Array, weights: Array) -> Self:
         """Returns the episode with poses that do not come late: see `on_time`."""
@@ -118,8 +96,8 @@ class RecordedEpisode:
 
     def steps(self) -> Steps:
         """Returns its steps."""
-        q, qd, wrench = self.measured, self.commanded, self.carried
-        elastic = self.grip.along(wrench[:-1])
+        q, qd, wrench = self.measured, self.commanded, self.wrench
+        elastic = self.grip.elastic(wrench[:-1])
         return Steps(
             np.arange(len(elastic)),
             q[:-1] + self.elsewhere[:-1],
@@ -136,7 +114,7 @@ class RecordedEpisode:
         Args:
             path: (n + 1, 6) what it was commanded to do, in coordinates.
         """
-        return self.rates.along(self.measured, path, self.carried)
+        return self.rates.along(self.measured, path, self.wrench)
 
 
 def _coordinates(poses: Array, twin: BoltCoordinates) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 
 from drake_disasm.effects import SensorEffect
 from sysid.models.base import Array
-from sysid.models.recorded_episode import RecordedEpisode
+from sysid.models.measured_episode import MeasuredEpisode
 from sysid.models.sensor_reading import SensorReading, at_bolt
 
 _PASSES = 4  # where effects are affine one is enough
@@ -16,12 +16,12 @@ _CHANGE = 1e-4  # N, N m: of wrenches, for differences
 _DAMPING = 1e-3  # of steps where a reading hardly shows a wrench: in a dead band
 
 
-def unread(
-    episodes: Sequence[RecordedEpisode],
+def undo_sensor_effects(
+    episodes: Sequence[MeasuredEpisode],
     effects: Sequence[SensorEffect],
     sensing: SensorReading,
     p_BoTo_B: Array,
-) -> list[RecordedEpisode]:
+) -> list[MeasuredEpisode]:
     """Returns episodes with the wrench as it was before effects on the sensor.
 
     Args:

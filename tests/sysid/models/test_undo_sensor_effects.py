@@ -13,7 +13,7 @@ from drake_disasm.effects import (
 )
 from drake_disasm.scenario import load_scenario
 from sysid.models.sensor_reading import SensorReading
-from sysid.models.unread import undone
+from sysid.models.undo_sensor_effects import undone
 
 _SCENARIO = load_scenario("removal")
 _READING = SensorReading(_SCENARIO, Tool.from_models(_SCENARIO), "cell")

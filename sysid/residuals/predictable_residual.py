@@ -53,7 +53,7 @@ LEARNER = Learner()
 
 
 @dataclass(frozen=True)
-class LeftOver:
+class PredictableResidual:
     """What a flexible learner explains of a channel that the effects leave.
 
     Attributes:
@@ -110,7 +110,7 @@ class _Inputs:
         return type(self)(self.values[mask], self.names)
 
 
-def left_over(fit: Fit) -> list[LeftOver]:
+def predictable_residual(fit: Fit) -> list[PredictableResidual]:
     """Returns what a flexible learner explains of each channel's residual.
 
     Of channels where that is significant (by contiguous folds that were not fitted,
@@ -136,7 +136,9 @@ def left_over(fit: Fit) -> list[LeftOver]:
             continue
         size = float(np.sqrt(np.mean((learned.predicted * sigma[kept, number]) ** 2)))
         needed = learned.depends_on(inputs, target, folds)
-        found.append(LeftOver(channel.name, share, size, channel.unit, needed))
+        found.append(
+            PredictableResidual(channel.name, share, size, channel.unit, needed)
+        )
     return found
 
 

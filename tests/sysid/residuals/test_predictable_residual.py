@@ -59,7 +59,7 @@ def found(folder: Path) -> ClosedLoop:
 
 
 def test_what_is_left_is_said_with_its_channel_and_what_it_depends_on(found):
-    (left,) = found.verdict.left_over
+    (left,) = found.verdict.predictable_residual
     assert left.channel == "elbow" and left.share > 0.5
     assert left.depends_on[0] == "velocity"
     assert 0.05 < left.size < 0.2 and left.unit == "N m"
@@ -97,7 +97,7 @@ def test_nothing_is_left_where_nothing_is_hidden(tmp_path):
     model = _model(tmp_path, hidden=0.0)
     verdict = close_loop(model, train=[0], test=[1], library=_LIBRARY).verdict
     assert verdict.names == ("JointViscousFriction.elbow",)
-    assert not verdict.left_over and verdict.residual_model is None
+    assert not verdict.predictable_residual and verdict.residual_model is None
     assert verdict.ending == "explained"
 
 
