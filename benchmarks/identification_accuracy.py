@@ -102,10 +102,10 @@ class Case:
     requests: tuple[ParameterRequest, ...]
     start: np.ndarray
 
-    def fitted(self, log: Log, transitions: int, coarse: bool = True) -> TwinModel:
+    def fitted(self, log: Log, transitions: int) -> TwinModel:
         """Returns the model of a log."""
         scenario, parameters = scenario_parameters(self.model, self.requests)
-        model = TwinModel([log], scenario, parameters, coarse=coarse)
+        model = TwinModel([log], scenario, parameters)
         return model.first(transitions)
 
     def true_values(self) -> tuple[tuple[Parameter, ...], np.ndarray]:
@@ -168,8 +168,7 @@ def _recovered(case: Case, seed: int, workers: Workers) -> dict[str, object]:
         log = record(
             Path(folder) / "log", case.truth, case.station, _TRANSITIONS, 1000 * seed
         )
-        # A twin's log in the twin's own steps: what is left is the sensor's noise.
-        fitted = case.fitted(log, _TRANSITIONS, coarse=case.station == "cell")
+        fitted = case.fitted(log, _TRANSITIONS)
     objective = Objective(fitted, workers, HUBER)
     quarter = Objective(objective.model.thin(4), workers, HUBER)
     near = gauss_newton(quarter, quarter.scaling.to_unit(case.start), 10)

@@ -300,8 +300,8 @@ def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
     """Returns the effects' parameters with their intervals.
 
     As wide as the covariance of correlated residuals says, and as much wider as the
-    model's time steps, and the model itself, are known to be off. Without shape
-    parameters on which no row of the log depends: they are as assumed.
+    model is known to be off. Without shape parameters on which no row of the log
+    depends: they are as assumed.
 
     Args:
         fit: with the effects.
@@ -310,10 +310,8 @@ def parameter_values(fit: Fit, own: int) -> tuple[ParameterValue, ...]:
     if len(fit.theta) == own:
         return ()
     scaling, half = Scaling(fit.model.parameters), fit.half_intervals
-    off, around = fit.error_of_steps, fit.error_of_model
-    u = fit.linearisation.u
-    low = scaling.from_unit(np.clip(u - half + np.minimum(off, 0) - around, 0, 1))
-    high = scaling.from_unit(np.clip(u + half + np.maximum(off, 0) + around, 0, 1))
+    u, half = fit.linearisation.u, half + fit.error_of_model
+    low, high = (scaling.from_unit(np.clip(end, 0, 1)) for end in (u - half, u + half))
     shows = fit.linearisation.effect > 0.0
     return tuple(
         ParameterValue(

@@ -239,21 +239,6 @@ class Fit:
         return dataclasses.replace(self.equations, blocks=blocks)
 
     @property
-    def error_of_steps(self) -> Array:
-        """By how much the estimate (p,) is off, in the unit box, for its coarse steps.
-
-        One Gauss-Newton step towards the optimum of the same model in finer time
-        steps. No interval of rows sees such an error.
-        """
-        linear, simulation = self.linearisation, simulation_of(self.model)
-        finer = simulation.refined() if simulation else None
-        if finer is None or not len(linear.u):
-            return np.zeros_like(linear.u)
-        fine = self.model.measurements.weighted(finer.predictions(self.theta))
-        change = (np.sqrt(linear.weights) * (fine - linear.residual)).reshape(-1)
-        return np.asarray(-self._step @ change)
-
-    @property
     def error_of_model(self) -> Array:
         """By how much the estimate (p,) may be off, in the unit box, for its model.
 

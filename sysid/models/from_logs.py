@@ -38,7 +38,6 @@ class ModelChoice:
         scenario: nominal; None for the one stated in the log.
         requests: parameters to vary; none stands for the default ones of the kind.
         urdf: of the arm; None for the one named in the log.
-        coarse: whether transitions may begin in coarse time steps.
         noise: standard deviations of channels, by name, instead of the model's, SI.
         fixed: whether a twin may have no parameter to vary.
         trust_urdf: whether the rigid bodies of an arm are the URDF's.
@@ -48,7 +47,6 @@ class ModelChoice:
     scenario: Scenario | None = None
     requests: tuple[ParameterRequest, ...] = ()
     urdf: str | None = None
-    coarse: bool = True
     noise: tuple[tuple[str, float], ...] = ()
     fixed: bool = False
     trust_urdf: bool = False
@@ -104,7 +102,7 @@ def _twin(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
         )
     scenario, parameters = scenario_parameters(scenario, choice.requests)
     rollout = choice.objective == "rollout"
-    return TwinModel(logs, scenario, parameters, rollout, choice.coarse)
+    return TwinModel(logs, scenario, parameters, rollout)
 
 
 def _static_wrench(logs: Sequence[Log], choice: ModelChoice) -> LogModel:

@@ -78,12 +78,11 @@ class ImpactReplays:
 
     Args:
         scenarios: of the k twins.
-        coarse: see `ImpactReplay`.
     """
 
-    def __init__(self, scenarios: Sequence[Scenario], coarse: bool) -> None:
-        self._scenarios, self._coarse = scenarios, coarse
-        self._texts = [f"{coarse=} {scenario!r}" for scenario in scenarios]
+    def __init__(self, scenarios: Sequence[Scenario]) -> None:
+        self._scenarios = scenarios
+        self._texts = [repr(scenario) for scenario in scenarios]
 
     def transitions(self, steps: Sequence[Steps]) -> list[Replayed]:
         """Returns what the steps of each twin give.
@@ -99,7 +98,7 @@ class ImpactReplays:
         """Returns the replays of some of the twins."""
         asked = tuple(self._scenarios[i] for i in which)
         text = "".join(self._texts[i] for i in which)
-        replay = _impact_replay(_Asked(text, asked), self._coarse)
+        replay = _impact_replay(_Asked(text, asked))
         ends = replay.ends([steps[i] for i in which])
         pairs = zip(ends, replay.reading_at_zeroing, strict=True)
         return [Replayed(*each, zero) for each, zero in pairs]
@@ -186,5 +185,5 @@ class _Asked:
 
 
 @functools.lru_cache(maxsize=4)
-def _impact_replay(asked: _Asked, coarse: bool) -> ImpactReplay:
-    return ImpactReplay(asked.scenarios, coarse)
+def _impact_replay(asked: _Asked) -> ImpactReplay:
+    return ImpactReplay(asked.scenarios)

@@ -20,10 +20,6 @@ class SimulatedModel(ScenarioModel):
     """
 
     @abc.abstractmethod
-    def refined(self) -> Self | None:
-        """Returns the same model in finer time steps; None if it takes none coarser."""
-
-    @abc.abstractmethod
     def with_displacement(self, displacement: Array, push: Array) -> Self:
         """Returns the same model with each step displaced from its command.
 

@@ -74,7 +74,6 @@ class TwinModel(SimulatedModel):
         scenario: Scenario,
         parameters: Sequence[Parameter],
         rollout: bool = False,
-        coarse: bool = True,
     ) -> None:
         """Takes the steps out of the logs.
 
@@ -83,14 +82,12 @@ class TwinModel(SimulatedModel):
             scenario: of the twin, at the parameters' nominal values.
             parameters: paths in that scenario.
             rollout: whether episodes are simulated whole.
-            coarse: whether the middle of a transition with IMPACT contact may be
-                simulated in coarse time steps (`ImpactReplay`).
 
         Raises:
             DisasmError: a log is of another kind or period.
         """
         self.parameters = tuple(parameters)
-        self.scenario, self.rollout, self.coarse = scenario, rollout, coarse
+        self.scenario, self.rollout = scenario, rollout
         self.reading = SensorReading.of(logs, scenario)
         recorded = Transitions.of(logs, scenario, self.reading)
         effects = sensor_chain(scenario.effects)
@@ -205,11 +202,6 @@ class TwinModel(SimulatedModel):
         if self._has_impact or self.rollout or own:
             return self
         return self.replace(scenario=_with_impact_as_stiff(self.scenario))
-
-    def refined(self) -> Self | None:
-        """See SimulatedModel: without coarse steps."""
-        is_coarse = self.coarse and self._has_impact and not self.rollout
-        return self.replace(coarse=False) if is_coarse else None
 
     def with_begins(self, theta: Array | None) -> Self:
         """See LogModel: steps begin where the wrench says, without sensor effects.
@@ -440,7 +432,7 @@ class TwinModel(SimulatedModel):
         simulated = [_environment_alone(scenario) for scenario in scenarios]
         if self.rollout or not self._has_impact:
             return DiagramReplays(simulated, self.rollout)
-        return ImpactReplays(simulated, self.coarse)
+        return ImpactReplays(simulated)
 
     @property
     def _has_impact(self) -> bool:

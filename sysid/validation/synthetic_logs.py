@@ -143,7 +143,7 @@ def rollout(
     motion, sensor = motion_chain(real.effects), sensor_chain(real.effects)
     weights = pose_weights(real.effects, scenario.task.period)
     real.effects = [e for e in real.effects if isinstance(e, EnvironmentEffect)]
-    replay = ImpactReplay([real], coarse=True)  # as the model of the log has it
+    replay = ImpactReplay([real])
     reading = SensorReading(scenario, Tool.from_models(scenario))
     measured = _Measured(scenario, commanded)
     count, size, _ = commanded.shape

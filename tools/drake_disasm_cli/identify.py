@@ -146,12 +146,6 @@ def _add_search_arguments(add: Callable[..., object]) -> None:
         help="a Gaussian process proposes points in place of the bees' scouts",
     )
     add("--seed", type=options.seed, default=0, help="of the searches (default: 0)")
-    add(
-        "--fine",
-        action="store_true",
-        help="simulate transitions with IMPACT contact in the twin's own time step "
-        "throughout: takes longer, for logs of a twin with that step",
-    )
 
 
 def _add_judgement_arguments(add: Callable[..., object]) -> None:
@@ -229,9 +223,7 @@ def _choice(args: argparse.Namespace) -> ModelChoice:
     elif args.overrides:
         raise DisasmError("--set: needs the --scenario that it changes; give it")
     requests = tuple(read_requests(args.parameters)) if args.parameters else ()
-    return ModelChoice(
-        args.objective, scenario, requests, args.urdf, not args.fine, tuple(args.noise)
-    )
+    return ModelChoice(args.objective, scenario, requests, args.urdf, tuple(args.noise))
 
 
 def _settings(args: argparse.Namespace) -> Settings:

@@ -107,7 +107,7 @@ def test_a_log_s_model_with_the_effect_leaves_the_noise_alone(tmp_path) -> None:
     transitions_log(tmp_path / "log", stated, [grease], seed=0, episodes=2, steps=12)
     errors = []
     for effects in ([], [grease]):
-        model = TwinModel([read_log(tmp_path / "log")], stated, (), coarse=False)
+        model = TwinModel([read_log(tmp_path / "log")], stated, ())
         objective = Objective(
             model.with_effects([*stated.effects, *effects]), Workers()
         )

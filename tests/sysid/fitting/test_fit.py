@@ -5,9 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from drake_disasm.effects import CommandGain, GroovePose
+from drake_disasm.effects import CommandGain
 from drake_disasm.logs import read_log
-from sysid.effect_selection.verdict import parameter_values
 from sysid.fitting.candidates import candidates
 from sysid.fitting.fitter import Fitter
 from sysid.fitting.settings import SelectionSettings
@@ -40,21 +39,6 @@ def test_an_effect_is_worth_what_the_loss_rises_by_without_it(gain):
     )
     (x,) = fit.columns_of(effect.only(["x"]))
     assert fit.theta[x] == pytest.approx(0.03, rel=0.02)
-
-
-def test_the_error_of_coarse_time_steps_leads_to_the_fit_in_fine_ones(tmp_path):
-    """Where a fit in fine steps ends, the estimate is off no more."""
-    fitter, effect = _fitter(tmp_path, GroovePose(ry=0.02), episodes=4)
-    turn = effect.only(["ry"])
-    coarse = fitter.fit((turn,))
-    fine = fitter.with_base(fitter.base.refined()).fit((turn,), coarse)
-    moved = fine.linearisation.u - coarse.linearisation.u
-    assert np.abs(moved).max() > 1e-7
-    np.testing.assert_allclose(coarse.error_of_steps, moved, rtol=0.5, atol=1e-7)
-    assert not fine.error_of_steps.any()
-    (value,) = parameter_values(coarse, 0)[:1]
-    most_of_the_way = coarse.theta[0] + 0.8 * (fine.theta[0] - coarse.theta[0])
-    assert value.interval[0] <= most_of_the_way <= value.interval[1]
 
 
 def test_amplitudes_at_null_and_at_a_bound_are_none(gain):

@@ -35,7 +35,7 @@ def test_reproduces_the_twins_own_log(silent_log, turned):
     What is left is the arm's velocity at the step's start, which no log has: a contact
     was made in the step before, nobody knows when.
     """
-    model = make(silent_log, turned, coarse=False)
+    model = make(silent_log, turned)
     residual = Objective(model, Workers()).residuals(truth(model))[0]
     assert np.abs(residual[:, :6]).max() < 0.4
     assert np.quantile(np.abs(residual[:, 6:]), 0.95) < 0.25
@@ -51,7 +51,7 @@ def test_a_rollout_reproduces_a_whole_episode(silent_log, turned):
 
 def test_at_the_truth_the_objective_is_the_sensors_noise(log, turned):
     """Wrench channels at 1, pose channels (which a twin's log has exactly) at 0."""
-    objective = Objective(make(log, turned, coarse=False), Workers())
+    objective = Objective(make(log, turned), Workers())
     residual = objective.residuals(truth(objective.model))[0]
     assert np.sqrt(np.mean(residual[:, 6:] ** 2)) == pytest.approx(1.0, abs=0.1)
     assert objective(truth(objective.model))[0] == pytest.approx(0.707, abs=0.07)
@@ -81,7 +81,7 @@ def test_a_thinned_log_keeps_rows_that_follow_each_other(log, turned):
 @pytest.mark.slow
 def test_recovers_parameters_from_nearby(log, turned):
     start = dataclasses.replace(turned, effects=[])
-    model = make(log, start, ["contact.friction", "GroovePose.ry"], coarse=False)
+    model = make(log, start, ["contact.friction", "GroovePose.ry"])
     objective = Objective(model.thin(4), Workers())
     begin = objective.scaling.to_unit(np.array([0.25, 0.033]))
     found = objective.scaling.from_unit(gauss_newton(objective, begin, 5).u)

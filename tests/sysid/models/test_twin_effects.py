@@ -60,7 +60,7 @@ def _log(folder, scenario, effect):
 
 def _error(log, scenario):
     """The rms residual of a model without parameters, in units of the noise."""
-    model = TwinModel([log], scenario, (), coarse=False)
+    model = TwinModel([log], scenario, ())
     measured = model.measurements
     error = (model.predictions(_NOTHING) - measured.values) / measured.noise
     return float(np.sqrt(np.mean(error**2)))
