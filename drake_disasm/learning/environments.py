@@ -175,6 +175,11 @@ class GymnasiumRows:
     """
 
     def __init__(self, envs: VectorEnv[Any, Any, Any]) -> None:
+        if not isinstance(envs, VectorEnv):
+            raise DisasmError(
+                f"{type(envs).__name__}: is no vector environment; make it with "
+                "gymnasium.make_vec"
+            )
         self.sizes = (
             _size_of("observation_space", envs.single_observation_space),
             _size_of("action_space", envs.single_action_space),
@@ -212,6 +217,12 @@ class GymnasiumRows:
         """Steps them."""
         actions = actions.astype(self._envs.single_action_space.dtype)
         observation, reward, terminated, truncated, infos = self._envs.step(actions)
+        is_finite = np.isfinite(observation).all(axis=1) & np.isfinite(reward)
+        if not is_finite[self._runs].all():
+            raise DisasmError(
+                "observation, reward: the vector environment gives some that are not "
+                "finite; the agent can't learn from them"
+            )
         self._runs &= ~(terminated | truncated)
         won = np.asarray(infos.get("is_success", np.zeros(self.count)), bool)
         ends = np.where(won, Outcome.SUCCESS, Outcome.WORKSPACE)
@@ -238,6 +249,8 @@ class GymnasiumRows:
 def _size_of(name: str, space: gymnasium.Space[Any]) -> int:
     if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
         raise DisasmError(f"{name}: {space} is no Box of one axis; flatten it")
+    if name == "action_space" and not space.is_bounded():
+        raise DisasmError(f"{name}: {space} has no bounds; give some, or clip actions")
     return space.shape[0]
 
 

@@ -120,6 +120,8 @@ class Training:
                 f"demonstrations: {config.demonstrations:g} of each batch are to come "
                 "from logs; give some by `demonstrations`"
             )
+        if scale is not None and np.shape(scale) != sizes[:1]:
+            raise DisasmError(f"scale: is of {np.size(scale)} numbers, not {sizes[0]}")
         self.agent, self.config, self.seed, self.device = agent, config, seed, device
         self.replay = dataset or Replay(config.replay, *sizes, device)
         self.scale = np.ones(sizes[0]) if scale is None else scale

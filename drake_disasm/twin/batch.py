@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from drake_disasm.common.arrays import Array, array_like, namespace, to_numpy
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.rotations import Pose
 from drake_disasm.devices.ft_sensor import quantise
 from drake_disasm.mdp import (
@@ -111,7 +112,7 @@ class BatchedTwin:
     ) -> None:
         given = [scenarios] if isinstance(scenarios, Scenario) else list(scenarios)
         count = len(given) if count is None else count
-        refuse_count(min(count, len(given)))
+        refuse_count(count, len(given))
         self.scenarios = given * count if len(given) == 1 else given
         self.count = len(self.scenarios)
         refuse_scenarios(self.scenarios)
@@ -138,7 +139,15 @@ class BatchedTwin:
         Args:
             seeds: one for each environment: of noise, and of what is drawn from the
                 scenario's ranges, the same as the diagram draws.
+
+        Raises:
+            DisasmError: they are not as many as the environments.
         """
+        if np.shape(seeds) != (self.count,):
+            raise DisasmError(
+                f"seeds: {np.size(seeds)} for {self.count} environments; give one for "
+                "each"
+            )
         every = np.arange(self.count)
         self.episodes = self.begin(every, seeds)
         self.observation = array_like(np.zeros((self.count, 12)), self.like)
@@ -192,7 +201,17 @@ class BatchedTwin:
 
         Args:
             actions: (n, 6) [m, rad], clipped to the bounds.
+
+        Raises:
+            DisasmError: nothing was reset, or the actions have another shape.
         """
+        if not hasattr(self, "episodes"):
+            raise DisasmError("step: nothing was reset; call reset first")
+        if tuple(np.shape(actions)) != (self.count, 6):
+            raise DisasmError(
+                f"actions: are of shape {tuple(np.shape(actions))}; give "
+                f"{(self.count, 6)}, [dx dy dz du dv dw] in m and rad"
+            )
         xp, episodes, before = namespace(self.like), self.episodes, self.observation
         numbers = self._twins.numbers
         action = array_like(actions, self.like)

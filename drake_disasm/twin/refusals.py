@@ -73,14 +73,19 @@ def refuse_without_compiler(device: str) -> None:
         )
 
 
-def refuse_count(count: int) -> None:
-    """Refuses a batch of nothing.
+def refuse_count(count: int, scenarios: int = 1) -> None:
+    """Refuses a batch of nothing, or of another size than its scenarios.
 
     Raises:
         DisasmError: says what to give.
     """
-    if count < 1:
+    if not isinstance(count, int) or min(count, scenarios) < 1:
         raise DisasmError(f"num_envs: {count} is no number of environments; give 1")
+    if scenarios not in (1, count):
+        raise DisasmError(
+            f"scenarios: {scenarios} for {count} environments; give one for each, or "
+            "one for all"
+        )
 
 
 def refuse_scenarios(scenarios: Sequence[Scenario]) -> None:

@@ -192,12 +192,12 @@ def main(arguments: Sequence[str]) -> int:
     origin = program.provenance("drake-disasm identify", arguments, args.seed) | _data(
         logs
     )
-    journal = Journal(args.out, _identity(args, logs), args.resume)
     with (
         program.ProgressBar("evaluation") as bar,
         executor_for(args.executor, args.scheduler, args.tls) as (executor, _),
         Workers(args.workers, executor=executor) as workers,
     ):
+        journal = Journal(args.out, _identity(args, logs), args.resume)
         whole = args.objective == "rollout"
         model, findings = data_arguments.checked(logs, model, args, workers, whole)
         train, test = split_episodes(model.measurements.names, _held_out(args))

@@ -200,17 +200,15 @@ def main(arguments: Sequence[str]) -> int:
     seeds = range(args.first_seed, args.first_seed + args.seeds)
     if experiment.start:
         check_start(experiment, seeds)
-    experiment = open_experiment(experiment, args.out, args.resume)
-    jobs = seed_jobs(experiment, seeds, args.out)
-    try:
-        unit = "round" if experiment.logs else "episode"
-        with (
-            program.ProgressBar(unit, keep=True) as bar,
-            executor_for(args.executor, args.scheduler, args.tls) as (executor, host),
-        ):
-            train_seeds(jobs, args.workers, bar, executor, host)
-    finally:
-        print(write_summary(args.out))
+    unit = "round" if experiment.logs else "episode"
+    with executor_for(args.executor, args.scheduler, args.tls) as (executor, host):
+        experiment = open_experiment(experiment, args.out, args.resume)
+        jobs = seed_jobs(experiment, seeds, args.out)
+        try:
+            with program.ProgressBar(unit, keep=True) as bar:
+                train_seeds(jobs, args.workers, bar, executor, host)
+        finally:
+            print(write_summary(args.out))
     print(f"results: {args.out}")
     return 0
 

@@ -209,6 +209,20 @@ def test_a_vector_environment_that_does_not_fit_is_refused() -> None:
         rows.begin(np.arange(1, 2), [4])
     with refused("action_space: Discrete(2)", "flatten"):
         GymnasiumRows(gymnasium.make_vec("CartPole-v1", 2, "sync"))
+    with refused("PendulumEnv", "make_vec"):
+        GymnasiumRows(PendulumEnv())
+    boundless = _pendulums()
+    boundless.single_action_space = gymnasium.spaces.Box(-np.inf, np.inf, (1,))
+    with refused("action_space", "bounds"):
+        GymnasiumRows(boundless)
+
+
+def test_an_observation_that_is_not_finite_is_no_lesson() -> None:
+    rows = GymnasiumRows(_pendulums())
+    rows.begin(np.arange(2), [0, 1])
+    rows._envs.env.envs[0].unwrapped.state[:] = np.nan
+    with refused("not finite"):
+        rows.step(np.zeros((2, 1)))
 
 
 def _side_by_side(**changes: Any) -> list[TrainingSpec]:

@@ -186,6 +186,7 @@ SLOW, LAG = ["ft_sensor.period=0.008"], ef.SensorLag(share=1.0)
     [
         (_with(), {"count": 0}, "num_envs: 0"),
         ([], {}, "num_envs: 0"),
+        ([_with(), _with()], {"count": 3}, "scenarios: 2 for 3 environments"),
         (_with(), {"device": "tpu9"}, "device: 'tpu9' is not there"),
         (_with("contact.model=hydroelastic"), {}, "contact.model: 'hydroelastic'"),
         (_with(effects=[FRICTION]), {}, "JointCoulombFriction"),
@@ -197,6 +198,14 @@ SLOW, LAG = ["ft_sensor.period=0.008"], ef.SensorLag(share=1.0)
 )
 def test_what_it_cannot_carry_is_one_clear_error(scenarios, options, words):
     assert words in refusal(BatchedTwin, scenarios, **options)
+
+
+def test_steps_and_seeds_of_another_size_are_refused():
+    twin = BatchedTwin(_with(), 2, "numpy")
+    assert "nothing was reset" in refusal(twin.step, np.zeros((2, 6)))
+    assert "seeds: 3 for 2" in refusal(twin.reset, range(3))
+    twin.reset(range(2))
+    assert "(2, 6)" in refusal(twin.step, np.zeros((2, 5)))
 
 
 def test_a_gpu_that_is_not_there_or_without_its_compiler_is_refused(monkeypatch):
