@@ -104,14 +104,6 @@ def test_a_restored_training_goes_on_bit_for_bit(algorithm, changes, tmp_path):
     assert _run(other)[0] != whole.summaries[0]
 
 
-@pytest.mark.parametrize(("schedule", "per_step"), [("delayed", 3), ("every_step", 2)])
-def test_updates_are_counted_per_step(schedule: str, per_step: int) -> None:
-    training = _training(schedule=schedule, updates_per_step=per_step)
-    summary, _ = _run(training)
-    assert training.agent.updates == per_step * summary.steps
-    assert training.replay.size == summary.steps
-
-
 def test_the_delayed_schedule_acts_with_one_policy_for_an_episode() -> None:
     """Both schedules begin alike; only `every_step` changes within the episode."""
     actions = {}
