@@ -65,21 +65,10 @@ def test_an_effect_that_is_not_there_is_added_at_its_null_value():
     assert by_path([turn, shift], {"GroovePose.z": 1e-4}) == {"effects.0.z": 1e-4}
 
 
-def test_an_effect_that_is_there_is_used():
-    scenario, (turn,) = scenario_parameters(
-        load_scenario("removal_turned"), [Request("GroovePose.ry")]
-    )
-    assert len(scenario.effects) == 1 and turn.nominal == pytest.approx(0.0349066)
-
-
 @pytest.mark.parametrize(
     ("request_", "message"),
     [
-        (Request("contact.fricton"), "did you mean 'friction'"),
-        (Request("GroovePse.ry"), "did you mean 'GroovePose'"),
-        (Request("GroovePose.rw"), "known: rx, ry"),
         (Request("lock"), "not a number"),
-        (Request("gripper.stiffness.6"), "count from 0"),
         (Request("lock.clearance", high=0.5), "go beyond"),
         (Request("contact.friction", low=0.3), "nominal"),
     ],
