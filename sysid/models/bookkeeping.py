@@ -25,6 +25,10 @@ class Assumption:
     remedy: str
 
 
+def _unchanged(channels: Array) -> Array:
+    return channels
+
+
 @dataclass(frozen=True)
 class Frame:
     """A frame in which channels may have been written, and where torques are about.
@@ -36,8 +40,8 @@ class Frame:
     """
 
     name: str = ""
-    of: Callable[[Array], Array] = np.asarray
-    back: Callable[[Array], Array] = np.asarray
+    of: Callable[[Array], Array] = _unchanged
+    back: Callable[[Array], Array] = _unchanged
 
 
 @dataclass(frozen=True)

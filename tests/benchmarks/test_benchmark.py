@@ -35,8 +35,3 @@ def test_only_and_json(keys, words: str, tmp_path: Path, capsys) -> None:
 def test_unknown_key_is_refused() -> None:
     message = refusal(benchmark.main, ["--only", "twin_reset"])
     assert "--only twin_reset: no such figure" in message and "twin_reset_ms" in message
-
-
-def test_programs_whose_memory_is_measured_are_there() -> None:
-    for name in ("simulate", "train", "identify"):
-        assert Path(benchmark.tool(name)[-1]).is_file()

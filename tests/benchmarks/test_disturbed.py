@@ -25,14 +25,6 @@ def test_rows_that_are_missing_are_counted(tmp_path: Path) -> None:
     assert rows_lost(tmp_path, tally) == 3
 
 
-def test_the_tally_counts_what_ended_episodes() -> None:
-    tally = Tally()
-    tally.forces, tally.steps = [3.0, 9.0], [10, 20]
-    tally.ends.update(["its last step", "its last step"])
-    text = tally.text()
-    assert "2 episodes, 30 steps" in text and "greatest 9.0 N" in text
-
-
 def test_a_stalling_policy_stands_still_now_and_then() -> None:
     policy = Stalling(0)
     policy(np.zeros(12))

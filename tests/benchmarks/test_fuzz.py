@@ -15,7 +15,7 @@ from tests.benchmarks.bad_workers import dying, hanging
 from tests.refusals import refusal
 
 #: A few cases of each reader and codec; the program itself reads thousands.
-CASES = dict.fromkeys(fuzz.READERS, 40) | dict.fromkeys(fuzz.CODECS, 400)
+CASES = dict.fromkeys(fuzz.READERS, 25) | dict.fromkeys(fuzz.CODECS, 400)
 CASES["import_mat"] = 5  # each starts a process
 
 

@@ -6,15 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from selection import ablation, judge, scores, sketch
-from selection.ablation import scaled, variants
 from selection.answer import FAILED, Answer, Case
 from selection.cases import case_of, chosen, known_cases
-from selection.columns import Columns, without_base
+from selection.columns import Columns
 from selection.hidden import Truth, hide
 from selection.noise import drawn_noise
 from selection.readings import Plan, write_sensor_case
-from selection.simulated import fourier
-from selection.watched import watched
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.finished_work import FinishedWork
@@ -35,22 +32,6 @@ _CASE = Case(
 
 def _judged(case: Case = _CASE, ending: str = "explained", **said: object):
     return scores.Judged(case, Answer(ending, **said))  # type: ignore[arg-type]
-
-
-def test_a_case_and_an_answer_come_back_from_their_files(tmp_path: Path) -> None:
-    """Both are plain data."""
-    _CASE.write(tmp_path / "case.json")
-    assert Case.read(tmp_path / "case.json") == _CASE
-    answer = Answer(
-        "partly", ("A",), ("B",), {"A": ("C", "D")}, {"A.x": (1.0, 0.5, 1.5)}, 0.2, 0.1
-    )
-    assert Answer.of_plain(answer.plain) == answer
-
-
-def test_an_unknown_ending_is_refused() -> None:
-    """A selector that says anything else can't be scored."""
-    with pytest.raises(DisasmError, match="ending 'noise'"):
-        Answer("noise")
 
 
 def test_a_name_is_right_if_it_or_its_set_was_put_in() -> None:
@@ -81,15 +62,6 @@ def test_an_alarm_is_a_confirmed_name_in_a_null_log() -> None:
     assert not _judged(null, suggested=("ArmDelay",)).is_alarm
 
 
-def test_an_interval_covers_or_does_not() -> None:
-    """Of effects that were put in, whatever the others' are."""
-    sizes = {
-        "JointDelay.joint_1.delay": (0.02, 0.015, 0.025),
-        "X.size": (1.0, 0.0, 2.0),
-    }
-    assert _judged(sizes=sizes).covered == (False,)
-
-
 def test_a_table_counts_effects_and_logs_apart() -> None:
     """What is left out of the library is no name that could be given."""
     case = dataclasses.replace(_CASE, least_error=0.05)
@@ -113,14 +85,6 @@ def test_halves_agree_by_names_and_by_sizes() -> None:
     far = Answer("explained", ("A",), sizes={"A.x": (2.0, 1.5, 2.5)})
     assert scores.compatible(first, near) == (1, 1)
     assert scores.compatible(first, far) == (0, 1)
-
-
-def test_velocity_and_acceleration_are_derivatives() -> None:
-    """Of the motion of simulated arms, by central differences."""
-    motion = fourier(np.random.default_rng(57_001), 3, 10.0)
-    for values, rate in ((motion.q, motion.v), (motion.v, motion.vd)):
-        slope = np.gradient(values, motion.time, axis=0)[1:-1]
-        assert slope == pytest.approx(rate[1:-1], abs=2e-2 * np.abs(rate).max())
 
 
 @pytest.mark.parametrize(("kind", "rho"), [("white", 0.0), ("ar0.9", 0.9), ("t3", 0.0)])
@@ -184,14 +148,6 @@ def test_columns_recover_what_was_hidden(tmp_path: Path) -> None:
     assert found == pytest.approx(true, abs=0.1 * np.abs(true).max())
 
 
-def test_projection_leaves_nothing_of_the_base() -> None:
-    """Columns without the base are at right angles to it."""
-    random = np.random.default_rng(0)
-    base, columns = random.normal(size=(50, 3)), random.normal(size=(50, 4))
-    left = without_base(columns, base)
-    assert base.T @ left == pytest.approx(np.zeros((3, 4)), abs=1e-9)
-
-
 def test_the_sketch_names_what_is_large_and_nothing_in_noise(tmp_path: Path) -> None:
     """A gain of ten times the noise, and a null log."""
     plan = dataclasses.replace(_plan(level=10.0), kinds=(("SensorGain",),))
@@ -223,29 +179,6 @@ def test_the_judge_keeps_answers_and_asks_failures_again(tmp_path: Path) -> None
     assert found.answer.ending == "none" and len(asked) == 2
 
 
-def test_an_unknown_selector_is_one_line() -> None:
-    """That names those there are."""
-    with pytest.raises(DisasmError, match="no module of benchmarks/selection"):
-        judge.selector_of("nobody")
-
-
-def test_a_read_setting_is_noted() -> None:
-    """Not those that a copy or a comparison reads."""
-
-    @dataclasses.dataclass(frozen=True)
-    class Settings:
-        """Two of them."""
-
-        alpha: float = 0.05
-        rows: int = 10
-
-    read = set[str]()
-    settings = watched(Settings(), read)
-    copied = dataclasses.replace(settings, rows=20)
-    assert copied != settings and not read
-    assert copied.rows == 20 and read == {"rows"}
-
-
 def test_an_ablation_counts_what_changes() -> None:
     """One name lost, and one wrong name more."""
     found = ablation.row(
@@ -256,12 +189,3 @@ def test_an_ablation_counts_what_changes() -> None:
     )
     assert found[:4] == ["alpha", "0.1", "0.05", 1]
     assert found[4:9] == ["-1", "-1", "+1", "0", "0"] and found[9] == "x 2.000"
-
-
-def test_a_setting_is_halved_doubled_or_switched() -> None:
-    """Whole numbers stay whole; a tuple is scaled as a whole."""
-    assert variants("on", True) == [("on", False)]
-    assert variants("rows", 1) == [("rows", 2)]
-    assert variants("alpha", 0.05) == [("alpha", 0.025), ("alpha", 0.1)]
-    assert scaled((2.0, 4.0), 0.5) == [1.0, 2.0]
-    assert variants("word", "text") == []

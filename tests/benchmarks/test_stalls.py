@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from stalls import StallRun, measure, table_rows
+from stalls import measure
 
 PERIOD = 0.005  # s
 
@@ -16,11 +16,3 @@ def test_haste_is_seen() -> None:
     assert speed == pytest.approx(0.15)
     rate, gap, speed = measure((times[:40], q[:40]), PERIOD)
     assert gap == pytest.approx(PERIOD) and speed == pytest.approx(0.03)
-
-
-def test_the_table_shows_the_worst_of_each() -> None:
-    runs = [
-        StallRun("policy", 0.1, 21, 0.0045, 0.03, 1.5, 0.11, "went on"),
-        StallRun("policy", 0.1, 20, 0.0046, 0.04, 1.0, 0.13, "went on"),
-    ]
-    assert table_rows(runs) == [(0.1, "policy", 21, 4.5, 40.0, 1.5, 0.12, "2 went on")]

@@ -55,18 +55,6 @@ def test_quantities_become_a_table() -> None:
     assert all(f"``{name}``" in text for name in names) and "judge" in text
 
 
-def test_absolute_values_are_text_apart_from_literals() -> None:
-    lines = ["|v| and `|w|`::", "", "    a | b", "", "|u|"]
-    escaped = docstrings.without_substitutions(lines)
-    assert escaped == [r"\|v\| and `|w|`::", "", "    a | b", "", r"\|u\|"]
-
-
-def test_what_is_indented_after_a_colon_is_code() -> None:
-    lines = ["So:", "", "    x = |v|", "", "Args:", "    x: of it.", "Not:", "", "so."]
-    text = docstrings.literal_blocks(lines)
-    assert text == ["So::", *lines[1:]]
-
-
 #: Markdown, the folder that it stands in, its page of the site, the link there.
 _LINKS = """
 [m](../drake_disasm/mdp.py)              docs         a.md         reference/api/drake_disasm.mdp.rst

@@ -54,14 +54,14 @@ def test_example_runs_and_prints(example: Path, tmp_path: Path) -> None:
     assert not re.search(r"\bnan\b", done.stdout, re.IGNORECASE), done.stdout
 
 
-@pytest.mark.parametrize("station", ["twin", "hardware"])
-def test_own_diagram_swaps_its_station(station: str) -> None:
+def test_own_diagram_swaps_its_station() -> None:
+    example = ROOT / "examples" / "own_diagram.py"
     done = subprocess.run(
-        [sys.executable, ROOT / "examples" / "own_diagram.py", "--station", station],
+        [sys.executable, example, "--station", "hardware"],
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stderr
     assert "the bolt is held at A" in done.stdout
-    assert ("truly" in done.stdout) == (station != "hardware")
+    assert "truly" not in done.stdout

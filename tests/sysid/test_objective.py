@@ -58,16 +58,6 @@ def test_the_same_bits_with_one_worker_and_threads():
         assert np.array_equal(Objective(model, threads)(THETAS), expected)
 
 
-def test_a_worker_that_dies_is_replaced_and_nothing_is_lost(tmp_path):
-    model = Decay()
-    expected = Objective(model, Workers())(THETAS)
-    model.die_once = tmp_path / "died"
-    with Workers(2) as pool:
-        assert np.array_equal(Objective(model, pool)(THETAS), expected)
-        assert pool.notes == ["a worker process died; its work was done again"]
-    assert model.die_once.exists()
-
-
 def test_pseudo_residuals_square_to_hubers_loss():
     r = np.array([-50.0, -3.0, -1.0, 0.0, 2.0, 3.0, 7.0])
     expected = np.where(np.abs(r) <= 3, r**2, 2 * 3 * np.abs(r) - 9)

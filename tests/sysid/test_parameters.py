@@ -69,21 +69,10 @@ def test_an_effect_that_is_not_there_is_added_at_its_null_value():
     assert by_path([turn, shift], {"GroovePose.z": 1e-4}) == {"effects.0.z": 1e-4}
 
 
-def test_an_effect_that_is_there_is_used():
-    scenario, (turn,) = scenario_parameters(
-        load_scenario("removal_turned"), [ParameterRequest("GroovePose.ry")]
-    )
-    assert len(scenario.effects) == 1 and turn.nominal == pytest.approx(0.0349066)
-
-
 @pytest.mark.parametrize(
     ("request_", "message"),
     [
-        (ParameterRequest("contact.fricton"), "did you mean 'friction'"),
-        (ParameterRequest("GroovePse.ry"), "did you mean 'GroovePose'"),
-        (ParameterRequest("GroovePose.rw"), "known: rx, ry"),
         (ParameterRequest("lock"), "not a number"),
-        (ParameterRequest("gripper.stiffness.6"), "count from 0"),
         (ParameterRequest("lock.clearance", high=0.5), "go beyond"),
         (ParameterRequest("contact.friction", low=0.3), "nominal"),
     ],

@@ -60,8 +60,6 @@ def test_acceptance_claims_no_more_than_the_verdict(tmp_path: Path) -> None:
         (["--policy=straight", "--closed=nothing"], ["no result.json", "close-loop"]),
         (["--policy=strait", "--closed=closed"], ["did you mean 'straight'"]),
         (["--policy=slow.npz", "--closed=closed"], ["task.period"]),
-        (["--policy=straight", "--closed=closed", "--draws=0"], ["--draws", "1"]),
-        (["--closed=closed"], ["--policy"]),
     ],
 )
 def test_bad_input_is_one_line(

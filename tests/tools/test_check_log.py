@@ -34,10 +34,3 @@ def test_a_dead_channel_is_refused(tmp_path: Path) -> None:
     log = write_slide_log(tmp_path / "log", tau=np.zeros(3000))
     run = run_program("check-log", "--log", log, "--workers=1")
     assert_one_line(run, ["slide"])
-
-
-def test_a_quick_check_leaves_the_excitation_out(tmp_path: Path) -> None:
-    run = run_program(
-        "check-log", "--log", write_slide_log(tmp_path / "log"), "--quick"
-    )
-    assert run.returncode == 0 and "parameters" not in run.stdout

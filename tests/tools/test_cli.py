@@ -14,7 +14,6 @@ from drake_disasm.logs import read_log
 from drake_disasm.scenario import load_scenario, scenario_from_mapping
 from tests.progress import default_signals
 from tests.refusals import refused
-from tests.tools.inputs import write_policy
 from tests.tools.programs import ROOT, assert_one_line, run_program
 
 _SWALLOWS = """
@@ -81,8 +80,6 @@ def test_a_missing_system_library_is_one_line(monkeypatch: pytest.MonkeyPatch) -
 #: A program, what it needs, and numbers that it refuses, one of each kind.
 _NUMBERS = [
     ("simulate", (), "--episodes=0"),
-    ("evaluate", ("--policy", "straight"), "--psi=nan"),
-    ("train", ("--out", "nowhere"), "--seeds=x"),
     ("identify", ("--log", "nowhere", "--out", "nowhere"), "--huber=0"),
     ("excite", ("--urdf", "x", "--out", "nowhere"), "--margin=2"),
 ]
@@ -193,15 +190,6 @@ def test_sigterm_ends_a_program_that_waits_for_a_library() -> None:
     assert errors == "terminated; what was finished is kept\n"
 
 
-@pytest.mark.parametrize(
-    "policy", ["a/b:c", "no_such:x", "nowhere.npz", "mine.py:Mine", "strait"]
-)
-def test_a_policy_that_is_none_is_one_line(policy: str) -> None:
-    done = run_program("simulate", "--no-meshcat", "--policy", policy)
-    assert_one_line(done, [policy.partition(":")[0]])
-
-
-def test_a_policy_that_does_not_fit_is_one_line(tmp_path: Path) -> None:
-    write_policy(tmp_path / "slow.npz", period=0.5)
-    run = ("simulate", "--no-meshcat", "--policy", tmp_path / "slow.npz")
-    assert_one_line(run_program(*run), ["task.period", "0.5", "0.1"])
+def test_a_policy_that_is_none_is_one_line() -> None:
+    done = run_program("simulate", "--no-meshcat", "--policy", "no_such:x")
+    assert_one_line(done, ["no_such"])

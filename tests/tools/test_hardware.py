@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from drake import lcmt_iiwa_command, lcmt_iiwa_status
 from pydrake.lcm import DrakeLcm
 
 from drake_disasm.logs import read_log
@@ -157,32 +156,6 @@ def test_no_row_is_lost_however_a_run_is_stopped(
         assert episode.rows >= count and episode["truncated"][-1]
 
 
-def _command_by_another_program() -> None:
-    """Commands the arm to where it is commanded already, all but a hair."""
-    lcm, heard = DrakeLcm(_LCM), []
-    lcm.Subscribe("IIWA_STATUS", heard.append)
-    while not heard:
-        lcm.HandleSubscriptions(500)
-    q = lcmt_iiwa_status.decode(heard[-1]).joint_position_commanded
-    message = lcmt_iiwa_command()
-    message.num_joints, message.joint_position = 7, [q[0] + 1e-5, *q[1:]]
-    lcm.Publish("IIWA_COMMAND", message.encode())
-
-
-@pytest.mark.slow
-def test_a_foreign_command_over_the_network_is_held_at(
-    moving: list[str], tmp_path: Path
-) -> None:
-    with _in_motion(moving, tmp_path / "log", 4) as (process, _):
-        _command_by_another_program()
-        _, errors = process.communicate()
-    assert process.returncode == 2
-    reason = "a command that is not ours came on IIWA_COMMAND from "
-    assert reason in errors
-    newest = max(read_log(tmp_path / "log").header.notes.items())
-    assert reason in newest[1]["cut_off"]
-
-
 @pytest.mark.slow
 def test_a_dry_run_shows_the_devices_and_commands_nothing(fake: Path) -> None:
     dry_run = command(
@@ -200,23 +173,6 @@ def test_a_dry_run_shows_the_devices_and_commands_nothing(fake: Path) -> None:
         process.stdout.read()
         assert process.wait() == 130
     assert "arm: position control" in said and "commands may lead the joints by" in said
-
-
-@pytest.mark.slow
-def test_a_second_program_is_told_who_has_the_devices(fake: Path) -> None:
-    hardware = ("simulate", "--station", "hardware", "--hardware-config", fake)
-    first = command(*hardware, "--dry-run", "--no-meshcat")
-    with running(first, stdout=subprocess.PIPE) as process:
-        assert process.stdout
-        while "ft_sensor" not in process.stdout.readline():
-            assert process.poll() is None
-        for more in ((), ("--dry-run",)):
-            second = run_program(*hardware, "--no-meshcat", *more)
-            assert second.returncode == 2
-            assert "another program has the sensor's stream (" in second.stderr
-            assert f": simulate.py (pid {process.pid}, " in second.stderr
-        process.send_signal(signal.SIGINT)
-        process.communicate()
 
 
 @pytest.mark.slow

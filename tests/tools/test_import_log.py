@@ -27,16 +27,6 @@ def table(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_recording_is_shown_with_the_guess(table: Path, tmp_path: Path) -> None:
-    run = run_program(
-        "import_log", str(table), "--show", "--save-map", str(tmp_path / "m")
-    )
-    assert run.returncode == 0, run.stderr
-    assert "250 Hz" in run.stdout and "tau.0: -2 to 2, in steps of" in run.stdout
-    assert "from: [q.0, q.1]" in run.stdout
-    assert (tmp_path / "m").read_text().startswith("kind: joint_motion")
-
-
 def test_a_recording_whose_names_tell_nothing_is_shown(tmp_path: Path) -> None:
     table = tmp_path / "run.csv"
     np.savetxt(table, np.random.default_rng(0).normal(size=(20, 3)), delimiter=",")
@@ -111,8 +101,6 @@ def test_torques_at_rest_go_from_a_table_to_a_verdict(tmp_path: Path) -> None:
     [
         (["none.csv", "--show"], "none.csv: does not exist"),
         (["TABLE"], "--out: give a folder"),
-        (["TABLE", "--out", "x", "--kind", "transitions"], "is not guessed"),
-        (["TABLE", "--out", "x", "--joints", "a"], "q has 2 channels, not 1"),
         (["TABLE", "--out", "x", "--urdf", "none.urdf", "--joints", "a"], "none.urdf"),
     ],
 )

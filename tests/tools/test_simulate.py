@@ -29,14 +29,6 @@ def test_default_run_takes_the_bolt_out(simulate: Runner) -> None:
     assert "1 of 1 episodes succeeded" in done.stdout
 
 
-@pytest.mark.slow
-def test_straight_jams_on_the_turned_groove(simulate: Runner) -> None:
-    done = simulate("--scenario", "removal_turned", "--policy", "straight")
-    assert done.returncode == 0, done.stderr
-    assert "force limit" in done.stdout
-    assert "0 of 1 episodes succeeded" in done.stdout
-
-
 def test_record_writes_a_log_that_describes_itself(
     simulate: Runner, tmp_path: Path
 ) -> None:
@@ -53,26 +45,10 @@ def test_record_writes_a_log_that_describes_itself(
     assert last["terminated"][-1] and not last["truncated"][-1]
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("lock: {clearence: 0.0004}", ["mine.yaml", "clearence", "clearance"]),
-        ("arm: {model: package://disasm_models/iiwa15.urdf}", ["iiwa15.urdf", "model"]),
-        ("lock: {clearance", ["mine.yaml", "line 1", "not YAML"]),
-    ],
-)
-def test_bad_scenario_is_one_line(
-    simulate: Runner, tmp_path: Path, text: str, words: list[str]
-) -> None:
-    (tmp_path / "mine.yaml").write_text(text)
+def test_bad_scenario_is_one_line(simulate: Runner, tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text("lock: {clearence: 0.0004}")
+    words = ["mine.yaml", "clearence", "clearance"]
     assert_one_line(simulate("--scenario", "mine.yaml"), words)
-
-
-def test_full_output_folder_is_refused(simulate: Runner, tmp_path: Path) -> None:
-    (tmp_path / "log").mkdir()
-    (tmp_path / "log/notes.txt").write_text("mine")
-    assert_one_line(simulate(*TWIN, "--record", "log"), ["log", "empty"])
-    assert [p.name for p in (tmp_path / "log").iterdir()] == ["notes.txt"]
 
 
 def test_page_that_cannot_be_written_is_refused_before_the_run(
@@ -102,14 +78,6 @@ def test_trained_policy_is_given_as_a_file(simulate: Runner, tmp_path: Path) -> 
     a, b = (read_log(tmp_path / name) for name in ("a", "b"))
     assert a.data_hash == b.data_hash
     assert a.header.provenance["policy"] == "out/mine.npz"
-
-
-def test_damaged_or_unfit_policy_is_one_line(simulate: Runner, tmp_path: Path) -> None:
-    run = (*TWIN, "--policy", str(_trained(tmp_path / "mine.npz")))
-    data = bytearray((tmp_path / "mine.npz").read_bytes())
-    data[len(data) // 2] ^= 1
-    (tmp_path / "mine.npz").write_bytes(data)
-    assert_one_line(simulate(*run), ["mine.npz", "damaged", "drake-disasm train"])
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """What programs call the quantities of a recording, and how its names read."""
 
 import dataclasses
+import functools
 import re
 from collections.abc import Mapping, Sequence
 
@@ -107,6 +108,7 @@ def labels_of(stream: Stream) -> list[Label]:
     return [Label(n, *_text_and_unit(text, endings)) for n, text in texts.items()]
 
 
+@functools.lru_cache(10_000)
 def tokens_of(text: str) -> Tokens:
     """Returns the words of a name: "- Arm_1/joint" is ("Arm", "1", "joint")."""
     return tuple(word for word in re.split(r"[^0-9A-Za-z]+", text) if word)

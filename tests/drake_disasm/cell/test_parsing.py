@@ -5,25 +5,14 @@ from pathlib import Path
 import pytest
 from pydrake.multibody.plant import MultibodyPlant
 
-from drake_disasm.cell.parsing import add_arm, add_model
-from drake_disasm.common.resources import model_path, models_dir, package_map
+from drake_disasm.cell.parsing import add_model
+from drake_disasm.common.resources import model_path
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import CellStation
 from tests.refusals import refusal
 
 HEX_E = "package://disasm_models/hex_e/hex_e.urdf"
 GRIPPER = "package://disasm_models/gripper_2f140/gripper_2f140.urdf"
-
-
-def test_shipped_models_are_found_and_read() -> None:
-    path = models_dir() / "hex_e" / "hex_e.urdf"
-    assert model_path(HEX_E) == model_path(str(path)) == path
-    assert package_map().GetPackageNames() == ["disasm_models"]
-    plant = MultibodyPlant(0.0)
-    instance, flange = add_arm(plant, "package://disasm_models/iiwa14/iiwa14.urdf")
-    plant.Finalize()
-    assert plant.num_positions(instance) == 7
-    assert flange.name() == "iiwa_link_ee"
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from drake_disasm.cell.twin_parameters import ControlledArm, _condensed, twin_of
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations import TwinStation
 from drake_disasm.twin.arm_step import ArmStep
-from tests.refusals import refusal
 
 _P = np.array([0.0, 0.02, 0.01])
 _ORDER = [0, 1, 2, 5, 4, 3]  # x, y, z, yaw, pitch, roll
@@ -83,12 +82,6 @@ def test_grip_and_arm_are_in_series(compliance: str) -> None:
         assert np.all(twin.bolt_stiffness()[:3] < 600.0)
     else:
         assert np.all(twin.bolt_stiffness()[:3] > 1e4)
-
-
-def test_a_grip_that_cannot_be_is_refused() -> None:
-    for override in ("stiffness.4=-1", "compliance=soft", "damping_ratio=0"):
-        key = f"gripper.{override}".split("=")[0].removesuffix(".4")
-        assert key in refusal(load_scenario, "removal", [f"gripper.{override}"])
 
 
 @pytest.mark.parametrize("compliance", ["adaptive", "rigid"])

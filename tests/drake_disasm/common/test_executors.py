@@ -27,15 +27,11 @@ def _square(job: int, progress: Progress) -> int:
     return job * job
 
 
-def _dies_once(job: Path) -> str:
+def _dies_once(job: Path, progress: Progress) -> str:
     if not job.exists():
         job.touch()
         os._exit(9)
     return job.name
-
-
-def _dies_once_reporting(job: Path, progress: Progress) -> str:
-    return _dies_once(job)
 
 
 def _dies(job: int) -> None:
@@ -92,16 +88,12 @@ def test_map_keeps_the_order_and_counts() -> None:
     assert seen == [ProgressUpdate("squaring", done) for done in (1, 2, 3, 4)]
 
 
-@pytest.mark.parametrize("reports", [False, True])
-def test_what_a_dead_worker_left_is_done_again(tmp_path: Path, reports: bool) -> None:
+def test_what_a_dead_worker_left_is_done_again(tmp_path: Path) -> None:
     jobs = [tmp_path / "a", tmp_path / "b"]
     jobs[1].touch()
     with WorkerPool(2) as pool:
-        if reports:
-            done = dict(pool.run(_dies_once_reporting, jobs))
-            assert done == dict(zip(jobs, "ab", strict=True))
-        else:
-            assert pool.map(_dies_once, jobs) == ["a", "b"]
+        done = dict(pool.run(_dies_once, jobs))
+        assert done == dict(zip(jobs, "ab", strict=True))
         assert pool.notes == ["a worker process died; its work was done again"]
 
 

@@ -115,16 +115,6 @@ def test_a_place_that_the_arm_obeys_and_we_never_sent_is_noticed(arm: Arm) -> No
     assert "for joint 2 that is 0.010 rad from ours" in arm.foreign()
 
 
-def test_no_socket_stays() -> None:
-    arm = Arm(DrakeLcm(_URL))
-    channel = arm.monitor._channel
-    assert channel._socket is not None
-    arm.monitor.start()
-    arm.monitor.stop()
-    assert channel._socket is None
-    assert channel.take() == []
-
-
 def test_an_arm_that_was_jogged_between_episodes_has_no_other_master(arm: Arm) -> None:
     """The first status that is handled after the jog is one from before it."""
     ours = np.full(7, 0.1)

@@ -132,6 +132,8 @@ def test_noise_has_the_stated_variance_and_no_mean() -> None:
         station.sensor_noise.SetRandomContext(mine, generator)
         readings[i] = simulation.evaluate(station, "ft_sensor.wrench")
     sigma = np.array(simulation.scenario.ft_sensor.noise)
+    correlation = np.corrcoef(readings.T) - np.eye(6)
+    assert np.abs(correlation).max() < 5.0 / np.sqrt(n)
     statistic = (n - 1) * readings.var(axis=0, ddof=1) / sigma**2
     assert np.all(np.abs(statistic - (n - 1)) < 4.0 * np.sqrt(2.0 * (n - 1)))
     context = station.GetMyMutableContextFromRoot(simulation.context)

@@ -1,11 +1,8 @@
 """The HEX's client against a box on the loopback that can misbehave."""
 
-import os
-import threading
 from collections.abc import Iterator
 
 import numpy as np
-import psutil
 import pytest
 
 from drake_disasm.common.ports import Health
@@ -156,30 +153,8 @@ def test_a_silent_or_restarted_box_is_asked_again() -> None:
     np.testing.assert_array_equal(client.read().values, WRENCH)
 
 
-def test_nothing_is_left_behind() -> None:
-    def udp() -> list[object]:
-        found = psutil.net_connections("udp")
-        return [c.laddr for c in found if c.pid == os.getpid()]
-
-    threads, sockets = threading.enumerate(), udp()
-    with FakeHexBox() as box:
-        client = HexClient("127.0.0.1", box.port, silence=PATIENT)
-        client.stop()
-        client.start()
-        assert len(udp()) == len(sockets) + 2
-        client.stop()
-        client.stop()
-        assert client.read().counters == Counters()
-    assert threading.enumerate() == threads
-    assert udp() == sockets
-
-
 def test_wrong_settings_and_addresses_are_refused() -> None:
-    for options, words in (
-        ({"filter_hz": 30.0}, "choose one of"),
-        ({"period": 0.001}, "whole milliseconds"),
-        ({"silence": 0.002}, "must be longer than period"),
-    ):
-        assert words in refusal(HexClient, "127.0.0.1", **options)
+    message = refusal(HexClient, "127.0.0.1", silence=0.002)
+    assert "must be longer than period" in message
     client = HexClient("127.0.0.1", port=70_000)
     assert "check the address" in refusal(client.start)

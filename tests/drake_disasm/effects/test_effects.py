@@ -10,7 +10,6 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from drake_disasm import effects as ef
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import load_scenario
-from drake_disasm.stations import CellStation, TwinStation
 from drake_disasm.task.simulation import TaskSimulation
 from tests.drake_disasm.conftest import STIFF
 from tests.drake_disasm.effects.learned_files import step_in_fy
@@ -37,21 +36,6 @@ SAMPLES = ef.JointSamples(
 def _sensing(rpy: tuple[float, float, float], time: float = 1.0) -> ef.Sensing:
     R_WS = RollPitchYaw(np.array(rpy)).ToRotationMatrix().matrix()
     return ef.Sensing(np.array(time), R_WS, G_W)
-
-
-def test_every_effect_is_declared_in_full() -> None:
-    """Beyond what registration demands: words, and amplitudes that are zero at null."""
-    for effect in SHIPPED:
-        assert "Equation:" in effect.__doc__ and "Where it acts:" in effect.__doc__
-        assert effect.noun and not effect.noun[0].isupper(), effect
-        for field in dataclasses.fields(effect):
-            data = field.metadata
-            assert data["doc"]
-            if field.name in ef.amplitudes(effect):
-                assert data["unit"] and field.default == 0.0
-                assert data["low"] <= 0.0 < data["high"]
-            for value in (field.default, *data["grid"]) if data["grid"] else ():
-                assert data["low"] <= value <= data["high"]
 
 
 def test_every_effect_vanishes_at_null_as_a_function() -> None:
@@ -127,13 +111,6 @@ def test_payload_error_is_a_hanging_mass(rpy: tuple[float, float, float]) -> Non
     np.testing.assert_allclose(read[3:], np.cross(p_SoScm_S, read[:3]), atol=1e-12)
 
 
-def test_sensor_bias_adds_and_zeroing_does_not_see_it() -> None:
-    bias = np.array([0.5, -1, 2, 0.1, 0.2, -0.3])
-    read = ef.SensorBias(*bias).apply(np.ones(6), _sensing((1, 2, 3)))
-    np.testing.assert_array_equal(read, 1 + bias)
-    assert ef.PayloadError.present_at_zeroing
-
-
 def test_drift_grows_and_warm_up_settles() -> None:
     for time in (0.0, 2.0, 1e4):
         sensing = _sensing((0, 0, 0), time)
@@ -196,23 +173,6 @@ def test_groove_friction_and_pose() -> None:
     end = X_GnG.rotation() @ np.array([0.06, 0, 0])
     expected = 0.06 * np.array([np.cos(0.1), 0, -np.sin(0.1)])
     np.testing.assert_allclose(end, expected, atol=1e-12)
-
-
-@pytest.mark.parametrize("station_type", [CellStation, TwinStation])
-def test_groove_pose_moves_body_and_geometry(station_type) -> None:
-    station = station_type(load_scenario("removal"))
-    context = station.CreateDefaultContext()
-    query = station.GetOutputPort("query_object")
-    geometry = station.lock.groove_ids[0]
-    before = RigidTransform(query.Eval(context).GetPoseInWorld(geometry))
-    effect = ef.GroovePose(ry=0.05, y=0.003)
-    station.set_effects(context, [effect])
-    X_GnG = effect.apply(station.lock.part.environment, ef.AT_REST).X_GnG
-    assert station.true_groove_pose(context).IsExactlyEqualTo(X_GnG)
-    after = query.Eval(context).GetPoseInWorld(geometry)
-    X_WG = station.X_WG
-    expected = X_WG @ X_GnG @ X_WG.inverse() @ before
-    assert after.IsNearlyEqualTo(expected, 1e-12)
 
 
 def test_imprecision_scatters_about_the_command_and_repeats_itself():

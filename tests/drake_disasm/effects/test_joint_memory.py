@@ -1,7 +1,6 @@
 """Friction that depends on the path, against Dahl's equation."""
 
 import numpy as np
-import pytest
 from scipy.integrate import solve_ivp
 
 from drake_disasm.effects import JointDahlFriction
@@ -32,17 +31,3 @@ def test_one_displacement_is_as_two_parts_of_it_and_as_many_at_once() -> None:
     np.testing.assert_allclose(at_once, in_parts, rtol=1e-14)
     expected = np.sign(dq) + (memory - np.sign(dq)) * np.exp(-np.abs(dq) / SLIP)
     np.testing.assert_allclose(at_once, expected, atol=1e-15)
-
-
-def test_it_slides_with_its_size_and_starts_as_a_spring() -> None:
-    q = np.array([0.0, 1e-7, 1.0, 1.0 - 1e-7, 0.0])
-    found = EFFECT.torque(EFFECT.along(q))
-    assert found[1] == pytest.approx(SIZE / SLIP * 1e-7, rel=1e-4)
-    np.testing.assert_allclose(found[[2, 4]], [SIZE, -SIZE])
-    assert found[2] - found[3] == pytest.approx(2 * SIZE / SLIP * 1e-7, rel=1e-3)
-
-
-def test_the_speed_does_not_matter() -> None:
-    path = 0.01 * np.sin(np.linspace(0.0, 9.0, 400))
-    slow = EFFECT.along(np.repeat(path, 3))
-    np.testing.assert_array_equal(slow[::3], EFFECT.along(path))

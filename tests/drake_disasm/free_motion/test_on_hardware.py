@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from drake_disasm.free_motion import way
 from drake_disasm.free_motion.playing import MotionPlayer
 from drake_disasm.free_motion.table import MotionTable
 from drake_disasm.scenario import load_scenario
@@ -14,7 +15,8 @@ _WIDE = {"workspace_low": [-0.5] * 3, "workspace_high": [0.5] * 3}
 _SLOWLY = MotionTable(4.0 * MOTION.time, MOTION.q)
 
 
-def test_the_workspace_holds_an_arm_that_lifts_the_bolt_beyond_it() -> None:
+def test_the_workspace_holds_an_arm_that_lifts_the_bolt_beyond_it(monkeypatch) -> None:
+    monkeypatch.setattr(way, "_PULL", 0.06)
     with fake_hardware(load_scenario("removal")) as fake:
         player = MotionPlayer(fake.station, MOTION)
         with pytest.raises(HoldError, match="workspace"):

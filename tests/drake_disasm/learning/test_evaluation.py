@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from drake_disasm.effects import GroovePose
-from drake_disasm.learning.evaluation import evaluate, summed_up
+from drake_disasm.learning.evaluation import summed_up
 from drake_disasm.learning.statistics import (
     bootstrap_interval,
     interquartile_mean,
@@ -12,10 +11,7 @@ from drake_disasm.learning.statistics import (
     wilson_interval,
 )
 from drake_disasm.mdp import Outcome
-from drake_disasm.policies import make_policy
-from drake_disasm.scenario import load_scenario
 from drake_disasm.task.episode import EpisodeSummary
-from drake_disasm.task.simulation import TaskSimulation
 
 
 def _summary(reward: float, outcome: Outcome, force: float) -> EpisodeSummary:
@@ -76,12 +72,3 @@ def test_the_bootstrap_interval_covers_the_truth_about_as_often_as_it_says() -> 
 
 def test_the_moving_mean_looks_back_only() -> None:
     np.testing.assert_allclose(moving_mean([2.0, 4.0, 6.0, 8.0], 2), [2, 3, 5, 7])
-
-
-def test_the_same_seeds_give_the_same_episodes_and_effects_count() -> None:
-    scenario = load_scenario("removal", ["task.steps=8"])
-    simulation = TaskSimulation(scenario, "twin", make_policy("straight"))
-    first = evaluate(simulation, [3, 4])
-    assert evaluate(simulation, [3, 4]) == first
-    turned = evaluate(simulation, [3, 4], effects=[GroovePose(ry=0.1)])
-    assert turned[0].mean_force > first[0].mean_force

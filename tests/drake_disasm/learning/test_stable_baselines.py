@@ -49,17 +49,6 @@ def test_a_batch_runs_the_episodes_of_single_environments() -> None:
     assert [info["outcome"] for info in batch.reset_infos] == ["running"] * 2
 
 
-def test_success_is_no_time_limit() -> None:
-    scenario = load_scenario("chapter3", ["task.travel_success=0.002"])
-    envs = DisassemblyVecEnv(1, scenario)
-    envs.reset()
-    for _ in range(9):
-        _, _, ended, infos = envs.step(np.array([[3e-3, 0, 0, 0, 0, 0]]))
-        if ended[0]:
-            break
-    assert infos[0]["is_success"] and not infos[0]["TimeLimit.truncated"]
-
-
 def test_sac_learns_on_it_with_the_usual_wrappers() -> None:
     envs = VecMonitor(DisassemblyVecEnv(4, _scenario()), info_keywords=("outcome",))
     normalised = VecNormalize(envs, norm_reward=False)

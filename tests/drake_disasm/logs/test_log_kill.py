@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
-from tests.progress import running, wait_until
+from tests.progress import running
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[3]
@@ -70,14 +70,6 @@ def test_killed_between_writing_and_renaming(file_format, tmp_path):
     resumed.write_episode(flat_columns("joint_motion", {"time": clock, "q": q}))
     assert _assert_whole(folder) == 4
     assert not list(folder.glob(".*"))
-
-
-def test_killed_at_any_time(tmp_path):
-    folder = tmp_path / "log"
-    with _writing(folder, "csv", -1) as process:
-        wait_until((folder / "episode_0004.csv").exists, process)
-        process.kill()
-    assert _assert_whole(folder) >= 5
 
 
 def test_a_kill_before_log_yaml_or_a_full_disk_leaves_nothing(tmp_path, monkeypatch):

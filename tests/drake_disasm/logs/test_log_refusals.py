@@ -35,8 +35,6 @@ def _as_text(column):
 #: kind, column, what is done to it, words of the message: what is wrong, and remedy.
 BAD_COLUMNS = [
     ("transitions", "wrench.fz", _drop, "missing column 'wrench.fz'", "add"),
-    ("transitions", "action_executed.dv", _drop, "missing column 'action_exec", "add"),
-    ("joint_motion", "q.1", _drop, "missing column 'q.1'", "add"),
     ("static_wrench", "order", _drop, "missing column 'order' or 'time'", "add"),
     ("joint_motion", "tau.2", _drop, "'tau.*' has 2 joints", "'tau.<i>' per joint"),
     ("transitions", "wrench.tx", _set(4, np.nan), "'wrench.tx' is NaN", "leave"),
@@ -44,18 +42,13 @@ BAD_COLUMNS = [
     ("transitions", "X_GB_measured.qw", _scale(3), "'X_GB_measured.qw' to", "norm"),
     ("static_wrench", "R_WS.qx", _scale(2), "non-unit quaternion", "divide"),
     ("joint_motion", "time", _set(5, 1.5e9 + 0.04), "non-monotone", "row 5", "sort"),
-    ("static_wrench", "order", _set(2, 0), "'order' is non-mono", "sort"),
     ("transitions", "time", _scale(1e3), "steps of 100 s", "period 0.1 s", "seconds"),
-    ("transitions", "time", _scale(0.4), "steps of 0.04 s", "period 0.1 s"),
     ("transitions", "truncated", _set(3, True), "'truncated' is true in row 3", "end"),
     ("transitions", "action.dz", _set(-1, 0.001), "'action.dz' is 0.001", "write 0"),
     ("transitions", "reward.force", _set(-1, -1.0), "'reward.force' is -1", "write 0"),
     ("joint_motion", "tau.0", _as_text, "'tau.0'", "write a number"),
     # Magnitudes that nothing has.
     ("transitions", "wrench.fx", _set(3, 1e300), "1e+300 in row 3", "1e+07 N;", "SI"),
-    ("transitions", "ft_sensor.tz", _set(3, -1e9), "beyond 1e+07 N\N{MIDDLE DOT}m;"),
-    ("transitions", "X_GB_measured.x", _set(3, 1e200), "beyond 10000 m;"),
-    ("transitions", "X_GB_measured.qw", _set(3, 1e200), "beyond 1e+20 1;"),
     ("joint_motion", "vd.2", _set(3, 1e300), "beyond 1e+09 rad/s"),
 ]
 
@@ -185,7 +178,6 @@ _UNITS = {"time": "s", "length": "m", "angle": "rad", "force": "N", "torque": "N
 BAD_HEADERS = [
     ("transitions", "schema", "drake_disasm/log/2", "wrong schema", "convert"),
     ("transitions", "kind", "poses", "key 'kind' is 'poses'", "use one of"),
-    ("transitions", "kind", ["transitions"], "key 'kind'", "use one of"),
     ("transitions", "task", None, "missing key 'task'", "add it"),
     ("transitions", "task", 7, "key 'task' is 7", "give a text"),
     ("joint_motion", "provenance", "me", "'provenance'", "a mapping"),
@@ -193,7 +185,6 @@ BAD_HEADERS = [
     ("transitions", "period", None, "missing key 'period'", "must say"),
     ("transitions", "period", "5e-3", "'period' is '5e-3'", "0.005"),
     ("joint_motion", "period", 0, "key 'period' is 0", "positive"),
-    ("transitions", "period", True, "key 'period' is True", "positive"),
     ("transitions", "period", 10**400, "'period'", "positive"),
     ("static_wrench", "period", 0.1, "key 'period'", "remove it"),
     ("joint_motion", "joints", None, "missing key 'joints'", "must say"),
@@ -203,12 +194,10 @@ BAD_HEADERS = [
     ("static_wrench", "frames", {}, "'frames.wrench' is None", "S or W"),
     ("transitions", "frames", {"wrench": "W"}, "'frames.wrench'", "express"),
     ("static_wrench", "frames", {"wrench": "S", "x": "S"}, "'frames.x'", "only"),
-    ("joint_motion", "units", None, "missing key 'units'", "add it"),
     ("joint_motion", "units", _UNITS | {"length": "mm"}, "'mm'", "'length: m'"),
     ("joint_motion", "units", _UNITS | {"mass": "kg"}, "'units.mass'", "only"),
     ("transitions", "notes", [1], "key 'notes' is not a mapping", "write"),
     ("transitions", "notes", {-1: {}}, "key 'notes' is not a mapping", "write"),
-    ("transitions", "notes", {"a": {}}, "key 'notes' is not a mapping", "write"),
     ("transitions", "notes", {0: "cut"}, "key 'notes' is not a mapping", "write"),
 ]  # fmt: skip
 
@@ -239,17 +228,10 @@ def test_units_may_be_spelt_otherwise_and_values_in_messages_are_short(written):
     assert len(refusal(read_log, folder)) < len(str(path)) + 300
 
 
-BOMB = "a0: &a0 [x]\n" + "".join(
-    f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 10)
-)
-
-
 @pytest.mark.parametrize(("text", "words"), [
     ("- 1\n- 2", "not a mapping"),
     ("\xff\xfe", ";"),
-    ("date: 2020-13-45", "not YAML (month must be"),
     ("a: " + "[" * 5000, "nested deeper"),
-    (f"{BOMB}task: *a9", "aliases written out"),
 ])  # fmt: skip
 def test_log_yaml_that_is_no_header(text, words, written):
     path = written("joint_motion") / "log.yaml"

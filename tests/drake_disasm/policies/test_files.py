@@ -16,7 +16,6 @@ from drake_disasm.common.resources import models_dir
 from drake_disasm.policies import (
     ActionMap,
     LearnedPolicy,
-    Network,
     Straight,
     find_policy,
     load_policy,
@@ -27,8 +26,6 @@ from drake_disasm.policies import (
 from drake_disasm.policies.files import FORMAT, POLICY
 from drake_disasm.scenario import load_scenario
 from tests.refusals import refusal
-
-MakeNetwork = Callable[..., Network]
 
 
 @pytest.fixture
@@ -81,33 +78,6 @@ def test_same_policy_same_bytes(policy: LearnedPolicy, file: Path) -> None:
         assert FORMAT in arrays["text"].tobytes().decode()
 
 
-def test_a_cut_file_and_flips_that_the_zip_would_accept_are_refused(file: Path) -> None:
-    """Whoever rewrites an array with any tool has to know our checksum, too."""
-    with np.load(file) as archive:
-        arrays = dict(archive)
-    arrays["text"].view(np.uint8).flat[3] ^= 1
-    data = file.read_bytes()
-    np.savez(file, **arrays)
-    assert "checksum" in _refusal(file)
-    for share in (0.0, 0.3, 0.99):
-        file.write_bytes(data[: int(share * len(data))])
-        _refusal(file)
-
-
-def test_other_files_are_refused(file: Path, tmp_path: Path) -> None:
-    file.write_text("a policy")
-    assert "is no .npz file" in _refusal(file)
-    np.save(file.open("wb"), np.ones(3))
-    assert "is no .npz file" in _refusal(file)
-    np.savez(file, weights=np.ones(3))
-    assert "lacks 'sha256'" in _refusal(file)
-    objects = np.array([{"a": 1}], dtype=object)
-    np.savez(file, weight_0=objects)  # as a pickle
-    assert "Object arrays" in _refusal(file)
-    assert "No such file" in _refusal(tmp_path / "missing.npz")
-    assert "directory" in _refusal(tmp_path)
-
-
 def _put(**changes: Any) -> Callable[[Arrays, dict[str, Any]], Any]:
     """Puts arrays (float32 where a shape is given) and parts of the text in."""
     made = {
@@ -134,28 +104,21 @@ BROKEN: list[tuple[Callable[[Arrays, dict[str, Any]], Any], str]] = [
     (_put(format="drake_disasm/policy/2"), f"drake_disasm/policy/2 {FORMAT}"),
     (_drop("format"), f"None {FORMAT}"),
     (_drop("weight_1"), "lacks 'weight_1'"),
-    (_drop("bias_2"), "lacks 'bias_2'"),
     (_drop(*_LAYERS), "lacks 'bias_0'"),
     (_drop("action_scale"), "lacks 'action_scale'"),
     (_put(spam=(1,)), "unknown 'spam'"),
     (_put(weight_1=(5, 9)), "weight_1 (5, 9) (5, 7)"),
-    (_put(bias_2=(5,)), "bias_2 (5,) (6,)"),
-    (_put(weight_1=(35,)), "weight_1 (35,)"),
     (_put(bias_0=()), "shape train it again"),
     (_put(weight_0=(7, 11)), "weight_0 (7, 11) (7, 12)"),
     (_put(weight_2=(5, 5), bias_2=(5,)), "(5, 5) (6, 5)"),
     (_put(observation_scale=np.ones(6)), "observation_scale (6,) (12,)"),
     (lambda a, t: a["weight_1"].__setitem__((0, 0), np.nan), "NaN weight_1"),
-    (lambda a, t: a["bias_0"].__setitem__(0, np.inf), "bias_0"),
     (lambda a, t: a["observation_scale"].__setitem__(0, 0.0), "scale zero"),
     (lambda a, t: a["action_scale"].__setitem__(0, -1.0), "scale negative"),
     (_put(weight_0=np.ones((7, 12))), "weight_0 float64 float32"),
-    (_put(bias_0=np.array(["a"] * 7)), "bias_0 float32"),
     (_put(base={"name": "strait", "parameters": {}}), "'strait' 'straight'"),
     (_put(base={"name": "straight", "parameters": {"sped": 1.0}}), "'sped' 'speed'"),
     (_put(base={"name": "straight", "parameters": {"speed": "fast"}}), "speed 'fast'"),
-    (_put(base={"name": "straight", "parameters": {"speed": np.nan}}), "speed nan"),
-    (_put(base={"name": "straight"}), "base"),
     (_put(base="straight"), "base"),
     (_drop("description"), "description"),
     (lambda a, t: t["description"].pop("period"), "description"),

@@ -18,12 +18,6 @@ def _observation(y: float = 0.0, **wrench: float) -> np.ndarray:
     return np.array([0, y, 0, 0, 0, 0, *(wrench.get(name, 0.0) for name in names)])
 
 
-def test_straight_answers_the_same_to_anything() -> None:
-    observation = np.random.default_rng(0).normal(size=12)
-    expected = [0.002, 0, 0, 0, 0, 0]
-    np.testing.assert_array_equal(Straight(0.002)(observation), expected)
-
-
 @pytest.mark.parametrize("name", SCRIPTED)
 def test_rows_are_answered_as_one_by_one(name: str) -> None:
     """Of NumPy to the bit, and as tensors."""

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from drake_disasm.common.ports import Health
-from drake_disasm.devices.reading import Mailbox, Reading
+from drake_disasm.devices.reading import Reading
 from drake_disasm.safety import Lag, SafetyConfig, Situation, guards
 
 Q = np.array([0.1, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0])
@@ -93,18 +92,3 @@ def test_an_arm_that_yields_may_lag_by_what_the_greatest_load_bends_it() -> None
 def test_limits_stay_below_what_the_gripper_takes():
     assert LIMITS.max_force < 25.0
     assert LIMITS.max_torque_xy < 5.0 and LIMITS.max_torque_z < 3.0
-
-
-def test_no_data_yet_is_a_health_and_not_zeros():
-    time = 0.0
-    mailbox = Mailbox(3, clock=lambda: time)
-    assert np.isnan(mailbox.read().values).all()
-    assert mailbox.read().health(0.0, 1.0) is Health.NO_DATA
-    mailbox.put(np.ones(3))
-    assert mailbox.read().health(0.5, 1.0) is Health.READY
-    assert mailbox.read().health(1.5, 1.0) is Health.STALE
-    mailbox.complain("broken")
-    assert mailbox.read().health(0.5, 1.0) is Health.ERROR
-    mailbox.put(np.ones(3))
-    assert mailbox.read().health(0.5, 1.0) is Health.READY
-    assert mailbox.read().counters.received == 2

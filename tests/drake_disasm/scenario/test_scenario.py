@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from drake_disasm.common.resources import models_dir
-from drake_disasm.effects import GrooveFriction, GroovePose
 from drake_disasm.mdp import action_bounds
 from drake_disasm.scenario import (
     Scenario,
@@ -22,13 +21,6 @@ SHIPPED = sorted(path.stem for path in (models_dir() / "scenarios").glob("*.yaml
 
 
 CHAPTERS = ("chapter3", "chapter4", "chapter5")
-
-
-def test_our_tasks_and_the_chapters_are_shipped() -> None:
-    ours = {"removal", "removal_turned", "removal_randomised", "sliding_randomised"}
-    impedance = {f"{name}_impedance" for name in CHAPTERS}
-    stiff = {f"{name}_stiff" for name in CHAPTERS}
-    assert {*ours, *CHAPTERS, *impedance, *stiff} == set(SHIPPED)
 
 
 @pytest.mark.parametrize("name", CHAPTERS[:2])
@@ -69,18 +61,6 @@ def test_chapters_differ_as_the_thesis_says() -> None:
     ours = removal.reward
     assert [ours.w_dis, ours.w_f, ours.w_t, ours.w_y] == [1.6, 0.3, 0.3, 5.0]
     assert [ours.f_max, ours.t_max, removal.steps] == [20.0, 5.0, 100]
-
-
-def test_overrides() -> None:
-    scenario = load_scenario(
-        "removal_turned",
-        ["lock.clearance=3e-4", "effects.0.ry=0.01", "gripper.hold=weld"],
-    )
-    assert scenario.lock.clearance == 3e-4
-    assert scenario.effects == [GroovePose(ry=0.01)]
-    assert scenario.gripper.hold == "weld"
-    replaced = load_scenario("removal", ["effects=[!GrooveFriction {coefficient: 1}]"])
-    assert replaced.effects == [GrooveFriction(coefficient=1.0)]
 
 
 def test_missing_scenarios_and_models_are_named() -> None:

@@ -87,11 +87,6 @@ def test_friction_does_not_chatter_when_the_joint_comes_to_rest(station):
     assert np.abs(np.diff(torques[-150:], 2)).max() < 0.01
 
 
-def test_a_joint_that_slides_takes_all_of_its_pre_sliding_friction(station, without):
-    measured = _forth_and_back(station, [fx.JointDahlFriction(NAME, 6.0, 0.002)])
-    np.testing.assert_allclose(measured - without, [6.0, -6.0], atol=0.03)
-
-
 def test_pre_sliding_friction_follows_the_path(station: CellStation) -> None:
     """Dahl's closed form along the joint's path, through reversals ever smaller."""
     effect = fx.JointDahlFriction(NAME, 6.0, 0.002)

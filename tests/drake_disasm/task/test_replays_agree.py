@@ -1,15 +1,8 @@
 """Many steps of the twin with IMPACT at once, against the diagram."""
 
-import dataclasses
-import math
-from typing import ClassVar
-
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform
 
-from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import EnvironmentEffect, amplitude, register_effect
 from drake_disasm.scenario import Scenario, load_scenario, with_values
 from drake_disasm.stations import TwinStation
 from drake_disasm.task.diagram_replay import TwinReplay
@@ -106,26 +99,3 @@ def test_a_state_without_balance_is_nan_and_the_others_are_found():
     assert np.isnan(found[3]).all()
     others = np.arange(COUNT) != 3
     np.testing.assert_allclose(found[others], expected[others], rtol=1e-9, atol=1e-11)
-
-
-@dataclasses.dataclass
-class Wear(EnvironmentEffect):
-    """Groove: z -= depth exp(-x / 20 mm), mu += 0.1 where more than half is worn."""
-
-    depth: float = amplitude("m", 0.0, 2e-3, "at A")
-    is_local: ClassVar[bool] = True
-    experiment: ClassVar[str] = "any"
-
-    def apply(self, environment, bolt):
-        worn = self.depth * math.exp(-max(bolt.p[0], 0.0) / 0.02)
-        friction = environment.friction + 0.1 * (worn > 0.5 * self.depth)
-        X_GnG = RigidTransform([0.0, 0.0, -worn]) @ environment.X_GnG
-        return dataclasses.replace(environment, X_GnG=X_GnG, friction=friction)
-
-
-def test_an_effect_whose_equation_takes_no_arrays_is_refused(own_effects):
-    register_effect(Wear)
-    scenario = load_scenario("removal_turned", QUIET)
-    scenario.effects.append(Wear(depth=4e-4))
-    with pytest.raises(DisasmError, match="Wear: its equation takes no arrays"):
-        ImpactReplay([scenario])

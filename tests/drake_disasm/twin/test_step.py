@@ -107,36 +107,6 @@ def test_without_contact_it_is_the_linear_step():
     assert not step.wrench.any()
 
 
-def test_states_do_not_see_each_other():
-    whole = ImpactStep.of(TURNED, H, *states())
-    for i in (0, 7, COUNT - 1):
-        one = ImpactStep.of(TURNED, H, *(part[i : i + 1] for part in states()))
-        assert one.v[0].tobytes() == whole.v[i].tobytes()
-        assert one.wrench[0].tobytes() == whole.wrench[i].tobytes()
-
-
-def test_each_state_has_its_own_conditions():
-    turned = np.array([0.0, 0.03, -0.02, 0.01] * (COUNT // 4))
-    around = (
-        np.linspace(0.0, 0.5, COUNT),
-        np.array([RollPitchYaw(0, a, 0).ToRotationMatrix().matrix() for a in turned]),
-        np.full((COUNT, 3), 1e-4),
-        np.full((COUNT, 3), 0.5),
-    )
-    clearance = np.linspace(2e-4, 6e-4, COUNT)
-
-    def conditions(rows, clearance):
-        own = Surroundings(*(each[rows] for each in around))
-        shape = TURNED.shape.with_clearance(clearance)
-        return dataclasses.replace(TURNED, around=own, shape=shape)
-
-    whole = ImpactStep.of(conditions(slice(None), clearance), H, *states())
-    for i in (0, 13, COUNT - 1):
-        own = conditions(slice(i, i + 1), float(clearance[i]))
-        one = ImpactStep.of(own, H, *(part[i : i + 1] for part in states()))
-        np.testing.assert_allclose(one.v[0], whole.v[i], atol=1e-9)
-
-
 def part(w, place, size):
     """Returns a view of what begins at a place of a workspace."""
     return w[place : place + size]

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from drake_disasm.effects import (
-    FlangePayload,
     JointCoulombFriction,
     JointViscousFriction,
     TorqueOffset,
@@ -42,14 +41,6 @@ def test_nothing_changed(tmp_path):
     assert "Nothing has changed" in changes_text(found)
     limits = {x.effect: x.amplitude for x in found.closed.verdict.limits}
     assert limits["JointCoulombFriction.elbow"] < 0.1
-
-
-@pytest.mark.slow
-def test_a_payload_is_weighed(tmp_path):
-    found = changes(tmp_path, [FlangePayload(1.0, 0.02, 0.0, 0.02)])
-    assert found.closed.verdict.confirmed == ("FlangePayload",)
-    mass, _ = values(found)["FlangePayload.mass"]
-    assert mass == pytest.approx(1.0, abs=0.02)
 
 
 def test_references_that_differ_are_named(tmp_path):
@@ -99,22 +90,7 @@ def test_a_friction_that_fell_has_a_course(tmp_path):
         if value.name == "JointCoulombFriction.elbow.size"
     ]
     assert sizes == pytest.approx([-0.3, -0.5], abs=0.03)
-
-
-@pytest.mark.slow
-def test_a_change_of_each_log_has_a_course(tmp_path):
-    first = two_logs(tmp_path / "a", _FRICTION, [TorqueOffset("elbow", 0.2)])
-    second = two_logs(tmp_path / "b", _FRICTION, [TorqueOffset("elbow", 0.4)])
-    model = JointMotionModel([*first, second[1]])
-    found = find_changes(model, 1)
-    sizes = [
-        value.value
-        for course in found.courses
-        for value in course.values
-        if value.name == "TorqueOffset.elbow.size"
-    ]
-    assert sizes == pytest.approx([0.2, 0.4], abs=0.02)
     plain = changes_mapping(found)
-    assert [each["episode"] for each in plain["courses"]] == ["log_1/episode_0000"] * 2
+    assert {each["episode"] for each in plain["courses"]} == {"log_1/episode_0000"}
     assert np.isfinite(plain["errors"]["relative"]["after"])
     assert "From log to log" in own_part(changes_page(found, {}))

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-import drake_disasm.effects as fx
 from sysid.data_checks import check_data
 from sysid.effect_selection.close_loop import close_loop
-from sysid.effect_selection.experiments import separating
 from sysid.models.from_logs import ModelChoice, model_of
 from sysid.models.joint_torque_static import arrivals
 from sysid.scenario_parameters import ParameterRequest
@@ -163,14 +161,3 @@ def test_rests_that_are_far_apart_in_time_are_no_jumps(small_arm):
     time = np.cumsum(np.random.default_rng(1).uniform(1.0, 60.0, len(q)))
     read = log("log", time=time)
     assert check_data([read], model_of([read], ModelChoice())) == ()
-
-
-def test_advice_on_rests_is_to_record_rests():
-    kinds = [fx.JointCoulombFriction, fx.TorqueGain, fx.JointSpring, fx.TorqueOffset]
-    kinds += [fx.FlangePayload, fx.ArmTilt, fx.JointElasticity, fx.EncoderError]
-    for one in kinds:
-        for other in kinds:
-            told = separating(f"{one.__name__}.j", f"{other.__name__}.j", "rest")
-            assert not any(word in told for word in ("speed", "swings", "fast", "slow"))
-    both = separating("JointCoulombFriction.j", "TorqueOffset.j", "rest")
-    assert "both sides" in both

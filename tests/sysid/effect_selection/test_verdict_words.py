@@ -1,16 +1,14 @@
 """What a verdict states in words: names, numbers, the ending and what to record."""
 
 import dataclasses
-import itertools
 
 import numpy as np
 import pytest
 
-from drake_disasm.effects import ArmEffect, registered_effects
+from drake_disasm.effects import registered_effects
 from sysid.effect_selection.contradictions import Contradiction
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effects_in_words, in_words
-from sysid.effect_selection.experiments import separating
 from sysid.effect_selection.strokes import joints_of_one_stroke
 from sysid.effect_selection.verdict import ParameterValue, Tie, Written
 from sysid.effect_selection.verdict_words import (
@@ -70,25 +68,12 @@ def _mixed():
     return dataclasses.replace(found, standings=(*found.standings[:2], bias))
 
 
-def test_a_sentence_goes_from_what_is_certain_to_what_is_left_and_the_error():
-    names = [in_words(name) for name in _mixed().names]
-    sentence = verdict_sentence(_mixed(), ERRORS)
-    places = [sentence.index(each) for each in (*names, "velocity", "10 to 1 %")]
-    assert places == sorted(places)
-
-
 def test_nothing_is_said_twice():
     found = dataclasses.replace(_mixed(), relative_error=0.5, contradictions=_AGAINST)
     lines = verdict_text(found, ERRORS).split("\n")
     assert lines[0] == verdict_sentence(found, ERRORS)
     phrases = ("velocity", "a contradicts b", "2 of 4", "weights", "SensorLag", "1 %")
     assert all("\n".join(lines).count(each) == 1 for each in phrases), lines
-
-
-def test_none_owns_that_the_model_states_an_error_of_its_own():
-    errors = dataclasses.replace(ERRORS, model_error=np.ones_like(ERRORS.measured))
-    assert "its own error" in verdict_sentence(made_verdict("none"), errors)
-    assert "its own error" not in verdict_sentence(made_verdict("none"), ERRORS)
 
 
 def test_effects_of_a_kind_and_standing_are_one_line():
@@ -123,47 +108,12 @@ def test_a_line_has_intervals_and_rivals():
     assert errors.endswith("fx 1 -> 0.1 N")
 
 
-def test_values_of_many_joints_say_where_and_leave_shapes_to_the_report():
-    values = [
-        ParameterValue(f"{name}.{field}", 2.0, "N m", (1.0, 3.0), null)
-        for name in _FRICTION
-        for field, null in (("size", 0.0), ("creep", None))
-    ]
-    (many,) = kind_lines(made_verdict("explained", _FRICTION, values=values))
-    assert many.title == "JointCoulombFriction of 3 joints"
-    assert all(f"2 N m (1 to 3) at j{i}" in many.details for i in range(3))
-    assert "creep" not in many.details
-    (one,) = kind_lines(made_verdict("explained", _FRICTION[:1], values=values))
-    assert "creep = 2 N m" in one.details and " at " not in one.details
-
-
-def test_each_set_has_a_recording_that_separates_it():
-    names = ("SensorLag", "SensorBias", "SensorGain", "SensorDrift")
-    ties = tuple((Tie("X", f"first {n}; second {n}"),) for n in names)
-    text = verdict_text(made_verdict("explained", names, ties), ERRORS)
-    assert all(f"first {n}" in text for n in names) and "second" not in text
-    text = verdict_text(made_verdict("explained", names[:1], ties[:1]), ERRORS)
-    assert "first SensorLag; second SensorLag" in text
-
-
 def test_effects_have_words_of_their_own_and_a_few_joints_are_named():
     assert effects_in_words(("RotorInertia.a", "Mine.a", "Mine.b", "MyOwnThing")) == (
         "inertia of the rotor at a, mine at a and b and my own thing"
     )
     words = [in_words(effect.__name__) for effect in registered_effects()]
     assert len(set(words)) == len(words) and all(words)
-
-
-def test_what_a_log_cannot_tell_apart_is_said_once_for_all_joints():
-    ties = tuple(
-        (Tie(n.replace("Coulomb", "Load"), "two payloads"),) for n in _FRICTION
-    )
-    found = made_verdict("explained", _FRICTION, ties)
-    text = not_told_apart(found)
-    assert text.count("friction in proportion to the load") == 1
-    assert text.endswith("record: two payloads.") and "stroke" not in text
-    found = dataclasses.replace(found, single_strokes=("j0",))
-    assert "j0 makes a single stroke" in not_told_apart(found)
 
 
 class Sliding(LogModel):
@@ -230,13 +180,19 @@ def test_errors_that_fall_and_rise_are_said_in_their_units(
     assert "%" not in text and all(w in text for w in words)
 
 
-def test_a_log_of_the_task_is_not_told_to_record_readings_at_rest():
-    of_task = [e for e in registered_effects() if not issubclass(e, ArmEffect)]
-    for one, other in itertools.product(of_task, of_task):
-        told = separating(one.__name__, other.__name__, setting="task")
-        assert "readings" not in told and "known weight" not in told
-    assert "readings" in separating("SensorBias", "GrooveFriction")
-    drifts = separating("SensorWarmUp", "SensorDrift")
-    assert drifts == separating("SensorDrift", "SensorWarmUp") and "rest" in drifts
-    joints = separating("JointCoulombFriction.j1", "JointLoadFriction.j1")
-    assert "payload" in joints and separating("Unheard", "Of")
+def test_none_owns_that_the_model_states_an_error_of_its_own():
+    errors = dataclasses.replace(ERRORS, model_error=np.ones_like(ERRORS.measured))
+    assert "its own error" in verdict_sentence(made_verdict("none"), errors)
+    assert "its own error" not in verdict_sentence(made_verdict("none"), ERRORS)
+
+
+def test_what_a_log_cannot_tell_apart_is_said_once_for_all_joints():
+    ties = tuple(
+        (Tie(n.replace("Coulomb", "Load"), "two payloads"),) for n in _FRICTION
+    )
+    found = made_verdict("explained", _FRICTION, ties)
+    text = not_told_apart(found)
+    assert text.count("friction in proportion to the load") == 1
+    assert text.endswith("record: two payloads.") and "stroke" not in text
+    found = dataclasses.replace(found, single_strokes=("j0",))
+    assert "j0 makes a single stroke" in not_told_apart(found)

@@ -115,27 +115,6 @@ def test_an_interrupted_identification_goes_on_to_the_same_bits(tmp_path):
     assert again.evaluations < whole.evaluations
 
 
-def test_refuses_to_go_on_with_another_identification(tmp_path):
-    run(Decay(), tmp_path / "fit")
-    with refused("another seed"):
-        Journal(tmp_path / "fit", {"seed": 1}, resume=True)
-    (tmp_path / "other").mkdir()
-    (tmp_path / "other" / "notes.txt").write_text("mine")
-    with refused("not empty"):
-        Journal(tmp_path / "other", {}, resume=False)
-
-
-def test_the_thesis_search_counts_as_the_thesis_does(tmp_path):
-    colony = BeesSettings.thesis()
-    search = SearchSettings(cycles=10, local_evaluations=0, bees=colony)
-    settings = Settings(search=search, huber_delta=np.inf)
-    found = run(Decay(), tmp_path / "fit", settings)
-    (stage,) = found.methods["bees"].stages
-    assert stage.trace.cycle_ends[:11] == list(range(6, 67, 6))  # then SBPLX
-    budgets = {m.stages[0].trace.evaluations for m in found.methods.values()}
-    assert max(budgets) - min(budgets) <= 6
-
-
 def test_a_profile_has_its_minimum_at_the_estimate(tmp_path):
     settings = Settings(search=SEARCH, profiles=("b",))
     (curve,) = run(Decay(), tmp_path / "fit", settings).profiles
@@ -163,3 +142,14 @@ def test_the_report_needs_nothing_else_and_says_it_all(tmp_path):
     mapping = to_mapping(found)
     assert set(mapping["parameters"]) == {"a", "b", "c"}
     assert "bees and nlopt agree" in summary(found)
+
+
+def test_the_thesis_search_counts_as_the_thesis_does(tmp_path):
+    colony = BeesSettings.thesis()
+    search = SearchSettings(cycles=10, local_evaluations=0, bees=colony)
+    settings = Settings(search=search, huber_delta=np.inf)
+    found = run(Decay(), tmp_path / "fit", settings)
+    (stage,) = found.methods["bees"].stages
+    assert stage.trace.cycle_ends[:11] == list(range(6, 67, 6))  # then SBPLX
+    budgets = {m.stages[0].trace.evaluations for m in found.methods.values()}
+    assert max(budgets) - min(budgets) <= 6

@@ -26,14 +26,6 @@ def test_ljung_box_is_statsmodels(rho):
     assert autocorrelation(residual, 3)[0] == pytest.approx(rho, abs=0.12)
 
 
-def test_blocks_are_longer_where_residuals_are_correlated():
-    episode = np.repeat([0, 1], 500)
-    white = coloured(1000, 0.0)[:, None]
-    red = coloured(1000, 0.9)[:, None]
-    assert block_length(white, episode) <= 4
-    assert block_length(red, episode) >= 20
-
-
 def test_blocks_are_twice_the_time_over_which_residuals_are_correlated():
     """(1 + rho) / (1 - rho) of a first-order process, in whatever episodes it lies."""
     red = coloured(40_000, 0.8)[:, None]

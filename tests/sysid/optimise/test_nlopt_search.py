@@ -28,13 +28,6 @@ def test_spends_its_budget_and_is_the_same_with_the_same_seed():
     assert first.evaluations == 100 and first.stopped == "budget"
 
 
-def test_goes_on_with_a_trace():
-    trace = nlopt_search(sphere, BOX, "GN_CRS2_LM", 50)
-    again = nlopt_search(sphere, BOX, "LN_SBPLX", 30, trace.best, trace=trace)
-    assert again is trace and trace.evaluations <= 80
-    assert trace.cycle_ends[0] == 50
-
-
 def test_never_leaves_the_bounds_by_a_rounding_error():
     box = Box.of([0.1, -0.3], [0.7, 0.1])
     trace = nlopt_search(lambda x: -x.sum(axis=1), box, "LN_SBPLX", 300)

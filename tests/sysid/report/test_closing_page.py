@@ -8,7 +8,6 @@ import pytest
 from drake_disasm.effects import SensorDrift
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.report import closing_page
-from sysid.report.templates import interval
 from tests.sysid.effect_selection.blind import closed, static_log
 from tests.sysid.report.pages import own_part
 
@@ -49,20 +48,3 @@ def test_an_error_that_the_model_states_of_itself_has_a_column(found):
     )
     page = own_part(closing_page(dataclasses.replace(found, errors=errors), {}))
     assert f"<th>{own}</th>" in page and page.count("<td>0.123</td>") == 6
-
-
-def test_what_is_at_its_bound_and_what_is_not_explained_is_marked(found):
-    verdict = dataclasses.replace(found.verdict, ending="explained")
-    found = dataclasses.replace(found, verdict=verdict)
-    page = own_part(closing_page(found, {}))
-    assert "at its bound" not in page and 'class="box warn"' not in page
-    values = tuple(dataclasses.replace(v, is_at_bound=True) for v in verdict.values)
-    other = dataclasses.replace(verdict, values=values, ending="partly")
-    page = closing_page(dataclasses.replace(found, verdict=other), {})
-    assert "at its bound" in page and 'class="box warn"' in page
-
-
-def test_an_interval_has_the_digits_that_tell_its_ends_apart():
-    assert interval((5.978, 5.998)) == "5.978 … 5.998"
-    assert interval((-0.1234, 0.3456)) == "-0.12 … 0.35"
-    assert interval((1e6, 1e6 + 1e-9)) == "1e+06 … 1e+06"

@@ -10,9 +10,8 @@ import pytest
 
 from sysid.studies import STUDIES
 from sysid.studies.report import as_text, write_report
-from sysid.studies.results import decimals, mean_of
 from sysid.studies.runner import open_study, run_study
-from sysid.studies.study import Study, StudyOptions, Table
+from sysid.studies.study import Study, StudyOptions
 from tests.refusals import refused
 
 _ORIGIN = {"command": "python tools/study.py", "commit": "abc", "date": "today"}
@@ -106,15 +105,10 @@ def test_a_report_has_every_seed_and_the_command(done: Path) -> None:
     assert len(rows) == 6
     assert (done / "curves_ddpg.png").read_bytes().startswith(b"\x89PNG")
     # Which command it is of, and which began the folder.
+    assert "begun" not in (done / "report.md").read_text()
     own = {"command": "python tools/study.py --resume", "commit": "def", "date": "now"}
     write_report(small_precision(provenance=own), done, _ORIGIN)
-    for kind in ("md", "html"):
-        text = (done / f"report.{kind}").read_text()
-        head = text[: text.index("Every seed")]
-        assert head.index(own["command"]) < head.index("Commit def, now")
-        assert "begun at commit abc, today, by" in head
-    write_report(small_precision(), done, _ORIGIN)
-    assert "begun" not in (done / "report.md").read_text()
+    assert "begun at commit abc, today, by" in (done / "report.md").read_text()
 
 
 def test_a_study_resumes_with_more_seeds_and_changes_nothing_else(done: Path) -> None:
@@ -158,16 +152,6 @@ def test_policies_are_judged_on_robots_of_other_precision(tmp_path: Path) -> Non
     assert tables[0].rows[1][4].startswith(f"{np.mean(values):.1f}")
 
 
-def test_a_thrown_bolt_does_not_widen_a_table() -> None:
-    assert decimals(-12.345, 2) == "-12.35" and decimals(-1.1e94, 2) == "-1.1e+94"
-    assert mean_of([1e30, 3e30]) == "2.0e+30 ± 1.4e+30"
-    table = Table("", ["who", "P", "found"], [["ddpg", "1/2", "-"], ["sac", "-", "x"]])
-    assert table.kinds == ["words", "numbers", "words"]
-    assert Table("", ["who"], []).kinds == ["words"]
-    text = as_text(Table("T", ["a", "long"], [["1", "2"], ["300", "4"]], "note"))
-    assert text == "T:\n  a  long\n  1     2\n300     4\nnote"
-
-
 def test_classical_control_stands_beside_every_agent(tmp_path: Path) -> None:
     study = _study(
         "baselines", levels={"agent": ["ddpg"], "psi": ["0"]}, seeds=(0,),
@@ -184,7 +168,7 @@ def test_classical_control_stands_beside_every_agent(tmp_path: Path) -> None:
 def test_factors_are_analysed_as_the_thesis_s(tmp_path: Path) -> None:
     levels = {"batch": ["100"], "critic_rate": ["0.005"]}
     levels |= {"tau": ["0.1", "0.9"], "actor_rate": ["0.005", "0.5"]}
-    study = _study("hyperparameters", levels=levels, validation=1)
+    study = _study("hyperparameters", levels=levels, validation=1, episodes=1)
     _run(study, tmp_path / "out")
     averages, variance, best, spent = study.tables(tmp_path / "out")
     assert ["tau", "0.1"] in [list(row[:2]) for row in averages.rows]
@@ -194,11 +178,3 @@ def test_factors_are_analysed_as_the_thesis_s(tmp_path: Path) -> None:
     for picture in study.pictures(tmp_path / "out"):
         picture.draw(tmp_path / picture.name)
         assert (tmp_path / picture.name).read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.slow
-def test_processes_give_the_same_bits(tmp_path: Path) -> None:
-    for workers in (1, 4):
-        _run(small_precision(lockstep=True), tmp_path / str(workers), workers)
-    assert bits(tmp_path / "1") == bits(tmp_path / "4")
-    assert len(bits(tmp_path / "1")) == 12

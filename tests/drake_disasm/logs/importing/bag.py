@@ -7,7 +7,7 @@ import numpy as np
 from drake_disasm.stations.fake_cell.bag import FakeBag, bag_times
 
 
-def record_arm(path: Path, shift: float, mcap: bool = True, seed: int = 1) -> None:
+def record_arm(path: Path, shift: float, seed: int = 1) -> None:
     """Writes 20 s of two joints at 200 Hz and a wrench at 500 Hz.
 
     The sensor's clock is late by `shift`: its stamps say t + shift of what was at t.
@@ -15,7 +15,6 @@ def record_arm(path: Path, shift: float, mcap: bool = True, seed: int = 1) -> No
     Args:
         path: of the bag.
         shift: [s].
-        mcap: whether its file is MCAP.
         seed: of jitter, losses and noise.
     """
     random, bag = np.random.default_rng(seed), FakeBag()
@@ -29,7 +28,7 @@ def record_arm(path: Path, shift: float, mcap: bool = True, seed: int = 1) -> No
         q, _, vd = motion(time)
         load = np.array([*(2.0 * vd), *np.sin(q), *np.cos(q)])
         bag.add_wrench(time + shift, load + 0.02 * random.standard_normal(6))
-    bag.write(path, mcap)
+    bag.write(path, True)
 
 
 def motion(time: np.ndarray | float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -43,13 +43,6 @@ def test_little_is_lost_and_little_is_noise(kind: str) -> None:
     assert abs(exact[:, 0] - inner).max() < 0.1 * vd.std()
 
 
-def test_the_rate_of_recording_hardly_matters() -> None:
-    q = _motion()[0]
-    measured = np.round((q + _noise(len(q), 1e-4)) / 1e-4) * 1e-4
-    found = [_cutoff(measured, every=every) for every in (1, 2, 5)]
-    assert max(found) < 1.5 * min(found)
-
-
 def test_a_joint_that_rests_has_no_say() -> None:
     q = _motion()[0]
     measured, still = q + _noise(len(q), 1e-5), 1e-5 * (_noise(len(q), 1.0, 4) > 1.0)

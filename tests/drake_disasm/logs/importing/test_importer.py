@@ -153,9 +153,8 @@ def test_a_wrong_map_is_refused(tmp_path, changes: dict[str, Any], said: str) ->
     assert said in refusal(read)
 
 
-@pytest.mark.parametrize("mcap", [True, False])
-def test_a_bag_s_clocks_are_brought_together(tmp_path: Path, mcap: bool) -> None:
-    record_arm(tmp_path / "bag", shift=0.012, mcap=mcap)
+def test_a_bag_s_clocks_are_brought_together(tmp_path: Path) -> None:
+    record_arm(tmp_path / "bag", shift=0.012)
     source = read_source(tmp_path / "bag")
     fields = guessed_map(source, "joint_motion", Known(("shoulder", "elbow")))
     found = import_recordings([source], fields, ImportProcessing())
@@ -273,18 +272,6 @@ def test_a_filter_or_gaps_that_leave_no_stretch_are_refused(tmp_path: Path) -> N
     assert "no stretch of 4 rows is without gaps" in message
 
 
-def test_readings_at_rest_are_taken_as_they_are(tmp_path: Path) -> None:
-    random = np.random.default_rng(0)
-    quaternion = random.standard_normal((9, 4))
-    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
-    names = ["time", "qw", "qx", "qy", "qz", "fx", "fy", "fz", "tx", "ty", "tz"]
-    wrench = random.random((9, 6))
-    columns = (np.arange(9.0), quaternion, wrench)
-    source = _csv(tmp_path / "run.csv", names, *columns)
-    [episode] = _guessed_log(source, "static_wrench", tmp_path / "log").episodes
-    np.testing.assert_array_equal(episode["wrench"], wrench)
-
-
 def test_a_sensor_in_contact_is_guessed_with_the_rows_in_free_space(
     tmp_path: Path,
 ) -> None:
@@ -317,28 +304,6 @@ def test_names_and_units_of_many_kinds_are_guessed(tmp_path: Path) -> None:
         assert guessed_map(read_source(path), "joint_motion").time_unit == unit
 
 
-def test_units_behind_names_are_taken(tmp_path: Path) -> None:
-    time, path = 10.0 * np.arange(100), tmp_path / "run.csv"
-    table = np.column_stack([time, np.sin(time), np.cos(time), time, time])
-    names = "t (ms);/arm/A1/position [deg];/arm/A2/position [deg];q_0;other/q_0"
-    np.savetxt(path, table, delimiter=";", header=names, comments="")
-    fields = guessed_map(read_source(path), "joint_motion", Known(("A1", "A2")))
-    assert (fields.time, fields.time_unit) == ("t (ms)", "ms")
-    channels = ("/arm/A1/position [deg]", "/arm/A2/position [deg]")
-    assert fields.columns == {"q": Column(channels, "deg")}  # and not one of two q_0
-
-
-def test_what_has_no_names_that_are_known_is_not_guessed(tmp_path: Path) -> None:
-    """Two topics in one table, and a response without commands."""
-    time, path = 0.01 * np.arange(100), tmp_path / "run.csv"
-    source = _csv(path, ("t", "left/q0", "right/q0"), time, time, time)
-    message = refusal(guessed_map, source, "joint_motion")
-    assert "no channel is called as joint positions" in message
-    source = _csv(path, ("t", "q"), time, time)
-    message = refusal(guessed_map, source, "joint_response", Known(["a"]))
-    assert "commanded joint positions" in message
-
-
 def test_commanded_and_measured_positions_become_a_response(tmp_path: Path) -> None:
     path = tmp_path / "servo.csv"
     lines = [f"{0.005 * i},{0.01 * i},{0.009 * i},7.4,1" for i in range(40)]
@@ -358,19 +323,6 @@ def test_commanded_and_measured_positions_become_a_response(tmp_path: Path) -> N
     np.testing.assert_allclose(episode["q"][:, 0], 0.009 * np.arange(40))
     np.testing.assert_array_equal(episode["supply"], 7.4)
     np.testing.assert_array_equal(episode["enabled"], 1.0)
-
-
-def test_a_clock_that_is_set_during_the_record_is_a_gap(tmp_path: Path) -> None:
-    """A robot that had no network when it was switched on: 1970, then today."""
-
-    def set_clock(values: dict[str, np.ndarray]) -> None:
-        values["t"][800:] += 1.7e12
-
-    path = _table(tmp_path / "run.npz", change=set_clock, kt=1.0)
-    found = _imported(path, parse_map(_FIELDS))
-    cut, step = 2 * found.done.reach // found.done.decimation, found.done.decimation
-    rows = [len(each["time"]) for each in found.episodes]
-    assert rows == [800 // step - cut, 1200 // step - cut]
 
 
 def test_recordings_at_two_rates_get_one(tmp_path: Path) -> None:

@@ -315,15 +315,6 @@ def test_every_channel_has_a_use_or_a_reason(tmp_path: Path) -> None:
     assert uses(source, "joint_motion")["q_0"].startswith("not used: q by its name")
 
 
-def test_torques_that_are_there_are_not_left_out(tmp_path: Path) -> None:
-    source = _table(tmp_path / "run.csv", t=_TIME, q=_Q[:, 0], tau=_Q[:, 1])
-    whole = _guess(source)
-    fields = FieldMap("joint_motion", {"q": whole.columns["q"]}, "t", joints=("a",))
-    message = refusal(import_recordings, [source], fields, ImportProcessing())
-    assert "has torques that are not in the map: tau" in message
-    assert import_recordings([source], fields, ImportProcessing(), accept=True).rows
-
-
 def _rests(path: Path, **clock: Any) -> Source:
     names = {f"q{i}": _Q[:20, i] for i in range(2)}
     return _table(path, **clock, **names, **{f"tau{i}": _Q[:20, i + 2] for i in (0, 1)})

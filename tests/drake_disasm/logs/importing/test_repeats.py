@@ -21,13 +21,6 @@ Q = np.sin(2.0 * TIME) + 0.3 * np.sin(5.3 * TIME)
 TAU = 3.0 * np.cos(2.0 * TIME) + 0.02 * np.random.default_rng(0).standard_normal(3000)
 
 
-def test_a_value_is_held_where_it_is_repeated_for_long() -> None:
-    stuck = TAU.copy()
-    stuck[700:720], stuck[900:905] = stuck[700], stuck[900]
-    [mask] = held_rows([stuck])
-    np.testing.assert_array_equal(np.flatnonzero(mask), np.arange(700, 720))
-
-
 def test_all_rows_at_an_end_value_are_held_if_it_is_repeated_for_long() -> None:
     clipped = np.clip(TAU, -2.5, np.inf)
     clipped[300] = -2.5

@@ -206,7 +206,7 @@ def test_two_publishers_on_one_topic_are_parted(tmp_path: Path) -> None:
             bag.add_joint_state(
                 0.01 * (i + 1.5), hand, np.full(1, float(i)), np.zeros(1)
             )
-    bag.write(tmp_path / "bag", True)
+    bag.write(tmp_path / "bag", False)
     source = read_source(tmp_path / "bag")
     assert [stream.rows for stream in source.streams] == [20, 4]
     np.testing.assert_array_equal(

@@ -70,6 +70,7 @@ def test_readings_at_rest_may_have_an_order(tmp_path: Path) -> None:
     fields = guessed_map(source, "static_wrench")
     [episode] = import_recordings([source], fields, ImportProcessing()).episodes
     np.testing.assert_array_equal(episode["order"], 2.0 * np.arange(9))
+    np.testing.assert_array_equal(episode["wrench"], table[4:].T)
     assert parse_map({"kind": "static_wrench", "columns": {"order": "n"}}).time == "n"
     source = _source(tmp_path / "b.npz", **columns)  # that of the rows
     fields = guessed_map(source, "static_wrench")
