@@ -46,10 +46,10 @@ lexers["csv"] = TextLexer()
 # what it names, where that is documented.
 default_role = "py:obj"
 suppress_warnings = ["ref.python"]  # `effects` may be an attribute of several classes
-# Autosummary writes a page per module, and leaves those of modules that are gone.
+# Autosummary writes a page per module, and leaves those of modules that are gone, and
+# their names on the pages of packages.
 for page in (DOCS / "reference" / "api").glob("*.rst"):
-    module = ROOT / page.stem.replace(".", "/")
-    if not (module.is_dir() or module.with_suffix(".py").is_file()):
+    if not (ROOT / page.stem.replace(".", "/")).with_suffix(".py").is_file():
         page.unlink()
 autosummary_generate = True
 autosummary_ignore_module_all = True
