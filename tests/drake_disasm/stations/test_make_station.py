@@ -21,6 +21,7 @@ from drake_disasm.effects import (
 from drake_disasm.effects.fields import amplitude
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import STATIONS, CellStation, TwinStation, make_station
+from drake_disasm.stations.contact import ImpactContactForce
 from drake_disasm.stations.hardware import HardwareStation
 from drake_disasm.stations.hardware_config import HardwareConfig
 from tests.refusals import refused
@@ -122,6 +123,8 @@ def test_neither_can_it_be_set_later(name, request):
 def test_the_same_effect_is_carried_where_it_belongs() -> None:
     station = make_station("twin", _scenario(ContactExponent(0.5), model="impact"))
     assert isinstance(station, TwinStation)
-    conditions = station.impact_conditions(station.CreateDefaultContext())
+    assert isinstance(station.contact, ImpactContactForce)
+    system, context = station.contact.system, station.CreateDefaultContext()
+    conditions = system.conditions(station.part_context(system, context))
     nominal = station.scenario.contact.impact.exponent
     assert conditions.law.exponent == pytest.approx(nominal + 0.5)
