@@ -158,14 +158,7 @@ class DisassemblyVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         Raises:
             DisasmError: the actions are not (num_envs, 6), or nothing was reset.
         """
-        actions = np.asarray(actions, dtype=float)
-        wanted = (self.num_envs, len(ACTION_NAMES))
-        if actions.shape != wanted:
-            raise DisasmError(
-                f"actions: are of shape {actions.shape}; give {wanted}, "
-                "[dx dy dz du dv dw] in m and rad"
-            )
-        rows = _in_numpy(self.twin.step(actions))
+        rows = _in_numpy(self.twin.step(np.asarray(actions, dtype=float)))
         if self._has_ended.any():  # in the step before: its action was for nothing
             self._begin_next(self._has_ended, rows)
         reward, terminated, truncated = rows.reward, rows.terminated, rows.truncated
@@ -181,8 +174,7 @@ class DisassemblyVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
 
     def _begin_next(self, ended: np.ndarray, rows: BatchResult) -> None:
         """Starts the next episodes where one has ended (n,)."""
-        if self._next is None:
-            raise DisasmError("step: nothing was reset; call reset first")
+        assert self._next is not None  # the twin was reset
         which = np.flatnonzero(ended)
         seeds, episodes = self._next.take(which)
         begun = _beginning(to_numpy(self.twin.start(which, seeds, episodes)))

@@ -20,7 +20,6 @@ from drake_disasm.scenario import Scenario, draw, with_values
 from drake_disasm.systems.imprecision import clamped
 from drake_disasm.systems.pose_target import executed_pose, moved_poses
 from drake_disasm.twin.episodes import Episodes, TwinBatch
-from drake_disasm.twin.plant import Plant
 from drake_disasm.twin.refusals import make_like, refuse_count, refuse_scenarios
 from drake_disasm.twin.stacking import put_rows, rows_of
 from drake_disasm.twin.twins import Twins
@@ -205,13 +204,13 @@ class BatchedTwin:
         Raises:
             DisasmError: nothing was reset, or the actions have another shape.
         """
-        if not hasattr(self, "episodes"):
-            raise DisasmError("step: nothing was reset; call reset first")
         if tuple(np.shape(actions)) != (self.count, 6):
             raise DisasmError(
                 f"actions: are of shape {tuple(np.shape(actions))}; give "
                 f"{(self.count, 6)}, [dx dy dz du dv dw] in m and rad"
             )
+        if not hasattr(self, "episodes"):
+            raise DisasmError("step: nothing was reset; call reset first")
         xp, episodes, before = namespace(self.like), self.episodes, self.observation
         numbers = self._twins.numbers
         action = array_like(actions, self.like)
@@ -294,11 +293,6 @@ class BatchedTwin:
         self.reading = quantise(reading, numbers.quantum)
         pose = self.pose_measured()
         return self._twins.processing.state(pose, self.reading, episodes.offset)
-
-    @property
-    def plant_at_A(self) -> Plant:
-        """The plants, while bolts rest at A; see `Twins`."""
-        return self._twins.plant_at_A
 
     def pose_measured(self) -> Pose:
         """Returns where the encoders have the bolts, X_GB (n, ...)."""

@@ -576,11 +576,27 @@ def balance(
         slope: of (6, 6) that is set, the rest's by the twist.
         w: workspace, with A, b, and the places before the step.
     """
-    law, mu = (w[LAW], w[LAW + 1], w[LAW + 2], w[LAW + 3]), w[FRICTION]
     for i in range(6):
         w[wrench + i] = 0.0
     for i in range(36):
         w[slope + i] = 0.0
+    _add_contacts(h, is_lagged, twist, wrench, slope, w)
+    for i in range(6):
+        total = -w[B + i] - h * w[wrench + i]
+        for j in range(6):
+            total += w[A + 6 * i + j] * w[twist + j]
+            at = slope + 6 * i + j
+            w[at] = w[A + 6 * i + j] - h * w[at]
+        w[rest + i] = total
+
+
+@compiled
+def _add_contacts(
+    h: float, is_lagged: bool, twist: int, wrench: int, slope: int, w: np.ndarray
+) -> None:
+    """Adds the forces at all places to the wrench, their changes by the twist to the
+    slope; see `balance`."""
+    law, mu = (w[LAW], w[LAW + 1], w[LAW + 2], w[LAW + 3]), w[FRICTION]
     _set_inward(twist, w)
     for k in range(PLACES):
         rate = w[_INWARD + k]
@@ -595,13 +611,6 @@ def balance(
         _push(k, F, dF, w)
         _rub(k, twist, limit, limit_by_rate, w)
         _add_wrench(k, wrench, slope, w)
-    for i in range(6):
-        total = -w[B + i] - h * w[wrench + i]
-        for j in range(6):
-            total += w[A + 6 * i + j] * w[twist + j]
-            at = slope + 6 * i + j
-            w[at] = w[A + 6 * i + j] - h * w[at]
-        w[rest + i] = total
 
 
 @compiled

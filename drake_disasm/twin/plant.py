@@ -11,6 +11,7 @@ import numpy as np
 from drake_disasm.common.arrays import (
     Array,
     apply_matrix,
+    array_like,
     cross,
     matrix_of,
     namespace,
@@ -178,7 +179,8 @@ class Plant:
         if not isinstance(rate, np.ndarray) and rate.device.type == "cuda":
             from drake_disasm.twin import on_gpu
 
-            arrays = on_gpu.advance(tables, self.arm.h, steps, rate, before)
+            there = [array_like(table, rate) for table in tables]
+            arrays = on_gpu.advance(there, self.arm.h, steps, rate, before)
         else:
             on_host = tuple(np.ascontiguousarray(to_numpy(table)) for table in tables)
             given = (on_host, self.arm.h, steps, to_numpy(rate), to_numpy(before))

@@ -90,9 +90,9 @@ def _add_batch_argument(add: Callable[..., object]) -> None:
         "--device",
         choices=DEVICES,
         default="auto",
-        help="cpu, cuda: where tensors stay from the step to the update, for --envs "
-        "and --log; numpy: rows one by one, each with its own random numbers; auto: "
-        "cuda if it is there and there are 1024 --envs, else numpy (default: auto)",
+        help="cpu or cuda keep tensors there from the step to the update, for --envs "
+        "and --log; numpy draws random numbers row by row; auto is cuda from 1024 "
+        "--envs on, if it is there, and else numpy (default: auto)",
     )
     add(
         "--lockstep",

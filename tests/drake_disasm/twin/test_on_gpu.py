@@ -11,7 +11,8 @@ import torch
 
 from drake_disasm.common.arrays import to_numpy
 from drake_disasm.scenario import load_scenario
-from drake_disasm.twin.batch import BatchedTwin, with_impact
+from drake_disasm.twin.batch import with_impact
+from drake_disasm.twin.episodes import TwinBatch
 from drake_disasm.twin.plant import Plant, PlantState
 
 #: The kernel in Numba's emulation of a GPU, thread after thread.
@@ -32,15 +33,13 @@ COUNT, STEPS = 40, 3
 
 def pushed() -> tuple[Plant, PlantState, np.ndarray]:
     """Returns plants of bolts in a turned groove, their states, and their commands."""
-    twin = BatchedTwin(with_impact(load_scenario("removal_turned")), COUNT, "numpy")
-    twin.reset(range(COUNT))
+    scenarios = [with_impact(load_scenario("removal_turned"))] * COUNT
+    batch = TwinBatch(scenarios, np.zeros(0))
+    episodes = batch.begin(range(COUNT), scenarios)
+    plant, state = batch.twins(episodes).plant_at_A, episodes.state
     random = np.random.default_rng(0)
-    for _ in range(3):
-        twin.step(
-            random.uniform(-1, 1, (COUNT, 6)) * [3e-3, 1e-3, 1e-3, 0.0, 0.01, 0.0]
-        )
     rate = random.uniform(-1, 1, (COUNT, 6)) * [0.03, 0.01, 0.01, 0.0, 0.1, 0.0]
-    return twin.plant_at_A, twin.episodes.state, rate
+    return plant, plant.advance(state, rate, 60).state, rate
 
 
 def test_each_thread_does_what_the_host_does(tmp_path: Path) -> None:
