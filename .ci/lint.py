@@ -21,6 +21,7 @@ FLOORS = {
     "drake_disasm": (
         {"common"},
         {"effects"},
+        {"parts"},
         {"scenario"},
         {"mdp", "cell", "logs"},
         {"devices"},

@@ -46,7 +46,7 @@ from sysid.workers import Workers
 TRUTH = load_scenario("removal_turned")
 BOUNDS = (
     ParameterRequest("contact.friction", 0.0, 0.6),
-    ParameterRequest("lock.clearance", 2e-4, 8e-4),
+    ParameterRequest("part.clearance", 2e-4, 8e-4),
     ParameterRequest("GroovePose.ry", -0.08, 0.08),
     ParameterRequest("GroovePose.z", -5e-4, 5e-4),
     ParameterRequest("gripper.stiffness.2", 200.0, 2000.0),

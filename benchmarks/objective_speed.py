@@ -26,7 +26,7 @@ SIZES = (883, 1776)  # the thesis's, for which it gives about ten minutes
 THESIS_S = 600.0
 _SCENARIO = "removal_turned"
 PARAMETERS = {
-    "hydroelastic": ("contact.friction", "lock.clearance", "GroovePose.ry"),
+    "hydroelastic": ("contact.friction", "part.clearance", "GroovePose.ry"),
     "impact": tuple(
         f"contact.impact.{name}"
         for name in ("stiffness", "exponent", "damping", "depth")

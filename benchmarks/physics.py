@@ -220,13 +220,13 @@ def _scenario_lines() -> Iterator[str]:
 def _contact_lines() -> Iterator[str]:
     yield "play of the neck at 1 N (mm): nominal, measured, excess %"
     for clearance in (1e-4, 2e-4, 4e-4, 1e-3):
-        found = play(1.0, f"lock.clearance={clearance}")
+        found = play(1.0, f"part.clearance={clearance}")
         excess = 100 * (found / clearance - 1)
         yield f"  {1e3 * clearance:.1f} {1e3 * found:.4f} {excess:+.1f}"
     yield "play on a turned groove: degrees, nominal mm, excess %"
     for degrees in (2.0, 4.0):
         for clearance in (1e-4, 4e-4):
-            override = f"lock.clearance={clearance}"
+            override = f"part.clearance={clearance}"
             found = play(1.0, override, ry=np.deg2rad(degrees))
             excess = 100 * (found / clearance - 1)
             yield f"  {degrees} {1e3 * clearance:.1f} {excess:+.1f}"
@@ -267,8 +267,8 @@ def _time_step_lines() -> Iterator[str]:
         ("admittance", ["effects.0.ry=0.0698"]),
         ("admittance", ["gripper.hold=weld"]),
         ("admittance", ["effects.0.ry=0.0698", "gripper.hold=weld"]),
-        ("straight", ["lock.clearance=0.001"]),
-        ("straight", ["lock.clearance=0.001", "gripper.hold=weld"]),
+        ("straight", ["part.clearance=0.001"]),
+        ("straight", ["part.clearance=0.001", "gripper.hold=weld"]),
     ):
         whole, half = (
             episode("cell", policy, f"simulation.cell_time_step={step}", *overrides)

@@ -15,7 +15,7 @@ from drake_disasm.common import program
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
 
-QUIET = ["ft_sensor.noise=[0, 0, 0, 0, 0, 0]", "lock.clearance=0.001"]
+QUIET = ["ft_sensor.noise=[0, 0, 0, 0, 0, 0]", "part.clearance=0.001"]
 _STEPS = {"x": 9e-4, "y": 3e-5, "z": 3e-5}  # m, that do not end at a wall
 
 

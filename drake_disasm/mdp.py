@@ -1,10 +1,15 @@
 """The Markov decision process: state, reward and termination, as pure functions.
 
-Description: slide the bolt from A to B along the groove, then lift it out.
+Description: move the bolt along the stages of its part's way (`Part.stages`): from A
+to B along a door chain's groove, then out of it.
 Randomisation: imprecision psi on the action (algorithm 3.2), sensor noise.
-Success: `travelled` (x - x0 > 55 mm, chapter 3) or `removed` (the head's underside
-2 mm above the plate, chapter 4); more than the safety force or torque is failure, and
-so is a bolt outside the workspace.
+Success: `travelled` (x - x0 > 55 mm, chapter 3) or `removed` (the last stage is done:
+a head's underside 2 mm above the plate, chapter 4); more than the safety force or
+torque is failure, and so is a bolt outside the workspace.
+
+A simulation judges `removed` by where the bolt truly is. Hardware knows its place to
+half a millimetre while the arm moves: there it is removed once it has been pulled
+`PULL_AWAY` further, and nothing holds it.
 
 The reward is the thesis's where the bolt goes on and up. Where it goes elsewhere it
 closes two holes, each worth more than the task itself: progress counts up to the
@@ -30,9 +35,12 @@ from drake_disasm.common.arrays import (
     namespace,
     side_by_side,
 )
+from drake_disasm.parts import AXES
 from drake_disasm.scenario import Scenario, TaskConfig
 
 _MM = 1000.0  # the reward speaks millimetres, because the thesis does
+#: Way beyond the last stage [m], and force there [N], that show a bolt to be free.
+PULL_AWAY, FREE_FORCE = 0.001, 2.0
 
 STATE_NAMES = ("x", "y", "z", "u", "v", "w", "fx", "fy", "fz", "tx", "ty", "tz")
 ACTION_NAMES = ("dx", "dy", "dz", "du", "dv", "dw")
@@ -109,24 +117,29 @@ def is_truncated(outcomes: Any) -> Any:
 
 @dataclasses.dataclass(frozen=True)
 class TaskGeometry:
-    """Where a task happens: lengths of the lock, and the workspace around.
+    """Where a task happens: the way out of the part, and the workspace around.
 
     Attributes:
-        lift_needed: rise of the bolt at which it is out [m].
-        groove_end: way along x at which the groove ends [m].
+        way: the bolt's coordinates (`AXES`) along and about which it leaves, a letter
+            for each stage: "xy" of a door chain.
+        ends: where each stage ends [m, rad]; the last with the task's margin.
+        radii: at which turns are counted [m]; 1 where a stage is none.
         low, high: (3,) of the workspace: the displacement of the bolt from the start,
             in G, beyond which an episode has failed [m].
         compliance: (3, 6) displacement of Bo in the grip by the wrench [f; tau] on
             the bolt at Bo, in G [m/N, m/(N m)].
+        turning: (3, 6) rotation of B in the grip likewise [rad/N, rad/(N m)].
 
-    Of n tasks each has n as an axis before these shapes.
+    Of n tasks each but `way` has n as an axis before these shapes.
     """
 
-    lift_needed: float | Array
-    groove_end: float | Array
+    way: str
+    ends: tuple[float | Array, ...]
+    radii: tuple[float | Array, ...]
     low: Array
     high: Array
     compliance: Array
+    turning: Array
 
     @classmethod
     def of(cls, scenario: Scenario, compliance: Array | None = None) -> Self:
@@ -134,14 +147,27 @@ class TaskGeometry:
 
         Args:
             scenario: of the task.
-            compliance: (3, 6) of the grip, if it is known: finding it takes time.
+            compliance: (6, 6) of the grip, if it is known: finding it takes time.
         """
-        lift = scenario.lock.lift_needed(scenario.task.lift_success)
-        end, room = scenario.lock.end, np.array(scenario.task.room)
-        high = np.array([end, lift, 0.0]) + room
+        stages, room = scenario.part.stages, np.array(scenario.task.room)
+        ends = [stage.end for stage in stages]
+        ends[-1] += scenario.task.lift_success
+        way, high = "".join(AXES[stage.axis] for stage in stages), np.zeros(6)
+        for stage, end in zip(stages, ends, strict=True):
+            high[stage.axis] = end
         if compliance is None:
-            compliance = bolt_compliance(scenario)[:3]
-        return cls(lift, end, -room, high, compliance)
+            compliance = bolt_compliance(scenario)
+        radii = tuple(stage.radius for stage in stages)
+        low, high = -room, high[:3] + room
+        return cls(way, tuple(ends), radii, low, high, compliance[:3], compliance[3:])
+
+    def along(self, state: BoltState, stage: int) -> Any:
+        """Returns how far the bolt has gone along a stage's axis (...,) [m, rad]."""
+        axis = AXES.index(self.way[stage])
+        if axis < 3:
+            return self.place(state)[..., axis]
+        wrench = namespace(state.f).concat([state.f, state.t], axis=-1)
+        return (state.r + apply_matrix(self.turning, wrench))[..., axis - 3]
 
     def place(self, state: BoltState) -> Array:
         """Returns where Bo is since the start (..., 3) [m], grip included."""
@@ -175,15 +201,25 @@ def reward_terms(
 
 
 def counts(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> Array:
-    """Returns the way along x and the height [m] that the reward counts, (..., 2)."""
-    p = geometry.place(state)
-    xp, x, y = namespace(p), p[..., 0], p[..., 1]
-    way = xp.where(x < geometry.groove_end, x, geometry.groove_end)
-    return side_by_side([way, xp.where(x > task.travel_success, y, 0.0)])
+    """Returns the ways along both stages [m] that the reward counts, (..., 2).
+
+    The first counts up to its end, the second from `task.travel_success` of the first.
+    """
+    first, (end, *_) = geometry.along(state, 0), geometry.ends
+    xp, radius = namespace(first), geometry.radii
+    way = radius[0] * xp.where(first < end, first, end)
+    if len(geometry.way) == 1:
+        return side_by_side([way, xp.zeros_like(way)])
+    second = radius[1] * geometry.along(state, 1)
+    return side_by_side([way, xp.where(first > task.travel_success, second, 0.0)])
 
 
 def outcome(
-    state: BoltState, steps_done: int, task: TaskConfig, geometry: TaskGeometry
+    state: BoltState,
+    steps_done: int,
+    task: TaskConfig,
+    geometry: TaskGeometry,
+    p_GBo: Array | None = None,
 ) -> Outcome:
     """Returns how the episode stands after `steps_done` steps.
 
@@ -191,9 +227,10 @@ def outcome(
         state: the newest state.
         steps_done: steps taken so far.
         task: limits and what counts as success.
-        geometry: where the groove ends and the bolt is out.
+        geometry: the way out.
+        p_GBo: (3,) where the bolt truly is in the true groove; None: nobody knows.
     """
-    return Outcome(int(outcomes(state, steps_done, task, geometry)))
+    return Outcome(int(outcomes(state, steps_done, task, geometry, p_GBo)))
 
 
 def outcomes(
@@ -201,6 +238,7 @@ def outcomes(
     steps_done: int | Array,
     task: TaskConfig,
     geometry: TaskGeometry,
+    p_GBo: Array | None = None,
 ) -> Array:
     """Returns the numbers (...,) of the outcomes of states; see `outcome`."""
     xp = namespace(state.p)
@@ -209,19 +247,33 @@ def outcomes(
     )
     is_last = (steps_done >= task.steps) & (found == Outcome.RUNNING)
     found = xp.where(is_last, Outcome.STEP_LIMIT, found)
-    found = xp.where(succeeded(state, task, geometry), Outcome.SUCCESS, found)
+    found = xp.where(succeeded(state, task, geometry, p_GBo), Outcome.SUCCESS, found)
     has_turned = xp.asarray(state.torque > task.reward.t_max)
     found = xp.where(has_turned, Outcome.TORQUE_LIMIT, found)
     has_pushed = xp.asarray(state.force > task.reward.f_max)
     return xp.where(has_pushed, Outcome.FORCE_LIMIT, found)
 
 
-def succeeded(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> Array:
-    """Returns whether the task is done (...,)."""
-    p = geometry.place(state)
+def succeeded(
+    state: BoltState,
+    task: TaskConfig,
+    geometry: TaskGeometry,
+    p_GBo: Array | None = None,
+) -> Array:
+    """Returns whether the task is done (...,); see `outcome`."""
     if task.success == "travelled":
-        return p[..., 0] > task.travel_success
-    return p[..., 1] >= geometry.lift_needed
+        return geometry.along(state, 0) > task.travel_success
+    if p_GBo is not None:
+        return is_removed(p_GBo, geometry)
+    axis = AXES.index(geometry.way[-1])
+    force = state.f[..., axis]
+    is_free = (force > -FREE_FORCE) & (force < FREE_FORCE)
+    return is_free & (geometry.along(state, -1) >= geometry.ends[-1] + PULL_AWAY)
+
+
+def is_removed(p_GBo: Array, geometry: TaskGeometry) -> Array:
+    """Returns whether a bolt that truly is at p_GBo (..., 3) is out (...,)."""
+    return p_GBo[..., AXES.index(geometry.way[-1])] >= geometry.ends[-1]
 
 
 def within_workspace(state: BoltState, geometry: TaskGeometry) -> Array:

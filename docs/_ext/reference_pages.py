@@ -52,10 +52,10 @@ lock: {clearance: 0.0003}           # m
 effects:
   - !GroovePose {ry: 0.0349}        # rad
 randomisation:
-  - {parameter: lock.clearance, low: 0.0003, high: 0.0006}
+  - {parameter: part.clearance, low: 0.0003, high: 0.0006}
 ```
 
-`--set lock.clearance=0.0002` changes one key from the command line. The shipped
+`--set part.clearance=0.0002` changes one key from the command line. The shipped
 scenarios are in [`models/scenarios/`](../../models/scenarios)."""
 _SETTINGS = """# Settings
 

@@ -9,8 +9,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, Frame, RigidBody
 from pydrake.systems.framework import Context
 
-from drake_disasm.cell.part import Part, Solid
 from drake_disasm.effects import Environment
+from drake_disasm.parts import ContactConfig, Part, Solid
 
 _BRASS = np.array([0.80, 0.65, 0.30, 1.0])
 _STEEL = np.array([0.55, 0.58, 0.62, 1.0])
@@ -22,6 +22,7 @@ class Lock:
 
     Attributes:
         part: what it is.
+        contact: what its bodies are made of.
         groove, bolt: the fixed and the moved body, whose frames are G and B.
         frame: the frame that the groove is welded to; its pose in Gn is a
             parameter of the plant's Context.
@@ -30,17 +31,24 @@ class Lock:
     """
 
     part: Part
+    contact: ContactConfig
     groove: RigidBody
     bolt: RigidBody
     frame: FixedOffsetFrame
     groove_ids: tuple[GeometryId, ...]
     bolt_ids: dict[str, GeometryId]
 
+    @property
+    def environment(self) -> Environment:
+        """Of the bolt, before effects."""
+        return self.part.environment(self.contact)
+
 
 def add_lock(
     plant: MultibodyPlant,
     frame_Gn: Frame,
     part: Part,
+    contact: ContactConfig,
     environment: Environment | None = None,
 ) -> Lock:
     """Adds groove (welded to a movable frame in Gn) and bolt (free) to the plant.
@@ -49,20 +57,23 @@ def add_lock(
         plant: not yet finalized.
         frame_Gn: the groove's nominal frame.
         part: what they are.
+        contact: what they are made of.
         environment: of the default Context; None is the nominal one.
     """
-    actual = environment or part.environment
+    actual = environment or part.environment(contact)
     frame = plant.AddFrame(FixedOffsetFrame("groove_pose", frame_Gn, actual.X_GnG))
     instance = plant.AddModelInstance("lock")
     groove = plant.AddRigidBody("groove", instance, part.M_fixed_G)
     plant.WeldFrames(frame, groove.body_frame())
     bolt = plant.AddRigidBody("bolt", plant.AddModelInstance("bolt"), part.M_moved_B)
-    materials = part.materials(actual)
+    materials = part.materials(actual, contact.resolution)
     fixed, moved = part.fixed_solids(actual), part.moved_solids
     groove_ids = _add_geometry(plant, groove, fixed, materials, _BRASS)
     bolt_ids = _add_geometry(plant, bolt, moved, materials, _STEEL)
     del bolt_ids["grip"]
-    return Lock(part, groove, bolt, frame, tuple(groove_ids.values()), bolt_ids)
+    return Lock(
+        part, contact, groove, bolt, frame, tuple(groove_ids.values()), bolt_ids
+    )
 
 
 def reshape_groove(
@@ -98,7 +109,7 @@ def set_environment(
     """
     set_pose(lock, environment, plant_context)
     source = lock.groove.GetParentPlant().get_source_id()
-    materials = lock.part.materials(environment)
+    materials = lock.part.materials(environment, lock.contact.resolution)
     names = lock.part.fixed_solids(environment)
     ids = dict(zip(names, lock.groove_ids, strict=True)) | lock.bolt_ids
     for name, geometry_id in ids.items():

@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from drake_disasm.cell.part import Part
+from drake_disasm.parts import Part
 from drake_disasm.scenario import PlacementConfig
 
 _MIDDLE = 0.02  # m along the groove, where the bench's middle is

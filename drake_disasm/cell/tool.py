@@ -19,7 +19,6 @@ from pydrake.multibody.tree import (
     WeldJoint,
 )
 
-from drake_disasm.cell.door_chain import part_of
 from drake_disasm.cell.parsing import add_model, model_frame
 from drake_disasm.scenario import Scenario
 
@@ -68,14 +67,14 @@ class Tool:
     @classmethod
     def from_models(cls, scenario: Scenario) -> Self:
         """Returns the tool of the scenario's sensor, gripper and lock."""
-        plant, M_bolt_B = MultibodyPlant(0.0), part_of(scenario).M_moved_B
+        plant, M_bolt_B = MultibodyPlant(0.0), scenario.part.M_moved_B
         models = add_tool(plant, plant.world_frame(), scenario)
         bolt = plant.AddRigidBody("bolt", plant.AddModelInstance("bolt"), M_bolt_B)
         plant.WeldFrames(models.frame_T, bolt.body_frame(), grasp_pose(scenario))
         plant.Finalize()
         context = plant.CreateDefaultContext()
         for name in FINGERS:
-            half_width = scenario.lock.grip_size[2] / 2
+            half_width = scenario.part.grip_width / 2
             plant.GetJointByName(name).set_translation(context, half_width)
         X_SF = models.frame_S.CalcPoseInWorld(context).inverse()
         X_FB = plant.EvalBodyPoseInWorld(context, bolt)
@@ -162,5 +161,5 @@ def grasp_rotation() -> RotationMatrix:
 
 def grasp_pose(scenario: Scenario) -> RigidTransform:
     """Returns X_TB: the fingertips end above the plate."""
-    tip = part_of(scenario).surface + scenario.gripper.fingertip_gap
+    tip = scenario.part.surface + scenario.gripper.fingertip_gap
     return RigidTransform(grasp_rotation(), [0.0, 0.0, tip + PAD_LENGTH / 2])

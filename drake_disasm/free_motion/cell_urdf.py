@@ -6,7 +6,6 @@ from xml.etree import ElementTree
 from pydrake.multibody.tree import SpatialInertia
 
 from drake_disasm.cell.arm_description import BASE, FLANGE
-from drake_disasm.cell.door_chain import part_of
 from drake_disasm.cell.parsing import arm_joints
 from drake_disasm.cell.placement import bench_top, nominal_groove_pose
 from drake_disasm.cell.tool import Tool
@@ -45,7 +44,7 @@ def cell_urdf(scenario: Scenario) -> str:
     _add_inertia(link, tool.M_F)
     size = {"radius": _text(_AROUND_TOOL), "length": _text(length)}
     _add_collision(link, [0.0, 0.0, 0.5 * length], "cylinder", size)
-    x, y, top = bench_top(X_WG, part_of(scenario))
+    x, y, top = bench_top(X_WG, scenario.part)
     height = top + _ABOVE_BENCH
     box = {"size": " ".join(map(_text, (*_BENCH, height)))}
     _add_collision(_add_link(root, "bench", BASE), [x, y, 0.5 * height], "box", box)

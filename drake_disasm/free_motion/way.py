@@ -3,11 +3,12 @@
 import numpy as np
 from pydrake.math import RigidTransform
 
+from drake_disasm.common.spatial import rotation_from_vector
 from drake_disasm.free_motion.table import MotionTable
 from drake_disasm.stations import Station
 
-_PULL, _LIFT = 0.02, 0.05  # m/s, in the groove and above it
-_HEIGHT = 0.15  # m, above the groove
+_IN_PART, _OUT, _TURN_IN_PART = 0.02, 0.05, 0.3  # m/s, m/s, rad/s, at the bolt
+_HEIGHT = 0.15  # m, above the part
 _TURN = 0.3  # rad/s, of the fastest joint from there to the motion's begin
 _REST = 0.5  # s, before the motion
 _STEP = 0.02  # s, of the table
@@ -17,9 +18,9 @@ _PEAK = 1.875  # of a quintic's rate, over its mean
 def with_way(station: Station, motion: MotionTable) -> tuple[MotionTable, float]:
     """Returns a motion with the way to it, and when the motion itself begins [s].
 
-    The bolt is pulled along the groove to its end and lifted out; from there all
-    joints go straight to where the motion begins. Each part begins and ends at rest.
-    Only the way out of the groove knows of anything to run into.
+    The bolt goes the stages of its part's way and is lifted out; from there all joints
+    go straight to where the motion begins. Each part begins and ends at rest. Only the
+    way out of the part knows of anything to run into.
 
     Args:
         station: whose arm stands at the start of the task.
@@ -28,13 +29,14 @@ def with_way(station: Station, motion: MotionTable) -> tuple[MotionTable, float]
     Raises:
         DisasmError: the arm can't go that way.
     """
-    end = station.scenario.lock.end
-    corners = np.array([[0.0, 0.0, 0.0], [end, 0.0, 0.0], [end, _HEIGHT, 0.0]])
-    q = [station.start]
-    for begin, target, speed in zip(corners, corners[1:], (_PULL, _LIFT), strict=False):
-        for share in _shares(float(np.linalg.norm(target - begin)), speed):
-            p = begin + share * (target - begin)
-            q.append(station.coordinates.solve(RigidTransform(p), q[-1]))
+    *inside, last_stage = station.scenario.part.stages
+    moves = [(s.axis, s.end, _TURN_IN_PART if s.is_turn else _IN_PART) for s in inside]
+    q, place = [station.start], np.zeros(6)
+    for axis, end, speed in [*moves, (last_stage.axis, _HEIGHT, _OUT)]:
+        for share in _shares(end, speed):
+            place[axis] = share * end
+            X_GB = RigidTransform(rotation_from_vector(place[3:]), place[:3])
+            q.append(station.coordinates.solve(X_GB, q[-1]))
     last, first = q[-1], motion.q[0]
     turn = float(np.abs(first - last).max())
     q += [last + share * (first - last) for share in _shares(turn, _TURN)]

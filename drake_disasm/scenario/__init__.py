@@ -1,7 +1,7 @@
 """Scenarios: typed YAML files, each of which defines one diagram.
 
 `load_scenario` reads a file (strictly: an unknown key is an error), applies
-overrides such as `lock.clearance=0.0003`, and checks every value against its
+overrides such as `part.clearance=0.0003`, and checks every value against its
 bounds and against the others. All values are SI.
 """
 
@@ -19,11 +19,8 @@ from drake_disasm.scenario.schema import (
     CONTROLS,
     ArmConfig,
     CartesianImpedanceConfig,
-    ContactConfig,
     GripperConfig,
-    ImpactConfig,
     JointImpedanceConfig,
-    LockConfig,
     ObservationConfig,
     PlacementConfig,
     Range,
@@ -39,11 +36,8 @@ __all__ = [
     "CONTROLS",
     "ArmConfig",
     "CartesianImpedanceConfig",
-    "ContactConfig",
     "GripperConfig",
-    "ImpactConfig",
     "JointImpedanceConfig",
-    "LockConfig",
     "ObservationConfig",
     "PlacementConfig",
     "Range",

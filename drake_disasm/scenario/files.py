@@ -18,11 +18,12 @@ from drake_disasm.common.quantity import check, closest
 from drake_disasm.common.resources import models_dir
 from drake_disasm.common.text import clipped
 from drake_disasm.effects import files_of, find_effect
-from drake_disasm.scenario.effect_tags import tagged
+from drake_disasm.parts import find_part
 from drake_disasm.scenario.migrations import upgraded
 from drake_disasm.scenario.names import find_field, resolve
 from drake_disasm.scenario.schema import Scenario
 from drake_disasm.scenario.strict_yaml import parse
+from drake_disasm.scenario.tags import tagged
 from drake_disasm.scenario.validity import validate
 
 #: Old names of shipped scenarios.
@@ -122,9 +123,11 @@ def dump_scenario(scenario: Scenario) -> str:
 def scenario_to_mapping(scenario: Scenario) -> dict[str, Any]:
     """Returns the scenario as plain data, for a log's header.
 
-    An effect is a mapping of its parameters with its name under `effect`.
+    An effect is a mapping of its parameters with its name under `effect`; the part
+    likewise, under `part`.
     """
     mapping = dataclasses.asdict(scenario)
+    mapping["part"] = {"part": type(scenario.part).__name__, **mapping["part"]}
     mapping["effects"] = [
         {"effect": type(effect).__name__, **dataclasses.asdict(effect)}
         for effect in scenario.effects
@@ -139,30 +142,37 @@ def scenario_from_mapping(mapping: dict[str, Any]) -> Scenario:
         DisasmError: unknown key or effect, bad value.
     """
     source = "scenario of the log"
-    plain = {key: value for key, value in mapping.items() if key != "effects"}
-    lines = [upgraded(yaml.safe_dump(plain)) if plain else "", "effects:"]
-    for effect in _effects(mapping, source):
-        values = {key: value for key, value in effect.items() if key != "effect"}
-        flow = yaml.safe_dump(values, default_flow_style=True, width=10**6).strip()
-        lines.append(f"- !{effect['effect']} {flow}")
-    if len(lines) == 2:
-        lines[1] = "effects: []"
+    tagged_keys = ("effects", "part")
+    plain = {k: value for k, value in mapping.items() if k not in tagged_keys}
+    lines = [upgraded(yaml.safe_dump(plain)) if plain else ""]
+    for part in _named([mapping["part"]] if "part" in mapping else [], "part", source):
+        lines.append(f"part: {_with_tag(part, 'part')}")
+    effects = _named(mapping.get("effects") or [], "effect", source)
+    lines.append("effects:" if effects else "effects: []")
+    lines += [f"- {_with_tag(effect, 'effect')}" for effect in effects]
     scenario = parse("\n".join(lines), Scenario(), source, line_numbers=False)
     _checked(validate, scenario, source)
     return scenario
 
 
-def _effects(mapping: dict[str, Any], source: str) -> list[dict[str, Any]]:
-    """Returns the effects of a scenario as plain data, each with a name."""
-    effects = mapping.get("effects") or []
+def _named(items: Any, key: str, source: str) -> list[dict[str, Any]]:
+    """Returns effects or parts as plain data, each with its name under a key."""
     try:
-        check_like(effects, [{"effect": ""}], "effects")
+        check_like(items, [{key: ""}], f"{key}s")
     except DisasmError as error:
         raise DisasmError(f"{source}: {error}; record it again") from None
-    for effect in effects:
-        if not effect["effect"].isidentifier():
-            find_effect(clipped(effect["effect"]))
-    return effects
+    find = find_effect if key == "effect" else find_part
+    for item in items:
+        if not item[key].isidentifier():
+            find(clipped(item[key]))
+    return list(items)
+
+
+def _with_tag(item: dict[str, Any], key: str) -> str:
+    """Returns plain data as YAML, its name as the tag."""
+    values = {name: value for name, value in item.items() if name != key}
+    flow = yaml.safe_dump(values, default_flow_style=True, width=10**6).strip()
+    return f"!{item[key]} {flow}"
 
 
 def _checked(

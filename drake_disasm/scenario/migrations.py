@@ -10,17 +10,43 @@ _RIGID = ("compliance", "rigid")
 def upgraded(text: str) -> str:
     """Returns the text of a scenario in today's words; most is returned as it is.
 
-    A section `twin` is of the time when the twin's springs were written by hand and the
-    gripper was rigid. The springs follow from arm and gripper now, so the section goes,
-    and with it ranges of its numbers; the gripper stays rigid unless it says otherwise.
+    A section `lock` is of the time when the door chain was the only part. A section
+    `twin` is of the time when the twin's springs were written by hand and the gripper
+    was rigid: they follow from arm and gripper now, so the section goes, and with it
+    ranges of its numbers; the gripper stays rigid unless it says otherwise.
     """
     try:
         bounded_yaml.check_bounds(text)
         root = yaml.compose(text)
     except Exception:  # the reader says what is wrong
         return text
-    if not isinstance(root, yaml.MappingNode) or not _section(root, "twin"):
+    if not isinstance(root, yaml.MappingNode):
         return text
+    has_twin = _section(root, "twin") is not None
+    if not has_twin and not _speaks_of_lock(root):
+        return text
+    _rename_lock(root)
+    if has_twin:
+        _drop_twin(root)
+    return str(yaml.serialize(root))
+
+
+def _speaks_of_lock(root: yaml.MappingNode) -> bool:
+    """Returns whether a scenario has the section `lock`, or ranges of its numbers."""
+    in_ranges = any(parameter.value.startswith("lock.") for parameter in _ranged(root))
+    return in_ranges or _section(root, "lock") is not None
+
+
+def _rename_lock(root: yaml.MappingNode) -> None:
+    for key, value in root.value:
+        if key.value == "lock" and isinstance(value, yaml.MappingNode):
+            key.value, value.tag = "part", "!DoorChain"
+    for parameter in _ranged(root):
+        if parameter.value.startswith("lock."):
+            parameter.value = f"part.{parameter.value.removeprefix('lock.')}"
+
+
+def _drop_twin(root: yaml.MappingNode) -> None:
     root.value = [(key, value) for key, value in root.value if key.value != "twin"]
     gripper = _section(root, "gripper")
     if gripper is None:
@@ -31,12 +57,23 @@ def upgraded(text: str) -> str:
     ranges = _section(root, "randomisation")
     if isinstance(ranges, yaml.SequenceNode):
         ranges.value = [node for node in ranges.value if not _is_of_twin(node)]
-    return str(yaml.serialize(root))
 
 
 def _section(node: yaml.MappingNode, name: str) -> yaml.Node | None:
     found = [value for key, value in node.value if key.value == name]
     return found[0] if found else None
+
+
+def _ranged(root: yaml.MappingNode) -> list[yaml.ScalarNode]:
+    """Returns the nodes that name what the ranges of a scenario are of."""
+    ranges = _section(root, "randomisation")
+    lines = ranges.value if isinstance(ranges, yaml.SequenceNode) else []
+    named = [
+        _section(line, "parameter")
+        for line in lines
+        if isinstance(line, yaml.MappingNode)
+    ]
+    return [node for node in named if isinstance(node, yaml.ScalarNode)]
 
 
 def _is_of_twin(node: yaml.Node) -> bool:

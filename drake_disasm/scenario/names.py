@@ -1,6 +1,6 @@
 """The names of a scenario's fields, as all programs and files write them.
 
-    lock.clearance                      a field of a section
+    part.clearance                      a field of a section
     gripper.stiffness.0                    an element of a list, counted from 0
     effects.0.ry                        a field of an effect, by its place in the list
     GroovePose.ry                       the same by the effect's name
@@ -19,6 +19,7 @@ from typing import Any
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.effects import Effect, acts_at_joint, registered_effects
+from drake_disasm.parts import registered_parts
 from drake_disasm.scenario.schema import Scenario
 
 _SECTIONS = frozenset(field.name for field in dataclasses.fields(Scenario))
@@ -177,11 +178,11 @@ def remedy(word: str, known: list[str]) -> str:
         word: that is not known here.
         known: words that are.
     """
-    sections = [
+    sections = dict.fromkeys(  # once each
         path.rpartition(".")[0]
         for path in _paths(Scenario)
         if path.endswith(f".{word}") and word
-    ]
+    )
     if sections:
         return f"it belongs to {' or '.join(sections)}"
     return closest(word, known)
@@ -192,5 +193,7 @@ def _paths(schema: type, path: str = "") -> Iterator[str]:
     for field in dataclasses.fields(schema):
         own = f"{path}.{field.name}" if path else field.name
         yield own
-        if isinstance(field.type, type) and dataclasses.is_dataclass(field.type):
-            yield from _paths(field.type, own)
+        kinds = registered_parts() if own == "part" else (field.type,)
+        for kind in kinds:
+            if isinstance(kind, type) and dataclasses.is_dataclass(kind):
+                yield from _paths(kind, own)

@@ -4,6 +4,7 @@ import dataclasses
 
 from drake_disasm.common.quantity import quantity
 from drake_disasm.effects import Effect
+from drake_disasm.parts import ContactConfig, DoorChain, Part
 
 #: KUKA's control modes that take joint angles from FRI.
 CONTROLS = ("position", "joint_impedance", "cartesian_impedance")
@@ -20,89 +21,6 @@ class SimulationConfig:
     )
     contact_approximation: str = quantity(
         "lagged", "", "of the discrete solver", choices=("lagged", "similar", "sap")
-    )
-
-
-@dataclasses.dataclass
-class LockConfig:
-    """Dimensions of the door-chain lock (own design, see models/SOURCES.md)."""
-
-    neck_diameter: float = quantity(0.005, "m", "bolt's neck", low=0.002, high=0.02)
-    head_diameter: float = quantity(0.010, "m", "bolt's head", low=0.003, high=0.04)
-    head_thickness: float = quantity(0.002, "m", "bolt's head", low=0.001, high=0.01)
-    clearance: float = quantity(
-        0.0004, "m", "slot width minus neck diameter", low=1e-4, high=1e-3
-    )
-    channel_clearance: float = quantity(
-        0.001, "m", "channel width minus head diameter", low=1e-4, high=5e-3
-    )
-    axial_clearance: float = quantity(
-        0.0004, "m", "channel height minus head thickness", low=1e-4, high=5e-3
-    )
-    lip_thickness: float = quantity(
-        0.0025, "m", "of the lips that form the slot", low=1e-3, high=0.01
-    )
-    travel: float = quantity(0.060, "m", "from A to B", low=0.02, high=0.15)
-    keyhole_clearance: float = quantity(
-        0.001, "m", "keyhole width minus head diameter", low=2e-4, high=5e-3
-    )
-    grip_size: list[float] = quantity(
-        [0.024, 0.030, 0.012], "m", "bolt's grip along x, y, z", low=0.004, high=0.05
-    )
-    grip_standoff: float = quantity(
-        0.003, "m", "gap between plate and grip", low=0.001, high=0.05
-    )
-    bolt_mass: float = quantity(
-        0.2, "kg", "of the bolt and its chain", low=0.001, high=1.0
-    )
-
-    @property
-    def end(self) -> float:
-        """How far along x the bolt can go until it stops in the keyhole [m]."""
-        return self.travel + self.keyhole_clearance / 2
-
-    def lift_needed(self, margin: float) -> float:
-        """Returns the rise of the bolt at which the head is clear of the plate [m].
-
-        Args:
-            margin: height of the head's underside above the plate's upper face [m].
-        """
-        head = self.axial_clearance / 2 + self.head_thickness
-        return self.lip_thickness + head + margin
-
-
-@dataclasses.dataclass
-class ImpactConfig:
-    """MSC Adams' IMPACT (thesis 4.3), in Adams' units: N, mm, s. Of the twin alone."""
-
-    stiffness: float = quantity(1e3, "N/mm^e", "k of k p^e", low=0.0, high=1e5)
-    exponent: float = quantity(1.0, "1", "e of k p^e", low=0.0, high=5.0)
-    damping: float = quantity(1.0, "N s/mm", "when fully deep", low=0.0, high=1000.0)
-    depth: float = quantity(0.1, "mm", "at which damping is full", low=0.0, high=1.0)
-
-
-@dataclasses.dataclass
-class ContactConfig:
-    """How bolt and groove touch.
-
-    Hydroelastic: the groove is rigid, the bolt's neck and head are compliant.
-    `impact` is the thesis's law instead, with the friction of this section.
-    """
-
-    model: str = quantity(
-        "hydroelastic", "", "of contact", choices=("hydroelastic", "impact")
-    )
-    impact: ImpactConfig = dataclasses.field(default_factory=ImpactConfig)
-    modulus: float = quantity(
-        4e9, "Pa", "hydroelastic modulus of the bolt's neck", low=1e6, high=1e11
-    )
-    head_modulus: float = quantity(
-        4e7, "Pa", "hydroelastic modulus of the bolt's head", low=1e5, high=1e11
-    )
-    dissipation: float = quantity(20.0, "s/m", "Hunt-Crossley", low=0.0, high=500.0)
-    friction: float = quantity(0.2, "1", "Coulomb, static = dynamic", low=0, high=2)
-    resolution: float = quantity(
-        0.0008, "m", "edge length on the bolt's mesh", low=1e-4, high=5e-3
     )
 
 
@@ -294,7 +212,7 @@ class ObservationConfig:
 class Range:
     """A number that each episode draws uniformly (domain randomisation)."""
 
-    parameter: str = quantity("", "", "name, as `GroovePose.ry` or `lock.clearance`")
+    parameter: str = quantity("", "", "name, as `GroovePose.ry` or `part.clearance`")
     low: float = quantity(0.0, "", "in the parameter's own unit")
     high: float = quantity(0.0, "", "in the parameter's own unit")
 
@@ -305,7 +223,7 @@ class Scenario:
 
     name: str = "removal"
     simulation: SimulationConfig = dataclasses.field(default_factory=SimulationConfig)
-    lock: LockConfig = dataclasses.field(default_factory=LockConfig)
+    part: Part = dataclasses.field(default_factory=DoorChain)
     contact: ContactConfig = dataclasses.field(default_factory=ContactConfig)
     placement: PlacementConfig = dataclasses.field(default_factory=PlacementConfig)
     arm: ArmConfig = dataclasses.field(default_factory=ArmConfig)

@@ -7,7 +7,7 @@ which key, in which line, and what to write instead.
 import dataclasses
 import re
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import yaml
@@ -17,9 +17,10 @@ from drake_disasm.common import bounded_yaml
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.text import clipped
 from drake_disasm.effects import find_effect, registered_effects
-from drake_disasm.scenario.effect_tags import tagged
+from drake_disasm.parts import find_part, registered_parts
 from drake_disasm.scenario.names import remedy
 from drake_disasm.scenario.schema import Range
+from drake_disasm.scenario.tags import tagged
 
 _MODEL = "see models/scenarios/removal.yaml"
 _LINE = re.compile(r"^line \d+: ")
@@ -107,7 +108,9 @@ def _check_section(node: yaml.Node, schema: type, path: str) -> None:
 
 
 def _check_value(node: yaml.Node, field: dataclasses.Field, path: str) -> None:
-    if isinstance(field.type, type) and dataclasses.is_dataclass(field.type):
+    if path == "part":
+        _check_tagged(node, path, find_part, registered_parts())
+    elif isinstance(field.type, type) and dataclasses.is_dataclass(field.type):
         _check_section(node, field.type, path)
     elif path == "effects":
         _check_effects(node)
@@ -162,18 +165,30 @@ def _check_effects(node: yaml.Node) -> None:
         )
     _check_length(node, "effects")
     for number, item in enumerate(node.value):
-        path, name = f"effects.{number}", clipped(item.tag.removeprefix("!"))
-        if not item.tag.startswith("!"):
-            names = ", ".join(effect.__name__ for effect in registered_effects())
-            raise _NodeError(
-                item,
-                f"{path}: has no name; write `- !Name {{...}}`, with one of {names}",
-            )
-        try:
-            effect = find_effect(name)
-        except DisasmError as error:
-            raise _NodeError(item, f"{path}: {error}") from None
-        _check_section(item, effect, path)
+        _check_tagged(item, f"effects.{number}", find_effect, registered_effects())
+
+
+def _check_tagged(
+    node: yaml.Node, path: str, find: Callable[[str], type], known: Sequence[type]
+) -> None:
+    """Checks a mapping whose tag names its class.
+
+    Args:
+        node: of the mapping.
+        path: where it stands in a scenario.
+        find: returns the class of a name.
+        known: all of them, for the message.
+    """
+    if not node.tag.startswith("!"):
+        names = ", ".join(kind.__name__ for kind in known)
+        raise _NodeError(
+            node, f"{path}: has no name; write `!Name {{...}}`, with one of {names}"
+        )
+    try:
+        kind = find(clipped(node.tag.removeprefix("!")))
+    except DisasmError as error:
+        raise _NodeError(node, f"{path}: {error}") from None
+    _check_section(node, kind, path)
 
 
 def _check_ranges(node: yaml.Node) -> None:

@@ -6,10 +6,10 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import check
 from drake_disasm.common.text import clipped
 from drake_disasm.effects import files_of, find_effect
+from drake_disasm.parts import AXES
 from drake_disasm.scenario.randomisation import corner, refuse_broken_ranges
 from drake_disasm.scenario.schema import (
     CartesianImpedanceConfig,
-    LockConfig,
     Scenario,
 )
 
@@ -42,7 +42,7 @@ def _validate_one(scenario: Scenario) -> None:
     _refuse_missing_files(scenario)
     _refuse_broken_periods(scenario)
     _refuse_impossible_stiffness(scenario.arm.cartesian_impedance)
-    _refuse_impossible_lock(scenario.lock)
+    scenario.part.refuse_impossible()
     _refuse_unreachable_end(scenario)
 
 
@@ -95,27 +95,11 @@ def _refuse_impossible_stiffness(config: CartesianImpedanceConfig) -> None:
             )
 
 
-def _refuse_impossible_lock(lock: LockConfig) -> None:
-    """The lips must hold the head, and the keyhole must let it through."""
-    slot = lock.neck_diameter + lock.clearance
-    if lock.head_diameter <= slot:
-        raise DisasmError(
-            f"lock.head_diameter: a head of {lock.head_diameter:g} m slips through the "
-            f"slot of {slot:g} m (lock.neck_diameter + lock.clearance); make it wider"
-        )
-    hole = lock.head_diameter + lock.keyhole_clearance
-    if lock.travel <= hole:
-        raise DisasmError(
-            f"lock.travel: {lock.travel:g} m leave no lips between A and a keyhole of "
-            f"{hole:g} m; give more than that"
-        )
-
-
 def _refuse_unreachable_end(scenario: Scenario) -> None:
-    task, end = scenario.task, scenario.lock.end
-    if task.success == "travelled" and task.travel_success >= end:
+    task, stage = scenario.task, scenario.part.stages[0]
+    if task.success == "travelled" and task.travel_success >= stage.end:
         raise DisasmError(
-            f"task.travel_success: the groove ends after {end:g} m (lock.travel and "
-            f"half of lock.keyhole_clearance), {task.travel_success:g} m is never "
-            "reached; give less"
+            f"task.travel_success: the way along {AXES[stage.axis]} ends after "
+            f"{stage.end:g} {'rad' if stage.is_turn else 'm'}, {task.travel_success:g} "
+            "is never reached; give less"
         )

@@ -28,6 +28,7 @@ from drake_disasm.systems.observation import Mounting
 SIMULATION_ONLY = (
     "applied_spatial_force",
     "bolt_pose",
+    "bolt_pose_in_groove",
     "contact_results",
     "query_object",
 )
@@ -210,10 +211,6 @@ class Station(Diagram):
 
         A station that keeps real time names the slow one when the diagram is late.
         """
-
-    def bolt_is_out(self, context: Context, lift_needed: float) -> bool:
-        """Returns whether the bolt has truly risen that far [m]; False if unknown."""
-        return False
 
     def check(self) -> None:
         """Raises DisasmError if the station no longer accepts commands."""

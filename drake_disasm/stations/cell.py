@@ -22,7 +22,6 @@ from pydrake.systems.primitives import (
 
 from drake_disasm.cell.arm_control import joint_gains
 from drake_disasm.cell.arm_dynamics import ArmDynamics
-from drake_disasm.cell.door_chain import part_of
 from drake_disasm.cell.grip import AXIS_ORDER, finger_springs
 from drake_disasm.cell.tool import FINGERS
 from drake_disasm.common.ports import CELL_PORTS
@@ -73,6 +72,7 @@ class CellStation(SimulatedStation):
     - ft_sensor.health
     - ft_sensor.time_measured
     - bolt_pose
+    - bolt_pose_in_groove
     - contact_results
     - query_object
     @endsystem
@@ -223,7 +223,7 @@ class CellStation(SimulatedStation):
         for i in range(1, plant.num_bodies()):  # 0 is the world
             body = plant.get_body(BodyIndex(i))
             body.SetSpatialInertiaInBodyFrame(context, SpatialInertia.Zero())
-        M_B = part_of(self.scenario).M_moved_B.ReExpress(X_FB.rotation())
+        M_B = self.scenario.part.M_moved_B.ReExpress(X_FB.rotation())
         load = plant.GetBodyByName("tool")
         load.SetSpatialInertiaInBodyFrame(context, M_B.Shift(-X_FB.translation()))
         carried = builder.AddNamedSystem(
@@ -320,7 +320,7 @@ class CellStation(SimulatedStation):
 
         From a mere touch both would hit the light bolt at speed and throw it.
         """
-        pressed = self.scenario.lock.grip_size[2] - 2.0 * _PAD_INDENTATION
+        pressed = self.scenario.part.grip_width - 2.0 * _PAD_INDENTATION
         return max(self.grip_command, pressed)
 
 
@@ -330,7 +330,7 @@ def _grip_command(scenario: Scenario) -> float:
     Fingers yield like springs (the real drive is self-locking), so they are
     sent to a place inside the grip. A welded bolt is only touched.
     """
-    gripper, width = scenario.gripper, scenario.lock.grip_size[2]
+    gripper, width = scenario.gripper, scenario.part.grip_width
     if gripper.hold == "weld":
         return width + 0.002
     return width - 2.0 * gripper.grip_force / gripper.finger_stiffness

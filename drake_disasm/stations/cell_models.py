@@ -8,7 +8,6 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, Frame, ModelInstanceIndex
 
-from drake_disasm.cell.door_chain import part_of
 from drake_disasm.cell.grip import Springs
 from drake_disasm.cell.lock import Lock, add_lock
 from drake_disasm.cell.parsing import add_arm, add_model
@@ -84,7 +83,7 @@ def add_cell(
     """
     iiwa, frame_F = add_arm(plant, scenario.arm.model)
     tool = add_tool(plant, frame_F, scenario)
-    lock = add_lock(plant, frame_Gn, part_of(scenario), environment)
+    lock = add_lock(plant, frame_Gn, scenario.part, scenario.contact, environment)
     bench = _add_bench(plant, frame_Gn, scenario)
     if scenario.gripper.hold == "weld":
         bolt = lock.bolt.body_frame()
@@ -97,7 +96,7 @@ def _add_bench(
 ) -> list[GeometryId]:
     """Puts the bench's top under the plate, level whatever the groove's yaw."""
     bench = add_model(plant, _BENCH)
-    p_WTop = bench_top(frame_Gn.GetFixedPoseInBodyFrame(), part_of(scenario))
+    p_WTop = bench_top(frame_Gn.GetFixedPoseInBodyFrame(), scenario.part)
     top = plant.GetFrameByName("top", bench)
     plant.WeldFrames(plant.world_frame(), top, RigidTransform(p_WTop))
     return list(plant.GetCollisionGeometriesForBody(top.body()))

@@ -25,8 +25,8 @@ from drake_disasm.cell.lock import (
     set_environment,
     set_pose,
 )
-from drake_disasm.cell.lock_materials import has_same_material
 from drake_disasm.effects import Environment
+from drake_disasm.parts.materials import has_same_material
 from drake_disasm.stations.base import Parts
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.systems.bolt_environment import BoltEnvironment
@@ -86,7 +86,7 @@ class HydroelasticContact(ContactStrategy):
     def reconfigure(self, lock: Lock, parts: Parts) -> None:
         """See ContactStrategy."""
         self._lock = lock
-        self._reshape(lock.part.environment, parts)
+        self._reshape(lock.environment, parts)
 
     def set_environment(self, environment: Environment, parts: Parts) -> None:
         """See ContactStrategy; reassigns all materials, which takes milliseconds."""
@@ -178,10 +178,10 @@ class ImpactContactForce(ContactStrategy):
         self.system.set_conditions(parts(self.system), conditions)
 
     def _conditions(self, environment: Environment) -> ImpactConditions:
-        (K, D), part = self._spring.gains(), self._lock.part
+        (K, D), lock = self._spring.gains(), self._lock
         return ImpactConditions.of(
-            ImpactLaw.of(part.contact.impact),
-            part.shape,
+            ImpactLaw.of(lock.contact.impact),
+            lock.part.required_gaps(),
             environment,
             np.zeros((1, 3)),
             M=self._M,

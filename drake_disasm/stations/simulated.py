@@ -13,7 +13,6 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder, System
 from pydrake.systems.primitives import RandomSource
 
-from drake_disasm.cell.door_chain import part_of
 from drake_disasm.cell.lock import Lock
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.common.ports import check_ports
@@ -52,8 +51,8 @@ class SimulatedStation(Station):
     is not connected is at rest.
 
     Besides the table's ports it has those of `simulation_only`: the outputs `bolt_pose`
-    (X_GnB, true), `contact_results` and `query_object`, and the input
-    `applied_spatial_force`.
+    (X_GnB, true), `bolt_pose_in_groove` (X_GB), `contact_results` and `query_object`,
+    and the input `applied_spatial_force`.
     """
 
     #: Time to settle at the start, before an episode begins [s].
@@ -79,7 +78,7 @@ class SimulatedStation(Station):
         # A copy, so that a later change to the scenario's list is detected.
         self._default_effects = copy.deepcopy(list(scenario.effects))
         self._acting_by_default = _acting(self._default_effects)
-        self._nominal = part_of(scenario).environment
+        self._nominal = scenario.part.environment(scenario.contact)
         self.refuse_effects(scenario.effects)
         self._environment = environment_at(self._nominal, scenario.effects)
         self._initial: InitialState | None = None
@@ -111,8 +110,8 @@ class SimulatedStation(Station):
 
     def _finish(self, builder: DiagramBuilder) -> None:
         """Exports the simulation's own ports, builds, and settles."""
-        plant, bolt = self.plant, self.lock.bolt
-        export_bolt_pose(builder, plant, int(bolt.index()), self.X_WG)
+        plant = self.plant
+        export_bolt_pose(builder, plant, self.lock, self.X_WG)
         builder.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
         self._wire_applied_forces(builder)
         builder.ExportOutput(self.scene_graph.get_query_output_port(), "query_object")
@@ -191,7 +190,7 @@ class SimulatedStation(Station):
         arm = [effect for effect in effects if isinstance(effect, ArmEffect)]
         self._set_arm_effects(context, arm)
         self.contact.set_environment(
-            environment_at(self.lock.part.environment, effects), self._parts(context)
+            environment_at(self.lock.environment, effects), self._parts(context)
         )
         self.sensor.set_effects(
             self.part_context(self.sensor, context), sensor_chain(effects)
@@ -212,7 +211,7 @@ class SimulatedStation(Station):
             bolt: its motion in the step to come.
         """
         if is_local(effects):
-            environment = environment_at(self.lock.part.environment, effects, bolt)
+            environment = environment_at(self.lock.environment, effects, bolt)
             self.contact.change_environment(environment, self._parts(context))
 
     def attach(self, simulator: Simulator) -> None:
@@ -283,12 +282,6 @@ class SimulatedStation(Station):
         plant_context = self.part_context(self.plant, context)
         self.plant.SetVelocities(plant_context, np.zeros(self.plant.num_velocities()))
         return self._state_at_start(settled)
-
-    def bolt_is_out(self, context: Context, lift_needed: float) -> bool:
-        """See Station."""
-        X_GnB: RigidTransform = self.GetOutputPort("bolt_pose").Eval(context)
-        X_GB = self.true_groove_pose(context).inverse() @ X_GnB
-        return bool(X_GB.translation()[1] >= lift_needed)
 
     def reading_at_zeroing(self, context: Context) -> np.ndarray:
         """Returns what the sensor reads, noise averaged away, (6,) [f; tau] in S."""

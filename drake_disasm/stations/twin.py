@@ -11,7 +11,6 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, PassThrough
 
 from drake_disasm.cell.coordinates import BoltCoordinates
-from drake_disasm.cell.door_chain import GROOVE_FIELDS, part_of
 from drake_disasm.cell.grip import deflection
 from drake_disasm.cell.lock import add_lock
 from drake_disasm.cell.tool import summed
@@ -20,10 +19,10 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.ports import TWIN_PORTS
 from drake_disasm.effects import ArmEffect
 from drake_disasm.effects.refusals import refuse_arm_effects
+from drake_disasm.parts import ImpactConfig
 from drake_disasm.scenario import (
     ArmConfig,
     GripperConfig,
-    ImpactConfig,
     Scenario,
     validate,
 )
@@ -72,6 +71,7 @@ class TwinStation(SimulatedStation):
     - bolt.health
     - bolt.time_measured
     - bolt_pose
+    - bolt_pose_in_groove
     - contact_results
     - query_object
     @endsystem
@@ -122,7 +122,9 @@ class TwinStation(SimulatedStation):
         self.scenario, self._initial = scenario, None
         self.parameters = twin_of(scenario)
         self._is_reconfigured = True
-        self.lock = dataclasses.replace(self.lock, part=part_of(scenario))
+        self.lock = dataclasses.replace(
+            self.lock, part=scenario.part, contact=scenario.contact
+        )
         self._prepare(context)
         self.set_effects(context, scenario.effects)
 
@@ -161,7 +163,8 @@ class TwinStation(SimulatedStation):
         scenario = self.scenario
         frame_Gn = self._add_plant(builder, scenario.simulation.twin_time_step)
         plant = self.plant
-        self.lock = add_lock(plant, frame_Gn, part_of(scenario), self._environment)
+        part, contact = scenario.part, scenario.contact
+        self.lock = add_lock(plant, frame_Gn, part, contact, self._environment)
         p_BoTo_B, springs = self.parameters.p_BoTo_B, self._arm_step().springs
         frame_Tn = plant.AddFrame(
             FixedOffsetFrame("grip_nominal", frame_Gn, RigidTransform(p_BoTo_B))
@@ -279,7 +282,7 @@ def _structure(scenario: Scenario) -> Scenario:
         contact=dataclasses.replace(
             _without(scenario.contact, _MATERIAL_FIELDS), impact=ImpactConfig()
         ),
-        lock=_without(scenario.lock, GROOVE_FIELDS),
+        part=_without(scenario.part, scenario.part.fixed_fields),
     )
 
 

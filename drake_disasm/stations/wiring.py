@@ -12,10 +12,11 @@ from pydrake.multibody.plant import (
 from pydrake.systems.framework import DiagramBuilder, InputPort
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
+from drake_disasm.cell.lock import Lock
 from drake_disasm.common.ports import Health
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor
 from drake_disasm.scenario import SimulationConfig
-from drake_disasm.systems.body_pose import BodyPose
+from drake_disasm.systems.bolt_pose import BoltPose
 from drake_disasm.systems.required_input import RequiredInput
 from drake_disasm.systems.step_clock import StepClock
 
@@ -99,9 +100,11 @@ def export_ready_device(builder: DiagramBuilder, name: str, time_step: float) ->
 
 
 def export_bolt_pose(
-    builder: DiagramBuilder, plant: MultibodyPlant, bolt: int, X_WG: RigidTransform
+    builder: DiagramBuilder, plant: MultibodyPlant, lock: Lock, X_WG: RigidTransform
 ) -> None:
-    """Exports where the bolt truly is, X_GnB, which only a simulation knows."""
-    truth = builder.AddNamedSystem("bolt_pose", BodyPose(bolt, X_WG))
+    """Exports where the bolt truly is, X_GnB and X_GB."""
+    bodies = lock.bolt.index(), lock.groove.index()
+    truth = builder.AddNamedSystem("bolt_pose", BoltPose(*bodies, X_WG))
     builder.Connect(plant.get_body_poses_output_port(), truth.get_input_port())
-    builder.ExportOutput(truth.get_output_port(), "bolt_pose")
+    builder.ExportOutput(truth.GetOutputPort("X_GnB"), "bolt_pose")
+    builder.ExportOutput(truth.GetOutputPort("X_GB"), "bolt_pose_in_groove")

@@ -1,6 +1,8 @@
 """Reward and outcome of the running episode, as output ports."""
 
 import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import (
     BasicVector,
     Context,
@@ -24,12 +26,14 @@ class TaskMonitor(LeafSystem):
     """Compares the observation with the one a period ago.
 
     Read at the end of a period, before its updates, `reward_terms` (in the order
-    of REWARD_TERMS) and `outcome` (an `Outcome`) are those of the step just done.
+    of REWARD_TERMS) and `outcome` (an `Outcome`) are those of the step just done. A
+    simulation connects `X_GB`, where the bolt truly is in the groove.
 
     @system
     name: TaskMonitor
     input_ports:
     - observation
+    - X_GB
     output_ports:
     - reward_terms
     - outcome
@@ -47,10 +51,11 @@ class TaskMonitor(LeafSystem):
         super().__init__()
         self._task, self.geometry = task, geometry
         self._observation = self.DeclareVectorInputPort("observation", 12)
+        self._X_GB = self.DeclareAbstractInputPort("X_GB", Value[RigidTransform]())
         self._before = self.DeclareDiscreteState(12)
         self._steps = self.DeclareDiscreteState(1)
         self.DeclarePeriodicDiscreteUpdateEvent(task.period, POLICY_DELAY, self._update)
-        inputs = {self._observation.ticket(), self.xd_ticket()}
+        inputs = {self._observation.ticket(), self._X_GB.ticket(), self.xd_ticket()}
         self.DeclareVectorOutputPort(
             "reward_terms",
             len(REWARD_TERMS),
@@ -79,7 +84,11 @@ class TaskMonitor(LeafSystem):
 
     def _calc_outcome(self, context: Context, output: BasicVector) -> None:
         steps = int(context.get_discrete_state(self._steps).value()[0])
-        result = outcome(self._state(context), steps, self._task, self.geometry)
+        p_GBo = None
+        if self._X_GB.HasValue(context):
+            p_GBo = self._X_GB.Eval(context).translation()
+        state = self._state(context)
+        result = outcome(state, steps, self._task, self.geometry, p_GBo)
         output.SetFromVector([float(result)])
 
     def _state(self, context: Context) -> BoltState:

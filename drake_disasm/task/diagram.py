@@ -167,7 +167,7 @@ def add_task(
         DisasmError: a system that is no policy.
     """
     processor = add_observation(builder, station, station.scenario.task.period)
-    monitor = _add_monitor(builder, station.scenario, processor)
+    monitor = _add_monitor(builder, station, processor)
     imprecision, noise = _add_imprecision(builder, station.scenario)
     pose_target = _add_pose_target(builder, station, imprecision, processor)
     station.register_motion_effects()  # the pose target applies them
@@ -250,13 +250,17 @@ def add_motion(
 
 
 def _add_monitor(
-    builder: DiagramBuilder, scenario: Scenario, processor: ObservationProcessor
+    builder: DiagramBuilder, station: Station, processor: ObservationProcessor
 ) -> TaskMonitor:
+    scenario = station.scenario
     monitor = builder.AddNamedSystem(
         "task_monitor", TaskMonitor(scenario.task, TaskGeometry.of(scenario))
     )
     observation = processor.GetOutputPort("observation")
-    builder.Connect(observation, monitor.get_input_port())
+    builder.Connect(observation, monitor.GetInputPort("observation"))
+    if station.HasOutputPort("bolt_pose_in_groove"):
+        truth = station.GetOutputPort("bolt_pose_in_groove")
+        builder.Connect(truth, monitor.GetInputPort("X_GB"))
     return monitor
 
 

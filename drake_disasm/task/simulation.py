@@ -21,7 +21,13 @@ from pydrake.systems.framework import (
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.timing import MOTION_DELAY, POLICY_DELAY, boundary
 from drake_disasm.effects import BoltMotion, Effect, is_local
-from drake_disasm.mdp import REWARD_TERMS, BoltState, Outcome, action_bounds
+from drake_disasm.mdp import (
+    REWARD_TERMS,
+    BoltState,
+    Outcome,
+    action_bounds,
+    is_removed,
+)
 from drake_disasm.scenario import Scenario, draw, with_values
 from drake_disasm.scenario.given import scenario_of
 from drake_disasm.stations import Station, make_station
@@ -279,7 +285,7 @@ class TaskSimulation:
 
     def bolt_is_out(self) -> bool:
         """Returns whether the bolt truly is out, which only a simulation knows."""
-        scenario = self._built
-        lift = scenario.lock.lift_needed(scenario.task.lift_success)
-        context = self.station.GetMyMutableContextFromRoot(self.context)
-        return self.station.bolt_is_out(context, lift)
+        if not self.station.HasOutputPort("bolt_pose_in_groove"):
+            return False
+        X_GB = self.evaluate(self.station, "bolt_pose_in_groove")
+        return bool(is_removed(X_GB.translation(), self.systems.monitor.geometry))

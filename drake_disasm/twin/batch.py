@@ -11,6 +11,7 @@ from drake_disasm.common.rotations import Pose
 from drake_disasm.devices.ft_sensor import quantise
 from drake_disasm.mdp import (
     BoltState,
+    is_removed,
     is_terminated,
     is_truncated,
     outcomes,
@@ -236,7 +237,9 @@ class BatchedTwin:
         states = BoltState.from_vector(before), BoltState.from_vector(after)
         terms = reward_terms(*states, numbers.task, numbers.geometry)
         terms = {name: xp.where(has_failed, 0.0, term) for name, term in terms.items()}
-        ends = outcomes(states[1], episodes.steps, numbers.task, numbers.geometry)
+        ends = outcomes(
+            states[1], episodes.steps, numbers.task, numbers.geometry, self._p_GBo()
+        )
         reasons = self._reasons(has_failed, is_finite, is_solved)
         place = numbers.geometry.place(states[1])
         return BatchResult(after, place, terms, ends, has_failed, reasons)
@@ -260,12 +263,14 @@ class BatchedTwin:
 
     def bolt_is_out(self) -> np.ndarray:
         """Returns whether each bolt truly is out (n,): only a simulation knows."""
+        return to_numpy(is_removed(self._p_GBo(), self._twins.numbers.geometry))
+
+    def _p_GBo(self) -> Array:
+        """Returns where each bolt truly is in its groove (n, 3) [m]."""
         numbers, around = self._twins.numbers, self._twins.plant_at_A.conditions.around
         X_GnB = numbers.coordinates.poses(self.episodes.state.q)
-        p_GBo = namespace(self.like).matmul(
-            (X_GnB.p - around.p_GnG)[:, None], around.R_GnG
-        )
-        return to_numpy(p_GBo[:, 0, 1] >= numbers.geometry.lift_needed)
+        moved = (X_GnB.p - around.p_GnG)[:, None]
+        return namespace(self.like).matmul(moved, around.R_GnG)[:, 0]
 
     @property
     def period(self) -> float:

@@ -7,10 +7,10 @@ from typing import Self
 
 from pydrake.math import RigidTransform
 
-from drake_disasm.cell.lock_shape import LockShape
 from drake_disasm.common.arrays import Array, array_like, namespace, side_by_side
 from drake_disasm.common.rotations import Pose
 from drake_disasm.effects import Environment
+from drake_disasm.parts.lock_shape import LockShape
 from drake_disasm.twin.law import ImpactLaw
 
 

@@ -3,7 +3,7 @@
 import dataclasses
 
 from drake_disasm.common.arrays import Array
-from drake_disasm.scenario import ImpactConfig
+from drake_disasm.parts import ImpactConfig
 
 
 @dataclasses.dataclass(frozen=True)

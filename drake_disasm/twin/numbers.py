@@ -8,14 +8,12 @@ import numpy as np
 from pydrake.multibody.tree import SpatialInertia
 
 from drake_disasm.cell.coordinates import BoltCoordinates
-from drake_disasm.cell.door_chain import GROOVE_FIELDS, part_of
 from drake_disasm.cell.grip import (
     AXIS_ORDER,
     Springs,
     bolt_compliance,
     deflection,
 )
-from drake_disasm.cell.lock_shape import LockShape
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import summed
 from drake_disasm.cell.twin_parameters import TwinParameters, twin_of
@@ -24,6 +22,7 @@ from drake_disasm.common.rotations import Pose
 from drake_disasm.devices.sensor_chain import Payload
 from drake_disasm.effects import Environment
 from drake_disasm.mdp import TaskGeometry, action_bounds
+from drake_disasm.parts.lock_shape import LockShape
 from drake_disasm.scenario import Scenario, TaskConfig
 from drake_disasm.systems.imprecision import Imprecise
 from drake_disasm.systems.observation import Mounting
@@ -79,15 +78,15 @@ class TwinNumbers:
             DisasmError: the arm can't reach the lock.
         """
         rigid = _rigid(_Case.of(scenario))
-        part, bounds = part_of(scenario), action_bounds(scenario.task)
+        part, bounds = scenario.part, action_bounds(scenario.task)
         return cls(
             law=ImpactLaw.of(scenario.contact.impact),
-            shape=part.shape,
+            shape=part.required_gaps(),
             M=rigid.M,
             arm=rigid.arm,
             grip=rigid.grip,
             body=rigid.body,
-            nominal=part.environment,
+            nominal=part.environment(scenario.contact),
             mounting=rigid.mounting,
             task=scenario.task,
             geometry=TaskGeometry.of(scenario, rigid.compliance),
@@ -127,9 +126,10 @@ class _Case:
     @classmethod
     def of(cls, scenario: Scenario) -> "_Case":
         """Returns the case of a scenario."""
-        groove: dict[str, Any] = dict.fromkeys(GROOVE_FIELDS, 0.0)
+        part = scenario.part
+        fixed: dict[str, Any] = dict.fromkeys(part.fixed_fields, 0.0)
         parts = (
-            dataclasses.replace(scenario.lock, **groove),
+            dataclasses.replace(part, **fixed),
             scenario.simulation.twin_time_step,
             scenario.placement,
             scenario.arm,
@@ -157,14 +157,14 @@ def _rigid(case: _Case) -> _Rigid:
     scenario = case.scenario
     parameters = twin_of(scenario)
     time_step = scenario.simulation.twin_time_step
-    M_B = summed([part_of(scenario).M_moved_B, parameters.M_fingers_B])
+    M_B = summed([scenario.part.M_moved_B, parameters.M_fingers_B])
     return _Rigid(
         M=_mass_matrix(M_B, parameters.p_BoTo_B),
         arm=ArmStep.of(parameters.arm, parameters.grip, time_step),
         grip=parameters.grip,
         body=_body(scenario, M_B, parameters.p_BoTo_B),
         mounting=_mounting(scenario, M_B, parameters),
-        compliance=bolt_compliance(scenario)[:3],
+        compliance=bolt_compliance(scenario),
     )
 
 

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.lib import NumpyVersion
 
-from drake_disasm.cell.door_chain import part_of
 from drake_disasm.common.arrays import Array
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import (
@@ -100,7 +99,7 @@ def refuse_scenarios(scenarios: Sequence[Scenario]) -> None:
         refuse_unknown_kinds(scenario.effects)
         refuse_arm_effects([e for e in scenario.effects if isinstance(e, ArmEffect)])
         _refuse_late_poses(scenario)
-        nominal = part_of(scenario).environment
+        nominal = scenario.part.environment(scenario.contact)
         refuse_without_quantity("impact", nominal, scenario.effects)
         _refuse_sampling(scenario)
         for end in ("low", "high"):
@@ -123,6 +122,7 @@ def _refuse_contact(scenario: Scenario) -> None:
             f"contact.model: '{scenario.contact.model}' has no form for a batch; set "
             "it to impact, or use the diagram's twin"
         )
+    scenario.part.required_gaps()
 
 
 def _refuse_late_poses(scenario: Scenario) -> None:

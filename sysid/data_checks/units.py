@@ -127,7 +127,7 @@ def _transitions(subject: Subject) -> list[DataFinding]:
     reach = float(np.abs(np.concatenate(commanded)).max())
     scenario = model.scenario_at(nominal_values(model.parameters))
     if scenario is not None:
-        travel = scenario.lock.travel
+        travel = scenario.part.reach
         if reach > settings.pose_reach * travel:
             what = f"X_GB_commanded reaches {reach:.3g} m, the bolt travels {travel} m"
             found.append(_finding(what))

@@ -98,7 +98,7 @@ def _twin(logs: Sequence[Log], choice: ModelChoice) -> LogModel:
     if not (choice.requests or choice.fixed):
         raise DisasmError(
             "no parameters to identify; name them by `parameters`, for example "
-            "contact.friction lock.clearance GroovePose.ry"
+            "contact.friction part.clearance GroovePose.ry"
         )
     scenario, parameters = scenario_parameters(scenario, choice.requests)
     rollout = choice.objective == "rollout"

@@ -312,7 +312,7 @@ def measured_states(
         _channels(scenario),
         lambda _, episode: at_sensor(observations(episode)[1:], sensing.X_SB),
     )
-    head = scenario.lock.head_diameter / 2.0
+    head = scenario.part.touch_radius
     error = np.concatenate([_model_error(log, sensing, head) for log in logs])
     return dataclasses.replace(found, model_error=error) if error.any() else found
 

@@ -459,9 +459,9 @@ def _with_impact_as_stiff(scenario: Scenario) -> Scenario:
     foundation as deep as the radius under diameter times thickness, k = 2 E t. On three
     logs of the cell that is near the best there is (docs/results/verdicts-blind.md).
     """
-    contact, lock = scenario.contact, scenario.lock
+    contact = scenario.contact
     most = find_field(scenario, "contact.impact.stiffness").metadata["high"]
-    stiffness = 2.0 * contact.head_modulus * lock.head_thickness * _N_PER_MM
+    stiffness = 2.0 * contact.head_modulus * scenario.part.touch_depth * _N_PER_MM
     impact = dataclasses.replace(
         contact.impact, stiffness=min(stiffness, most), exponent=1.0
     )

@@ -28,7 +28,7 @@ _TRANSITIONS = 440  # of the log
 _EXPLORATION = 1.5e-4  # m, of `admittance` while it is recorded
 _PARAMETERS = (
     "contact.friction",
-    "lock.clearance",
+    "part.clearance",
     "contact.impact.stiffness",
     "contact.impact.exponent",
 )

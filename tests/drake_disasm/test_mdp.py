@@ -19,11 +19,13 @@ from drake_disasm.scenario import TaskConfig, load_scenario
 from drake_disasm.systems.task_monitor import TaskMonitor
 
 GEOMETRY = TaskGeometry(
-    lift_needed=0.007,
-    groove_end=0.0605,
+    way="xy",
+    ends=(0.0605, 0.007),
+    radii=(1.0, 1.0),
     low=np.array([-0.01, -0.01, -0.01]),
     high=np.array([0.07, 0.02, 0.01]),
     compliance=np.zeros((3, 6)),
+    turning=np.zeros((3, 6)),
 )
 
 
@@ -76,7 +78,7 @@ def test_progress_ends_with_the_groove(task: TaskConfig) -> None:
 
 def test_leaving_the_workspace_fails() -> None:
     task = load_scenario("removal").task
-    never = dataclasses.replace(GEOMETRY, lift_needed=1.0)
+    never = dataclasses.replace(GEOMETRY, ends=(0.0605, 1.0))
     for p in (*np.diag(GEOMETRY.low), *np.diag(GEOMETRY.high)):
         before, after = (BoltState(f * p, *np.zeros((3, 3))) for f in (0.99, 1.01))
         assert outcome(before, 5, task, never) is Outcome.RUNNING
@@ -84,10 +86,10 @@ def test_leaving_the_workspace_fails() -> None:
 
 
 def test_the_workspace_follows_the_lock() -> None:
-    scenario = load_scenario("removal", ["lock.travel=0.1", "task.room=[.01,.02,.03]"])
+    scenario = load_scenario("removal", ["part.travel=0.1", "task.room=[.01,.02,.03]"])
     geometry = TaskGeometry.of(scenario)
     np.testing.assert_allclose(geometry.low, [-0.01, -0.02, -0.03])
-    out = scenario.lock.lift_needed(0.002)
+    out = scenario.part.stages[-1].end + 0.002
     np.testing.assert_allclose(geometry.high, [0.1105, out + 0.02, 0.03])
 
 
@@ -101,8 +103,8 @@ OUTCOMES = [
     (_state(10), 150, Outcome.STEP_LIMIT),
     (_state(10, f=31), 5, Outcome.FORCE_LIMIT),
     (_state(10, t=5.1), 5, Outcome.TORQUE_LIMIT),
-    (_state(60, 7.1), 100, Outcome.SUCCESS),
-    (_state(60, 7.1, f=31), 5, Outcome.FORCE_LIMIT),
+    (_state(60, 8.1), 100, Outcome.SUCCESS),
+    (_state(60, 8.1, f=31), 5, Outcome.FORCE_LIMIT),
 ]
 
 
@@ -116,6 +118,53 @@ def test_success_is_travel_or_lift() -> None:
     assert outcome(_state(55.1), 5, sliding, GEOMETRY) is Outcome.SUCCESS
     assert outcome(_state(54.9, 8), 5, sliding, GEOMETRY) is Outcome.RUNNING
     assert outcome(_state(60, 6.9), 5, removal, GEOMETRY) is Outcome.RUNNING
+
+
+def test_removed_is_judged_by_the_bolt_itself_where_it_is_known() -> None:
+    task = load_scenario("removal").task
+    for seen, true_y, expected in (
+        (_state(60, 9.0), 0.0069, Outcome.RUNNING),
+        (_state(60, 6.0, f=-5.0), 0.0071, Outcome.SUCCESS),
+    ):
+        p_GBo = np.array([0.06, true_y, 0.0])
+        assert outcome(seen, 5, task, GEOMETRY, p_GBo) is expected
+
+
+def test_removed_without_the_truth_is_pulled_away_and_free() -> None:
+    task = load_scenario("removal").task
+    for state, expected in (
+        (_state(60, 7.9), Outcome.RUNNING),
+        (_state(60, 8.1, f=-2.1), Outcome.RUNNING),
+        (_state(60, 8.1, f=-1.9), Outcome.SUCCESS),
+    ):
+        assert outcome(state, 5, task, GEOMETRY) is expected
+
+
+def test_one_stage_pays_for_its_own_axis_until_its_end() -> None:
+    """A peg that is pulled out along y: what goes beyond its end pays nothing."""
+    task = load_scenario("removal").task
+    peg = dataclasses.replace(GEOMETRY, way="y", ends=(0.007,), radii=(1.0,))
+    terms = reward_terms(_state(3, 1.0), _state(9, 2.5), task, peg)
+    assert terms["progress"] == pytest.approx(task.reward.w_dis * 1.5)
+    assert terms["lift"] == 0.0
+    beyond = reward_terms(_state(0, 6.5), _state(0, 9.0), task, peg)
+    assert beyond["progress"] == pytest.approx(task.reward.w_dis * 0.5)
+
+
+def test_a_turn_counts_at_its_radius_with_the_grip() -> None:
+    """About y by 0.1 rad, of which the grip gives 0.02 under 0.2 N m at 10 N m/rad."""
+    task = load_scenario("removal").task
+    turning = np.zeros((3, 6))
+    turning[1, 4] = 0.1
+    part = dataclasses.replace(
+        GEOMETRY, way="vy", ends=(1.0, 0.007), radii=(0.01, 1.0), turning=turning
+    )
+    still = BoltState(*np.zeros((4, 3)))
+    after = BoltState(
+        np.zeros(3), np.array([0, 0.1, 0]), np.zeros(3), np.array([0, -0.2, 0])
+    )
+    terms = reward_terms(still, after, task, part)
+    assert terms["progress"] == pytest.approx(task.reward.w_dis * 10.0 * 0.08)
 
 
 def test_terminated_and_truncated_are_told_apart() -> None:
@@ -155,7 +204,7 @@ def _monitor() -> tuple[TaskMonitor, Context]:
 
 
 def _observe(monitor: TaskMonitor, context: Context, observation: np.ndarray) -> None:
-    monitor.get_input_port().FixValue(context, observation)
+    monitor.GetInputPort("observation").FixValue(context, observation)
 
 
 def _period(monitor: TaskMonitor, context: Context) -> None:
@@ -197,7 +246,7 @@ def test_outcome_follows_the_observation() -> None:
         (6, 20.1, Outcome.FORCE_LIMIT),
         (8, -20.1, Outcome.FORCE_LIMIT),
         (11, -5.1, Outcome.TORQUE_LIMIT),
-        (1, 0.0071, Outcome.SUCCESS),
+        (1, 0.0081, Outcome.SUCCESS),
         (0, 0.0701, Outcome.WORKSPACE),
         (6, 19.9, Outcome.RUNNING),
     ):

@@ -40,7 +40,7 @@ def test_sliding_force_is_mu_n(mu: float, offset: float) -> None:
 @pytest.mark.parametrize("clearance", [1e-4, 1e-3])
 def test_play_is_the_clearance(clearance: float) -> None:
     """At 1 N and the shipped mesh, within 15 %."""
-    found = play(1.0, f"lock.clearance={clearance}")
+    found = play(1.0, f"part.clearance={clearance}")
     assert found == pytest.approx(clearance, rel=0.15)
 
 

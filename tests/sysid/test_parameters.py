@@ -50,7 +50,7 @@ def test_names_reach_sections_lists_and_effects():
     names = [
         "contact.friction",
         "gripper.stiffness.2",
-        "lock.clearance",
+        "part.clearance",
         "contact.modulus",
     ]
     _, found = scenario_parameters(REMOVAL, [ParameterRequest(n) for n in names])
@@ -73,7 +73,7 @@ def test_an_effect_that_is_not_there_is_added_at_its_null_value():
     ("request_", "message"),
     [
         (ParameterRequest("lock"), "not a number"),
-        (ParameterRequest("lock.clearance", high=0.5), "go beyond"),
+        (ParameterRequest("part.clearance", high=0.5), "go beyond"),
         (ParameterRequest("contact.friction", low=0.3), "nominal"),
     ],
 )
@@ -87,10 +87,10 @@ def test_reads_names_and_files(tmp_path):
     path.write_text(
         "contact.friction: {low: 0.1, high: 0.5, nominal: 0.3}\n"
         "contact.modulus: {low: 1.0e+8, high: 1.0e+10, scale: linear}\n"
-        "lock.clearance:\n"
+        "part.clearance:\n"
     )
     requests = read_requests([str(path), "GroovePose.ry"])
-    assert [r.name for r in requests][-2:] == ["lock.clearance", "GroovePose.ry"]
+    assert [r.name for r in requests][-2:] == ["part.clearance", "GroovePose.ry"]
     _, found = scenario_parameters(REMOVAL, requests)
     assert (found[0].nominal, found[0].low, found[0].high) == (0.3, 0.1, 0.5)
     assert not found[1].log_scale

@@ -129,11 +129,11 @@ def test_ctrl_c_leaves_a_state_that_resumes_to_the_same_result(
     [
         (("--parameters", "contact.fricton"), "did you mean 'friction'"),
         (("--objective", "static_wrench"), "transitions or rollout"),
-        (("--parameters", "contact.friction", "--set", "lock.travel=1"), "--scenario"),
+        (("--parameters", "contact.friction", "--set", "part.travel=1"), "--scenario"),
         ((), "--parameters"),
         (  # nobody got as far as the end of the groove
-            ("--parameters", "contact.friction", "lock.travel", "--workers", "1"),
-            "lock.travel: has no effect on this log's channels",
+            ("--parameters", "contact.friction", "part.travel", "--workers", "1"),
+            "part.travel: has no effect on this log's channels",
         ),
     ],
 )

@@ -37,7 +37,7 @@ def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="KEY=VALUE",
         dest="overrides",
-        help="override one field, e.g. lock.clearance=0.0003, effects.0.ry=0.02 or "
+        help="override one field, e.g. part.clearance=0.0003, effects.0.ry=0.02 or "
         "'effects=[!SensorBias {fx: 0.5}]'; repeatable",
     )
     add_import_argument(parser)

@@ -44,7 +44,7 @@ _EXAMPLES = """examples:
   drake-disasm simulate --policy admittance --explore 0.15 --episodes 11 \\
       --no-meshcat --hidden removal_turned --record out/log
   drake-disasm identify --log out/log --out out/fit \\
-      --parameters contact.friction lock.clearance GroovePose.ry
+      --parameters contact.friction part.clearance GroovePose.ry
   drake-disasm simulate --scenario out/fit/scenario.yaml
   drake-disasm identify --log out/log --parameters bounds.yaml --out out/fit_2
   drake-disasm identify --log out/readings --out out/sensor    a static_wrench log

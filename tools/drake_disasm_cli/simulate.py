@@ -33,7 +33,7 @@ _EXAMPLES = """examples:
   drake-disasm simulate --station twin --no-meshcat --episodes 10 --record out/log
   drake-disasm simulate --station twin --no-meshcat --episodes 20 --record out/log \\
       --resume                                       ten more
-  drake-disasm simulate --set lock.clearance=0.0002 --set contact.friction=0.3
+  drake-disasm simulate --set part.clearance=0.0002 --set contact.friction=0.3
   drake-disasm simulate --html out/removal.html      a page that plays offline
   drake-disasm simulate --no-meshcat --episodes 11 --record out/hidden \\
       --policy admittance --explore 0.15 --hidden removal_turned

@@ -16,7 +16,7 @@ _SLOWLY = MotionTable(4.0 * MOTION.time, MOTION.q)
 
 
 def test_the_workspace_holds_an_arm_that_lifts_the_bolt_beyond_it(monkeypatch) -> None:
-    monkeypatch.setattr(way, "_PULL", 0.06)
+    monkeypatch.setattr(way, "_IN_PART", 0.06)
     with fake_hardware(load_scenario("removal")) as fake:
         player = MotionPlayer(fake.station, MOTION)
         with pytest.raises(HoldError, match="workspace"):

@@ -25,7 +25,7 @@ MOTION = MotionTable(_TIME, _POSTURE - _SWING[:, None] * np.eye(7)[[1, 3]].sum(a
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The way takes two seconds, not ten."""
-    for name, speed in (("_PULL", 0.15), ("_LIFT", 0.5), ("_TURN", 1.0)):
+    for name, speed in (("_IN_PART", 0.15), ("_OUT", 0.5), ("_TURN", 1.0)):
         monkeypatch.setattr(way, name, speed)
     monkeypatch.setattr(way, "_REST", 0.1)
     yield
@@ -42,7 +42,7 @@ def test_the_way_leaves_the_groove_along_it_and_then_upwards(hasty: None) -> Non
     whole, begin = with_way(station, MOTION)
     before = whole.q[whole.time < begin]
     p = np.array([station.coordinates.pose(q).translation() for q in before])
-    end = station.scenario.lock.end
+    end = station.scenario.part.stages[0].end
     in_groove = p[: int(np.argmax(p[:, 1] > 1e-4))]
     assert in_groove[-1, 0] == pytest.approx(end, abs=1e-4)
     np.testing.assert_allclose(in_groove[:, 1:], 0.0, atol=1e-4)

@@ -184,7 +184,7 @@ def test_scenario_hash_is_of_content() -> None:
     removal = scenario_hash(load_scenario("removal"))
     assert removal == scenario_hash(load_scenario("removal"))
     assert len(removal) == 64
-    for override in ("lock.clearance=0.0003", "effects=[!SensorBias {fx: 0.5}]"):
+    for override in ("part.clearance=0.0003", "effects=[!SensorBias {fx: 0.5}]"):
         assert removal != scenario_hash(load_scenario("removal", [override]))
 
 

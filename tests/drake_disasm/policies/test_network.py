@@ -134,7 +134,7 @@ def test_policy_of_another_task_is_refused(policy, changes, override, words):
 
 
 def test_policy_carries_over_to_other_locks_errors_and_wider_bounds(policy):
-    overrides = ["lock.clearance=0.0003", "effects=[!SensorBias {fx: 0.5}]"]
+    overrides = ["part.clearance=0.0003", "effects=[!SensorBias {fx: 0.5}]"]
     overrides += ["task.max_translation=0.005", "task.max_rotation=0.05"]
     overrides += ["task.steps=200", "imprecision=0.0003"]
     policy.check_fits(load_scenario("chapter4", overrides))

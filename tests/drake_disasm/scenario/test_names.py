@@ -16,7 +16,7 @@ from tests.refusals import refused
 
 #: Names with the paths that they stand for in removal_turned, which lists a GroovePose.
 NAMES = {
-    "lock.clearance": "lock.clearance",
+    "part.clearance": "part.clearance",
     "task.reward.w_f": "task.reward.w_f",
     "imprecision": "imprecision",
     "gripper.stiffness.2": "gripper.stiffness.2",
@@ -27,15 +27,15 @@ NAMES = {
 }
 #: Names that lead nowhere, with what the message says.
 UNKNOWN = {
-    "lock.clearence": "did you mean 'clearance'?",
-    "clearance": "it belongs to lock",
-    "lok.clearance": "did you mean 'lock'?",
+    "part.clearence": "did you mean 'clearance'?",
+    "clearance": "it belongs to part",
+    "prt.clearance": "did you mean 'part'?",
     "GroovePse.ry": "did you mean 'GroovePose'?",
     "GroovePose.rw": "known: rx, ry, rz",
     "GroovePose": "'' does not exist",
     "effects.1.ry": "the scenario lists 1 effects, counted from 0",
     "gripper.stiffness.6": "there is no number 6 of 6; count from 0",
-    "lock.clearance.x": "'x' is not part of a number or word",
+    "part.clearance.x": "'x' is not part of a number or word",
     "JointCoulombFriction.size": "write JointCoulombFriction.JOINT.size",
 }
 

@@ -28,7 +28,7 @@ def test_draws_repeat_by_seed_and_stay_in_their_range() -> None:
 
 @pytest.mark.parametrize(("text", "message"), [
     (RANGE.format("effects.3.ry", 0, 1), "there is no number 3 of 1"),
-    (RANGE.format("lock", 0, 1), "is not a number that can vary"),
+    (RANGE.format("part", 0, 1), "is not a number that can vary"),
     (RANGE.format("gripper.hold", 0, 1), "is not a number that can vary"),
     (RANGE.format("contact.friction", 0.3, 0.1), "is above high"),
     (RANGE.format("contact.friction", 0.1, 5), "with every high end"),

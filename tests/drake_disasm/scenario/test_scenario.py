@@ -83,7 +83,7 @@ effects:
   - !GroovePose {ry: 0.01}
 randomisation:
   - {parameter: twin.mass, low: 2, high: 3}
-  - {parameter: lock.clearance, low: 0.0003, high: 0.0006}
+  - {parameter: part.clearance, low: 0.0003, high: 0.0006}
 """
 
 
@@ -97,7 +97,7 @@ def test_an_older_scenario_keeps_its_grip_and_what_it_says_of_it(tmp_path):
     scenario = _loaded(tmp_path, OLD)
     assert scenario.gripper.compliance == "rigid"
     assert scenario.effects[0].ry == 0.01
-    assert [r.parameter for r in scenario.randomisation] == ["lock.clearance"]
+    assert [r.parameter for r in scenario.randomisation] == ["part.clearance"]
     text = OLD + "gripper: {hold: weld, compliance: adaptive}\n"
     scenario = _loaded(tmp_path, text)
     assert scenario.gripper.hold == "weld"

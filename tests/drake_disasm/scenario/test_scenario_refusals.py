@@ -12,21 +12,21 @@ from tests.refusals import refused
 _K = "arm: {cartesian_impedance: {stiffness: [%s]}}"
 #: What stands in a file, and what is said about it.
 BAD = {
-    "lock: {clearence: 1e-4}": ["line 1", "'clearence'", "'clearance'"],
-    "lock: {clearance: 0}": ["lock.clearance", "0.0001 to 0.001"],
-    "lock: {clearance: 0.3 mm}": ["line 1", "'0.3 mm'", "number"],
-    "lock: {clearance: .nan}": ["lock.clearance", "nan"],
-    "lock: {clearance: true}": ["clearance"],
-    "lock: {clearance: [1]}": ["wrong shape", "clearance"],
-    "lock: 3": ["line 1", "lock", "not a section"],
-    "lock:": ["lock"],
+    "part: !DoorChain {clearence: 1e-4}": ["line 1", "'clearence'", "'clearance'"],
+    "part: !DoorChain {clearance: 0}": ["part.clearance", "0.0001 to 0.001"],
+    "part: !DoorChain {clearance: 0.3 mm}": ["line 1", "'0.3 mm'", "number"],
+    "part: !DoorChain {clearance: .nan}": ["part.clearance", "nan"],
+    "part: !DoorChain {clearance: true}": ["clearance"],
+    "part: !DoorChain {clearance: [1]}": ["wrong shape", "clearance"],
+    "part: 3": ["line 1", "part", "no name"],
+    "part:": ["part"],
     "1: 2": [],
-    "lock: {clearance": ["line 1", "not YAML"],
-    "lock: {clearance: 0.0003}\nlock: {travel: 0.05}": [],
-    "lock: {clearance: 0.0003}\ncontact:\n  clearance: 0.0003\n": ["line 3"],
-    "lock: " + "{clearance: " * 5000: ["nested deeper"],
-    f"lock: {{clearance: {10**400}}}": ["lock.clearance"],
-    "clearance: 0.0003": ["lock"],
+    "part: !DoorChain {clearance": ["line 1", "not YAML"],
+    "part: !DoorChain {clearance: 0.0003}\npart: !DoorChain {travel: 0.05}": [],
+    "part: !DoorChain {clearance: 0.0003}\ncontact:\n  clearance: 0.0003\n": ["line 3"],
+    "part: " + "{clearance: " * 5000: ["nested deeper"],
+    f"part: !DoorChain {{clearance: {10**400}}}": ["part.clearance"],
+    "clearance: 0.0003": ["part"],
     "effects:": ["effects"],
     "effects: [!GroovePose {ry: 1}]": ["effects.0.ry", "-0.2 to 0.2"],
     "effects: [{}]": ["effects.0", "no name", "GroovePose"],
@@ -78,11 +78,11 @@ def test_a_name_of_no_file_is_one_short_line(name: str) -> None:
 BAD_SETS = {
     "": "key=value",
     "=3": "",
-    "lock.clearance": "key=value",
-    "lock.clearance={": "",
-    "lock.clearnce=1": "'clearance'",
+    "part.clearance": "key=value",
+    "part.clearance={": "",
+    "part.clearnce=1": "'clearance'",
     "lock..clearance=3": "",
-    "lock.clearance.x=3": "",
+    "part.clearance.x=3": "",
     "task.reward=3": "",
     "effects.0=3": "",
     "effects.-1.ry=1": "",
@@ -100,11 +100,11 @@ def test_a_bad_override_is_one_line(override: str) -> None:
 
 
 IMPOSSIBLE = {
-    "lock.head_diameter=0.0053": ["lock.head_diameter: ", "slips through the slot"],
-    "lock.neck_diameter=0.012": ["lock.head_diameter: ", "slips through the slot"],
-    "lock={head_diameter: 0.03, travel: 0.03}": ["lock.travel: ", "no lips"],
+    "part.head_diameter=0.0053": ["part.head_diameter: ", "slips through the slot"],
+    "part.neck_diameter=0.012": ["part.head_diameter: ", "slips through the slot"],
+    "part=!DoorChain {head_diameter: 0.03, travel: 0.03}": ["part.travel: ", "no lips"],
     "task.room=[0, 0.01, 0.01]": ["task.room: ", "out of range"],
-    "lock.travel=0.05": ["task.travel_success: ", "never reached"],
+    "part.travel=0.05": ["task.travel_success: ", "never reached"],
     "gripper.stiffness=[600, 600, 0, 10, 10, 10]": ["gripper.stiffness"],
     "gripper.stiffness=[600, 600, -5, 10, 10, 10]": ["gripper.stiffness"],
     "gripper.damping_ratio=0": ["gripper.damping_ratio"],
@@ -120,8 +120,8 @@ def test_what_cannot_be_is_refused(override: str) -> None:
 
 def test_a_scenario_made_in_code_is_checked_too() -> None:
     scenario = load_scenario("removal")
-    scenario.lock.clearance = 0.0
-    with refused("lock.clearance"):
+    scenario.part.clearance = 0.0
+    with refused("part.clearance"):
         make_station("twin", scenario)
 
 
@@ -141,7 +141,10 @@ def test_a_logs_scenario_is_checked_too(mapping: dict) -> None:
 
 
 def test_later_overrides_win_and_leave_the_rest_of_their_section() -> None:
-    overrides = ["lock.clearance=2e-4", "lock={clearance: 3e-4, travel: 0.05}"]
+    overrides = [
+        "part.clearance=2e-4",
+        "part=!DoorChain {clearance: 3e-4, travel: 0.05}",
+    ]
     scenario = load_scenario("removal", [*overrides, "task.reward.w_f=0.25"])
-    assert (scenario.lock.clearance, scenario.lock.travel) == (3e-4, 0.05)
+    assert (scenario.part.clearance, scenario.part.travel) == (3e-4, 0.05)
     assert (scenario.task.reward.w_f, scenario.task.reward.w_dis) == (0.25, 1.6)

@@ -110,7 +110,7 @@ def test_begin_and_the_scenarios_effects_leave_it_and_come_back_to_it(station):
 def test_groove_and_materials_are_the_effects(station: SimulatedStation) -> None:
     context = station.CreateDefaultContext()
     effects = station.scenario.effects
-    expected = fx.environment_at(station.lock.part.environment, effects, fx.AT_REST)
+    expected = fx.environment_at(station.lock.environment, effects, fx.AT_REST)
     assert station.true_groove_pose(context).IsExactlyEqualTo(expected.X_GnG)
     inspector = station.GetOutputPort("query_object").Eval(context).inspector()
     for geometry in (*station.lock.groove_ids, *station.lock.bolt_ids.values()):
@@ -198,7 +198,7 @@ def test_a_diagram_that_lacks_a_command_is_refused(name, port, remedy, request):
 
 def test_a_reconfigured_twin_begins_as_a_new_one() -> None:
     """Its default Context is the old scenario's; `begin` goes by the new one."""
-    other = load_scenario("removal_turned", [QUIET, "lock.clearance=3e-4"])
+    other = load_scenario("removal_turned", [QUIET, "part.clearance=3e-4"])
     other.gripper.stiffness = [2.0 * k for k in other.gripper.stiffness]
     reused, fresh = TwinStation(load_scenario("removal", [QUIET])), TwinStation(other)
     context = reused.CreateDefaultContext()

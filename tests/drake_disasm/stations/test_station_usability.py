@@ -37,7 +37,7 @@ def station(request: pytest.FixtureRequest) -> Station:
 
 
 def test_a_scenario_is_given_by_name_by_file_or_as_an_object(tmp_path: Path) -> None:
-    expected = load_scenario("sliding_randomised", ["lock.clearance=0.0003"])
+    expected = load_scenario("sliding_randomised", ["part.clearance=0.0003"])
     file = tmp_path / "own.yaml"
     file.write_text(dump_scenario(expected))
     for given in (str(file), file, expected):

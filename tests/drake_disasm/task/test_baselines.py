@@ -15,7 +15,7 @@ from drake_disasm.task.simulation import TaskSimulation
 F_MAX = 20.0  # N
 SCENARIO = load_scenario("removal")
 GEOMETRY = TaskGeometry.of(SCENARIO)
-HOVER = GEOMETRY.lift_needed - 0.001  # m, just below the height that counts as out
+HOVER = GEOMETRY.ends[-1] - 0.001  # m, just below the height that counts as out
 
 
 def _episodes(

@@ -151,7 +151,7 @@ def test_a_system_that_is_no_policy_or_elsewhere_is_refused(scenario):
     bad = AsSystem(lambda s: np.full(6, np.nan))
     with refused("an action must be finite"):
         Simulator(_own_diagram(scenario, "twin", bad)[0]).AdvanceTo(0.01)
-    clearance = "randomisation=[{parameter: lock.clearance, low: 3e-4, high: 5e-4}]"
+    clearance = "randomisation=[{parameter: part.clearance, low: 3e-4, high: 5e-4}]"
     wide = load_scenario("removal", [clearance])  # needs a diagram anew
     with refused("can't move to another diagram"):
         TaskSimulation(wide, "twin", AsSystem(make_policy("straight"))).reset(0)

@@ -14,17 +14,17 @@ TURNED = load_scenario(
     ["ft_sensor.noise=[0, 0, 0, 0, 0, 0]", "task.max_translation=0.003"],
 )
 OTHER = with_values(TURNED, {
-    "lock.clearance": 0.0006, "lock.travel": 0.05, "contact.friction": 0.35,
+    "part.clearance": 0.0006, "part.travel": 0.05, "contact.friction": 0.35,
     "contact.modulus": 1e9, "contact.dissipation": 5.0, "effects.0.ry": 0.02,
     "gripper.stiffness.1": 800.0, "gripper.damping_ratio": 0.8, "arm.stiffness.3": 6e3,
 })  # fmt: skip
-THICK = with_values(TURNED, {"lock.neck_diameter": 0.0051})  # another plant
+THICK = with_values(TURNED, {"part.neck_diameter": 0.0051})  # another plant
 IMPACT = load_scenario(
     "removal_turned", ["contact.model=impact", "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"]
 )
 OTHER_IMPACT = with_values(IMPACT, {
     "contact.impact.stiffness": 50.0, "contact.impact.exponent": 1.3,
-    "contact.friction": 0.1, "lock.clearance": 0.0005, "gripper.stiffness.2": 900.0,
+    "contact.friction": 0.1, "part.clearance": 0.0005, "gripper.stiffness.2": 900.0,
     "effects.0.ry": 0.01,
 })  # fmt: skip
 ACTIONS = np.random.default_rng(0).uniform(-1, 1, (6, 6)) * [

@@ -27,7 +27,7 @@ def _columns(scenario: Scenario, seed: int = 3) -> dict[str, np.ndarray]:
 
 def test_a_range_of_one_value_is_that_value() -> None:
     """Noise too is what it is without ranges: the draws have a stream of their own."""
-    values = {"effects.0.ry": 0.04, "lock.clearance": 0.0003, "contact.friction": 0.3}
+    values = {"effects.0.ry": 0.04, "part.clearance": 0.0003, "contact.friction": 0.3}
     short = with_values(load_scenario("removal_turned", ["task.steps=20"]), values)
     expected = _columns(short)
     ranged = _columns(_ranged(*((name, v, v) for name, v in values.items())))
@@ -44,7 +44,7 @@ def test_effects_change_in_place_and_anything_else_rebuilds() -> None:
     diagram, first = simulation.diagram, simulation.drawn
     simulation.reset(1)
     assert simulation.diagram is diagram and simulation.drawn != first
-    simulation = TaskSimulation(_ranged(("lock.clearance", 3e-4, 5e-4)), "twin")
+    simulation = TaskSimulation(_ranged(("part.clearance", 3e-4, 5e-4)), "twin")
     simulation.reset(0)
     diagram = simulation.diagram
     simulation.reset(0)

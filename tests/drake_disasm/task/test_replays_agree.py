@@ -76,8 +76,8 @@ def test_what_a_scenario_gives_does_not_depend_on_the_others():
     values = [
         {},
         {"contact.impact.stiffness": 50.0, "contact.impact.depth": 0.3},
-        {"gripper.stiffness.2": 900.0, "lock.clearance": 0.0005},
-        {"effects.0.ry": 0.01, "lock.neck_diameter": 0.0051},
+        {"gripper.stiffness.2": 900.0, "part.clearance": 0.0005},
+        {"effects.0.ry": 0.01, "part.neck_diameter": 0.0051},
     ]
     scenarios = [with_values(TURNED, each) for each in values]
     given = [steps(TURNED).select(np.arange(COUNT) < n) for n in (24, 7, 1, 12)]

@@ -5,10 +5,10 @@ import pytest
 from pydrake.math import RotationMatrix
 from pydrake.multibody.tree import BodyIndex
 
-from drake_disasm.cell.lock_shape import LockShape
 from drake_disasm.cell.twin_parameters import bolt_stiffness
+from drake_disasm.parts import DoorChain
 from drake_disasm.policies import make_policy
-from drake_disasm.scenario import LockConfig, load_scenario
+from drake_disasm.scenario import load_scenario
 from drake_disasm.task.diagram_replay import TwinReplay
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.simulation import TaskSimulation
@@ -92,7 +92,7 @@ def test_an_episode_ends_as_with_hydroelastic_contact():
 def test_a_step_without_a_balance_is_an_error():
     conditions = ImpactConditions(
         law=ImpactLaw(100.0, 1.5, 1.0, 0.1),
-        shape=LockShape.of(LockConfig()),
+        shape=DoorChain().gaps,
         around=Surroundings(np.zeros(1), np.eye(3)[None], *np.zeros((2, 1, 3))),
         M=np.eye(6),
         K=np.ones(6),

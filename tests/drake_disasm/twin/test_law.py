@@ -2,7 +2,7 @@
 
 import pytest
 
-from drake_disasm.scenario import ImpactConfig
+from drake_disasm.parts import ImpactConfig
 from drake_disasm.twin.equations import normal_force
 from drake_disasm.twin.law import ImpactLaw
 

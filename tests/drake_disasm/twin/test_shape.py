@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from drake_disasm.cell.lock_shape import LockShape
-from drake_disasm.scenario import LockConfig
+from drake_disasm.parts import DoorChain
 from drake_disasm.twin.equations import (
     ARM,
     DEPTH,
@@ -23,7 +22,7 @@ MM = 1e-3
 def places(R, p):
     w = np.full(SIZE, np.nan)
     for place, numbers in (
-        (LOCK, LockShape.of(LockConfig()).row),
+        (LOCK, DoorChain().gaps.row),
         (R_GB, R),
         (P_GBO, p),
     ):
@@ -70,7 +69,7 @@ def test_a_quarter_turn_changes_nothing_for_a_round_bolt():
 
 
 def test_another_clearance_is_the_lock_s_with_that_clearance():
-    wide = LockShape.of(LockConfig(clearance=6e-4))
-    narrow = LockShape.of(LockConfig(clearance=2e-4)).with_clearance(6e-4)
+    wide = DoorChain(clearance=6e-4).gaps
+    narrow = DoorChain(clearance=2e-4).gaps.with_clearance(6e-4)
     assert narrow.slot == pytest.approx(wide.slot, abs=1e-12)
     assert wide.slot - wide.neck == pytest.approx(3e-4, abs=1e-12)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw
 
-from drake_disasm.cell.lock_shape import LockShape
-from drake_disasm.scenario import LockConfig
+from drake_disasm.parts import DoorChain
 from drake_disasm.twin import equations
 from drake_disasm.twin.conditions import ImpactConditions, Surroundings
 from drake_disasm.twin.contact_step import ImpactStep
@@ -18,7 +17,7 @@ M = np.diag([3.0, 3.0, 3.0, 0.02, 0.02, 0.02])
 K, D = np.array([15e3] * 3 + [150.0] * 3), np.array([400.0] * 3 + [3.0] * 3)
 TURNED = ImpactConditions(
     law=ImpactLaw(300.0, 1.4, 2.0, 0.1),
-    shape=LockShape.of(LockConfig()),
+    shape=DoorChain().gaps,
     around=Surroundings(
         np.array([0.2]),
         RollPitchYaw(0.0, 0.03, 0.0).ToRotationMatrix().matrix()[None],

@@ -124,7 +124,7 @@ def test_where_a_model_leads_nowhere_steps_begin_as_the_wrench_says(dragged):
     """At a parameter set that the scenario refuses, say."""
     log, scenario, _ = dragged
     model = TwinModel([log], scenario, ())
-    broken = dataclasses.replace(scenario.lock, neck_diameter=0.011)
+    broken = dataclasses.replace(scenario.part, neck_diameter=0.011)
     refused = model.replace(scenario=dataclasses.replace(scenario, lock=broken))
     assert refused.with_begins(_NOTHING) is refused
 

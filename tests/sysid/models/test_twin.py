@@ -5,8 +5,8 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from drake_disasm.common.spatial import rotation_from_vector, shift_and_express
+from drake_disasm.parts import ImpactConfig
 from drake_disasm.scenario import load_scenario, validate
-from drake_disasm.scenario.schema import ImpactConfig
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models import PredictionError
 from sysid.models.twin import TwinModel, at_sensor
@@ -15,7 +15,7 @@ from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 from sysid.workers import Workers
 from tests.refusals import refused
 
-NAMES = ("contact.friction", "lock.clearance", "GroovePose.ry")
+NAMES = ("contact.friction", "part.clearance", "GroovePose.ry")
 
 
 def make(log, scenario, names=NAMES, **options) -> TwinModel:
@@ -113,7 +113,7 @@ def test_channels_are_weighted_by_the_sensors_noise(log, turned):
 
 
 def test_a_scenario_that_cannot_be_is_a_failed_prediction(log, turned):
-    model = make(log, turned, ["lock.neck_diameter"])
+    model = make(log, turned, ["part.neck_diameter"])
     with pytest.raises(PredictionError, match="slips through"):
         model.predict(np.array([0.011]), slice(0, 2))
     assert model.predict(np.array([0.005]), slice(0, 2)).shape == (2, 12)

@@ -162,13 +162,13 @@ def test_a_parameter_set_that_fails_leaves_the_others_of_its_batch(tmp_path):
     scenario = _scenario("impact")
     _, log = _log(tmp_path / "log", scenario, SensorMounting(ry=0.1))
     scenario, parameters = scenario_parameters(
-        scenario, [ParameterRequest("lock.clearance")]
+        scenario, [ParameterRequest("part.clearance")]
     )
     model = TwinModel([log], scenario, parameters)
     thetas = np.array([[4e-4], [-1.0], [5e-4]])
     assert model.together >= len(thetas)
     found = model.simulate_all(thetas, slice(0, _STEPS))
-    assert "lock.clearance" in found[1]
+    assert "part.clearance" in found[1]
     for i in (0, 2):
         alone = model.simulate(thetas[i], slice(0, _STEPS))
         np.testing.assert_allclose(found[i], alone, rtol=1e-9, atol=1e-11)

@@ -19,7 +19,6 @@ from pydrake.geometry import (
 from pydrake.multibody.plant import CoulombFriction
 
 from drake_disasm.effects import Environment
-from drake_disasm.scenario import LockConfig
 
 _FRICTION_STEP = 1e-4  # below the scatter of any measurement
 _PAD_FRICTION = 0.8  # steel on rubber, as on the gripper's pads
@@ -69,7 +68,10 @@ def groove_material(environment: Environment) -> ProximityProperties:
 
 
 def bolt_materials(
-    environment: Environment, lock: LockConfig, resolution: float
+    environment: Environment,
+    neck_diameter: float,
+    head_diameter: float,
+    resolution: float,
 ) -> dict[str, ProximityProperties]:
     """Returns the materials of neck and head by name.
 
@@ -78,12 +80,12 @@ def bolt_materials(
 
     Args:
         environment: friction, moduli and dissipation.
-        lock: dimensions.
+        neck_diameter, head_diameter: of the bolt [m].
         resolution: edge length on the neck's mesh [m].
     """
     neck, head = _surface(environment), _surface(environment)
-    neck_edge = facet_length(lock.neck_diameter, resolution)
-    head_edge = facet_length(lock.head_diameter, 2 * resolution)
+    neck_edge = facet_length(neck_diameter, resolution)
+    head_edge = facet_length(head_diameter, 2 * resolution)
     AddCompliantHydroelasticProperties(neck_edge, environment.modulus, neck)
     AddCompliantHydroelasticProperties(head_edge, environment.head_modulus, head)
     return {"neck": neck, "head": head}

@@ -3,7 +3,6 @@
 import dataclasses
 
 from drake_disasm.common.arrays import Array
-from drake_disasm.scenario import LockConfig
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,27 +33,6 @@ class LockShape:
     head: float | Array
     top: float | Array
     bottom: float | Array
-
-    @classmethod
-    def of(cls, lock: LockConfig) -> "LockShape":
-        """Returns the shape of a lock's dimensions."""
-        lip = lock.lip_thickness / 2
-        half_hole = (lock.head_diameter + lock.keyhole_clearance) / 2
-        top = -lip - lock.axial_clearance / 2  # half the axial play below the lips
-        return cls(
-            slot=(lock.neck_diameter + lock.clearance) / 2,
-            wall=(lock.head_diameter + lock.channel_clearance) / 2,
-            lips_end=lock.travel - half_hole,
-            lip=lip,
-            under_lip=-lip,
-            floor=-lip - lock.head_thickness - lock.axial_clearance,
-            start=-half_hole,
-            end=lock.travel + half_hole,
-            neck=lock.neck_diameter / 2,
-            head=lock.head_diameter / 2,
-            top=top,
-            bottom=top - lock.head_thickness,
-        )
 
     def with_clearance(self, clearance: float | Array) -> "LockShape":
         """Returns the shape with another slot: its width less the neck's diameter."""

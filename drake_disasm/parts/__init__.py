@@ -1,0 +1,27 @@
+"""What is taken apart: a body that stays, and one that is gripped and moved.
+
+To add one to the library: a file, and its import below. To add one of your own from
+anywhere else: `register_part`.
+"""
+
+from drake_disasm.parts.base import AXES, Part, Solid, Stage
+from drake_disasm.parts.contact import ContactConfig, ImpactConfig
+from drake_disasm.parts.registry import find_part, register_part, registered_parts
+
+# Parts are registered and documented in the order of these lines.
+# isort: off
+from drake_disasm.parts.door_chain import DoorChain
+# isort: on
+
+__all__ = [
+    "AXES",
+    "ContactConfig",
+    "DoorChain",
+    "ImpactConfig",
+    "Part",
+    "Solid",
+    "Stage",
+    "find_part",
+    "register_part",
+    "registered_parts",
+]

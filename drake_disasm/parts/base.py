@@ -1,0 +1,175 @@
+"""What a part to be taken apart says of itself, for every user of its shapes.
+
+A part is a dataclass, so that a scenario can state it (`part: !PegInHole {...}`) and
+identification can fit its fields. To write one: derive from `Part`, give it fields by
+`drake_disasm.common.quantity`, and put `@register_part` above it.
+
+Frames: G is fixed to the body that stays, B to the one that is moved; as an episode
+begins they coincide. y points out of the fixed body, back at the robot; the fingers
+close along z.
+"""
+
+import abc
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+from pydrake.geometry import ProximityProperties, Shape
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import SpatialInertia
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.effects import Environment
+from drake_disasm.parts.contact import ContactConfig
+from drake_disasm.parts.lock_shape import LockShape
+
+#: A solid: its pose in the body's frame, and its shape.
+Solid = tuple[RigidTransform, Shape]
+
+#: The coordinates of the moved body in G, in the order of the task's state.
+AXES = ("x", "y", "z", "u", "v", "w")
+
+
+@dataclasses.dataclass(frozen=True)
+class Stage:
+    """A part of the way by which the moved body leaves: along or about one axis of G.
+
+    Attributes:
+        axis: number in AXES.
+        end: where it ends [m, rad].
+        effort: with which a scripted policy pushes along it [N, N m].
+        radius: of a turn, at which its way is counted [m].
+    """
+
+    axis: int
+    end: float
+    effort: float
+    radius: float = 1.0
+
+    @property
+    def is_turn(self) -> bool:
+        """Whether it is about the axis."""
+        return self.axis >= 3
+
+
+@dataclasses.dataclass
+class Part(abc.ABC):
+    """A body that is gripped and moved, in another that stays where it is.
+
+    Both are made of solids by name.
+
+    Attributes:
+        fixed_fields: names of the fields that shape the fixed body alone.
+    """
+
+    fixed_fields: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    @abc.abstractmethod
+    def stages(self) -> tuple[Stage, ...]:
+        """The way out, one or two stages; the last is no turn, and ends in the open."""
+
+    @property
+    def gaps(self) -> LockShape | None:
+        """The gaps between the bodies, nominal, for IMPACT; None has no such form."""
+        return None
+
+    def environment(self, contact: ContactConfig) -> Environment:
+        """Returns the moved body's environment before effects.
+
+        Args:
+            contact: what the bodies are made of.
+        """
+        return Environment(
+            X_GnG=RigidTransform(),
+            friction=contact.friction,
+            modulus=contact.modulus,
+            head_modulus=contact.head_modulus,
+            dissipation=contact.dissipation,
+            clearance=self.play,
+            impact_stiffness=contact.impact.stiffness,
+            impact_exponent=contact.impact.exponent,
+        )
+
+    @property
+    @abc.abstractmethod
+    def play(self) -> float:
+        """Of the moved body in the fixed one: difference of their widths [m]."""
+
+    @property
+    @abc.abstractmethod
+    def M_fixed_G(self) -> SpatialInertia:
+        """Inertia of the fixed body about Go."""
+
+    @property
+    @abc.abstractmethod
+    def M_moved_B(self) -> SpatialInertia:
+        """Inertia of the moved body about Bo."""
+
+    @property
+    @abc.abstractmethod
+    def bottom(self) -> float:
+        """y of the lowest face of the fixed body in G, which lies on the bench [m]."""
+
+    @property
+    @abc.abstractmethod
+    def surface(self) -> float:
+        """y of the face in G above which the moved body can be gripped [m]."""
+
+    @property
+    @abc.abstractmethod
+    def grip_width(self) -> float:
+        """Width of the moved body between the fingers, along z [m]."""
+
+    @property
+    @abc.abstractmethod
+    def touch_radius(self) -> float:
+        """Greatest distance of contact from the moved body's y axis [m]."""
+
+    @property
+    @abc.abstractmethod
+    def touch_depth(self) -> float:
+        """Along y, of what touches at that radius [m]."""
+
+    @property
+    @abc.abstractmethod
+    def moved_solids(self) -> Mapping[str, Solid]:
+        """The solids of the moved body; the one named `grip` touches the fingers."""
+
+    @abc.abstractmethod
+    def fixed_solids(self, environment: Environment) -> Mapping[str, Solid]:
+        """Returns the solids of the fixed body, which effects may have reshaped."""
+
+    @abc.abstractmethod
+    def materials(
+        self, environment: Environment, resolution: float
+    ) -> Mapping[str, ProximityProperties]:
+        """Returns the hydroelastic properties of all solids, by name.
+
+        Args:
+            environment: of the moved body.
+            resolution: edge length on the compliant body's mesh [m].
+        """
+
+    def refuse_impossible(self) -> None:  # noqa: B027, most parts have none
+        """Raises DisasmError for dimensions that don't go together."""
+
+    @property
+    def reach(self) -> float:
+        """Longest way of a stage that is no turn [m]."""
+        return max((s.end for s in self.stages if not s.is_turn), default=math.inf)
+
+    def required_gaps(self) -> LockShape:
+        """Returns `gaps`.
+
+        Raises:
+            DisasmError: the part has none; says what to use instead.
+        """
+        if self.gaps is None:
+            raise DisasmError(
+                f"contact.model: 'impact' is a law for simple gaps, and "
+                f"{type(self).__name__} has none; set it to hydroelastic, and leave "
+                "out what needs a batch (--envs, --lockstep)"
+            )
+        return self.gaps
