@@ -11,6 +11,7 @@ from drake_disasm.parts.registry import find_part, register_part, registered_par
 # Parts are registered and documented in the order of these lines.
 # isort: off
 from drake_disasm.parts.door_chain import DoorChain
+from drake_disasm.parts.peg_in_hole import PegInHole
 # isort: on
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "DoorChain",
     "ImpactConfig",
     "Part",
+    "PegInHole",
     "Solid",
     "Stage",
     "find_part",

@@ -10,18 +10,15 @@ from typing import ClassVar
 import numpy as np
 from pydrake.geometry import Box, Cylinder, ProximityProperties
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.tree import SpatialInertia, UnitInertia
+from pydrake.multibody.tree import SpatialInertia
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import quantity
 from drake_disasm.effects import Environment
-from drake_disasm.parts.base import Part, Solid, Stage
+from drake_disasm.parts.base import Solid, Stage
+from drake_disasm.parts.gripped_block import GrippedBlock
 from drake_disasm.parts.lock_shape import LockShape
-from drake_disasm.parts.materials import (
-    bolt_materials,
-    grip_material,
-    groove_material,
-)
+from drake_disasm.parts.materials import bolt_materials, rigid_material
 from drake_disasm.parts.registry import register_part
 
 _BORDER = 0.010  # m, solid rim around the channel
@@ -32,7 +29,7 @@ _PUSH, _LIFT = 12.0, 8.0  # N, of a scripted policy
 
 @register_part
 @dataclasses.dataclass
-class DoorChain(Part):
+class DoorChain(GrippedBlock):
     """The lock of a door chain (own design, see models/SOURCES.md).
 
     The bolt slides along x until its head is in the keyhole, then it is lifted.
@@ -56,15 +53,6 @@ class DoorChain(Part):
     travel: float = quantity(0.060, "m", "from A to B", low=0.02, high=0.15)
     keyhole_clearance: float = quantity(
         0.001, "m", "keyhole width minus head diameter", low=2e-4, high=5e-3
-    )
-    grip_size: list[float] = quantity(
-        [0.024, 0.030, 0.012], "m", "bolt's grip along x, y, z", low=0.004, high=0.05
-    )
-    grip_standoff: float = quantity(
-        0.003, "m", "gap between plate and grip", low=0.001, high=0.05
-    )
-    bolt_mass: float = quantity(
-        0.2, "kg", "of the bolt and its chain", low=0.001, high=1.0
     )
 
     fixed_fields: ClassVar[tuple[str, ...]] = (
@@ -120,11 +108,6 @@ class DoorChain(Part):
         return self.head_thickness
 
     @property
-    def grip_width(self) -> float:
-        """See Part."""
-        return self.grip_size[2]
-
-    @property
     def surface(self) -> float:
         """See Part: the plate's upper face."""
         return float(self.gaps.lip)
@@ -133,11 +116,6 @@ class DoorChain(Part):
     def bottom(self) -> float:
         """See Part: the plate's lower face."""
         return float(self.gaps.floor) - _FLOOR
-
-    @property
-    def grip_height(self) -> float:
-        """y of the grip's middle in B [m]."""
-        return self.surface + self.grip_standoff + self.grip_size[1] / 2
 
     def fixed_solids(self, environment: Environment) -> dict[str, Solid]:
         """See Part.
@@ -175,10 +153,9 @@ class DoorChain(Part):
         return {name: (np.array(a), np.array(b)) for name, (a, b) in corners.items()}
 
     @property
-    def moved_solids(self) -> dict[str, Solid]:
-        """See Part: neck, head and grip of the bolt."""
-        top, grip = float(self.gaps.top), self.grip_height
-        neck_end = grip - self.grip_size[1] / 2
+    def touching_solids(self) -> dict[str, Solid]:
+        """See GrippedBlock: neck and head of the bolt."""
+        top, neck_end = float(self.gaps.top), self.grip_height - self.grip_size[1] / 2
         return {
             "neck": (
                 RigidTransform(_R_Y_AXIS, [0, (top + neck_end) / 2, 0]),
@@ -188,18 +165,16 @@ class DoorChain(Part):
                 RigidTransform(_R_Y_AXIS, [0, top - self.head_thickness / 2, 0]),
                 Cylinder(self.head_diameter / 2, self.head_thickness),
             ),
-            "grip": (RigidTransform([0, grip, 0]), Box(*self.grip_size)),
         }
 
-    def materials(
+    def touching_materials(
         self, environment: Environment, resolution: float
     ) -> dict[str, ProximityProperties]:
-        """See Part; the grip's has the friction of the pads on it."""
-        groove = groove_material(environment)
-        materials = dict.fromkeys(self.fixed_solids(environment), groove)
+        """See GrippedBlock."""
+        groove = rigid_material(environment)
         diameters = self.neck_diameter, self.head_diameter
-        materials |= bolt_materials(environment, *diameters, resolution)
-        return materials | {"grip": grip_material(environment.dissipation)}
+        bolt = bolt_materials(environment, *diameters, resolution)
+        return dict.fromkeys(self.fixed_solids(environment), groove) | bolt
 
     @property
     def M_fixed_G(self) -> SpatialInertia:
@@ -207,14 +182,6 @@ class DoorChain(Part):
         return SpatialInertia.SolidBoxWithDensity(
             8500.0, self.travel, self.lip_thickness, 2 * _BORDER
         )
-
-    @property
-    def M_moved_B(self) -> SpatialInertia:
-        """See Part: as if all the bolt's mass were in its grip."""
-        p_BoBcm_B = np.array([0.0, self.grip_height, 0.0])
-        box = UnitInertia.SolidBox(*self.grip_size)
-        mass = self.bolt_mass
-        return SpatialInertia.MakeFromCentralInertia(mass, p_BoBcm_B, box * mass)
 
     def refuse_impossible(self) -> None:
         """See Part: the lips must hold the head, the keyhole must let it through."""

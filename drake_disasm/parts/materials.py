@@ -1,6 +1,6 @@
-"""What the lock's parts are made of, as a scene graph's proximity properties.
+"""What bodies are made of, as a scene graph's proximity properties.
 
-The groove is rigid and the bolt's neck and head are compliant. Drake takes the
+The fixed body is rigid, as a groove, and the moved one compliant. Drake takes the
 contact's normals from the rigid side: from the groove they are those of its flat
 faces, while a rigid round neck would offer its facets' normals, and the discrete
 solver then resists sliding by a tenth of the normal force at the shipped time step
@@ -60,8 +60,8 @@ def facet_length(diameter: float, resolution: float) -> float:
     return np.pi * diameter / facets * (1 + 1e-6)
 
 
-def groove_material(environment: Environment) -> ProximityProperties:
-    """Returns the groove's material: rigid, with the environment's friction."""
+def rigid_material(environment: Environment) -> ProximityProperties:
+    """Returns a fixed body's material: rigid, with the environment's friction."""
     properties = _surface(environment)
     AddRigidHydroelasticProperties(resolution_hint=1.0, properties=properties)
     return properties
@@ -83,12 +83,27 @@ def bolt_materials(
         neck_diameter, head_diameter: of the bolt [m].
         resolution: edge length on the neck's mesh [m].
     """
-    neck, head = _surface(environment), _surface(environment)
     neck_edge = facet_length(neck_diameter, resolution)
     head_edge = facet_length(head_diameter, 2 * resolution)
-    AddCompliantHydroelasticProperties(neck_edge, environment.modulus, neck)
-    AddCompliantHydroelasticProperties(head_edge, environment.head_modulus, head)
-    return {"neck": neck, "head": head}
+    return {
+        "neck": compliant_material(environment, environment.modulus, neck_edge),
+        "head": compliant_material(environment, environment.head_modulus, head_edge),
+    }
+
+
+def compliant_material(
+    environment: Environment, modulus: float, edge: float
+) -> ProximityProperties:
+    """Returns the material of a moved body's solid.
+
+    Args:
+        environment: its friction and dissipation.
+        modulus: hydroelastic [Pa].
+        edge: length on its mesh [m].
+    """
+    properties = _surface(environment)
+    AddCompliantHydroelasticProperties(edge, modulus, properties)
+    return properties
 
 
 def grip_material(dissipation: float) -> ProximityProperties:

@@ -5,6 +5,7 @@ import yaml
 from drake_disasm.common import bounded_yaml
 
 _RIGID = ("compliance", "rigid")
+_OF_LOCK = {"bolt_mass": "mass"}
 
 
 def upgraded(text: str) -> str:
@@ -41,9 +42,12 @@ def _rename_lock(root: yaml.MappingNode) -> None:
     for key, value in root.value:
         if key.value == "lock" and isinstance(value, yaml.MappingNode):
             key.value, value.tag = "part", "!DoorChain"
+            for word, _ in value.value:
+                word.value = _OF_LOCK.get(word.value, word.value)
     for parameter in _ranged(root):
         if parameter.value.startswith("lock."):
-            parameter.value = f"part.{parameter.value.removeprefix('lock.')}"
+            word = parameter.value.removeprefix("lock.")
+            parameter.value = f"part.{_OF_LOCK.get(word, word)}"
 
 
 def _drop_twin(root: yaml.MappingNode) -> None:

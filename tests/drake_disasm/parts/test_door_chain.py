@@ -63,7 +63,7 @@ def test_heights_add_up(part: DoorChain) -> None:
 
 def test_bolt_weight_and_facets() -> None:
     """Facets by Drake's count: the circumference over the hint, rounded up."""
-    part = DoorChain(bolt_mass=0.3)
+    part = DoorChain(mass=0.3)
     M_B = part.M_moved_B
     assert M_B.get_mass() == 0.3
     middle = part.lip_thickness / 2 + part.grip_standoff + part.grip_size[1] / 2

@@ -118,7 +118,7 @@ def test_a_learned_effect_is_the_diagrams(tmp_path):
     "values",
     [
         {"gripper.stiffness.2": 1200.0, "arm.stiffness.1": 5e3},
-        {"part.bolt_mass": 0.4, "part.neck_diameter": 0.0051},
+        {"part.mass": 0.4, "part.neck_diameter": 0.0051},
         {"contact.impact.stiffness": 200.0, "contact.impact.depth": 0.3},
         {"contact.friction": 0.4, "part.clearance": 6e-4},
     ],

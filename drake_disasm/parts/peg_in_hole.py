@@ -1,0 +1,186 @@
+"""A peg in a hole, round or square, which is pulled out.
+
+G has its origin in the middle of the hole's mouth, y out of the block. B has its origin
+on the peg's axis, at the mouth.
+"""
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+from pydrake.common import MemoryFile
+from pydrake.geometry import Box, Cylinder, InMemoryMesh, Mesh, ProximityProperties
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.tree import SpatialInertia
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import quantity
+from drake_disasm.effects import Environment
+from drake_disasm.parts.base import Solid, Stage
+from drake_disasm.parts.gripped_block import GrippedBlock
+from drake_disasm.parts.materials import (
+    compliant_material,
+    facet_length,
+    rigid_material,
+)
+from drake_disasm.parts.registry import register_part
+
+_RIM = 0.010  # m, of the block around the hole
+_BELOW = 0.001  # m, from the peg's tip to the hole's bottom
+_FLOOR = 0.003  # m, of the block under the hole
+_PULL = 20.0  # N, of a scripted policy
+_SAG = 0.05  # of the play, by which a facet's middle is nearer than its ends
+_R_Y_AXIS = RotationMatrix.MakeXRotation(-np.pi / 2)  # a cylinder along y
+
+
+@register_part
+@dataclasses.dataclass
+class PegInHole(GrippedBlock):
+    """A peg in a hole, round or square.
+
+    It is pulled out along y, without turning. A hole that is tilted is the effect
+    GroovePose.
+    """
+
+    cross_section: str = quantity(
+        "round", "", "of peg and hole", choices=("round", "square")
+    )
+    width: float = quantity(
+        0.010, "m", "diameter or side of the peg", low=0.003, high=0.03
+    )
+    clearance: float = quantity(
+        0.0002, "m", "hole's width minus the peg's", low=2e-5, high=1e-3
+    )
+    depth: float = quantity(0.020, "m", "of the peg in the hole", low=0.002, high=0.08)
+
+    fixed_fields: ClassVar[tuple[str, ...]] = ("clearance",)
+
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """See Part: up, until the tip is level with the block's face."""
+        return (Stage(1, self.depth, _PULL),)
+
+    @property
+    def play(self) -> float:
+        """See Part."""
+        return self.clearance
+
+    @property
+    def touch_radius(self) -> float:
+        """See Part: half the width."""
+        return self.width / 2.0
+
+    @property
+    def touch_depth(self) -> float:
+        """See Part."""
+        return self.depth
+
+    @property
+    def surface(self) -> float:
+        """See Part: the block's upper face."""
+        return 0.0
+
+    @property
+    def bottom(self) -> float:
+        """See Part: the block's lower face."""
+        return -self.depth - _BELOW - _FLOOR
+
+    def fixed_solids(self, environment: Environment) -> dict[str, Solid]:
+        """See Part: the block's floor, and walls around the hole."""
+        width = self.width + float(environment.clearance)
+        outer = width + 2 * _RIM
+        low = -self.depth - _BELOW
+        floor = RigidTransform([0.0, low - _FLOOR / 2, 0.0]), Box(outer, _FLOOR, outer)
+        if self.cross_section == "round":
+            wall = _bushing(width / 2, outer / 2, low, self._facets)
+            return {"wall": (RigidTransform(), wall), "floor": floor}
+        at, long = (width + _RIM) / 2, width + _RIM
+        walls = {
+            "wall_0": ([at, low / 2, _RIM / 2], Box(_RIM, -low, long)),
+            "wall_1": ([_RIM / 2, low / 2, -at], Box(long, -low, _RIM)),
+            "wall_2": ([-at, low / 2, -_RIM / 2], Box(_RIM, -low, long)),
+            "wall_3": ([-_RIM / 2, low / 2, at], Box(long, -low, _RIM)),
+        }
+        return {n: (RigidTransform(p), box) for n, (p, box) in walls.items()} | {
+            "floor": floor
+        }
+
+    @property
+    def touching_solids(self) -> dict[str, Solid]:
+        """See GrippedBlock: the peg."""
+        top = self.surface + self.grip_standoff
+        length, middle = top + self.depth, (top - self.depth) / 2
+        if self.cross_section == "round":
+            X_BP = RigidTransform(_R_Y_AXIS, [0.0, middle, 0.0])
+            return {"peg": (X_BP, Cylinder(self.width / 2, length))}
+        box = Box(self.width, length, self.width)
+        return {"peg": (RigidTransform([0.0, middle, 0.0]), box)}
+
+    def touching_materials(
+        self, environment: Environment, resolution: float
+    ) -> dict[str, ProximityProperties]:
+        """See GrippedBlock: flat on flat is softer, or it chatters."""
+        rigid = rigid_material(environment)
+        edge, modulus = resolution, environment.head_modulus
+        if self.cross_section == "round":
+            finest = np.pi * self.width / self._facets
+            edge = facet_length(self.width, min(resolution, finest))
+            modulus = environment.modulus
+        peg = compliant_material(environment, modulus, edge)
+        return dict.fromkeys(self.fixed_solids(environment), rigid) | {"peg": peg}
+
+    @property
+    def _facets(self) -> int:
+        """How many sides round things have, a multiple of four.
+
+        A facet is nearer to the axis than its ends by r (1 - cos(pi / n)).
+        """
+        most = _SAG * self.clearance / (self.width / 2)
+        return 4 * int(np.ceil(np.pi / np.arccos(1.0 - most) / 4))
+
+    @property
+    def M_fixed_G(self) -> SpatialInertia:
+        """See Part: a block of steel; it never moves."""
+        side = self.width + 2 * _RIM
+        return SpatialInertia.SolidBoxWithDensity(7800.0, side, -self.bottom, side)
+
+    def refuse_impossible(self) -> None:
+        """See Part: a short peg of a large play would tip over."""
+        if self.clearance > self.depth / 4:
+            raise DisasmError(
+                f"part.clearance: {self.clearance:g} m let a peg that is "
+                f"{self.depth:g} m deep (part.depth) tip over; give less than a quarter"
+            )
+
+
+def _bushing(inner: float, outer: float, low: float, facets: int) -> Mesh:
+    """Returns a tube from y = `low` to y = 0, closed, as a mesh.
+
+    Its inner facets are tangent to the hole's circle, two of them across z: across
+    the axes the play is exact.
+
+    Args:
+        inner, outer: radii [m].
+        low: of its lower face [m].
+        facets: of each circle.
+    """
+    angle = 2 * np.pi * (np.arange(facets) + 0.5) / facets
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) / np.cos(np.pi / facets)
+    rings = [(radius, y) for y in (low, 0.0) for radius in (inner, outer)]
+    lines = [
+        f"v {r * x:.12g} {y:.12g} {r * z:.12g}" for r, y in rings for x, z in circle
+    ]
+    bottom_in, bottom_out, top_in, top_out = (
+        1 + ring * facets + np.arange(facets) for ring in range(4)
+    )
+    for one, other in (
+        (top_in, bottom_in),
+        (bottom_in, bottom_out),
+        (bottom_out, top_out),
+        (top_out, top_in),
+    ):
+        a, b = np.roll(one, -1), np.roll(other, -1)
+        for quad in zip(one, other, b, a, strict=True):
+            lines.append("f " + " ".join(map(str, quad)))
+    text = "\n".join(lines).encode()
+    return Mesh(InMemoryMesh(mesh_file=MemoryFile(text, ".obj", "bushing")))
