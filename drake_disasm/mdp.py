@@ -152,7 +152,7 @@ class TaskGeometry:
         stages, room = scenario.part.stages, np.array(scenario.task.room)
         ends = [stage.end for stage in stages]
         ends[-1] += scenario.task.lift_success
-        way, high = "".join(AXES[stage.axis] for stage in stages), np.zeros(6)
+        way, high = way_of(scenario), np.zeros(6)
         for stage, end in zip(stages, ends, strict=True):
             high[stage.axis] = end
         if compliance is None:
@@ -162,17 +162,26 @@ class TaskGeometry:
         return cls(way, tuple(ends), radii, low, high, compliance[:3], compliance[3:])
 
     def along(self, state: BoltState, stage: int) -> Any:
-        """Returns how far the bolt has gone along a stage's axis (...,) [m, rad]."""
+        """Returns how far the bolt has gone along a stage's axis (...,) [m].
+
+        A turn counts at its radius.
+        """
         axis = AXES.index(self.way[stage])
         if axis < 3:
             return self.place(state)[..., axis]
         wrench = namespace(state.f).concat([state.f, state.t], axis=-1)
-        return (state.r + apply_matrix(self.turning, wrench))[..., axis - 3]
+        turned = (state.r + apply_matrix(self.turning, wrench))[..., axis - 3]
+        return self.radii[stage] * turned
 
     def place(self, state: BoltState) -> Array:
         """Returns where Bo is since the start (..., 3) [m], grip included."""
         wrench = namespace(state.f).concat([state.f, state.t], axis=-1)
         return state.p + apply_matrix(self.compliance, wrench)
+
+
+def way_of(scenario: Scenario) -> str:
+    """Returns the coordinates along and about which a scenario's bolt leaves."""
+    return "".join(AXES[stage.axis] for stage in scenario.part.stages)
 
 
 def _length(vectors: Array) -> Any:
@@ -205,13 +214,13 @@ def counts(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> Array:
 
     The first counts up to its end, the second from `task.travel_success` of the first.
     """
-    first, (end, *_) = geometry.along(state, 0), geometry.ends
-    xp, radius = namespace(first), geometry.radii
-    way = radius[0] * xp.where(first < end, first, end)
+    gone, end = geometry.along(state, 0), geometry.radii[0] * geometry.ends[0]
+    xp = namespace(gone)
+    way = xp.where(gone < end, gone, end)
     if len(geometry.way) == 1:
         return side_by_side([way, xp.zeros_like(way)])
-    second = radius[1] * geometry.along(state, 1)
-    return side_by_side([way, xp.where(first > task.travel_success, second, 0.0)])
+    second = geometry.along(state, 1)
+    return side_by_side([way, xp.where(gone > task.travel_success, second, 0.0)])
 
 
 def outcome(

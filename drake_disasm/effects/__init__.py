@@ -60,6 +60,7 @@ from drake_disasm.effects.environment.rusty_patch import RustyPatch
 from drake_disasm.effects.environment.contact_stiffness import ContactStiffness
 from drake_disasm.effects.environment.contact_exponent import ContactExponent
 from drake_disasm.effects.environment.chain_pull import ChainPull
+from drake_disasm.effects.environment.detent_torque import DetentTorque
 from drake_disasm.effects.motion.command_gain import CommandGain
 from drake_disasm.effects.motion.lag import MotionLag
 from drake_disasm.effects.motion.backlash import Backlash
@@ -125,6 +126,7 @@ __all__ = [
     "ContactExponent",
     "ContactStiffness",
     "DelayEffect",
+    "DetentTorque",
     "Effect",
     "EncoderError",
     "Environment",

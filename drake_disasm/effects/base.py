@@ -61,6 +61,7 @@ class Environment:
         impact_stiffness, impact_exponent: IMPACT's k [N/mm^e] and e.
         force_Gn: (fx, fy, fz) that pulls on the bolt at Bo besides the contact, in
             Gn [N].
+        detent: greatest torque of the part's detent [N m].
 
     Of n environments each number is an array (n,), and the pose a `Pose`.
     """
@@ -74,6 +75,7 @@ class Environment:
     impact_stiffness: float | Array
     impact_exponent: float | Array
     force_Gn: tuple[float | Array, float | Array, float | Array] = (0.0, 0.0, 0.0)
+    detent: float | Array = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -238,10 +240,12 @@ class EnvironmentEffect(Effect, abc.ABC):
     Attributes:
         is_local: whether it depends on where the bolt is, how fast it goes, or when.
         contact_models: the scenario's `contact.model` in which it acts.
+        of_part: name of the part that alone has what it changes.
     """
 
     is_local: ClassVar[bool] = False
     contact_models: ClassVar[tuple[str, ...]] = ("hydroelastic", "impact")
+    of_part: ClassVar[str] = ""
 
     @abc.abstractmethod
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:

@@ -21,7 +21,7 @@ _KINDS = (EnvironmentEffect, MotionEffect, PoseEffect, SensorEffect, ArmEffect)
 _OF_BOTH = frozenset(("X_GnG", "friction", "clearance", "force_Gn"))
 #: The quantities of an Environment that a contact model has, by `contact.model`.
 CONTACT_QUANTITIES = {
-    "hydroelastic": _OF_BOTH | {"modulus", "head_modulus", "dissipation"},
+    "hydroelastic": _OF_BOTH | {"modulus", "head_modulus", "dissipation", "detent"},
     "impact": _OF_BOTH | {"impact_stiffness", "impact_exponent"},
 }
 _OTHER_CONTACT = {

@@ -12,10 +12,12 @@ from drake_disasm.parts.registry import find_part, register_part, registered_par
 # isort: off
 from drake_disasm.parts.door_chain import DoorChain
 from drake_disasm.parts.peg_in_hole import PegInHole
+from drake_disasm.parts.bayonet import Bayonet
 # isort: on
 
 __all__ = [
     "AXES",
+    "Bayonet",
     "ContactConfig",
     "DoorChain",
     "ImpactConfig",

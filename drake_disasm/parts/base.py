@@ -15,6 +15,7 @@ import math
 from collections.abc import Mapping
 from typing import ClassVar
 
+import numpy as np
 from pydrake.geometry import ProximityProperties, Shape
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import SpatialInertia
@@ -23,6 +24,9 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Environment
 from drake_disasm.parts.contact import ContactConfig
 from drake_disasm.parts.lock_shape import LockShape
+
+#: Forces and torques (6,), [f; tau].
+Wrench = np.ndarray
 
 #: A solid: its pose in the body's frame, and its shape.
 Solid = tuple[RigidTransform, Shape]
@@ -61,9 +65,11 @@ class Part(abc.ABC):
 
     Attributes:
         fixed_fields: names of the fields that shape the fixed body alone.
+        has_spring: whether `spring_wrench` is ever more than zero.
     """
 
     fixed_fields: ClassVar[tuple[str, ...]] = ()
+    has_spring: ClassVar[bool] = False
 
     @property
     @abc.abstractmethod
@@ -90,7 +96,13 @@ class Part(abc.ABC):
             clearance=self.play,
             impact_stiffness=contact.impact.stiffness,
             impact_exponent=contact.impact.exponent,
+            detent=self.detent,
         )
+
+    @property
+    def detent(self) -> float:
+        """Greatest torque of a detent, nominal [N m]."""
+        return 0.0
 
     @property
     @abc.abstractmethod
@@ -151,6 +163,18 @@ class Part(abc.ABC):
             environment: of the moved body.
             resolution: edge length on the compliant body's mesh [m].
         """
+
+    def spring_wrench(self, X_GB: RigidTransform, environment: Environment) -> Wrench:
+        """Returns what a spring of the part does to the moved body, in each step.
+
+        Args:
+            X_GB: where the moved body is.
+            environment: its own, effects included.
+
+        Returns:
+            (6,) [f; tau] at Bo in G [N, N m].
+        """
+        return np.zeros(6)
 
     def refuse_impossible(self) -> None:  # noqa: B027, most parts have none
         """Raises DisasmError for dimensions that don't go together."""

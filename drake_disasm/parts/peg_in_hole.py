@@ -8,8 +8,7 @@ import dataclasses
 from typing import ClassVar
 
 import numpy as np
-from pydrake.common import MemoryFile
-from pydrake.geometry import Box, Cylinder, InMemoryMesh, Mesh, ProximityProperties
+from pydrake.geometry import Box, Cylinder, ProximityProperties
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import SpatialInertia
 
@@ -23,13 +22,13 @@ from drake_disasm.parts.materials import (
     facet_length,
     rigid_material,
 )
+from drake_disasm.parts.meshes import circle, facet_count, tube
 from drake_disasm.parts.registry import register_part
 
 _RIM = 0.010  # m, of the block around the hole
 _BELOW = 0.001  # m, from the peg's tip to the hole's bottom
 _FLOOR = 0.003  # m, of the block under the hole
 _PULL = 20.0  # N, of a scripted policy
-_SAG = 0.05  # of the play, by which a facet's middle is nearer than its ends
 _R_Y_AXIS = RotationMatrix.MakeXRotation(-np.pi / 2)  # a cylinder along y
 
 
@@ -92,7 +91,7 @@ class PegInHole(GrippedBlock):
         low = -self.depth - _BELOW
         floor = RigidTransform([0.0, low - _FLOOR / 2, 0.0]), Box(outer, _FLOOR, outer)
         if self.cross_section == "round":
-            wall = _bushing(width / 2, outer / 2, low, self._facets)
+            wall = tube(circle(width / 2, self._facets), outer / 2, low, 0.0)
             return {"wall": (RigidTransform(), wall), "floor": floor}
         at, long = (width + _RIM) / 2, width + _RIM
         walls = {
@@ -131,12 +130,8 @@ class PegInHole(GrippedBlock):
 
     @property
     def _facets(self) -> int:
-        """How many sides round things have, a multiple of four.
-
-        A facet is nearer to the axis than its ends by r (1 - cos(pi / n)).
-        """
-        most = _SAG * self.clearance / (self.width / 2)
-        return 4 * int(np.ceil(np.pi / np.arccos(1.0 - most) / 4))
+        """How many sides the round hole has, and at least the peg."""
+        return facet_count(self.width / 2, self.clearance)
 
     @property
     def M_fixed_G(self) -> SpatialInertia:
@@ -151,36 +146,3 @@ class PegInHole(GrippedBlock):
                 f"part.clearance: {self.clearance:g} m let a peg that is "
                 f"{self.depth:g} m deep (part.depth) tip over; give less than a quarter"
             )
-
-
-def _bushing(inner: float, outer: float, low: float, facets: int) -> Mesh:
-    """Returns a tube from y = `low` to y = 0, closed, as a mesh.
-
-    Its inner facets are tangent to the hole's circle, two of them across z: across
-    the axes the play is exact.
-
-    Args:
-        inner, outer: radii [m].
-        low: of its lower face [m].
-        facets: of each circle.
-    """
-    angle = 2 * np.pi * (np.arange(facets) + 0.5) / facets
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) / np.cos(np.pi / facets)
-    rings = [(radius, y) for y in (low, 0.0) for radius in (inner, outer)]
-    lines = [
-        f"v {r * x:.12g} {y:.12g} {r * z:.12g}" for r, y in rings for x, z in circle
-    ]
-    bottom_in, bottom_out, top_in, top_out = (
-        1 + ring * facets + np.arange(facets) for ring in range(4)
-    )
-    for one, other in (
-        (top_in, bottom_in),
-        (bottom_in, bottom_out),
-        (bottom_out, top_out),
-        (top_out, top_in),
-    ):
-        a, b = np.roll(one, -1), np.roll(other, -1)
-        for quad in zip(one, other, b, a, strict=True):
-            lines.append("f " + " ".join(map(str, quad)))
-    text = "\n".join(lines).encode()
-    return Mesh(InMemoryMesh(mesh_file=MemoryFile(text, ".obj", "bushing")))

@@ -8,7 +8,7 @@ from drake_disasm.policies.files import (
     scenario_hash,
     shipped_policies,
 )
-from drake_disasm.policies.named import resolve_policy
+from drake_disasm.policies.named import default_policy, resolve_policy
 from drake_disasm.policies.network import (
     ActionMap,
     LearnedPolicy,
@@ -31,6 +31,7 @@ __all__ = [
     "Network",
     "PolicyDescription",
     "Straight",
+    "default_policy",
     "find_policy",
     "load_policy",
     "make_policy",

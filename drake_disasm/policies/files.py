@@ -11,6 +11,7 @@ One .npz holds
 
 import dataclasses
 import hashlib
+import itertools
 import json
 import math
 from pathlib import Path
@@ -29,6 +30,7 @@ from drake_disasm.common.quantity import closest
 from drake_disasm.common.resources import models_dir
 from drake_disasm.common.text import clipped, shown
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
+from drake_disasm.parts import AXES
 from drake_disasm.policies.network import (
     ActionMap,
     LearnedPolicy,
@@ -45,6 +47,9 @@ AGAIN = "copy it again, or train it again (drake-disasm train)"
 POLICY = ArchiveKind(
     "policy", "give one that drake-disasm train wrote", AGAIN, 2**26, most_members=400
 )
+
+#: All ways out, of one or two stages.
+WAYS = (*AXES, *("".join(two) for two in itertools.permutations(AXES, 2)))
 
 _PARTS = ("weight_", "bias_")  # of each layer
 #: What the format calls fields of PolicyDescription that have another name.
@@ -175,6 +180,8 @@ def _entries(description: PolicyDescription) -> dict[str, Any]:
 
 def _description(values: Any) -> PolicyDescription:
     default = _entries(PolicyDescription())
+    if isinstance(values, dict):  # a door chain was the only part once
+        values = {"way": default["way"]} | values
     if not isinstance(values, dict) or values.keys() != default.keys():
         raise DisasmError(f"has a description with other entries; {AGAIN}")
     read = {name: _like(default[name], values[name], name) for name in default}
@@ -220,6 +227,9 @@ def _base_from_mapping(mapping: Any) -> Straight | Admittance | None:
             raise DisasmError(
                 f"sets '{clipped(key)}' of '{name}'; {closest(key, known)}"
             )
-        if type(value) not in (int, float) or not abs(value) < math.inf:
+        is_way = key == "way" and value in WAYS
+        if not is_way and (
+            type(value) not in (int, float) or not abs(value) < math.inf
+        ):
             raise DisasmError(f"sets {key} of '{name}' to {shown(value)}; train anew")
     return SCRIPTED[name](**parameters)

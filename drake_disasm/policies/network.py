@@ -10,7 +10,7 @@ import numpy as np
 
 from drake_disasm.common.arrays import Array, array_like
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
+from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES, way_of
 from drake_disasm.policies.scripted import Admittance, Straight
 from drake_disasm.scenario import Scenario
 
@@ -133,6 +133,7 @@ class PolicyDescription:
         observation_variant: of the scenario that it was trained on.
         period: of the MDP [s].
         max_translation, max_rotation: bounds of the action [m, rad].
+        way: along and about which coordinates the bolt leaves (`AXES`).
         provenance: command, date, seed, versions, commit.
         evaluation: its figures.
     """
@@ -148,6 +149,7 @@ class PolicyDescription:
     period: float = 0.1
     max_translation: float = 0.003
     max_rotation: float = 0.0174533
+    way: str = "xy"
     provenance: dict[str, Any] = dataclasses.field(default_factory=dict)
     evaluation: dict[str, Any] = dataclasses.field(default_factory=dict)
 
@@ -188,7 +190,8 @@ class LearnedPolicy:
     def check_fits(self, scenario: Scenario) -> None:
         """Refuses a task whose observations or actions differ from the policy's.
 
-        Another lock, friction or effect is accepted: transfer to those is the purpose.
+        Another part of the same way out, friction or effect is accepted: transfer to
+        those is the purpose.
         So are wider bounds, which it does not use.
 
         Raises:
@@ -213,6 +216,7 @@ def _compared(
         ("state", trained.state_names, STATE_NAMES),
         ("action", trained.action_names, ACTION_NAMES),
         ("observation.variant", trained.observation_variant, variant),
+        ("the way out", trained.way, way_of(scenario)),
     ):
         yield name, then, now, then == now
     same = math.isclose(trained.period, task.period)

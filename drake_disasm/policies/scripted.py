@@ -26,12 +26,14 @@ _STOP, _STOP_SHARE = 3.0, 0.25  # N that tell a stop, and share of what a step a
 
 @dataclasses.dataclass(frozen=True)
 class Straight:
-    """Always moves along +x, whatever the wrench.
+    """Always moves along the first stage of the way out, whatever the wrench.
 
     Attributes:
-        speed: per step [m].
+        way: the bolt's coordinate (`AXES`) along or about which it moves.
+        speed: per step [m, rad].
     """
 
+    way: str = "x"
     speed: float = 0.001
 
     def __call__(self, observation: Array) -> Array:
@@ -39,7 +41,7 @@ class Straight:
         xp, device = namespace(observation), array_api_compat.device(observation)
         shape = (*observation.shape[:-1], 6)
         action = xp.zeros(shape, dtype=xp.float64, device=device)
-        action[..., 0] = self.speed
+        action[..., AXES.index(self.way)] = self.speed
         return action
 
 
@@ -171,8 +173,11 @@ def make_policy(name: str, scenario: Scenario | None = None) -> Straight | Admit
         raise DisasmError(
             f"policy '{name}' does not exist; {closest(name, list(SCRIPTED))}"
         )
-    if scenario is None or name != "admittance":
+    if scenario is None:
         return SCRIPTED[name]()
-    grip = np.diag(bolt_compliance(scenario))
     stages = scenario.part.stages
+    if name == "straight":
+        speed = _FASTEST_TURN if stages[0].is_turn else _FASTEST
+        return Straight(AXES[stages[0].axis], speed)
+    grip = np.diag(bolt_compliance(scenario))
     return Admittance.for_stiffness(bolt_stiffness(scenario), grip, stages)

@@ -187,7 +187,14 @@ class TaskConfig:
     period: float = quantity(0.1, "s", "of one step", low=0.01, high=5.0)
     max_translation: float = quantity(0.003, "m", "per step", low=1e-5, high=0.05)
     max_rotation: float = quantity(0.0174533, "rad", "per step", low=1e-5, high=0.5)
-    travel_success: float = quantity(0.055, "m", "x travelled", low=0.001, high=0.2)
+    travel_success: float = quantity(
+        0.055,
+        "m",
+        "way along the first stage (x of a door chain), from which on the second "
+        "counts; a turn's at its radius",
+        low=0.001,
+        high=0.2,
+    )
     lift_success: float = quantity(
         0.002, "m", "head's underside above the plate", low=0.0, high=0.05
     )

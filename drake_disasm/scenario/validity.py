@@ -97,9 +97,10 @@ def _refuse_impossible_stiffness(config: CartesianImpedanceConfig) -> None:
 
 def _refuse_unreachable_end(scenario: Scenario) -> None:
     task, stage = scenario.task, scenario.part.stages[0]
-    if task.success == "travelled" and task.travel_success >= stage.end:
+    end = stage.radius * stage.end
+    needs_it = task.success == "travelled" or len(scenario.part.stages) > 1
+    if needs_it and task.travel_success >= end:
         raise DisasmError(
             f"task.travel_success: the way along {AXES[stage.axis]} ends after "
-            f"{stage.end:g} {'rad' if stage.is_turn else 'm'}, {task.travel_success:g} "
-            "is never reached; give less"
+            f"{end:g} m, {task.travel_success:g} m is never reached; give less"
         )

@@ -127,8 +127,13 @@ class SimulatedStation(Station):
         R_WGn = self.X_WG.rotation()
         surroundings = builder.AddNamedSystem(
             "bolt_environment",
-            BoltEnvironment(self.lock.bolt.index(), R_WGn, self._environment),
+            BoltEnvironment(
+                self.lock.bolt.index(), self.lock.part, R_WGn, self._environment
+            ),
         )
+        if self.lock.part.has_spring:
+            truth = builder.GetSubsystemByName("bolt_pose").GetOutputPort("X_GB")
+            builder.Connect(truth, surroundings.GetInputPort("X_GB"))
         port = surroundings.GetInputPort("applied_spatial_force")
         builder.ExportInput(port, "applied_spatial_force")
         self.contact = self._make_contact(surroundings)

@@ -188,10 +188,14 @@ class TwinModel(SimulatedModel):
         return not self._has_impact
 
     def applicable_effects(self, library: Sequence[type[Effect]]) -> list[Effect]:
-        """See LogModel; some effects act in one model of contact alone."""
+        """See LogModel; some act in one model of contact, or on one part, alone."""
         contact = self.scenario.contact.model
+        part = type(self.scenario.part).__name__
         acting = [
-            k for k in library if contact in getattr(k, "contact_models", contact)
+            kind
+            for kind in library
+            if not issubclass(kind, EnvironmentEffect)
+            or (contact in kind.contact_models and kind.of_part in ("", part))
         ]
         return super().applicable_effects(acting)
 
@@ -199,7 +203,7 @@ class TwinModel(SimulatedModel):
         """See LogModel: IMPACT, where it has all parameters, with the same meaning."""
         paths = [parameter.path for parameter in self.parameters]
         own = [p for p in paths if p.startswith("contact.") and p != _FRICTION]
-        if self._has_impact or self.rollout or own:
+        if self._has_impact or self.rollout or own or self.scenario.part.gaps is None:
             return self
         return self.replace(scenario=_with_impact_as_stiff(self.scenario))
 

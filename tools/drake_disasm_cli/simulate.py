@@ -16,7 +16,7 @@ from drake_disasm.common import options, program, stopping
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder
 from drake_disasm.logs import LogWriter, flat_columns
-from drake_disasm.policies import Exploring, resolve_policy
+from drake_disasm.policies import Exploring, default_policy, resolve_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import Station
 from drake_disasm.task.episode import EpisodeSummary, run_episode, summary_table
@@ -56,11 +56,11 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 def _add_run_arguments(add: Callable[..., object]) -> None:
     add(
         "--policy",
-        default="removal_randomised",
         metavar="NAME",
         help="a scripted one (straight, admittance), a trained one (a shipped name, or "
         "an .npz file), or one of your own: FILE.py:Class or module:name, a callable "
-        "from (12,) to (6,) or a LeafSystem (default: removal_randomised, shipped)",
+        "from (12,) to (6,) or a LeafSystem (default: removal_randomised, shipped, for "
+        "a door chain, and admittance for other parts)",
     )
     common.add_station_argument(
         add,
@@ -128,6 +128,7 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     _refuse_contradictions(args)
     scenario = load_scenario(args.scenario, args.overrides)
+    args.policy = args.policy or default_policy(scenario)
     if args.station == "hardware":
         return _on_hardware(args, arguments, scenario)
     real = common.real_scenario(args, scenario)

@@ -84,7 +84,9 @@ def test_choice_comes_back_from_its_action(base: Admittance | None) -> None:
         assert back.dtype == np.float32
         np.testing.assert_allclose(back, chosen, atol=1e-6)
     # What is out of reach becomes the nearest choice.
-    mapping = ActionMap(np.array([1e-3, 1e-3, 0.0, 0.1, 0.1, 0.1]), Straight(1e-3))
+    mapping = ActionMap(
+        np.array([1e-3, 1e-3, 0.0, 0.1, 0.1, 0.1]), Straight(speed=1e-3)
+    )
     choice = mapping.from_action(np.zeros(12), np.array([1.0, -1.0, 0.5, 0, 0.05, 0]))
     np.testing.assert_allclose(choice, [1, -1, 0, 0, 0.5, 0])
 

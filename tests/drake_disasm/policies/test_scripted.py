@@ -8,9 +8,12 @@ import torch
 
 from drake_disasm.cell.twin_parameters import bolt_stiffness
 from drake_disasm.mdp import action_bounds
+from drake_disasm.parts import DoorChain
 from drake_disasm.policies import SCRIPTED, Admittance, Exploring, Straight, make_policy
 from drake_disasm.scenario import TaskConfig, load_scenario
 from tests.refusals import refused
+
+STAGES = DoorChain().stages
 
 
 def _observation(y: float = 0.0, **wrench: float) -> np.ndarray:
@@ -88,16 +91,35 @@ STIFFNESS = {
 def test_gains_follow_from_the_stiffness(held: str) -> None:
     """A step takes back less than a force or torque has, on every axis."""
     k = STIFFNESS[held]
-    policy = Admittance.for_stiffness(k, 0.0)
+    policy = Admittance.for_stiffness(k, np.zeros(6), STAGES)
     assert (policy.yield_compliance * k[:3]).max() == pytest.approx(0.4)
     assert (policy.rotation_compliance * k[3:]).max() == pytest.approx(0.6)
     assert policy.speed * k[0] < policy.push + 1.0
     assert policy.stop < policy.push
     # The stiff one's are those that were tuned for it.
-    policy = Admittance.for_stiffness(STIFFNESS["stiff"], 0.0)
-    for field in dataclasses.fields(Admittance):
-        tuned = getattr(Admittance(), field.name)
-        assert getattr(policy, field.name) == pytest.approx(tuned, rel=0.1)
+    policy = Admittance.for_stiffness(STIFFNESS["stiff"], np.zeros(6), STAGES)
+    tuned, found = dataclasses.asdict(Admittance()), dataclasses.asdict(policy)
+    assert found.pop("way") == tuned.pop("way") == "xy"
+    assert found == pytest.approx(tuned, rel=0.1)
+
+
+def test_a_peg_is_pulled_and_yields_to_what_is_across() -> None:
+    policy = make_policy("admittance", load_scenario("iiwa_peg"))
+    action = policy(_observation(fy=-5.0, fz=-3.0, tx=0.1))
+    assert action[1] == policy.speed and action[0] == 0.0
+    assert action[2] < 0.0 < action[3]
+    stopped = policy(_observation(fy=-policy.push))
+    assert stopped[1] == pytest.approx(0.0)
+
+
+def test_a_bayonet_is_turned_until_it_is_stopped_and_pulled_then() -> None:
+    """The detent's torque does not count as the stop."""
+    scenario = load_scenario("iiwa_bayonet")
+    policy = make_policy("admittance", scenario)
+    in_detent = policy(_observation(ty=-scenario.part.detent_torque))
+    assert in_detent[4] > 0.0 and in_detent[1] == 0.0
+    at_stop = policy(_observation(ty=-policy.push))
+    assert at_stop[4] == pytest.approx(0.0) and at_stop[1] == policy.lift_speed
 
 
 def test_a_bolt_that_is_held_down_is_pushed_on_along_x() -> None:
@@ -109,7 +131,9 @@ def test_a_bolt_that_is_held_down_is_pushed_on_along_x() -> None:
 
 def test_lifting_begins_with_the_bolt_and_not_with_the_grip() -> None:
     """Up by 3 mm against 1.5 N at 0.6 kN/m, the bolt has risen by 0.5 mm only."""
-    policy = Admittance.for_stiffness(STIFFNESS["yielding"], 1.0 / 600.0)
+    policy = Admittance.for_stiffness(
+        STIFFNESS["yielding"], np.full(6, 1.0 / 600.0), STAGES
+    )
     assert policy(_observation(0.003, fy=-1.5))[0] == pytest.approx(policy.speed)
     free = policy(_observation(0.003, fy=-0.5))
     assert free[0] == pytest.approx(0.0) and free[1] > 0.0
