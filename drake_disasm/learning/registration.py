@@ -12,6 +12,8 @@ IDS = {
     "drake_disasm/Removal-v0": "removal",
     "drake_disasm/RemovalTurned-v0": "removal_turned",
     "drake_disasm/RemovalRandomised-v0": "removal_randomised",
+    "drake_disasm/Peg-v0": "iiwa_peg",
+    "drake_disasm/Bayonet-v0": "iiwa_bayonet",
     "drake_disasm/Chapter3-v0": "chapter3",
     "drake_disasm/Chapter3Impedance-v0": "chapter3_impedance",
     "drake_disasm/Chapter3Stiff-v0": "chapter3_stiff",

@@ -4,7 +4,7 @@ To add one to the library: a file, and its import below. To add one of your own 
 anywhere else: `register_part`.
 """
 
-from drake_disasm.parts.base import AXES, Part, Solid, Stage
+from drake_disasm.parts.base import AXES, WAYS, Part, Solid, Stage, Wrench
 from drake_disasm.parts.contact import ContactConfig, ImpactConfig
 from drake_disasm.parts.registry import find_part, register_part, registered_parts
 
@@ -13,18 +13,22 @@ from drake_disasm.parts.registry import find_part, register_part, registered_par
 from drake_disasm.parts.door_chain import DoorChain
 from drake_disasm.parts.peg_in_hole import PegInHole
 from drake_disasm.parts.bayonet import Bayonet
+from drake_disasm.parts.from_files import FromFiles
 # isort: on
 
 __all__ = [
     "AXES",
+    "WAYS",
     "Bayonet",
     "ContactConfig",
     "DoorChain",
+    "FromFiles",
     "ImpactConfig",
     "Part",
     "PegInHole",
     "Solid",
     "Stage",
+    "Wrench",
     "find_part",
     "register_part",
     "registered_parts",

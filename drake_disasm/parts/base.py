@@ -11,6 +11,7 @@ close along z.
 
 import abc
 import dataclasses
+import itertools
 import math
 from collections.abc import Mapping
 from typing import ClassVar
@@ -33,6 +34,9 @@ Solid = tuple[RigidTransform, Shape]
 
 #: The coordinates of the moved body in G, in the order of the task's state.
 AXES = ("x", "y", "z", "u", "v", "w")
+
+#: All ways out, of one or two stages.
+WAYS = (*AXES, *("".join(two) for two in itertools.permutations(AXES, 2)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,10 +70,12 @@ class Part(abc.ABC):
     Attributes:
         fixed_fields: names of the fields that shape the fixed body alone.
         has_spring: whether `spring_wrench` is ever more than zero.
+        file_fields: names of the fields that name files, beside the scenario's.
     """
 
     fixed_fields: ClassVar[tuple[str, ...]] = ()
     has_spring: ClassVar[bool] = False
+    file_fields: ClassVar[tuple[str, ...]] = ()
 
     @property
     @abc.abstractmethod

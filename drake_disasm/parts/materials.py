@@ -37,16 +37,24 @@ def has_same_material(one: Environment, other: Environment) -> bool:
 
 def _surface(environment: Environment) -> ProximityProperties:
     """Returns what the surfaces of groove, neck and head have in common."""
-    properties = ProximityProperties()
-    AddContactMaterial(
-        dissipation=environment.dissipation,
-        friction=CoulombFriction(environment.friction, environment.friction),
-        properties=properties,
-    )
+    return with_surface(ProximityProperties(), environment)
+
+
+def with_surface(
+    properties: ProximityProperties, environment: Environment
+) -> ProximityProperties:
+    """Returns properties with an environment's friction and dissipation instead."""
+    changed = ProximityProperties(properties)
+    friction = CoulombFriction(environment.friction, environment.friction)
     # Speculative contact within a margin would be a quarter of the play here, and it
     # changes nothing but the speed (docs/explanation/physics.md).
-    properties.AddProperty("hydroelastic", "margin", 0.0)
-    return properties
+    for group, name, value in (
+        ("material", "coulomb_friction", friction),
+        ("material", "hunt_crossley_dissipation", float(environment.dissipation)),
+        ("hydroelastic", "margin", 0.0),
+    ):
+        changed.UpdateProperty(group, name, value)
+    return changed
 
 
 def facet_length(diameter: float, resolution: float) -> float:

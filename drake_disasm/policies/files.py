@@ -11,7 +11,6 @@ One .npz holds
 
 import dataclasses
 import hashlib
-import itertools
 import json
 import math
 from pathlib import Path
@@ -30,7 +29,7 @@ from drake_disasm.common.quantity import closest
 from drake_disasm.common.resources import models_dir
 from drake_disasm.common.text import clipped, shown
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
-from drake_disasm.parts import AXES
+from drake_disasm.parts import WAYS
 from drake_disasm.policies.network import (
     ActionMap,
     LearnedPolicy,
@@ -47,9 +46,6 @@ AGAIN = "copy it again, or train it again (drake-disasm train)"
 POLICY = ArchiveKind(
     "policy", "give one that drake-disasm train wrote", AGAIN, 2**26, most_members=400
 )
-
-#: All ways out, of one or two stages.
-WAYS = (*AXES, *("".join(two) for two in itertools.permutations(AXES, 2)))
 
 _PARTS = ("weight_", "bias_")  # of each layer
 #: What the format calls fields of PolicyDescription that have another name.

@@ -109,7 +109,11 @@ def with_hidden_effects(
 
 
 def _find_files(scenario: Scenario, folder: Path) -> None:
-    """Makes the files that effects name in a scenario those beside it."""
+    """Makes the files that effects and the part name those beside a scenario."""
+    for name in scenario.part.file_fields:
+        file = getattr(scenario.part, name)
+        if file and not file.startswith("package:"):
+            setattr(scenario.part, name, str((folder / file).absolute()))
     for effect in scenario.effects:
         for field, file in files_of(effect).items():
             setattr(effect, field, str((folder / file).absolute()))

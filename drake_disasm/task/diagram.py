@@ -258,7 +258,8 @@ def _add_monitor(
     )
     observation = processor.GetOutputPort("observation")
     builder.Connect(observation, monitor.GetInputPort("observation"))
-    if station.HasOutputPort("bolt_pose_in_groove"):
+    is_known = station.HasOutputPort("bolt_pose_in_groove")
+    if is_known and scenario.task.judged_by == "bolt":
         truth = station.GetOutputPort("bolt_pose_in_groove")
         builder.Connect(truth, monitor.GetInputPort("X_GB"))
     return monitor

@@ -237,8 +237,9 @@ class BatchedTwin:
         states = BoltState.from_vector(before), BoltState.from_vector(after)
         terms = reward_terms(*states, numbers.task, numbers.geometry)
         terms = {name: xp.where(has_failed, 0.0, term) for name, term in terms.items()}
+        p_GBo = self._p_GBo() if numbers.task.judged_by == "bolt" else None
         ends = outcomes(
-            states[1], episodes.steps, numbers.task, numbers.geometry, self._p_GBo()
+            states[1], episodes.steps, numbers.task, numbers.geometry, p_GBo
         )
         reasons = self._reasons(has_failed, is_finite, is_solved)
         place = numbers.geometry.place(states[1])

@@ -25,6 +25,7 @@ from drake_disasm.scenario import Scenario, corner, validate
 _SHARED: dict[str, Callable[[Scenario], Any]] = {
     "task.period": lambda s: s.task.period,
     "task.success": lambda s: s.task.success,
+    "task.judged_by": lambda s: s.task.judged_by,
     "simulation.twin_time_step": lambda s: s.simulation.twin_time_step,
     "ft_sensor.period": lambda s: s.ft_sensor.period,
     "observation.variant": lambda s: s.observation.variant,
