@@ -184,8 +184,8 @@ class TaskConfig:
         "removed", "", "what counts as success", choices=("travelled", "removed")
     )
     judged_by: str = quantity(
-        "bolt", "", "what a simulation judges `removed` by: where the bolt truly is, or "
-        "the readings, as on hardware", choices=("bolt", "readings"),
+        "bolt", "", "what a simulation judges `removed` by: where the bolt truly is, "
+        "or the readings, as on hardware", choices=("bolt", "readings"),
     )  # fmt: skip
     steps: int = quantity(100, "1", "limit per episode", low=1, high=100000)
     period: float = quantity(0.1, "s", "of one step", low=0.01, high=5.0)
