@@ -4,7 +4,14 @@ import dataclasses
 from collections.abc import Mapping
 
 import numpy as np
-from pydrake.geometry import GeometryId, ProximityProperties, RoleAssign, SceneGraph
+from pydrake.geometry import (
+    CollisionFilterDeclaration,
+    GeometryId,
+    GeometrySet,
+    ProximityProperties,
+    RoleAssign,
+    SceneGraph,
+)
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, Frame, RigidBody
 from pydrake.systems.framework import Context
@@ -94,6 +101,10 @@ def reshape_groove(
     solids = lock.part.fixed_solids(environment).values()
     for geometry_id, (X_GP, shape) in zip(lock.groove_ids, solids, strict=True):
         scene_graph.ChangeShape(context, source, geometry_id, shape, X_GP)
+    # A changed shape is as if new: it would meet the others of its own body.
+    filters = scene_graph.collision_filter_manager(context)
+    own = CollisionFilterDeclaration().ExcludeWithin(GeometrySet(lock.groove_ids))
+    filters.Apply(own)
 
 
 def set_environment(
