@@ -22,6 +22,7 @@ from drake_disasm.common.files import write_text
 from drake_disasm.effects import registered_effects
 from drake_disasm.effects.documentation import documentation
 from drake_disasm.learning.hyperparameters import Hyperparameters
+from drake_disasm.parts import registered_parts
 from drake_disasm.scenario.schema import Scenario
 from drake_disasm.stations.hardware_config import HardwareConfig
 from sysid.data_checks.settings import DataSettings
@@ -48,7 +49,7 @@ values out of bounds are refused with their line and the remedy.
 
 ```yaml
 name: my_cell
-lock: {clearance: 0.0003}           # m
+part: !DoorChain {clearance: 0.0003}  # m
 effects:
   - !GroovePose {ry: 0.0349}        # rad
 randomisation:
@@ -80,7 +81,9 @@ def pages() -> dict[str, str]:
     """Returns the Markdown of each page, by file name."""
     return {
         "effects.md": _page(_EFFECTS, effects()),
-        "scenario.md": _page(_SCENARIO, "\n".join(_sections(Scenario, 2))),
+        "scenario.md": _page(
+            _SCENARIO, "\n".join([*_sections(Scenario, 2), *_parts()])
+        ),
         "settings.md": _page(_SETTINGS, "\n".join(_settings())),
         "command-line.md": _page(_COMMANDS, "\n".join(_commands())),
     }
@@ -111,6 +114,19 @@ def _sections(schema: type, depth: int, name: str = "") -> Iterator[str]:
         inner = _section_type(field)
         if inner is not None:
             yield from _sections(inner, depth, f"{name}.{field.name}".lstrip("."))
+
+
+def _parts() -> Iterator[str]:
+    """Yields the parts of the library, each as a section."""
+    yield from (
+        "## `part`",
+        "",
+        "What is taken apart: `part: !PegInHole {depth: 0.03}`.",
+    )
+    for part in registered_parts():
+        if part.__module__.startswith("drake_disasm."):
+            yield from ("", f"### `!{part.__name__}`", "", _first_paragraph(part), "")
+            yield from _table(QUANTITY_HEAD, quantity_rows(part))
 
 
 def _section_type(field: dataclasses.Field[Any]) -> type | None:

@@ -43,7 +43,6 @@ from drake_disasm.effects.fields import (
 )
 from drake_disasm.effects.registry import (
     find_effect,
-    import_effects,
     register_effect,
     registered_effects,
 )
@@ -188,7 +187,6 @@ __all__ = [
     "environment_at",
     "files_of",
     "find_effect",
-    "import_effects",
     "is_local",
     "joint_name",
     "motion_chain",

@@ -2,8 +2,8 @@
 
 An effect is added by the decorator `register_effect`, wherever its class is defined.
 The module that defines it has to be imported: by the program that uses it, by
-`import_effects` (`--import` on the command line), or by itself, if its package
-declares an entry point of the group `drake_disasm.effects`:
+`drake_disasm.parts.import_own` (`--import` on the command line), or by itself, if its
+package declares an entry point of the group `drake_disasm.effects`:
 
     [project.entry-points."drake_disasm.effects"]
     my_effects = "my_package.effects"
@@ -17,7 +17,7 @@ from typing import TypeVar, overload
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.executors import import_in_workers
 from drake_disasm.common.quantity import closest
-from drake_disasm.common.user_code import import_module, import_named
+from drake_disasm.common.user_code import import_module
 from drake_disasm.effects.base import Effect
 from drake_disasm.effects.definition import refuse_faulty
 
@@ -93,28 +93,6 @@ def find_effect(name: str) -> type[Effect]:
         hint = closest(name, list(_effects))
         raise DisasmError(f"effect '{name}' is not registered; {hint} ({_REMEDY})")
     return _effects[name]
-
-
-def import_effects(name: str) -> str:
-    """Imports a module that registers effects; worker processes import it, too.
-
-    Args:
-        name: of a module, or of a Python file, whose folder joins the search path.
-
-    Returns:
-        The name, so that it can be the type of a command line's argument.
-
-    Raises:
-        DisasmError: there is no such file or module, it fails, or it registers nothing.
-    """
-    before = set(_effects.values())
-    module = import_named(name, "effects")
-    new = set(_effects.values()) - before
-    if not new and module.__name__ not in {e.__module__ for e in _effects.values()}:
-        raise DisasmError(
-            f"{name}: registers no effect; put @register_effect above the class"
-        )
-    return name
 
 
 def _place(effect: type[Effect]) -> str:

@@ -6,7 +6,12 @@ anywhere else: `register_part`.
 
 from drake_disasm.parts.base import AXES, WAYS, Part, Solid, Stage, Wrench
 from drake_disasm.parts.contact import ContactConfig, ImpactConfig
-from drake_disasm.parts.registry import find_part, register_part, registered_parts
+from drake_disasm.parts.registry import (
+    find_part,
+    import_own,
+    register_part,
+    registered_parts,
+)
 
 # Parts are registered and documented in the order of these lines.
 # isort: off
@@ -30,6 +35,7 @@ __all__ = [
     "Stage",
     "Wrench",
     "find_part",
+    "import_own",
     "register_part",
     "registered_parts",
 ]

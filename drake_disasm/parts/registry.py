@@ -1,7 +1,8 @@
 """Which parts there are: the library's own and those that users add.
 
 A part is added by the decorator `register_part`, wherever its class is defined; the
-module must be imported by the program that uses it (`--import` on the command line).
+module must be imported by the program that uses it, or by `import_own` (`--import` on
+the command line).
 """
 
 import dataclasses
@@ -10,6 +11,8 @@ from typing import TypeVar
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.executors import import_in_workers
 from drake_disasm.common.quantity import closest
+from drake_disasm.common.user_code import import_named
+from drake_disasm.effects import registered_effects
 from drake_disasm.parts.base import Part
 
 _Kind = TypeVar("_Kind", bound=type[Part])
@@ -64,6 +67,29 @@ def find_part(name: str) -> type[Part]:
             "of your own must be imported before it is used, by `imports`)"
         )
     return _parts[name]
+
+
+def import_own(name: str) -> str:
+    """Imports a module that registers parts or effects; so do worker processes.
+
+    Args:
+        name: of a module, or of a Python file, whose folder joins the search path.
+
+    Returns:
+        The name, so that it can be the type of a command line's argument.
+
+    Raises:
+        DisasmError: there is no such file or module, it fails, or it registers nothing.
+    """
+    before = {*registered_effects(), *registered_parts()}
+    module = import_named(name, "effects or parts")
+    known = {*registered_effects(), *registered_parts()}
+    if known == before and module.__name__ not in {k.__module__ for k in known}:
+        raise DisasmError(
+            f"{name}: registers no effect or part; put @register_effect or "
+            "@register_part above the class"
+        )
+    return name
 
 
 def _place(part: type[Part]) -> str:

@@ -12,8 +12,8 @@ import numpy as np
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import read_json
 from drake_disasm.common.plain_data import check_like
-from drake_disasm.effects import import_effects
 from drake_disasm.logs import Log, read_logs
+from drake_disasm.parts import import_own
 from drake_disasm.scenario import scenario_from_mapping, scenario_to_mapping
 from sysid.data_checks import check_data, without_flagged_rows
 from sysid.effect_selection.close_loop import ClosedLoop
@@ -174,7 +174,7 @@ class Reference:
             DisasmError: an effect is not known, or can't be imported.
         """
         for name in raw["imports"]:
-            import_effects(name)
+            import_own(name)
         scenario = raw["scenario"]
         choice = ModelChoice(
             scenario=scenario_from_mapping(scenario) if scenario else None,

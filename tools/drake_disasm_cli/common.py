@@ -11,8 +11,8 @@ from drake_disasm.common import options, program
 from drake_disasm.common.cluster import EXECUTORS
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
-from drake_disasm.effects import import_effects
 from drake_disasm.logs import Log, read_logs
+from drake_disasm.parts import import_own
 from drake_disasm.scenario import (
     Scenario,
     load_scenario,
@@ -49,11 +49,11 @@ def add_import_argument(parser: argparse.ArgumentParser) -> None:
         "--import",
         action="append",
         default=[],
-        type=import_effects,
+        type=import_own,
         metavar="FILE.py|MODULE",
         dest="imports",
-        help="import effects of your own (@register_effect), which scenarios and logs "
-        "may then have; repeatable",
+        help="import effects or parts of your own (@register_effect, @register_part), "
+        "which scenarios and logs may then have; repeatable",
     )
 
 

@@ -13,6 +13,7 @@ from drake_disasm import scenario as sc
 from drake_disasm.common import executors
 from drake_disasm.common.executors import WorkerPool
 from drake_disasm.logs import read_log
+from drake_disasm.parts import import_own
 from drake_disasm.task.simulation import TaskSimulation
 from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 from tests.drake_disasm.conftest import QUIET
@@ -204,7 +205,7 @@ def test_an_effect_that_is_not_registered_is_named_with_the_remedy() -> None:
 
 def test_types_that_are_text_are_understood(tmp_path: Path) -> None:
     text = "from __future__ import annotations\n" + _FILE.format(name="FromText")
-    ef.import_effects(_file(tmp_path, "own_text", text))
+    import_own(_file(tmp_path, "own_text", text))
     scenario = sc.load_scenario("removal", ["effects=[!FromText {fx: 0.05}]"])
     assert type(scenario.effects[0]).__name__ == "FromText"
 
@@ -218,7 +219,7 @@ def _in_worker(effect: ef.SensorEffect) -> list[str]:
 
 def test_a_spawned_worker_knows_what_was_imported(tmp_path: Path) -> None:
     """By pickle, and by name alone, from a file outside any package."""
-    ef.import_effects(_file(tmp_path, "own_spawned", _FILE.format(name="Spawned")))
+    import_own(_file(tmp_path, "own_spawned", _FILE.format(name="Spawned")))
     effect = ef.find_effect("Spawned")(fx=0.01)
     with WorkerPool(2) as pool:
         assert pool.map(_in_worker, [effect]) == [["own_spawned.Spawned"] * 2]
@@ -231,16 +232,16 @@ e.register_effect(type('Own', (e.SensorEffect,), {}))"""
 @pytest.mark.parametrize(
     ("stem", "text", "message"),
     [
-        ("own_empty", "", "registers no effect; put @register_effect above"),
+        ("own_empty", "", "registers no effect or part; put @register_effect"),
         ("own_broken", "1 / 0", "own_broken: can't be imported (ZeroDivisionError"),
         ("json", "", "another module has the name json"),
         ("own_faulty", _NOT_COMPLETE, "own_faulty: effect Own: is not a dataclass"),
     ],
 )
 def test_a_file_that_gives_no_effect_says_why(stem, text, message, tmp_path) -> None:
-    assert message in refusal(ef.import_effects, _file(tmp_path, stem, text))
-    assert "nowhere.py: no such file" in refusal(ef.import_effects, "nowhere.py")
-    assert "nowhere: can't be imported" in refusal(ef.import_effects, "nowhere")
+    assert message in refusal(import_own, _file(tmp_path, stem, text))
+    assert "nowhere.py: no such file" in refusal(import_own, "nowhere.py")
+    assert "nowhere: can't be imported" in refusal(import_own, "nowhere")
 
 
 def test_every_program_that_reads_scenarios_imports_effects(tmp_path: Path) -> None:
