@@ -19,8 +19,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.solvers import Solve
 
+from drake_disasm.cell.arm_description import per_joint
 from drake_disasm.cell.arm_dynamics import add_frames, bolt_jacobian
-from drake_disasm.cell.parsing import add_arm
+from drake_disasm.cell.arm_model import add_arm
 from drake_disasm.common.arrays import Array, apply_matrix, namespace
 from drake_disasm.common.errors import DisasmError, UnreachableError
 from drake_disasm.common.rotations import Pose, matrices_of_rpy, rpy_of_matrices
@@ -99,9 +100,9 @@ class ArmCoordinates(Coordinates):
         self._X_WG = X_WG
         self._plant, self._frame_B, self._frame_G = _arm_alone(arm, X_FB, X_WG)
         self._context = self._plant.CreateDefaultContext()
-        self._posture = np.array(arm.posture)
-        self._parameters = self._differential_ik_parameters(period)
         self.size = self._plant.num_positions()
+        self._posture = per_joint(arm.posture, self.size, "arm.posture")
+        self._parameters = self._differential_ik_parameters(period)
 
     def pose(self, coordinates: np.ndarray) -> RigidTransform:
         """See Coordinates."""
@@ -174,7 +175,7 @@ class ArmCoordinates(Coordinates):
         return np.linalg.inv(J @ np.diag(1.0 / joint_stiffness) @ J.T)
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
-        """Returns the Jacobian (6, 7) at Bo in Gn, [translation; rotation]."""
+        """Returns the Jacobian (6, n) at Bo in Gn, [translation; rotation]."""
         self._plant.SetPositions(self._context, q)
         return bolt_jacobian(self._plant, self._context, self._frame_B, self._frame_G)
 
@@ -201,7 +202,7 @@ def _arm_alone(
 ) -> tuple[MultibodyPlant, Frame, Frame]:
     """Returns a plant with the arm, and its frames B and Gn."""
     plant = MultibodyPlant(0.0)
-    _, flange = add_arm(plant, arm.model)
+    flange = add_arm(plant, arm).frame_F
     frames = add_frames(plant, flange, X_FB, X_WG)
     plant.Finalize()
     return plant, *frames
