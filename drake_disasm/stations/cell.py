@@ -33,6 +33,7 @@ from drake_disasm.stations.cell_models import add_adaptive_fingers, add_cell
 from drake_disasm.stations.contact import exclude_collisions
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
+from drake_disasm.stations.start_collisions import refuse_collisions
 from drake_disasm.stations.wiring import export_ready_device, export_required
 from drake_disasm.systems.cartesian_impedance import CartesianImpedance
 
@@ -102,7 +103,7 @@ class CellStation(SimulatedStation):
         config = self.scenario
         frame_Gn = self._add_plant(builder, config.simulation.cell_time_step)
         plant = self.plant
-        models = add_cell(plant, frame_Gn, config, self._environment)
+        self._models = models = add_cell(plant, frame_Gn, config, self._environment)
         self.arm_instance = models.arm.instance
         self.tool_models, self.lock = models.tool, models.lock
         # A groove that is tilted sinks into the bench, and the bolt in it.
@@ -312,6 +313,12 @@ class CellStation(SimulatedStation):
     def _fix_commands(self, context: Context) -> None:
         super()._fix_commands(context)
         self.GetInputPort("gripper.position").FixValue(context, self.grip_command)
+
+    def _refuse_bad_start(self) -> None:
+        context = self.CreateDefaultContext()
+        self._place_at_start(self.part_context(self.plant, context))
+        query = self.GetOutputPort("query_object").Eval(context)
+        refuse_collisions(self.plant, query, self._models)
 
     def _place_at_start(self, plant_context: Context) -> None:
         plant = self.plant

@@ -5,17 +5,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
+from drake_disasm.cell.coordinates import ArmCoordinates
+from drake_disasm.cell.placement import nominal_groove_pose
+from drake_disasm.cell.tool import Tool
 from drake_disasm.common.ports import cell_ports, port_differences
 from drake_disasm.effects import JointCoulombFriction, JointViscousFriction
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
-from drake_disasm.stations import CellStation
+from drake_disasm.stations import CellStation, TwinStation
 from drake_disasm.stations.measured_cell import MeasuredCell
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.recording import record_transitions
 from drake_disasm.task.simulation import TaskSimulation
+from tests.refusals import refused
 
 ARMS = {"ur5e": 6, "panda": 7}
 #: Joints whose friction the tests add.
@@ -72,6 +77,52 @@ def test_friction_of_its_joints_costs_torque(cell: CellStation) -> None:
         accelerations.append(applied - damping * rate)
     without, with_friction = accelerations
     assert without - with_friction == pytest.approx(3.5, rel=0.01)
+
+
+_STRETCHED = "placement.p_WG=[0.82, -0.13, 0.15]"
+_ABOVE_ITSELF = "placement.p_WG=[0.05, -0.13, 0.15]"
+_BELOW = "placement.p_WG=[0.18, -0.13, -0.4]"
+_ELBOW_DOWN = "arm.posture=[-0.5, -0.2, -1.65, 0.28, -1.57, 1.05]"
+_TURNED_BACK = "arm.posture=[-0.5, -1.55, 4.0, -1.68, -1.57, 1.05]"
+
+
+@pytest.mark.parametrize(("override", "words"), [
+    (_STRETCHED, ["arm.posture", "nearly singular", "30 are needed", "bent elbow"]),
+    (_ABOVE_ITSELF, ["arm.posture", "nearly singular", "placement.p_WG"]),
+    (_TURNED_BACK, ["arm.posture", "4 rad of elbow_joint", "-3.14159 to 3.14159"]),
+    ("arm.posture=[0, 0]", ["arm.posture", "2 values", "6 joints"]),
+    ("placement.p_WG=[1.1, 0, 0.15]", ["can't reach", "placement", "posture"]),
+])  # fmt: skip
+def test_a_start_that_the_arm_can_not_serve_is_refused(
+    override: str, words: list[str]
+) -> None:
+    with refused(*words):
+        TwinStation(load_scenario("ur5e_removal", [override]))
+
+
+def test_the_posture_picks_the_branch() -> None:
+    """Six joints hold the bolt in a few ways; the nearest is taken."""
+    back = "arm.posture=[2.9, -1.55, -1.65, -1.68, 1.57, 1.05]"
+    starts = []
+    for overrides in ([], [back], [_ELBOW_DOWN]):
+        scenario = load_scenario("ur5e_removal", overrides)
+        tool, X_WG = Tool.from_models(scenario), nominal_groove_pose(scenario.placement)
+        arm = ArmCoordinates(scenario.arm, X_WG, tool.X_FB, scenario.task.period)
+        start = arm.start(RigidTransform())
+        assert arm.pose(start).IsNearlyEqualTo(RigidTransform(), 1e-5)
+        assert np.abs(start - scenario.arm.posture).max() < 1.0
+        starts.append(start)
+    assert np.sign([start[2] for start in starts]).tolist() == [1, -1, -1]
+    assert np.sign([start[4] for start in starts]).tolist() == [-1, 1, -1]
+
+
+@pytest.mark.parametrize(("override", "words"), [
+    (_ELBOW_DOWN, ["ur5e::forearm_link and bench::bench", "inside each other"]),
+    (_BELOW, ["ur5e::base_link and ur5e::forearm_link", "collision_filter_group"]),
+])  # fmt: skip
+def test_a_start_in_collision_names_the_bodies(override: str, words: list[str]) -> None:
+    with refused("arm.posture: at the start", *words):
+        CellStation(load_scenario("ur5e_removal", [override]))
 
 
 def _success(station: str, arm: str) -> bool:
