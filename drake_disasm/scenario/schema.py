@@ -206,8 +206,14 @@ class GripperConfig:
     """
 
     model: str = quantity(
-        "package://disasm_models/gripper_2f140/gripper_2f140.urdf", "", "URDF"
+        "package://disasm_models/gripper_2f140/gripper_2f140.urdf",
+        "",
+        "URDF with the frames gripper_base, finger_carriage, tcp and fingertip",
     )
+    fingers: list[str] = quantity(
+        ["left_finger_joint", "right_finger_joint"], "",
+        "sliding joints of the model, at 0 where the pads meet",
+    )  # fmt: skip
     hold: str = quantity(
         "friction", "", "how the bolt is held", choices=("friction", "weld")
     )

@@ -24,7 +24,6 @@ from drake_disasm.cell.arm_control import joint_gains
 from drake_disasm.cell.arm_dynamics import ArmDynamics
 from drake_disasm.cell.door_chain import part_of
 from drake_disasm.cell.grip import AXIS_ORDER, finger_springs
-from drake_disasm.cell.tool import FINGERS
 from drake_disasm.effects import ArmEffect
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.arm_mechanics import ArmMechanics, refuse_unknown_arm_effects
@@ -323,10 +322,8 @@ class CellStation(SimulatedStation):
     def _place_at_start(self, plant_context: Context) -> None:
         plant = self.plant
         plant.SetPositions(plant_context, self.arm_instance, self.start)
-        for name in FINGERS:
-            plant.GetJointByName(name).set_translation(
-                plant_context, self._start_opening / 2
-            )
+        for finger in self.tool_models.fingers:
+            finger.set_translation(plant_context, self._start_opening / 2)
         if self.scenario.gripper.hold == "friction":
             plant.SetFreeBodyPose(plant_context, self.lock.bolt, self.X_WG)
 

@@ -87,7 +87,7 @@ def add_cell(
     bench = _add_bench(plant, frame_Gn, scenario)
     if scenario.gripper.hold == "weld":
         bolt = lock.bolt.body_frame()
-        plant.WeldFrames(tool.frame_T, bolt, grasp_pose(scenario))
+        plant.WeldFrames(tool.frame_T, bolt, grasp_pose(scenario, tool))
     return CellModels(arm, tool, lock, bench)
 
 

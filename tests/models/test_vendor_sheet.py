@@ -17,7 +17,7 @@ from pydrake.multibody.tree import BodyIndex, Frame
 MODELS = Path(__file__).parents[2] / "models"
 URDFS = [
     *("bench/bench", "gripper_2f140/gripper_2f140", "hex_e/hex_e", "iiwa14/iiwa14"),
-    *("ur5e/ur5e", "panda/panda"),
+    *("ur5e/ur5e", "panda/panda", "panda_hand/panda_hand"),
 ]
 JOINTS = range(7)
 
