@@ -27,7 +27,7 @@ from drake_disasm.common.files import make_folder, write_text
 from drake_disasm.common.spatial import pose_from_vector
 from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.stations.base import Station
-from drake_disasm.stations.measured_cell import MEASURED_PORTS, MeasuredCell
+from drake_disasm.stations.measured_cell import MeasuredCell, measured_ports
 from drake_disasm.task.diagram import TaskSystems
 
 _FRAME_PERIOD = 1.0 / 32.0  # s
@@ -141,6 +141,7 @@ class MeasuredView:
         self, meshcat: Meshcat, station: Station, close_up: bool = False
     ) -> None:
         builder = DiagramBuilder()
+        self._ports = measured_ports(station.scenario)
         self._cell = builder.AddNamedSystem(
             "measured_cell", MeasuredCell(station.scenario)
         )
@@ -153,14 +154,14 @@ class MeasuredView:
         """Draws one frame, if all of it is finite.
 
         Args:
-            measured: by port, MEASURED_PORTS at least: angles (7,) [rad], opening and
+            measured: by port, `measured_ports` at least: angles (n,) [rad], opening and
                 its rate (2,) [m, m/s].
         """
-        values = [measured[name] for name in MEASURED_PORTS]
+        values = [measured[name] for name in self._ports]
         if not all(np.isfinite(value).all() for value in values):
             return
         cell_context = self._cell.GetMyContextFromRoot(self._context)
-        for name, value in zip(MEASURED_PORTS, values, strict=True):
+        for name, value in zip(self._ports, values, strict=True):
             self._cell.GetInputPort(name).FixValue(cell_context, value)
         self._diagram.ForcedPublish(self._context)
 
@@ -191,7 +192,7 @@ def add_cell_view(
 def _measured_geometry(builder: DiagramBuilder, station: Station) -> OutputPort:
     """Returns the query port of a station's cell, posed by its measurements."""
     cell = builder.AddNamedSystem("measured_cell", MeasuredCell(station.scenario))
-    for port in MEASURED_PORTS:
+    for port in measured_ports(station.scenario):
         builder.Connect(station.GetOutputPort(port), cell.GetInputPort(port))
     return cell.GetOutputPort("query_object")
 

@@ -7,13 +7,14 @@ are made of them.
 import numpy as np
 from scipy.linalg import eigh
 
+from drake_disasm.cell.arm_description import per_joint
 from drake_disasm.scenario import ArmConfig
 
 _INERTIA = 4.0  # kg m^2, of a joint with its rotor, for position control's damping
 
 
 def joint_gains(arm: ArmConfig, inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns stiffness (7,) [N m/rad] and damping (7,) [N m s/rad] of the joints.
+    """Returns stiffness (n,) [N m/rad] and damping (n,) [N m s/rad] of the joints.
 
     d = 2 zeta sqrt(k m). Position control takes the same m for each joint, as drives
     are tuned once; joint impedance control takes that of the posture. With Cartesian
@@ -21,16 +22,16 @@ def joint_gains(arm: ArmConfig, inertia: np.ndarray) -> tuple[np.ndarray, np.nda
 
     Args:
         arm: with its control.
-        inertia: (7,) diagonal of the mass matrix, with the tool, at the start
+        inertia: (n,) diagonal of the mass matrix, with the tool, at the start
             [kg m^2].
     """
     if arm.control == "cartesian_impedance":
         return np.zeros_like(inertia), np.zeros_like(inertia)
     if arm.control == "joint_impedance":
-        config = arm.joint_impedance
-        k = np.array(config.stiffness)
+        config, key = arm.joint_impedance, "arm.joint_impedance.stiffness"
+        k = per_joint(config.stiffness, len(inertia), key)
         return k, 2.0 * config.damping_ratio * np.sqrt(k * inertia)
-    k = np.array(arm.stiffness)
+    k = per_joint(arm.stiffness, len(inertia), "arm.stiffness")
     return k, 2.0 * arm.damping_ratio * np.sqrt(k * _INERTIA)
 
 
@@ -58,7 +59,7 @@ def cartesian_gains(
 
 
 def yielding(arm: ArmConfig, J: np.ndarray) -> np.ndarray:
-    """Returns how far a load on the bolt turns the joints (7, 6) [rad/N, rad/(N m)].
+    """Returns how far a load on the bolt turns the joints (n, 6) [rad/N, rad/(N m)].
 
     dq = C w, for the wrench w = [f; tau] at Bo in Gn and the commanded joint angles.
     Springs in the joints: C = k^-1 J^T. Cartesian impedance control: C = J^+ K^-1;
@@ -66,7 +67,7 @@ def yielding(arm: ArmConfig, J: np.ndarray) -> np.ndarray:
 
     Args:
         arm: with its control.
-        J: (6, 7) Jacobian at Bo in Gn, [translation; rotation].
+        J: (6, n) Jacobian at Bo in Gn, [translation; rotation].
     """
     if arm.control == "cartesian_impedance":
         return np.asarray(np.linalg.pinv(J) / arm.cartesian_impedance.stiffness)
@@ -77,7 +78,7 @@ def yielding(arm: ArmConfig, J: np.ndarray) -> np.ndarray:
 def nullspace_gains(
     arm: ArmConfig, inertia: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns stiffness and damping (7,) of Cartesian impedance's null space.
+    """Returns stiffness and damping (n,) of Cartesian impedance's null space.
 
     Args:
         arm: its `cartesian_impedance`, whatever its control.

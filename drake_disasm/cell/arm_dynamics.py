@@ -11,7 +11,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from drake_disasm.cell.parsing import add_arm
+from drake_disasm.cell.arm_model import add_arm
 from drake_disasm.cell.tool import Tool
 from drake_disasm.scenario import ArmConfig
 
@@ -39,7 +39,8 @@ class ArmDynamics:
         M_F: SpatialInertia | None = None,
     ) -> None:
         self.plant = MultibodyPlant(0.0)
-        _, flange = add_arm(self.plant, arm.model)
+        model = add_arm(self.plant, arm)
+        self._instance, flange = model.instance, model.frame_F
         instance = self.plant.AddModelInstance("tool")
         load = self.plant.AddRigidBody("tool", instance, M_F or tool.M_F)
         self.plant.WeldFrames(flange, load.body_frame())
@@ -48,7 +49,7 @@ class ArmDynamics:
         self._context = self.plant.CreateDefaultContext()
 
     def set_positions(self, q: np.ndarray) -> None:
-        """Goes to joint angles (7,) [rad]."""
+        """Goes to joint angles (n,) [rad]."""
         self.plant.SetPositions(self._context, q)
 
     def pose(self) -> RigidTransform:
@@ -56,12 +57,19 @@ class ArmDynamics:
         return self._frame_B.CalcPose(self._context, self._frame_G)
 
     def jacobian(self) -> np.ndarray:
-        """Returns the Jacobian (6, 7) at Bo in Gn, [translation; rotation]."""
+        """Returns the Jacobian (6, n) at Bo in Gn, [translation; rotation]."""
         return bolt_jacobian(self.plant, self._context, self._frame_B, self._frame_G)
 
     def mass_matrix(self) -> np.ndarray:
-        """Returns the mass matrix (7, 7), rotors included [kg m^2]."""
+        """Returns the mass matrix (n, n), rotors included [kg m^2]."""
         return np.asarray(self.plant.CalcMassMatrix(self._context))
+
+    def joint_damping(self) -> np.ndarray:
+        """Returns the damping of the joints themselves (n,) [N m s/rad]."""
+        joints = self.plant.GetJointIndices(self._instance)
+        moving = [j for j in map(self.plant.get_joint, joints) if j.num_velocities()]
+        moving.sort(key=lambda joint: joint.velocity_start())
+        return np.array([joint.default_damping() for joint in moving])
 
     def bolt_inertia(self) -> np.ndarray:
         """Returns Lambda = (J M^-1 J^T)^-1 (6, 6): inertia at Bo in Gn.

@@ -19,8 +19,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.solvers import Solve
 
+from drake_disasm.cell.arm_description import per_joint
 from drake_disasm.cell.arm_dynamics import add_frames, bolt_jacobian
-from drake_disasm.cell.parsing import add_arm
+from drake_disasm.cell.arm_model import add_arm
 from drake_disasm.common.arrays import Array, apply_matrix, namespace
 from drake_disasm.common.errors import DisasmError, UnreachableError
 from drake_disasm.common.rotations import Pose, matrices_of_rpy, rpy_of_matrices
@@ -30,6 +31,8 @@ from drake_disasm.scenario import ArmConfig
 _ZERO = np.zeros(3)
 _TOLERANCE = 1e-5  # m, of inverse kinematics
 _TURN_TOLERANCE = 1e-4  # rad, of the same
+_LENGTH = 0.3  # m, of a bolt's lever by which rotations count as displacements
+_LEAST_REACH = 0.03  # m/rad, of the bolt by the joints in its hardest direction
 _SOLUTION = DifferentialInverseKinematicsStatus.kSolutionFound
 
 
@@ -99,9 +102,10 @@ class ArmCoordinates(Coordinates):
         self._X_WG = X_WG
         self._plant, self._frame_B, self._frame_G = _arm_alone(arm, X_FB, X_WG)
         self._context = self._plant.CreateDefaultContext()
-        self._posture = np.array(arm.posture)
-        self._parameters = self._differential_ik_parameters(period)
         self.size = self._plant.num_positions()
+        self._posture = per_joint(arm.posture, self.size, "arm.posture")
+        self._refuse_posture_beyond_limits()
+        self._parameters = self._differential_ik_parameters(period)
 
     def pose(self, coordinates: np.ndarray) -> RigidTransform:
         """See Coordinates."""
@@ -145,7 +149,7 @@ class ArmCoordinates(Coordinates):
         """Returns joint angles for a pose, as near the preferred posture as can be.
 
         Raises:
-            DisasmError: the pose is out of reach.
+            DisasmError: the pose is out of reach, or the arm is nearly singular there.
         """
         X_WB = self._X_WG @ X_GB
         ik = InverseKinematics(self._plant)
@@ -159,11 +163,37 @@ class ArmCoordinates(Coordinates):
         result = Solve(ik.prog(), self._posture)
         if not result.is_success():
             raise DisasmError(
-                f"the arm can't reach the lock at {np.round(p, 3)} m; "
-                "move it by placement.p_WG"
+                f"the arm can't reach the lock at {np.round(p, 3)} m from arm.posture; "
+                "move it by placement.p_WG, or give another posture"
             )
         # Polished to rounding error: the solver stops at its own tolerance.
-        return self.solve(X_GB, result.GetSolution(ik.q()))
+        q = self.solve(X_GB, result.GetSolution(ik.q()))
+        self._refuse_near_singular(q)
+        return q
+
+    def _refuse_posture_beyond_limits(self) -> None:
+        low = self._plant.GetPositionLowerLimits()
+        high = self._plant.GetPositionUpperLimits()
+        for i in np.flatnonzero((self._posture < low) | (self._posture > high)):
+            names = self._plant.GetPositionNames(add_model_instance_prefix=False)
+            joint, value = names[i].removesuffix("_q"), self._posture[i]
+            raise DisasmError(
+                f"arm.posture: {value:g} rad of {joint} is beyond its limits; give a "
+                f"value from {low[i]:g} to {high[i]:g}"
+            )
+
+    def _refuse_near_singular(self, q: np.ndarray) -> None:
+        """Refuses joint angles from which some motion of the bolt takes too much."""
+        J = self.jacobian(q)
+        J[3:] *= _LENGTH
+        least = np.linalg.svd(J, compute_uv=False)[-1]
+        if least < _LEAST_REACH:
+            raise DisasmError(
+                "arm.posture: the arm is nearly singular at the start: 1 rad of its "
+                f"joints moves the bolt by {1e3 * least:.0f} mm in one direction, and "
+                f"{1e3 * _LEAST_REACH:.0f} are needed; give a posture with bent elbow "
+                "and wrist, or move the lock by placement.p_WG"
+            )
 
     def stiffness(self, joint_stiffness: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Returns the 6x6 stiffness at Bo in G, [translation; rotation] order.
@@ -174,7 +204,7 @@ class ArmCoordinates(Coordinates):
         return np.linalg.inv(J @ np.diag(1.0 / joint_stiffness) @ J.T)
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
-        """Returns the Jacobian (6, 7) at Bo in Gn, [translation; rotation]."""
+        """Returns the Jacobian (6, n) at Bo in Gn, [translation; rotation]."""
         self._plant.SetPositions(self._context, q)
         return bolt_jacobian(self._plant, self._context, self._frame_B, self._frame_G)
 
@@ -201,7 +231,7 @@ def _arm_alone(
 ) -> tuple[MultibodyPlant, Frame, Frame]:
     """Returns a plant with the arm, and its frames B and Gn."""
     plant = MultibodyPlant(0.0)
-    _, flange = add_arm(plant, arm.model)
+    flange = add_arm(plant, arm).frame_F
     frames = add_frames(plant, flange, X_FB, X_WG)
     plant.Finalize()
     return plant, *frames

@@ -14,16 +14,16 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     Frame,
     ModelInstanceIndex,
+    PrismaticJoint,
     RigidBody,
     SpatialInertia,
     WeldJoint,
 )
 
 from drake_disasm.cell.parsing import add_model, model_frame
-from drake_disasm.scenario import Scenario
-
-FINGERS = ("left_finger_joint", "right_finger_joint")
-PAD_LENGTH = 0.065  # m, along z_T; T sits in its middle
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.quantity import closest
+from drake_disasm.scenario import GripperConfig, Scenario
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,24 +70,25 @@ class Tool:
         plant, M_bolt_B = MultibodyPlant(0.0), scenario.part.M_moved_B
         models = add_tool(plant, plant.world_frame(), scenario)
         bolt = plant.AddRigidBody("bolt", plant.AddModelInstance("bolt"), M_bolt_B)
-        plant.WeldFrames(models.frame_T, bolt.body_frame(), grasp_pose(scenario))
+        X_TB = grasp_pose(scenario, models)
+        plant.WeldFrames(models.frame_T, bolt.body_frame(), X_TB)
         plant.Finalize()
+        _refuse_wide_grasp(scenario, models)
         context = plant.CreateDefaultContext()
-        for name in FINGERS:
-            half_width = scenario.part.grip_width / 2
-            plant.GetJointByName(name).set_translation(context, half_width)
+        for joint in models.fingers:
+            joint.set_translation(context, scenario.part.grip_width / 2)
         X_SF = models.frame_S.CalcPoseInWorld(context).inverse()
         X_FB = plant.EvalBodyPoseInWorld(context, bolt)
         bodies = [b for i in models.instances for b in plant.GetBodyIndices(i)]
         M_F = plant.CalcSpatialInertia(
             context, plant.world_frame(), [*bodies, bolt.index()]
         )
-        fingers = [plant.GetJointByName(name).child_body().index() for name in FINGERS]
+        fingers = [joint.child_body().index() for joint in models.fingers]
         palm = [index for index in bodies if index not in fingers]
         return cls(
             X_FB=X_FB,
             X_SB=X_SF @ X_FB,
-            X_TB=grasp_pose(scenario),
+            X_TB=X_TB,
             M_F=M_F,
             M_palm_F=plant.CalcSpatialInertia(context, plant.world_frame(), palm),
             M_fingers_B=plant.CalcSpatialInertia(context, bolt.body_frame(), fingers),
@@ -103,14 +104,18 @@ class ToolModels:
     Attributes:
         sensor_joint: the weld between flange and sensor whose reaction is read.
         frame_S, frame_T: sensing frame and tool centre point.
+        frame_tip: where the pads end along z_T.
         carriage: body that carries the fingers, fixed to the palm.
+        fingers: the joints of the two fingers.
         sensor, gripper: model instances.
     """
 
     sensor_joint: WeldJoint
     frame_S: Frame
     frame_T: Frame
+    frame_tip: Frame
     carriage: RigidBody
+    fingers: tuple[PrismaticJoint, PrismaticJoint]
     sensor: ModelInstanceIndex
     gripper: ModelInstanceIndex
 
@@ -138,8 +143,45 @@ def add_tool(plant: MultibodyPlant, frame_F: Frame, scenario: Scenario) -> ToolM
     gripper = add_model(plant, url)
     plant.WeldFrames(tool_side, model_frame(plant, gripper, "gripper_base", url))
     frame_T = model_frame(plant, gripper, "tcp", url)
+    frame_tip = model_frame(plant, gripper, "fingertip", url)
     carriage = model_frame(plant, gripper, "finger_carriage", url).body()
-    return ToolModels(joint, frame_S, frame_T, carriage, sensor, gripper)
+    fingers = _fingers(plant, gripper, scenario.gripper)
+    return ToolModels(
+        joint, frame_S, frame_T, frame_tip, carriage, fingers, sensor, gripper
+    )
+
+
+def _fingers(
+    plant: MultibodyPlant, instance: ModelInstanceIndex, gripper: GripperConfig
+) -> tuple[PrismaticJoint, PrismaticJoint]:
+    """Returns the joints of the fingers, or refuses a gripper that has others."""
+    joints = [plant.get_joint(index) for index in plant.GetJointIndices(instance)]
+    moving = {each.name(): each for each in joints if each.num_velocities() > 0}
+    names = list(moving)
+    for name in gripper.fingers:
+        if name not in moving:
+            raise DisasmError(
+                f"gripper.fingers: {gripper.model} has no movable joint '{name}'; "
+                f"{closest(name, names)}"
+            )
+    left, right = (moving[name] for name in gripper.fingers)
+    is_pair = all(isinstance(each, PrismaticJoint) for each in (left, right))
+    if len(moving) != 2 or left is right or not is_pair:
+        raise DisasmError(
+            f"gripper.model: {gripper.model} moves by {', '.join(names)}; a gripper "
+            "here has two sliding fingers: make the other joints fixed"
+        )
+    return left, right
+
+
+def _refuse_wide_grasp(scenario: Scenario, models: ToolModels) -> None:
+    width = scenario.part.grip_width
+    opening = sum(joint.position_upper_limit() for joint in models.fingers)
+    if width > opening:
+        raise DisasmError(
+            f"gripper.model: {scenario.gripper.model} opens to {opening:g} m, and the "
+            f"bolt's grip is {width:g} m wide; give a narrower one, or another gripper"
+        )
 
 
 def summed(inertias: Sequence[SpatialInertia]) -> SpatialInertia:
@@ -159,7 +201,11 @@ def grasp_rotation() -> RotationMatrix:
     return RotationMatrix(np.array([[-1.0, 0, 0], [0, 0, -1.0], [0, -1.0, 0]]))
 
 
-def grasp_pose(scenario: Scenario) -> RigidTransform:
+def grasp_pose(scenario: Scenario, models: ToolModels) -> RigidTransform:
     """Returns X_TB: the fingertips end above the plate."""
-    tip = scenario.part.surface + scenario.gripper.fingertip_gap
-    return RigidTransform(grasp_rotation(), [0.0, 0.0, tip + PAD_LENGTH / 2])
+    above = scenario.part.surface + scenario.gripper.fingertip_gap
+    X_CT, X_CTip = (
+        frame.GetFixedPoseInBodyFrame() for frame in (models.frame_T, models.frame_tip)
+    )
+    tip = (X_CT.inverse() @ X_CTip).translation()[2]
+    return RigidTransform(grasp_rotation(), [0.0, 0.0, above + tip])

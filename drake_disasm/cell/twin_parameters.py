@@ -17,9 +17,6 @@ from drake_disasm.cell.tool import Tool
 from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import Scenario
 
-#: Of the joints themselves in the model file [N m s/rad].
-_JOINT_DAMPING = 0.5
-
 
 @dataclasses.dataclass(frozen=True)
 class ControlledArm:
@@ -152,13 +149,14 @@ def _controlled_arm(case: _Case) -> ControlledArm:
         inertia = moving.bolt_inertia()
         # Joint rates by that of the bolt where nothing holds the null space.
         T = np.linalg.solve(moving.mass_matrix(), moving.jacobian().T) @ inertia
-        return ControlledArm(inertia, D, K, _JOINT_DAMPING * T.T @ T)
+        return ControlledArm(inertia, D, K, (T.T * known.joint_damping()) @ T)
     k, d = joint_gains(arm, np.diag(known.mass_matrix()))
-    return _condensed(moving.jacobian(), moving.mass_matrix(), k, d)
+    own = known.joint_damping()
+    return _condensed(moving.jacobian(), moving.mass_matrix(), k, d, own)
 
 
 def _condensed(
-    J: np.ndarray, M: np.ndarray, k: np.ndarray, d: np.ndarray
+    J: np.ndarray, M: np.ndarray, k: np.ndarray, d: np.ndarray, own: np.ndarray
 ) -> ControlledArm:
     """Returns joints with springs as seen from a point, by static condensation.
 
@@ -168,10 +166,11 @@ def _condensed(
     that is slow against the null space.
 
     Args:
-        J: (6, 7) Jacobian of the point.
-        M: (7, 7) mass matrix.
-        k, d: (7,) stiffness and damping of the joints.
+        J: (6, n) Jacobian of the point.
+        M: (n, n) mass matrix.
+        k, d: (n,) stiffness and damping of the joints' control.
+        own: (n,) damping of the joints themselves.
     """
     K = np.linalg.inv((J / k) @ J.T)
     T = (J / k).T @ K
-    return ControlledArm(T.T @ M @ T, (T.T * d) @ T, K, _JOINT_DAMPING * T.T @ T)
+    return ControlledArm(T.T @ M @ T, (T.T * d) @ T, K, (T.T * own) @ T)

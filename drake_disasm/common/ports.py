@@ -51,22 +51,32 @@ def _device(name: str) -> tuple[Port, ...]:
     )
 
 
-#: Ports of the cell, simulated or real. Torques have Drake's sign.
-CELL_PORTS: tuple[Port, ...] = (
-    Port("iiwa.position", 7, "rad", "joints 1 to 7", is_input=True),
-    Port("gripper.position", 1, "m", "opening between the pads", is_input=True),
-    Port("iiwa.position_commanded", 7, "rad", "joints 1 to 7"),
-    Port("iiwa.position_measured", 7, "rad", "joints 1 to 7"),
-    Port("iiwa.velocity_estimated", 7, "rad/s", "joints 1 to 7"),
-    Port("iiwa.torque_commanded", 7, "N m", "joints 1 to 7"),
-    Port("iiwa.torque_measured", 7, "N m", "joints 1 to 7"),
-    Port("iiwa.torque_external", 7, "N m", "joints 1 to 7; bolt part of the tool"),
-    Port("gripper.state_measured", 2, "m, m/s", "opening and its rate"),
-    Port("ft_sensor.wrench", 6, "N, N m", _WRENCH_FRAME),
-    *_device("iiwa"),
-    *_device("gripper"),
-    *_device("ft_sensor"),
-)
+def cell_ports(arm: str, joints: int) -> tuple[Port, ...]:
+    """Returns the ports of the cell, simulated or real. Torques have Drake's sign.
+
+    Args:
+        arm: name of the arm, `arm.name` of a scenario.
+        joints: number of its joints.
+    """
+    where = f"joints 1 to {joints}"
+    return (
+        Port(f"{arm}.position", joints, "rad", where, is_input=True),
+        Port("gripper.position", 1, "m", "opening between the pads", is_input=True),
+        Port(f"{arm}.position_commanded", joints, "rad", where),
+        Port(f"{arm}.position_measured", joints, "rad", where),
+        Port(f"{arm}.velocity_estimated", joints, "rad/s", where),
+        Port(f"{arm}.torque_commanded", joints, "N m", where),
+        Port(f"{arm}.torque_measured", joints, "N m", where),
+        Port(
+            f"{arm}.torque_external", joints, "N m", f"{where}; bolt part of the tool"
+        ),
+        Port("gripper.state_measured", 2, "m, m/s", "opening and its rate"),
+        Port("ft_sensor.wrench", 6, "N, N m", _WRENCH_FRAME),
+        *_device(arm),
+        *_device("gripper"),
+        *_device("ft_sensor"),
+    )
+
 
 #: Ports of the twin: the bolt stands for the arm.
 TWIN_PORTS: tuple[Port, ...] = (

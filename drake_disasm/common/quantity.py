@@ -20,6 +20,7 @@ def quantity(
     choices: tuple[str, ...] = (),
     grid: tuple[float, ...] = (),
     step: float | None = None,
+    any_length: bool = False,
 ) -> Any:
     """Returns a dataclass field holding a number, a list of numbers or a word.
 
@@ -32,13 +33,14 @@ def quantity(
         grid: values from which a search may begin, where the default is not enough.
         step: by which a search first changes it, where a smaller one shows nothing of
             what it does; None leaves that to the search.
+        any_length: whether a list may have another number of values than the default.
     """
     metadata = {"unit": unit, "doc": doc, "low": low, "high": high}
     metadata |= {"choices": choices, "grid": grid, "step": step}
     if isinstance(default, list):
+        length = {} if any_length else {"length": len(default)}
         return dataclasses.field(
-            default_factory=lambda: list(default),
-            metadata=metadata | {"length": len(default)},
+            default_factory=lambda: list(default), metadata=metadata | length
         )
     return dataclasses.field(default=default, metadata=metadata)
 

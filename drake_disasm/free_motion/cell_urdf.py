@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import SpatialInertia
 
-from drake_disasm.cell.arm_description import BASE, FLANGE
-from drake_disasm.cell.parsing import arm_joints
+from drake_disasm.cell.arm_model import ArmModel, add_arm
 from drake_disasm.cell.placement import bench_top, nominal_groove_pose
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.resources import model_path
@@ -24,7 +25,8 @@ def cell_urdf(scenario: Scenario) -> str:
 
     The tool has the inertia of sensor, gripper and bolt, and for collisions a cylinder
     that they are in; the bench is a box with the lock in it. Nothing is to be seen of
-    the arm, so that no other file is needed.
+    the arm, so that no other file is needed. What its file leaves out of the drives is
+    written out, as `add_arm` assumes it.
 
     Args:
         scenario: of the cell.
@@ -32,32 +34,73 @@ def cell_urdf(scenario: Scenario) -> str:
     Raises:
         DisasmError: a model file is missing, or the arm is none that a station takes.
     """
-    arm_joints(scenario.arm.model)
+    plant = MultibodyPlant(0.0)
+    arm = add_arm(plant, scenario.arm)
+    plant.Finalize()
     ElementTree.register_namespace("drake", _DRAKE)
     root = ElementTree.parse(model_path(scenario.arm.model)).getroot()
     for link in root.iter("link"):
         for shape in link.findall("visual"):
             link.remove(shape)
+    _complete_joints(root, plant, arm)
     tool, X_WG = Tool.from_models(scenario), nominal_groove_pose(scenario.placement)
     length = float(tool.X_FB.translation()[2]) + _BEYOND_BOLT
-    link = _add_link(root, "tool", FLANGE)
+    link = _add_link(root, "tool", scenario.arm.flange)
     _add_inertia(link, tool.M_F)
     size = {"radius": _text(_AROUND_TOOL), "length": _text(length)}
     _add_collision(link, [0.0, 0.0, 0.5 * length], "cylinder", size)
     x, y, top = bench_top(X_WG, scenario.part)
     height = top + _ABOVE_BENCH
     box = {"size": " ".join(map(_text, (*_BENCH, height)))}
-    _add_collision(_add_link(root, "bench", BASE), [x, y, 0.5 * height], "box", box)
+    X_WBase = arm.base.CalcPoseInWorld(plant.CreateDefaultContext())
+    bench = _add_link(root, "bench", scenario.arm.base, X_WBase.inverse())
+    _add_collision(bench, [x, y, 0.5 * height], "box", box)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _add_link(root: ElementTree.Element, name: str, parent: str) -> ElementTree.Element:
-    """Returns a new link that is fixed to another, its frame on that one's."""
+def _complete_joints(
+    root: ElementTree.Element, plant: MultibodyPlant, arm: ArmModel
+) -> None:
+    """Fixes the joints that are held, and states drives that are assumed."""
+    for joint in root.iter("joint"):
+        if joint.get("name") in arm.held:
+            joint.set("type", "fixed")
+    if not arm.has_assumed_drives:
+        return
+    for stated in root.findall("transmission"):
+        root.remove(stated)
+    for index in plant.GetJointActuatorIndices():
+        drive = plant.get_joint_actuator(index)
+        name = drive.joint().name()
+        transmission = ElementTree.SubElement(
+            root, "transmission", name=f"{name}_drive"
+        )
+        kind = ElementTree.SubElement(transmission, "type")
+        kind.text = "transmission_interface/SimpleTransmission"
+        ElementTree.SubElement(transmission, "joint", name=name)
+        actuator = ElementTree.SubElement(transmission, "actuator", name=name)
+        for number in ("gear_ratio", "rotor_inertia"):
+            value = _text(getattr(drive, f"default_{number}")())
+            ElementTree.SubElement(actuator, f"{{{_DRAKE}}}{number}", value=value)
+
+
+def _add_link(
+    root: ElementTree.Element,
+    name: str,
+    parent: str,
+    X_PL: RigidTransform | None = None,
+) -> ElementTree.Element:
+    """Returns a new link that is fixed to another, its frame there or on that one's."""
     link = ElementTree.SubElement(root, "link", name=name)
     joint = ElementTree.SubElement(root, "joint", name=f"{name}_joint", type="fixed")
     ElementTree.SubElement(joint, "parent", link=parent)
     ElementTree.SubElement(joint, "child", link=name)
+    if X_PL is not None and not X_PL.IsExactlyIdentity():
+        rpy = RollPitchYaw(X_PL.rotation()).vector()
+        place = {"xyz": X_PL.translation(), "rpy": rpy}
+        values = {key: " ".join(map(_text, value)) for key, value in place.items()}
+        ElementTree.SubElement(joint, "origin", values)
     return link
 
 

@@ -19,12 +19,12 @@ from drake_disasm.free_motion.way import with_way
 from drake_disasm.stations import Station
 from drake_disasm.stations.advance import advance
 
-#: Columns of a log of kind `joint_response`, and the ports that they are read from.
-_PORTS = {
-    "q_commanded": "iiwa.position_commanded",
-    "q": "iiwa.position_measured",
-    "v": "iiwa.velocity_estimated",
-    "tau": "iiwa.torque_measured",
+#: Columns of a log of kind `joint_response`, and the arm's ports that they are from.
+_QUANTITIES = {
+    "q_commanded": "position_commanded",
+    "q": "position_measured",
+    "v": "velocity_estimated",
+    "tau": "torque_measured",
 }
 _SLICE = 0.1  # s, between two updates of the progress
 
@@ -55,7 +55,7 @@ class MotionPlayer:
         motion: MotionTable,
         add_view: Callable[[DiagramBuilder, Station], object] | None = None,
     ) -> None:
-        if station.arm != "iiwa":
+        if not station.joints:
             raise DisasmError("the twin has no arm to move; use `station` cell")
         self.station, self.period = station, station.control_period
         whole, self.begin = with_way(station, motion)
@@ -66,7 +66,7 @@ class MotionPlayer:
         builder = DiagramBuilder()
         builder.AddSystem(station)
         source = builder.AddNamedSystem("motion", TrajectorySource(path))
-        command = station.GetInputPort("iiwa.position")
+        command = station.GetInputPort(f"{station.arm}.position")
         builder.Connect(source.get_output_port(), command)
         assert station.grip_command is not None  # every arm here has a gripper
         grip = builder.AddNamedSystem(
@@ -75,11 +75,12 @@ class MotionPlayer:
         opening = station.GetInputPort("gripper.position")
         builder.Connect(grip.get_output_port(), opening)
         self._sinks = {}
-        for name, port in _PORTS.items():
+        for name, quantity in _QUANTITIES.items():
             sink = builder.AddNamedSystem(
                 f"log_{name}", VectorLogSink(len(station.start), self.period)
             )
-            builder.Connect(station.GetOutputPort(port), sink.get_input_port())
+            port = station.GetOutputPort(f"{station.arm}.{quantity}")
+            builder.Connect(port, sink.get_input_port())
             self._sinks[name] = sink
         if add_view:
             add_view(builder, station)

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 
-from drake_disasm.cell.parsing import add_arm
+from drake_disasm.cell.arm_model import add_arm
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import read_bytes
 from drake_disasm.logs.tables import MOST_BYTES, read_table
+from drake_disasm.scenario import ArmConfig
 
 _REMEDY = "give a table as drake-disasm excite writes it: time, q.0, q.1, ... in SI"
 
@@ -53,12 +54,12 @@ def read_motion(path: Path, joints: int) -> MotionTable:
     return MotionTable(time - time[0], values[:, 1:])
 
 
-def refuse_beyond_limits(motion: MotionTable, arm: str, source: Path) -> None:
+def refuse_beyond_limits(motion: MotionTable, arm: ArmConfig, source: Path) -> None:
     """Refuses a motion that leaves the joints' ranges or is faster than they can be.
 
     Args:
         motion: to be played.
-        arm: URL of its model, which states the limits.
+        arm: whose model states the limits.
         source: of the motion, for the message.
 
     Raises:

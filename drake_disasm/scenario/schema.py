@@ -35,7 +35,7 @@ class JointImpedanceConfig:
 
     stiffness: list[float] = quantity(
         [1000.0, 1000.0, 1000.0, 1000.0, 1000.0, 1000.0, 1000.0], "N m/rad",
-        "of each joint", low=10.0, high=5000.0,
+        "of each joint, or one for all", low=10.0, high=5000.0, any_length=True,
     )  # fmt: skip
     damping_ratio: float = quantity(0.7, "1", "of each joint", low=0.1, high=1.0)
 
@@ -70,22 +70,33 @@ class CartesianImpedanceConfig:
 class ArmConfig:
     """The arm and its controller: `stiffness`, `damping_ratio` are position control's.
 
-    The gains of each control: drake_disasm/cell/arm_control.py.
+    The gains of each control: drake_disasm/cell/arm_control.py. `posture` and the
+    stiffnesses have a value for each joint, or one for all. An arm of six joints has no
+    redundancy: the posture picks one of the ways in which it can hold the bolt.
     """
 
     model: str = quantity(
         "package://disasm_models/iiwa14/iiwa14.urdf", "", "URDF of the arm"
     )
+    name: str = quantity("iiwa", "", "of the device, in `<name>.position` and the like")
+    base: str = quantity("iiwa_link_0", "", "link that stands on the world's origin")
+    flange: str = quantity(
+        "iiwa_link_ee", "", "link that carries the sensor, its z out of the arm"
+    )
+    joints: list[str] = quantity(
+        [], "", "driven ones from base to flange, the model's others held at zero; "
+        "empty: all movable ones", any_length=True,
+    )  # fmt: skip
     posture: list[float] = quantity(
         [0.0, 0.6, 0.0, -1.4, 0.0, 1.14, 0.0], "rad", "preferred joint angles",
-        low=-3.0, high=3.0,
+        low=-6.3, high=6.3, any_length=True,
     )  # fmt: skip
     control: str = quantity(
         "position", "", "how the arm is controlled", choices=CONTROLS
     )
     stiffness: list[float] = quantity(
-        [20e3, 8e3, 20e3, 8e3, 8e3, 8e3, 8e3], "N m/rad", "of each joint",
-        low=10.0, high=1e6,
+        [20e3, 8e3, 20e3, 8e3, 8e3, 8e3, 8e3], "N m/rad",
+        "of each joint, or one for all", low=10.0, high=1e6, any_length=True,
     )  # fmt: skip
     damping_ratio: float = quantity(
         1.0, "1", "of each joint about its own inertia", low=0.1, high=5.0
@@ -113,8 +124,14 @@ class GripperConfig:
     """
 
     model: str = quantity(
-        "package://disasm_models/gripper_2f140/gripper_2f140.urdf", "", "URDF"
+        "package://disasm_models/gripper_2f140/gripper_2f140.urdf",
+        "",
+        "URDF with the frames gripper_base, finger_carriage, tcp and fingertip",
     )
+    fingers: list[str] = quantity(
+        ["left_finger_joint", "right_finger_joint"], "",
+        "sliding joints of the model, at 0 where the pads meet",
+    )  # fmt: skip
     hold: str = quantity(
         "friction", "", "how the bolt is held", choices=("friction", "weld")
     )

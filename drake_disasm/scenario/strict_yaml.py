@@ -120,8 +120,9 @@ def _check_value(node: yaml.Node, field: dataclasses.Field, path: str) -> None:
         if not isinstance(node, yaml.SequenceNode):
             raise _NodeError(node, f"{path}: has the wrong shape; write [a, b, ...]")
         _check_length(node, path, field.metadata.get("length", _MOST_ITEMS))
+        (kind,) = typing.get_args(field.type)
         for item in node.value:
-            _check_scalar(item, float, path, field.metadata)
+            _check_scalar(item, kind, path, field.metadata)
     else:
         _check_scalar(node, typing.cast(type, field.type), path, field.metadata)
 

@@ -13,6 +13,8 @@ from drake_disasm.scenario.schema import (
     Scenario,
 )
 
+#: Devices of the stations besides the arm.
+_OTHER_DEVICES = ("gripper", "ft_sensor", "bolt")
 #: Of Cartesian impedance control along the axes [N/m] and about them [N m/rad].
 _STIFFNESS = (("N/m along", 10.0, 5000.0), ("N m/rad about", 1.0, 300.0))
 
@@ -41,6 +43,7 @@ def _validate_one(scenario: Scenario) -> None:
     _refuse_unregistered(scenario)
     _refuse_missing_files(scenario)
     _refuse_broken_periods(scenario)
+    _refuse_unfit_name(scenario.arm.name)
     _refuse_impossible_stiffness(scenario.arm.cartesian_impedance)
     scenario.part.refuse_impossible()
     _refuse_unreachable_end(scenario)
@@ -82,6 +85,15 @@ def _refuse_broken_periods(scenario: Scenario) -> None:
                 f"{name}: task.period ({scenario.task.period:g} s) is not a whole "
                 f"number of {step:g} s; give a divisor of it"
             )
+
+
+def _refuse_unfit_name(name: str) -> None:
+    """Refuses an arm's name that no port can begin with."""
+    if not name.isidentifier() or name in _OTHER_DEVICES:
+        raise DisasmError(
+            f"arm.name: '{clipped(name)}' is empty, another device's, or no word; give "
+            "one of letters, digits and _, such as ur5e"
+        )
 
 
 def _refuse_impossible_stiffness(config: CartesianImpedanceConfig) -> None:

@@ -5,12 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import (
-    Frame,
-    JointActuator,
-    ModelInstanceIndex,
-    RevoluteJoint,
-)
+from pydrake.multibody.tree import JointActuator, RevoluteJoint
 from pydrake.symbolic import Expression, Variable
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import (
@@ -23,6 +18,7 @@ from pydrake.systems.primitives import (
     SymbolicVectorSystem,
 )
 
+from drake_disasm.cell.arm_model import ArmModel
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.effects import (
@@ -111,24 +107,22 @@ class ArmMechanics:
 
     Args:
         plant: with the arm, not yet finalized.
-        arm: its model instance.
-        frame_F: its flange.
+        arm: on its base in the plant.
         effects: of the default Context.
     """
 
     def __init__(
         self,
         plant: MultibodyPlant,
-        arm: ModelInstanceIndex,
-        frame_F: Frame,
+        arm: ArmModel,
         effects: Sequence[ArmEffect],
     ) -> None:
         self._plant = plant
-        self._payload = add_payload_body(plant, frame_F, effects)
+        self._payload = add_payload_body(plant, arm.frame_F, effects)
         self._joints: dict[str, _Joint] = {}
         for index in plant.GetJointActuatorIndices():  # by instance: not yet finalized
             actuator = plant.get_joint_actuator(index)
-            if actuator.model_instance() != arm:
+            if actuator.model_instance() != arm.instance:
                 continue
             joint = actuator.joint()
             self._joints[joint.name()] = _Joint(

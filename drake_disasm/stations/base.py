@@ -12,11 +12,12 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort, System
 from pydrake.systems.primitives import RandomSource
 
+from drake_disasm.cell.arm_model import arm_joints
 from drake_disasm.cell.coordinates import ArmCoordinates, Coordinates
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.ports import Port
+from drake_disasm.common.ports import Port, cell_ports
 from drake_disasm.common.quantity import closest
 from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.devices.sensor_chain import Payload
@@ -63,7 +64,8 @@ class Station(Diagram):
         simulation_only: ports that every simulated station has besides its table, and
             hardware has not: ask `HasOutputPort` or `HasInputPort` before using one in
             a diagram that is to run on both.
-        arm: the device whose position is commanded ("iiwa", or "bolt").
+        arm: the device whose position is commanded: the arm's name, or "bolt".
+        joints: names of the arm's joints, from its base; the twin has none.
         has_velocity_input: whether `<arm>.velocity` is an input as well.
         control_period: at which `<arm>.position` is read [s].
         grip_command: what to send to `gripper.position` [m]; None has no gripper.
@@ -82,6 +84,7 @@ class Station(Diagram):
     table: tuple[Port, ...]
     simulation_only: tuple[str, ...] = SIMULATION_ONLY
     arm: str
+    joints: tuple[str, ...] = ()
     has_velocity_input: bool
     control_period: float
     grip_command: float | None = None
@@ -214,6 +217,12 @@ class Station(Diagram):
 
     def check(self) -> None:
         """Raises DisasmError if the station no longer accepts commands."""
+
+    def _set_arm(self) -> None:
+        """Sets the arm's name, its joints, and the ports that go by them."""
+        self.arm = self.scenario.arm.name
+        self.joints = arm_joints(self.scenario.arm)
+        self.table = cell_ports(self.arm, len(self.joints))
 
     def _set_cell_geometry(self) -> Tool:
         """Sets the geometry of arm, tool and lock; returns the tool."""

@@ -23,8 +23,6 @@ from pydrake.systems.primitives import (
 from drake_disasm.cell.arm_control import joint_gains
 from drake_disasm.cell.arm_dynamics import ArmDynamics
 from drake_disasm.cell.grip import AXIS_ORDER, finger_springs
-from drake_disasm.cell.tool import FINGERS
-from drake_disasm.common.ports import CELL_PORTS
 from drake_disasm.effects import ArmEffect
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.arm_mechanics import ArmMechanics, refuse_unknown_arm_effects
@@ -33,6 +31,7 @@ from drake_disasm.stations.cell_models import add_adaptive_fingers, add_cell
 from drake_disasm.stations.contact import exclude_collisions
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
+from drake_disasm.stations.start_collisions import refuse_collisions
 from drake_disasm.stations.wiring import export_ready_device, export_required
 from drake_disasm.systems.cartesian_impedance import CartesianImpedance
 
@@ -41,7 +40,10 @@ _FINGER_MASS = 0.3  # kg, of a finger with its drive, for its damping
 
 
 class CellStation(SimulatedStation):
-    """KUKA iiwa 14, OnRobot HEX-E and Robotiq 2F-140 at the door-chain lock.
+    """Arm, force/torque sensor and gripper at the door-chain lock.
+
+    By default a KUKA iiwa 14, an OnRobot HEX-E and a Robotiq 2F-140. The arm's ports
+    have its name, `arm`, for which "iiwa" stands here.
 
     Position and joint impedance control are a spring and damper in each joint about
     the commanded angle, which the discrete solver takes implicitly, Cartesian
@@ -49,6 +51,9 @@ class CellStation(SimulatedStation):
     by Drake's InverseDynamics with the tool's data. That is what KUKA's modes feel
     like from outside, the stiffness of position mode being that of the drives. The
     fingers are position-controlled likewise.
+
+    Attributes:
+        arm_instance: model instance of the arm in the plant.
 
     @system
     name: CellStation
@@ -79,8 +84,6 @@ class CellStation(SimulatedStation):
     """
 
     kind = "cell"
-    table = CELL_PORTS
-    arm = "iiwa"
     has_velocity_input = False
     grip_command: float
     settling_time = 0.5
@@ -88,6 +91,7 @@ class CellStation(SimulatedStation):
     def __init__(self, scenario: Scenario) -> None:
         super().__init__(scenario)
         refuse_twins_contact(scenario)
+        self._set_arm()
         self.grip_command = _grip_command(scenario)
         self.tool = self._set_cell_geometry()
         self._dynamics = ArmDynamics(scenario.arm, self.tool, self.X_WG)
@@ -98,13 +102,14 @@ class CellStation(SimulatedStation):
         config = self.scenario
         frame_Gn = self._add_plant(builder, config.simulation.cell_time_step)
         plant = self.plant
-        models = add_cell(plant, frame_Gn, config, self._environment)
-        self.iiwa, self.tool_models, self.lock = models.iiwa, models.tool, models.lock
+        self._models = models = add_cell(plant, frame_Gn, config, self._environment)
+        self.arm_instance = models.arm.instance
+        self.tool_models, self.lock = models.tool, models.lock
         # A groove that is tilted sinks into the bench, and the bolt in it.
         inside = self.lock.bolt_ids.values()
         exclude_collisions(self.scene_graph, inside, models.bench)
-        arm = [e for e in self._default_effects if isinstance(e, ArmEffect)]
-        self._mechanics = ArmMechanics(plant, self.iiwa, models.frame_F, arm)
+        effects = [e for e in self._default_effects if isinstance(e, ArmEffect)]
+        self._mechanics = ArmMechanics(plant, models.arm, effects)
         fingers = None
         if config.gripper.compliance == "adaptive":
             springs = finger_springs(config.gripper, self.tool)
@@ -125,7 +130,7 @@ class CellStation(SimulatedStation):
         self._dynamics.set_positions(self.start)
         inertia = np.diag(self._dynamics.mass_matrix())
         k_arm, d_arm = joint_gains(self.scenario.arm, inertia)
-        joints = plant.GetJointActuatorIndices(self.iiwa)
+        joints = plant.GetJointActuatorIndices(self.arm_instance)
         for index, k, d in zip(joints, k_arm, d_arm, strict=True):
             _set_spring(plant, index, k, d)
         for index in plant.GetJointActuatorIndices(self.tool_models.gripper):
@@ -133,28 +138,28 @@ class CellStation(SimulatedStation):
             _set_spring(plant, index, k, 2.0 * np.sqrt(k * _FINGER_MASS))
 
     def _wire_arm(self, builder: DiagramBuilder) -> None:
-        plant, connect = self.plant, builder.Connect
-        command = builder.AddNamedSystem("iiwa_command", PassThrough(7))
+        plant, connect, n = self.plant, builder.Connect, len(self.joints)
+        command = builder.AddNamedSystem("arm_command", PassThrough(n))
         export_required(
             builder,
             command.get_input_port(),
-            "iiwa.position",
-            "connect the commanded joint angles (7,), station.start to stay there",
+            f"{self.arm}.position",
+            f"connect the commanded joint angles ({n},), station.start to stay there",
         )
         desired = builder.AddNamedSystem(
-            "iiwa_interpolator",
+            "arm_interpolator",
             StateInterpolatorWithDiscreteDerivative(
-                7, self.scenario.arm.control_period, suppress_initial_transient=True
+                n, self.scenario.arm.control_period, suppress_initial_transient=True
             ),
         )
         connect(command.get_output_port(), desired.get_input_port())
         reading = self._wire_torques(builder, desired.get_output_port())
         position, velocity = self._in_halves(
-            builder, "iiwa_state", plant.get_state_output_port(self.iiwa)
+            builder, "arm_state", plant.get_state_output_port(self.arm_instance)
         )
-        torque = plant.get_net_actuation_output_port(self.iiwa)
+        torque = plant.get_net_actuation_output_port(self.arm_instance)
         measured = self._mechanics.wire(builder, position, velocity, torque)
-        position, velocity = self._in_halves(builder, "iiwa_reading", reading)
+        position, velocity = self._in_halves(builder, "arm_reading", reading)
         outputs = {
             "position_commanded": command.get_output_port(),
             "position_measured": position,
@@ -164,46 +169,47 @@ class CellStation(SimulatedStation):
             "torque_external": self._external_torque(builder),
         }
         for quantity, port in outputs.items():
-            builder.ExportOutput(port, f"iiwa.{quantity}")
-        export_ready_device(builder, "iiwa", self.time_step)
+            builder.ExportOutput(port, f"{self.arm}.{quantity}")
+        export_ready_device(builder, self.arm, self.time_step)
 
     @staticmethod
     def _in_halves(
         builder: DiagramBuilder, name: str, state: OutputPort
     ) -> tuple[OutputPort, OutputPort]:
-        """Returns ports of the positions (7,) and velocities (7,) of a state (14,)."""
-        halves = builder.AddNamedSystem(name, Demultiplexer([7, 7]))
+        """Returns ports of the positions (n,) and velocities (n,) of a state (2 n,)."""
+        n = state.size() // 2
+        halves = builder.AddNamedSystem(name, Demultiplexer([n, n]))
         builder.Connect(state, halves.get_input_port())
         return halves.get_output_port(0), halves.get_output_port(1)
 
     def _wire_torques(self, builder: DiagramBuilder, desired: OutputPort) -> OutputPort:
-        """Adds encoders and controller; returns the port of what encoders read (14,).
+        """Adds encoders and controller; returns the port of what encoders read (2 n,).
 
-        Springs about a desired state (14,), and gravity's part. Springs in the joints
+        Springs about a desired state (2 n,), and gravity's part. Springs in the joints
         are the plant's own; gravity compensation is by the controller's own model of
         arm and tool.
         """
-        plant, iiwa, connect = self.plant, self.iiwa, builder.Connect
+        plant, arm, connect = self.plant, self.arm_instance, builder.Connect
         state, goal = self._mechanics.wire_encoders(
-            builder, plant.get_state_output_port(iiwa), desired
+            builder, plant.get_state_output_port(arm), desired
         )
         weight = builder.AddNamedSystem(
-            "iiwa_gravity_compensation",
+            "arm_gravity_compensation",
             InverseDynamics(self._dynamics.plant, InverseDynamics.kGravityCompensation),
         )
         connect(state, weight.get_input_port(0))
-        actuation = plant.get_actuation_input_port(iiwa)
+        actuation = plant.get_actuation_input_port(arm)
         if self.scenario.arm.control != "cartesian_impedance":
-            connect(goal, plant.get_desired_state_input_port(iiwa))
+            connect(goal, plant.get_desired_state_input_port(arm))
             connect(weight.get_output_port(), actuation)
             return state
         spring = builder.AddNamedSystem(
-            "iiwa_cartesian_impedance",
+            "arm_cartesian_impedance",
             CartesianImpedance(self.scenario.arm, self._dynamics, self.start),
         )
         connect(state, spring.GetInputPort("state"))
         connect(desired, spring.GetInputPort("desired_state"))
-        torque = builder.AddNamedSystem("iiwa_torque", Adder(2, 7))
+        torque = builder.AddNamedSystem("arm_torque", Adder(2, len(self.joints)))
         connect(weight.get_output_port(), torque.get_input_port(0))
         connect(spring.get_output_port(), torque.get_input_port(1))
         connect(torque.get_output_port(), actuation)
@@ -215,7 +221,9 @@ class CellStation(SimulatedStation):
         Held by friction the bolt is a body apart: its weight comes as a contact
         force on the fingers and is taken off here, as the robot's tool data would.
         """
-        contact = self.plant.get_generalized_contact_forces_output_port(self.iiwa)
+        contact = self.plant.get_generalized_contact_forces_output_port(
+            self.arm_instance
+        )
         if self.scenario.gripper.hold == "weld":
             return contact
         X_FB, plant = self.tool.X_FB, self._dynamics.plant
@@ -227,11 +235,12 @@ class CellStation(SimulatedStation):
         load = plant.GetBodyByName("tool")
         load.SetSpatialInertiaInBodyFrame(context, M_B.Shift(-X_FB.translation()))
         carried = builder.AddNamedSystem(
-            "iiwa_bolt_weight",
+            "arm_bolt_weight",
             InverseDynamics(plant, InverseDynamics.kGravityCompensation, context),
         )
-        external = builder.AddNamedSystem("iiwa_torque_external", Adder(2, 7))
-        state = self.plant.get_state_output_port(self.iiwa)
+        adder = Adder(2, contact.size())
+        external = builder.AddNamedSystem("arm_torque_external", adder)
+        state = self.plant.get_state_output_port(self.arm_instance)
         builder.Connect(state, carried.get_input_port(0))
         builder.Connect(contact, external.get_input_port(0))
         builder.Connect(carried.get_output_port(), external.get_input_port(1))
@@ -304,13 +313,17 @@ class CellStation(SimulatedStation):
         super()._fix_commands(context)
         self.GetInputPort("gripper.position").FixValue(context, self.grip_command)
 
+    def _refuse_bad_start(self) -> None:
+        context = self.CreateDefaultContext()
+        self._place_at_start(self.part_context(self.plant, context))
+        query = self.GetOutputPort("query_object").Eval(context)
+        refuse_collisions(self.plant, query, self._models)
+
     def _place_at_start(self, plant_context: Context) -> None:
         plant = self.plant
-        plant.SetPositions(plant_context, self.iiwa, self.start)
-        for name in FINGERS:
-            plant.GetJointByName(name).set_translation(
-                plant_context, self._start_opening / 2
-            )
+        plant.SetPositions(plant_context, self.arm_instance, self.start)
+        for finger in self.tool_models.fingers:
+            finger.set_translation(plant_context, self._start_opening / 2)
         if self.scenario.gripper.hold == "friction":
             plant.SetFreeBodyPose(plant_context, self.lock.bolt, self.X_WG)
 

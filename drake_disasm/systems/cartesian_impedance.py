@@ -36,7 +36,7 @@ class CartesianImpedance(LeafSystem):
     Args:
         arm: with the gains' parameters.
         dynamics: of the arm with its tool, for this system alone.
-        start: (7,) joint angles of the gains [rad].
+        start: (n,) joint angles of the gains [rad].
     """
 
     def __init__(

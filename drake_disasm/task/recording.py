@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from drake_disasm.cell.arm_model import arm_joints
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.logs.columns import flat_columns
 from drake_disasm.logs.header import LogHeader
@@ -21,7 +22,6 @@ _NO_STEP: dict[str, Any] = {
     "action": np.zeros(6),
     "action_executed": np.zeros(6),
 } | {f"reward.{name}": np.float64(0.0) for name in REWARD_TERMS}
-_JOINTS = tuple(f"iiwa_joint_{i}" for i in range(1, 8))
 
 
 class EpisodeRecorder:
@@ -115,7 +115,7 @@ def transitions_header(
         task=scenario.name,
         provenance={**provenance, **simulated},
         period=scenario.task.period,
-        joints=() if station == "twin" else _JOINTS,
+        joints=() if station == "twin" else arm_joints(scenario.arm),
         scenario=scenario_to_mapping(scenario),
     )
 

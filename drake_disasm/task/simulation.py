@@ -269,10 +269,10 @@ class TaskSimulation:
         return port.Eval(owner.GetMyContextFromRoot(self.context))
 
     def joint_positions(self) -> np.ndarray:
-        """Returns the arm's measured joint angles (7,); the twin has none, (0,)."""
-        if self.station.arm != "iiwa":
+        """Returns the arm's measured joint angles (n,); the twin has none, (0,)."""
+        if not self.station.joints:
             return np.zeros(0)
-        return self.evaluate(self.station, "iiwa.position_measured")
+        return self.evaluate(self.station, f"{self.station.arm}.position_measured")
 
     def evaluate(self, system: Diagram | LeafSystem, port: str) -> Any:
         """Returns the present value of a system's output port."""

@@ -12,7 +12,7 @@ from tests.docs.pages import ROOT, Block, blocks
 
 _PAGE = ROOT / "docs" / "guides" / "gallery.md"
 _DATA = ROOT.parent / "shared" / "data"
-_SLOW = ("ur10e", "emps", "weigh")
+_SLOW = ("ur10e", "rokae", "emps", "weigh")
 #: Numbers that a machine may change in the last digit.
 _NUMBER = re.compile(r"\d+\.?\d*")
 

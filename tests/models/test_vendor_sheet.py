@@ -15,7 +15,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame
 
 MODELS = Path(__file__).parents[2] / "models"
-URDFS = ["bench/bench", "gripper_2f140/gripper_2f140", "hex_e/hex_e", "iiwa14/iiwa14"]
+URDFS = [
+    *("bench/bench", "gripper_2f140/gripper_2f140", "hex_e/hex_e", "iiwa14/iiwa14"),
+    *("ur5e/ur5e", "panda/panda", "panda_hand/panda_hand"),
+]
 JOINTS = range(7)
 
 # LBR iiwa 14 R820, joints 1 to 7.
@@ -136,7 +139,7 @@ def test_gripper_mass_stroke_and_pads(gripper: MultibodyPlant) -> None:
 
 
 #: A frame of the vendor's, and what the springs of adaptive fingers move.
-MASSLESS = {"iiwa_link_ee", "finger_carriage"}
+MASSLESS = {"iiwa_link_ee", "tool0", "panda_link8", "finger_carriage"}
 
 
 @pytest.mark.parametrize("name", URDFS)

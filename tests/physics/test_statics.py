@@ -45,7 +45,7 @@ def test_sensor_reads_the_tools_weight(welded: CellStation, posture) -> None:
     plant = welded.plant
     frame_S = welded.tool_models.frame_S
     plant_context = welded.part_context(plant, context)
-    plant.SetPositions(plant_context, welded.iiwa, posture)
+    plant.SetPositions(plant_context, welded.arm_instance, posture)
     welded.GetInputPort("iiwa.position").FixValue(context, posture)
     simulator.AdvanceTo(welded.settling_time)
     R_WS = frame_S.CalcPoseInWorld(plant_context).rotation()
@@ -103,7 +103,7 @@ def test_stiffest_cartesian_impedance_comes_to_rest() -> None:
     context = simulator.get_mutable_context()
     plant_context = station.part_context(station.plant, context)
     pushed_off = np.array([1, -1, 1, -1, 1, -1, 1]) * 0.05  # rad/s
-    station.plant.SetVelocities(plant_context, station.iiwa, pushed_off)
+    station.plant.SetVelocities(plant_context, station.arm_instance, pushed_off)
     simulator.Initialize()
     speeds = []
     for time in (0.5, 1.5, 3.0):

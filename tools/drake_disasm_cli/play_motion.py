@@ -16,7 +16,7 @@ from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 
-from drake_disasm.cell.parsing import arm_joints
+from drake_disasm.cell.arm_model import arm_joints
 from drake_disasm.common import program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_text
@@ -79,9 +79,9 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     _refuse_contradictions(args)
     scenario = load_scenario(args.scenario, args.overrides)
-    joints = arm_joints(scenario.arm.model)
+    joints = arm_joints(scenario.arm)
     motion = read_motion(args.motion, len(joints))
-    refuse_beyond_limits(motion, scenario.arm.model, args.motion)
+    refuse_beyond_limits(motion, scenario.arm, args.motion)
     writer = _open_log(args, arguments, scenario) if args.record else None
     # Of hardware, the pace is its own.
     rate = 0.0 if args.station == "hardware" else common.realtime_rate(args)
@@ -147,7 +147,7 @@ def _open_log(
         task="free motion",
         provenance=provenance,
         period=scenario.arm.control_period,
-        joints=arm_joints(scenario.arm.model),
+        joints=arm_joints(scenario.arm),
         urdf=str((args.record / _URDF).absolute()),
         drive=_REAL if is_real else _SIMULATED,
         scenario=scenario_to_mapping(scenario),

@@ -43,9 +43,9 @@ def test_condensed_joints_give_way_as_springs_in_series() -> None:
     random = np.random.default_rng(1)
     J, k = random.uniform(-1, 1, (6, 7)), random.uniform(5e3, 2e4, 7)
     M, f = np.diag(random.uniform(1, 2, 7)), random.uniform(-1, 1, 6)
-    arm = _condensed(J, M, k, np.ones(7))
+    arm = _condensed(J, M, k, np.ones(7), np.zeros(7))
     np.testing.assert_allclose(np.linalg.solve(arm.K, f), J @ (J.T @ f / k))
-    square = _condensed(J[:, :6], M[:6, :6], k[:6], np.ones(6))
+    square = _condensed(J[:, :6], M[:6, :6], k[:6], np.ones(6), np.zeros(6))
     inverse = np.linalg.inv(J[:, :6])
     np.testing.assert_allclose(square.M, inverse.T @ M[:6, :6] @ inverse, rtol=1e-6)
 

@@ -8,11 +8,11 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from drake_disasm.cell.arm_dynamics import ArmDynamics
-from drake_disasm.cell.parsing import add_arm
+from drake_disasm.cell.arm_model import add_arm
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import Tool
 from drake_disasm.free_motion.cell_urdf import cell_urdf
-from drake_disasm.scenario import load_scenario
+from drake_disasm.scenario import ArmConfig, load_scenario
 
 SCENARIO = load_scenario("removal")
 
@@ -26,7 +26,7 @@ def urdf(tmp_path: Path) -> str:
 
 def test_inertia_and_gravity_are_those_of_arm_and_tool(urdf: str) -> None:
     plant = MultibodyPlant(0.0)
-    add_arm(plant, urdf)
+    add_arm(plant, ArmConfig(model=urdf))
     plant.Finalize()
     X_WG = nominal_groove_pose(SCENARIO.placement)
     known = ArmDynamics(SCENARIO.arm, Tool.from_models(SCENARIO), X_WG)
@@ -47,7 +47,7 @@ def test_inertia_and_gravity_are_those_of_arm_and_tool(urdf: str) -> None:
 
 def test_tool_and_bench_are_there_to_be_run_into(urdf: str) -> None:
     plant, _ = AddMultibodyPlantSceneGraph(DiagramBuilder(), 0.0)
-    add_arm(plant, urdf)
+    add_arm(plant, ArmConfig(model=urdf))
     plant.Finalize()
     for name in ("tool", "bench", "iiwa_link_6"):
         assert plant.GetCollisionGeometriesForBody(plant.GetBodyByName(name))

@@ -10,9 +10,10 @@ from drake_disasm.free_motion.table import (
     read_motion,
     refuse_beyond_limits,
 )
+from drake_disasm.scenario import ArmConfig
 from tests.refusals import refusal
 
-_ARM = "package://disasm_models/iiwa14/iiwa14.urdf"
+_ARM = ArmConfig()
 
 
 def written(path: Path, *lines: str) -> Path:

@@ -32,7 +32,7 @@ def _lifted(station: CellStation, effects: Sequence[fx.Effect]) -> Simulator:
     context = simulator.get_mutable_context()
     plant_context = station.part_context(station.plant, context)
     q = station.start + LIFT
-    station.plant.SetPositions(plant_context, station.iiwa, q)
+    station.plant.SetPositions(plant_context, station.arm_instance, q)
     station.GetInputPort("iiwa.position").FixValue(context, q)
     simulator.Initialize()
     return simulator
@@ -106,7 +106,7 @@ def _joint(station: CellStation, simulator: Simulator) -> float:
     """Returns where the joint truly is."""
     context = simulator.get_mutable_context()
     plant_context = station.part_context(station.plant, context)
-    return float(station.plant.GetPositions(plant_context, station.iiwa)[JOINT])
+    return float(station.plant.GetPositions(plant_context, station.arm_instance)[JOINT])
 
 
 def test_a_spring_is_held_by_the_drive(station: CellStation) -> None:
@@ -160,7 +160,7 @@ def test_a_payload_bends_the_joints(station: CellStation) -> None:
         context, JacobianWrtVariable.kV, plant.GetFrameByName("iiwa_link_ee"),
         p_FoPcm_F, plant.world_frame(), plant.world_frame(),
     )  # fmt: skip
-    yielded = station.start + LIFT - plant.GetPositions(context, station.iiwa)
+    yielded = station.start + LIFT - plant.GetPositions(context, station.arm_instance)
     weight = J_W.T @ [0.0, 0.0, 9.81 * mass]
     k = np.array(station.scenario.arm.stiffness)
     np.testing.assert_allclose(k * yielded, weight[:7], atol=0.01)

@@ -42,7 +42,7 @@ def test_measured_torque_carries_the_weight(held: CellStation) -> None:
     plant, context = held.plant, held.settled([])
     plant_context = held.part_context(plant, context)
     gravity = plant.CalcGravityGeneralizedForces(plant_context)
-    expected = -plant.GetVelocitiesFromArray(held.iiwa, gravity)
+    expected = -plant.GetVelocitiesFromArray(held.arm_instance, gravity)
     if held.scenario.gripper.hold == "friction":  # there the bolt is a body apart
         p_WG, world = held.X_WG.translation(), plant.world_frame()
         flange = plant.GetFrameByName("iiwa_link_ee")
@@ -51,7 +51,7 @@ def test_measured_torque_carries_the_weight(held: CellStation) -> None:
             plant_context, JacobianWrtVariable.kV, flange, p_F, world, world
         )
         weight = J_W.T @ [0.0, 0.0, 0.2 * 9.81]
-        expected = expected + plant.GetVelocitiesFromArray(held.iiwa, weight)
+        expected = expected + plant.GetVelocitiesFromArray(held.arm_instance, weight)
     measured = held.GetOutputPort("iiwa.torque_measured").Eval(context)
     np.testing.assert_allclose(measured, expected, atol=5e-3)
 

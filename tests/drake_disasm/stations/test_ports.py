@@ -5,15 +5,15 @@ import dataclasses
 import pytest
 
 from drake_disasm.common.ports import (
-    CELL_PORTS,
     TWIN_PORTS,
+    cell_ports,
     check_ports,
     port_differences,
 )
 from drake_disasm.stations import CellStation, SimulatedStation
 from tests.refusals import refused
 
-TABLES = {"cell": CELL_PORTS, "twin": TWIN_PORTS}
+TABLES = {"cell": cell_ports("iiwa", 7), "twin": TWIN_PORTS}
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -23,7 +23,7 @@ def test_parity_in_both_directions(name: str, request: pytest.FixtureRequest) ->
 
 
 def test_a_missing_an_extra_and_a_resized_port_are_named(cell: CellStation) -> None:
-    first, second, third, *rest = CELL_PORTS
+    first, second, third, *rest = TABLES["cell"]
     odd = dataclasses.replace(third, size=3)
     more = dataclasses.replace(first, name="iiwa.jerk")
     words = ("iiwa.jerk is missing", "iiwa.position is extra", "has size 7, not 3")
