@@ -19,7 +19,10 @@ PRINTED = {
     "own_policy": ["twin        12", "cell        12"],
     "own_environment": [r"last  eight episodes: mean reward  -0\."],
     "own_agent": ["4      120", "8      239"],
-    "own_effect": ["MagneticCatch  confirmed  force = ", r"\[MagneticCatch\(force=3\.9"],
+    "own_effect": [
+        "MagneticCatch  confirmed  force = ",
+        r"MagneticCatch\(force=3\.9",
+    ],
     "gymnasium_sb3": ["200 steps in ", "steps/s", "outcome: "],
     "own_log_model": ["JointCoulombFriction.pivot  confirmed", r"size = 0\.150"],
     "own_place": ["SheathFriction  confirmed", r"size = 2\.99"],

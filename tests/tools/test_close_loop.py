@@ -1,13 +1,23 @@
 """tools/close_loop.py, as a user runs it."""
 
+import contextlib
 import json
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from drake_disasm.effects import CommandGain, SensorMounting
+from drake_disasm.effects import (
+    CommandGain,
+    JointCoulombFriction,
+    PayloadError,
+    SensorBias,
+    SensorCrossTalk,
+    SensorDrift,
+    SensorMounting,
+)
 from drake_disasm.logs import Log, LogWriter, read_log
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import load_scenario
@@ -15,10 +25,21 @@ from drake_disasm.task.simulation import TaskSimulation
 from sysid.objective import pseudo_residual
 from sysid.validation.blind_tests import nominal
 from sysid.validation.synthetic_logs import transitions_log
+from tests.conftest import library_of
 from tests.sysid.effect_selection.blind import static_log
 from tests.sysid.report.pages import own_part
 from tests.tools.inputs import write_slide_log
 from tests.tools.programs import assert_one_line, interrupt, run_program
+
+
+@pytest.fixture(autouse=True)
+def library(request: pytest.FixtureRequest) -> Iterator[None]:
+    """A few effects, but for slow proofs."""
+    few = SensorBias, SensorCrossTalk, SensorDrift, SensorMounting, PayloadError
+    few += (JointCoulombFriction,)
+    is_slow = request.node.get_closest_marker("slow")
+    with contextlib.nullcontext() if is_slow else library_of(*few):
+        yield
 
 
 def run(*arguments: object) -> subprocess.CompletedProcess[str]:
