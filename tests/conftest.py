@@ -1,12 +1,11 @@
 """What tests of all packages share."""
 
-import contextlib
 from collections.abc import Iterator
 
 import pytest
 
 from drake_disasm.common import executors
-from drake_disasm.effects import Effect, registry
+from drake_disasm.effects import find_effect, registry
 from sysid.residuals import predictable_residual
 
 _LEARNER = predictable_residual.Learner()
@@ -32,10 +31,14 @@ def own_effects(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(executors, "_modules", dict(executors._modules))
 
 
-@contextlib.contextmanager
-def library_of(*effects: type[Effect]) -> Iterator[None]:
-    """No other effects are registered: a search among all takes ten times as long."""
-    registry.registered_effects()  # loads what entry points name
+@pytest.fixture(scope="module", autouse=True)
+def library(request: pytest.FixtureRequest) -> Iterator[None]:
+    """The effects that a module names in `LIBRARY` are all there are, if it does.
+
+    A search among every effect takes ten times as long.
+    """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(registry, "_effects", {kind.__name__: kind for kind in effects})
+        if names := getattr(request.module, "LIBRARY", None):
+            few = {name: find_effect(name) for name in names}
+            patch.setattr(registry, "_effects", few)
         yield

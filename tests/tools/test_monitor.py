@@ -7,24 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from drake_disasm.effects import (
-    PayloadError,
-    SensorBias,
-    SensorDrift,
-    SensorGain,
-    SensorMounting,
-)
-from tests.conftest import library_of
 from tests.progress import running, wait_until
 from tests.sysid.monitoring.days import write_day, write_reference
 from tests.tools.inputs import write_slide_log
 from tests.tools.programs import assert_one_line, command, interrupt, run_program
 
-
-@pytest.fixture(scope="module", autouse=True)
-def library():
-    with library_of(SensorBias, SensorDrift, SensorGain, SensorMounting, PayloadError):
-        yield
+LIBRARY = ("SensorBias", "SensorDrift", "SensorGain", "SensorMounting", "PayloadError")
 
 
 @pytest.fixture(scope="module")

@@ -8,31 +8,24 @@ import pytest
 from drake_disasm.effects import (
     JointCoulombFriction,
     JointViscousFriction,
-    TorqueGain,
     TorqueOffset,
 )
 from sysid.effect_selection.change_words import changes_mapping, changes_text
 from sysid.effect_selection.changes import Changes, find_changes
 from sysid.models.joint_motion import JointMotionModel
 from sysid.report import changes_page
-from tests.conftest import library_of
 from tests.sysid.models.two_logs import two_logs
 from tests.sysid.report.pages import own_part
 
+LIBRARY = (
+    "JointCoulombFriction", "JointViscousFriction", "TorqueOffset", "TorqueGain"
+)  # fmt: skip
 _FRICTION = [
     JointCoulombFriction("shoulder", 1.0),
     JointViscousFriction("shoulder", 0.3),
     JointCoulombFriction("elbow", 0.8),
     JointViscousFriction("elbow", 0.2),
 ]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def library():
-    with library_of(
-        JointCoulombFriction, JointViscousFriction, TorqueOffset, TorqueGain
-    ):
-        yield
 
 
 def changes(folder, added, since=0) -> Changes:

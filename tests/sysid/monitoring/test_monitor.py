@@ -6,13 +6,6 @@ import numpy as np
 import pytest
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import (
-    PayloadError,
-    SensorBias,
-    SensorDrift,
-    SensorGain,
-    SensorMounting,
-)
 from drake_disasm.logs import read_log
 from sysid.monitoring.episodes import Course
 from sysid.monitoring.monitor import OWN, Monitor
@@ -20,17 +13,11 @@ from sysid.monitoring.page import monitor_page
 from sysid.monitoring.record import Record
 from sysid.monitoring.reference import KEY, Reference
 from sysid.monitoring.watched import WatchedFolder
-from tests.conftest import library_of
 from tests.sysid.models.arm import smooth_motion, write_motion_log, write_two_link_arm
 from tests.sysid.monitoring.days import write_day, write_reference
 
 _LEVEL = 30.0
-
-
-@pytest.fixture(scope="module", autouse=True)
-def library():
-    with library_of(SensorBias, SensorDrift, SensorGain, SensorMounting, PayloadError):
-        yield
+LIBRARY = ("SensorBias", "SensorDrift", "SensorGain", "SensorMounting", "PayloadError")
 
 
 @pytest.fixture(scope="module")
