@@ -22,7 +22,7 @@ from tests.tools.programs import assert_one_line, interrupt, run_program, start_
 
 LIBRARY = (
     "SensorBias", "SensorCrossTalk", "SensorDrift", "SensorMounting", "PayloadError",
-    "JointCoulombFriction",
+    "JointCoulombFriction", "CommandGain",
 )  # fmt: skip
 
 
