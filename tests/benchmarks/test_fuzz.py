@@ -15,8 +15,8 @@ from tests.benchmarks.bad_workers import dying, hanging
 from tests.refusals import refusal
 
 #: A few cases of each reader and codec; the program itself reads thousands.
-CASES = dict.fromkeys(fuzz.READERS, 25) | dict.fromkeys(fuzz.CODECS, 400)
-CASES["import_mat"] = 5  # each starts a process
+CASES = dict.fromkeys(fuzz.READERS, 12) | dict.fromkeys(fuzz.CODECS, 400)
+CASES |= {"policy": 25, "checkpoint": 25, "import_mat": 3}  # each starts a process
 
 
 @pytest.fixture(autouse=True)

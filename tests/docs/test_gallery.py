@@ -12,7 +12,6 @@ from tests.docs.pages import ROOT, Block, blocks
 
 _PAGE = ROOT / "docs" / "guides" / "gallery.md"
 _DATA = ROOT.parent / "shared" / "data"
-_SLOW = ("ur10e", "rokae", "emps", "weigh")
 #: Numbers that a machine may change in the last digit.
 _NUMBER = re.compile(r"\d+\.?\d*")
 
@@ -21,17 +20,13 @@ def _entries() -> list[object]:
     """Returns commands and what they print, of each recording."""
     pairs = zip(blocks(_PAGE, "sh"), blocks(_PAGE, "text"), strict=True)
     return [
-        pytest.param(
-            commands,
-            printed,
-            id=name,
-            marks=[pytest.mark.slow] if name in _SLOW else [],
-        )
+        pytest.param(commands, printed, id=name)
         for commands, printed in pairs
         if (name := re.findall(r"--out out/(\w+)", commands.text)[0])
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not _DATA.is_dir(), reason="no recordings are at hand")
 @pytest.mark.parametrize(("commands", "printed"), _entries())
 def test_commands_print_what_the_page_says(

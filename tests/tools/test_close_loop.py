@@ -18,7 +18,12 @@ from sysid.validation.synthetic_logs import transitions_log
 from tests.sysid.effect_selection.blind import static_log
 from tests.sysid.report.pages import own_part
 from tests.tools.inputs import write_slide_log
-from tests.tools.programs import assert_one_line, interrupt, run_program
+from tests.tools.programs import assert_one_line, interrupt, run_program, start_program
+
+LIBRARY = (
+    "SensorBias", "SensorCrossTalk", "SensorDrift", "SensorMounting", "PayloadError",
+    "JointCoulombFriction", "CommandGain",
+)  # fmt: skip
 
 
 def run(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -145,7 +150,9 @@ def test_transitions_give_a_scenario_that_simulates(tmp_path):
     hidden = [CommandGain(x=0.03)]
     transitions_log(tmp_path / "log", nominal(), hidden, 0, episodes=6, steps=12)
     out = tmp_path / "out"
-    result = run("--log", tmp_path / "log", "--out", out, "--workers", "1")
+    result = start_program(
+        "close_loop", "--log", tmp_path / "log", "--out", out, "--workers", "1"
+    )
     assert result.returncode == 0, result.stderr
     result = json.loads((out / "result.json").read_text())
     assert result["effects"] == ["CommandGain"]
@@ -172,7 +179,7 @@ def test_ctrl_c_leaves_fits_with_which_the_same_command_goes_on(tmp_path):
     value = np.sqrt(
         np.mean(pseudo_residual(2.0 * arrays["residual"], arrays["huber_delta"]) ** 2)
     )
-    again = run(*arguments)
+    again = start_program("close_loop", *arguments)
     assert again.returncode == 0, again.stderr
     assert f"without effects: objective {value:.4g}" in again.stdout
     assert not (out / "fits").exists()

@@ -1,5 +1,6 @@
 """Each example that a program's --help shows is run, as it stands there."""
 
+import importlib
 import re
 import shlex
 import sys
@@ -39,7 +40,7 @@ _SMALL = {
 _ELSEWHERE = re.compile(
     r"--executor dask|--station hardware|^drake-disasm fake-cell|--follow"
 )
-_QUICK = ("simulate", "evaluate", "import-log", "check-log", "plot-training", "accept")
+_QUICK = ("plot-training", "accept")
 #: A study's own factors, at one level each.
 _LEVELS = {
     "precision": ("--levels", "agent=ddpg", "psi=0"),
@@ -112,6 +113,14 @@ def _log_of_the_twin(folder: Path) -> None:
         "simulate", *words.split(), *small.split(), "--record=out/log", cwd=folder
     )
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", SUBCOMMANDS)
+def test_examples_are_accepted(name: str) -> None:
+    module = importlib.import_module(f"drake_disasm_cli.{name.replace('-', '_')}")
+    for _, program, *words in examples(name):
+        if program == name:
+            module.parse(words)  # exits if it is refused
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,8 @@ from tests.sysid.monitoring.days import write_day, write_reference
 from tests.tools.inputs import write_slide_log
 from tests.tools.programs import assert_one_line, command, interrupt, run_program
 
+LIBRARY = ("SensorBias", "SensorDrift", "SensorGain", "SensorMounting", "PayloadError")
+
 
 @pytest.fixture(scope="module")
 def closed(tmp_path_factory):

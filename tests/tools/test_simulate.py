@@ -22,6 +22,7 @@ from tests.tools.programs import Runner, assert_one_line, command
 TWIN = ("--station", "twin")
 
 
+@pytest.mark.slow
 def test_default_run_takes_the_bolt_out(simulate: Runner) -> None:
     done = simulate()
     assert done.returncode == 0, done.stderr
@@ -36,6 +37,8 @@ def test_record_writes_a_log_that_describes_itself(
         *TWIN, "--scenario", "removal_turned", "--episodes", "2", "--record", "log"
     )
     assert done.returncode == 0, done.stderr
+    assert "success (the bolt is out)" in done.stdout
+    assert "2 of 2 episodes succeeded" in done.stdout
     log = read_log(tmp_path / "log")
     assert len(log.episodes) == 2
     assert all(55 < episode.rows <= 151 for episode in log.episodes)

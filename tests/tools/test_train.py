@@ -15,7 +15,7 @@ import pytest
 from drake_disasm.logs import read_log
 from drake_disasm.policies import load_policy
 from tests.progress import running, wait_until
-from tests.tools.programs import assert_one_line, command, run_program
+from tests.tools.programs import assert_one_line, command, interrupt, run_program
 
 #: A training of seconds: short episodes, a small network, nothing compiled.
 SMALL = [
@@ -58,7 +58,7 @@ def _content(folder: Path) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("train") / "whole"
-    _finished(out, "--episodes=6", "--seeds=2")
+    _finished(out, "--episodes=6", "--seeds=2", "--workers=1")
     return out
 
 
@@ -95,23 +95,22 @@ def test_a_batch_of_twins_can_be_trained_on(tmp_path: Path) -> None:
     assert log.header.scenario["contact"]["model"] == "impact"
 
 
-def test_seeds_apart_and_together_are_the_same(
-    undisturbed: Path, tmp_path: Path
-) -> None:
-    """One seed in this process, or two in a pool: the same bits."""
-    _finished(tmp_path / "one", "--episodes=6", "--first-seed=1")
-    assert _content(tmp_path / "one/seed_001") == _content(undisturbed / "seed_001")
+@pytest.mark.slow
+def test_seeds_in_a_pool_are_the_same(undisturbed: Path, tmp_path: Path) -> None:
+    _finished(tmp_path / "pool", "--episodes=6", "--seeds=2", "--workers=2")
+    for seed in ("seed_000", "seed_001"):
+        assert _content(tmp_path / "pool" / seed) == _content(undisturbed / seed)
 
 
-def test_a_killed_training_goes_on_bit_for_bit(
+def test_a_training_that_was_stopped_goes_on_bit_for_bit(
     undisturbed: Path, tmp_path: Path
 ) -> None:
-    out = tmp_path / "killed"
-    program = _command(out, "--episodes=6")
-    with running(program, stderr=subprocess.DEVNULL) as process:
-        wait_until((out / "seed_000/log/episode_0001.parquet").exists, process)
-        process.kill()
+    """Ctrl-C keeps what is finished; being killed is a slow proof."""
+    out = tmp_path / "stopped"
+    is_time = (out / "seed_000/log/episode_0001.parquet").exists
+    interrupt(is_time, "train", *SMALL, "--out", out, "--episodes=6")
     assert not (out / "seed_000/result.json").exists()
+    assert (out / "seed_000/checkpoint.npz").exists()
     _finished(out, "--episodes=6", "--resume")
     assert _content(out / "seed_000") == _content(undisturbed / "seed_000")
     written = (out / "seed_000/policy.npz").stat().st_mtime_ns
@@ -144,10 +143,10 @@ def _episodes(out: Path) -> int:
     return len(list(out.glob("seed_000/log/episode_*")))
 
 
-@pytest.mark.parametrize("seeds", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_ctrl_c_keeps_what_is_finished(seeds: int, tmp_path: Path) -> None:
-    out, count = tmp_path / "out", f"--seeds={seeds}"
-    program = _command(out, "--episodes=5000", count)
+@pytest.mark.slow
+def test_ctrl_c_of_a_pool_keeps_what_is_finished(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    program = _command(out, "--episodes=5000", "--seeds=2")
     with running(program, stderr=subprocess.PIPE, start_new_session=True) as process:
         wait_until((out / "seed_000/log/episode_0001.parquet").exists, process)
         os.killpg(process.pid, signal.SIGINT)

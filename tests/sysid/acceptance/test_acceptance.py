@@ -89,9 +89,10 @@ def test_an_arm_that_falls_short_is_too_slow_in_some_draws(
             assert trial.succeeded == (gain > -0.25)
     separation = found.separation
     assert separation is not None and separation.auc == 0.0
-    assert accept(["straight"], twin, draws=12) == [found]
-    [other] = accept(["straight"], twin, draws=12, seed=100)
-    assert other.draws != found.draws
+    [again] = accept(["straight"], twin, draws=2)
+    assert again.draws == found.draws[:2] and again.values == found.values
+    [other] = accept(["straight"], twin, draws=2, seed=100)
+    assert other.draws != again.draws
 
 
 def test_the_nominal_twin_does_not_have_the_effect(tmp_path: Path) -> None:

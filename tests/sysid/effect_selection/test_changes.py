@@ -17,6 +17,9 @@ from sysid.report import changes_page
 from tests.sysid.models.two_logs import two_logs
 from tests.sysid.report.pages import own_part
 
+LIBRARY = (
+    "JointCoulombFriction", "JointViscousFriction", "TorqueOffset", "TorqueGain"
+)  # fmt: skip
 _FRICTION = [
     JointCoulombFriction("shoulder", 1.0),
     JointViscousFriction("shoulder", 0.3),
@@ -62,7 +65,7 @@ def test_a_friction_that_fell_is_told_by_how_much(tmp_path):
 
 
 def test_many_references_hide_no_change(tmp_path):
-    logs = two_logs(tmp_path, _FRICTION, [JointCoulombFriction("elbow", 0.02)])
+    logs = two_logs(tmp_path, _FRICTION, [JointCoulombFriction("elbow", 0.014)])
     names = [f"reference_{n}" for n in range(5)]
     references = [dataclasses.replace(logs[0], folder=tmp_path / n) for n in names]
     found = find_changes(JointMotionModel([*references, logs[1]]), 5)

@@ -234,8 +234,14 @@ def test_a_real_arm_is_written_right(recording, tmp_path):
 
 @pytest.fixture(scope="module")
 def real_arm(tmp_path_factory) -> Log:
+    """Every third row: an order takes seconds to find in all of them."""
     folder = tmp_path_factory.mktemp("lwr4")
-    return read_log(write_motion(1, folder / "log", write_arm(folder / "arm.urdf")))
+    log = read_log(write_motion(1, folder / "log", write_arm(folder / "arm.urdf")))
+    return damaged(log, lambda columns: columns.update(_every_third(columns)))
+
+
+def _every_third(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {name: values[::3] for name, values in columns.items()}
 
 
 @pytest.mark.parametrize("order", [(6, 0, 1, 2, 3, 4, 5), (3, 1, 2, 0, 4, 5, 6)])

@@ -17,6 +17,7 @@ from tests.sysid.models.arm import smooth_motion, write_motion_log, write_two_li
 from tests.sysid.monitoring.days import write_day, write_reference
 
 _LEVEL = 30.0
+LIBRARY = ("SensorBias", "SensorDrift", "SensorGain", "SensorMounting", "PayloadError")
 
 
 @pytest.fixture(scope="module")

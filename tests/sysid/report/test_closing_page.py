@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from drake_disasm.effects import SensorDrift
+from drake_disasm.effects import SensorDrift, SensorGain, SensorMounting
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.report import closing_page
 from tests.sysid.effect_selection.blind import closed, static_log
@@ -15,7 +15,8 @@ from tests.sysid.report.pages import own_part
 @pytest.fixture(scope="module")
 def found(tmp_path_factory) -> ClosedLoop:
     folder = tmp_path_factory.mktemp("drifting")
-    return closed(static_log(folder, [SensorDrift], 5.0, seed=2))
+    log = static_log(folder, [SensorDrift], 5.0, seed=2)
+    return closed(log, [SensorDrift, SensorGain, SensorMounting])
 
 
 def test_the_page_needs_nothing_else_and_begins_with_the_sentence(found):

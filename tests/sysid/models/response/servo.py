@@ -62,14 +62,16 @@ def write_response(
     header = LogHeader("joint_response", "swing", {}, joints=("servo",), urdf=str(urdf))
     time = 0.005 * np.arange(round(duration / 0.005) + 1)
     one = np.ones((len(time), 1))
+    gain, on = columns.get("gain", one), columns.get("enabled", one)
+    commanded = [goals(time, number) for number in range(episodes)]
+    segments = [
+        Segment(0.0, *np.zeros((2, 1)), time, inputs, np.zeros(1))
+        for inputs in (Inputs(goal, 0.0 * goal, gain, one, on) for goal in commanded)
+    ]
+    motion = simulate(arm, [parameters], segments, 5 * (len(time) - 1), 0.001)
+    positions = np.round(motion.q[::5, 0] / quantum).swapaxes(0, 1) * quantum
     with LogWriter(folder, header) as writer:
-        for number in range(episodes):
-            goal = goals(time, number)
-            on = columns.get("enabled", one)
-            inputs = Inputs(goal, 0.0 * goal, columns.get("gain", one), one, on)
-            segment = Segment(0.0, *np.zeros((2, 1)), time, inputs, np.zeros(1))
-            motion = simulate(arm, [parameters], [segment], 5 * (len(time) - 1), 0.001)
-            q = np.round(motion.q[::5, 0, 0] / quantum) * quantum
+        for goal, q in zip(commanded, positions, strict=True):
             table = {"time": time, "q_commanded": goal, "q": q, **columns}
             writer.write_episode(flat_columns("joint_response", table))
     return read_log(folder)
