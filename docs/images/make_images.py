@@ -1,9 +1,10 @@
-"""Takes the README's picture: Meshcat in the middle of an episode, in Chromium.
+"""Takes pictures of Meshcat in the middle of episodes, in Chromium.
 
-Run `python docs/images/make_images.py` with Debian's chromium installed.
+Run `python docs/images/make_images.py [PICTURE ...]` with Debian's chromium installed.
 """
 
 import subprocess
+import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +16,12 @@ from drake_disasm.scenario import load_scenario
 from drake_disasm.task.simulation import TaskSimulation
 from drake_disasm.visualization import MeshcatView, start_meshcat
 
-_STEPS = 45
+#: By file: the scenario, and how many steps of its baseline.
+PICTURES = {
+    "overview": ("removal_turned", 45),
+    "ur5e_peg": ("ur5e_peg", 15),
+    "panda_bayonet": ("panda_bayonet", 60),
+}
 BAR, _GAP = 24, 12  # pixels
 _FLAGS = (
     "--headless --no-sandbox --disable-quic --no-first-run --disable-sync "
@@ -25,13 +31,14 @@ _FLAGS = (
 )
 
 
-def main() -> None:
-    """Writes overview.png beside this file: the cell, and a close-up of the lock."""
-    with tempfile.TemporaryDirectory() as folder:
-        files = [Path(folder) / f"{name}.png" for name in ("cell", "lock")]
-        for file, close_up in zip(files, (False, True), strict=True):
-            _take(file, close_up)
-        _side_by_side(files, Path(__file__).with_name("overview.png"))
+def main(names: Sequence[str]) -> None:
+    """Writes pictures beside this file: the cell, and a close-up of the part."""
+    for name in names or PICTURES:
+        with tempfile.TemporaryDirectory() as folder:
+            files = [Path(folder) / f"{view}.png" for view in ("cell", "part")]
+            for file, close_up in zip(files, (False, True), strict=True):
+                _take(file, close_up, *PICTURES[name])
+            _side_by_side(files, Path(__file__).with_name(f"{name}.png"))
 
 
 def _side_by_side(files: Sequence[Path], to: Path) -> None:
@@ -45,14 +52,13 @@ def _side_by_side(files: Sequence[Path], to: Path) -> None:
     joined.save(to, optimize=True)
 
 
-def _take(file: Path, close_up: bool) -> None:
-    view = MeshcatView(start_meshcat(), close_up=close_up)
-    simulation = TaskSimulation(
-        load_scenario("removal_turned"), "cell", make_policy("admittance"), [view]
-    )
+def _take(file: Path, close_up: bool, name: str, steps: int) -> None:
+    view, scenario = MeshcatView(start_meshcat(), close_up=close_up), load_scenario(name)
+    policy = make_policy("admittance", scenario)
+    simulation = TaskSimulation(scenario, "cell", policy, [view])
     view.begin_episode()
     simulation.reset(0)
-    for _ in range(_STEPS):
+    for _ in range(steps):
         simulation.step()
     screenshot(view.meshcat.web_url(), file)
 
@@ -74,4 +80,4 @@ def screenshot(url: str, file: Path) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])
