@@ -53,7 +53,8 @@ def _side_by_side(files: Sequence[Path], to: Path) -> None:
 
 
 def _take(file: Path, close_up: bool, name: str, steps: int) -> None:
-    view, scenario = MeshcatView(start_meshcat(), close_up=close_up), load_scenario(name)
+    view = MeshcatView(start_meshcat(), close_up=close_up)
+    scenario = load_scenario(name)
     policy = make_policy("admittance", scenario)
     simulation = TaskSimulation(scenario, "cell", policy, [view])
     view.begin_episode()
