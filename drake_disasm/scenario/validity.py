@@ -110,8 +110,7 @@ def _refuse_impossible_stiffness(config: CartesianImpedanceConfig) -> None:
 def _refuse_unreachable_end(scenario: Scenario) -> None:
     task, stage = scenario.task, scenario.part.stages[0]
     end = stage.radius * stage.end
-    needs_it = task.success == "travelled" or len(scenario.part.stages) > 1
-    if needs_it and task.travel_success >= end:
+    if (task.success == "travelled" or stage.is_turn) and task.travel_success >= end:
         raise DisasmError(
             f"task.travel_success: the way along {AXES[stage.axis]} ends after "
             f"{end:g} m, {task.travel_success:g} m is never reached; give less"

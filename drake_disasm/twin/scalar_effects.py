@@ -35,6 +35,7 @@ _ENVIRONMENT = Environment(
     impact_stiffness=1e3 * _TWO,
     impact_exponent=_TWO,
     force_Gn=(_TWO, 2.0 * _TWO, 3.0 * _TWO),
+    detent=0.2 * _TWO,
 )
 _SENSING = Sensing(
     0.3 * _TWO,

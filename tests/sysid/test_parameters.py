@@ -72,7 +72,7 @@ def test_an_effect_that_is_not_there_is_added_at_its_null_value():
 @pytest.mark.parametrize(
     ("request_", "message"),
     [
-        (ParameterRequest("lock"), "not a number"),
+        (ParameterRequest("part"), "not a number"),
         (ParameterRequest("part.clearance", high=0.5), "go beyond"),
         (ParameterRequest("contact.friction", low=0.3), "nominal"),
     ],

@@ -95,8 +95,8 @@ def test_a_number_that_cannot_be_is_one_line(
 
 
 def test_a_library_s_argument_is_an_option_in_messages(tmp_path: Path) -> None:
-    done = run_program("simulate", "--set", "lock.clearence=1")
-    assert_one_line(done, ["--set lock.clearence", "'clearance'"])
+    done = run_program("simulate", "--set", "part.clearence=1")
+    assert_one_line(done, ["--set part.clearence", "'clearance'"])
     done = run_program("evaluate", "--policy", "straight", "--sweep", "imprecision=7")
     assert_one_line(done, ["imprecision"])
 
@@ -137,7 +137,7 @@ class TestHiddenEffects:
     @pytest.mark.parametrize(
         ("text", "words"),
         [
-            ("lock: {clearance: 0.0003}\neffects: [!SensorBias {}]", ["lock", "--set"]),
+            ("lock: {clearance: 0.0003}\neffects: [!SensorBias {}]", ["part", "--set"]),
             ("effects: [!SensorBais {}]", ["SensorBias"]),
         ],
     )

@@ -16,7 +16,7 @@ _JOINTS = 7
 @pytest.fixture
 def motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A swing of one second; the way to it is hurried."""
-    for name, speed in (("_PULL", 0.15), ("_LIFT", 0.5), ("_TURN", 1.0)):
+    for name, speed in (("_IN_PART", 0.15), ("_OUT", 0.5), ("_TURN", 1.0)):
         monkeypatch.setattr(way, name, speed)
     time = np.linspace(0.0, 1.0, 201)
     swing = 0.05 * (1.0 - np.cos(2.0 * np.pi * time))[:, None] * np.ones(_JOINTS)

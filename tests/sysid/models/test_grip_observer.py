@@ -125,7 +125,7 @@ def test_where_a_model_leads_nowhere_steps_begin_as_the_wrench_says(dragged):
     log, scenario, _ = dragged
     model = TwinModel([log], scenario, ())
     broken = dataclasses.replace(scenario.part, neck_diameter=0.011)
-    refused = model.replace(scenario=dataclasses.replace(scenario, lock=broken))
+    refused = model.replace(scenario=dataclasses.replace(scenario, part=broken))
     assert refused.with_begins(_NOTHING) is refused
 
 
