@@ -86,7 +86,7 @@ def play(*overrides: str, force: float = 1.0) -> float:
     ends = []
     for sign in (1.0, -1.0):
         simulation.reset(0)
-        pushed, f_z = 0.4 * scenario.part.play, 0.0
+        pushed, f_z = 0.4 * scenario.part.clearance, 0.0
         while abs(f_z) < force:
             s = simulation.step(np.array([0, 0, sign * pushed, 0, 0, 0])).observation
             f_z, pushed = float(s[8]), 2e-6

@@ -152,36 +152,35 @@ class TaskGeometry:
         stages, room = scenario.part.stages, np.array(scenario.task.room)
         ends = [stage.end for stage in stages]
         ends[-1] += scenario.task.lift_success
-        way, high = way_of(scenario), np.zeros(6)
+        high = np.zeros(6)
         for stage, end in zip(stages, ends, strict=True):
             high[stage.axis] = end
         if compliance is None:
             compliance = bolt_compliance(scenario)
         radii = tuple(stage.radius for stage in stages)
         low, high = -room, high[:3] + room
+        way = scenario.part.way
         return cls(way, tuple(ends), radii, low, high, compliance[:3], compliance[3:])
 
-    def along(self, state: BoltState, stage: int) -> Any:
-        """Returns how far the bolt has gone along a stage's axis (...,) [m].
+    def ways(self, state: BoltState) -> list[Any]:
+        """Returns how far the bolt has gone along each stage's axis (...,) [m].
 
         A turn counts at its radius.
         """
-        axis = AXES.index(self.way[stage])
-        if axis < 3:
-            return self.place(state)[..., axis]
-        wrench = namespace(state.f).concat([state.f, state.t], axis=-1)
-        turned = (state.r + apply_matrix(self.turning, wrench))[..., axis - 3]
-        return self.radii[stage] * turned
+        found, p = [], self.place(state)
+        for axis, radius in zip(map(AXES.index, self.way), self.radii, strict=True):
+            if axis < 3:
+                found.append(p[..., axis])
+                continue
+            wrench = namespace(state.f).concat([state.f, state.t], axis=-1)
+            turned = state.r + apply_matrix(self.turning, wrench)
+            found.append(radius * turned[..., axis - 3])
+        return found
 
     def place(self, state: BoltState) -> Array:
         """Returns where Bo is since the start (..., 3) [m], grip included."""
         wrench = namespace(state.f).concat([state.f, state.t], axis=-1)
         return state.p + apply_matrix(self.compliance, wrench)
-
-
-def way_of(scenario: Scenario) -> str:
-    """Returns the coordinates along and about which a scenario's bolt leaves."""
-    return "".join(AXES[stage.axis] for stage in scenario.part.stages)
 
 
 def _length(vectors: Array) -> Any:
@@ -214,13 +213,13 @@ def counts(state: BoltState, task: TaskConfig, geometry: TaskGeometry) -> Array:
 
     The first counts up to its end, the second from `task.travel_success` of the first.
     """
-    gone, end = geometry.along(state, 0), geometry.radii[0] * geometry.ends[0]
-    xp = namespace(gone)
-    way = xp.where(gone < end, gone, end)
-    if len(geometry.way) == 1:
+    first, *others = geometry.ways(state)
+    xp, end = namespace(first), geometry.radii[0] * geometry.ends[0]
+    way = xp.where(first < end, first, end)
+    if not others:
         return side_by_side([way, xp.zeros_like(way)])
-    second = geometry.along(state, 1)
-    return side_by_side([way, xp.where(gone > task.travel_success, second, 0.0)])
+    second = xp.where(first > task.travel_success, others[0], 0.0)
+    return side_by_side([way, second])
 
 
 def outcome(
@@ -271,13 +270,13 @@ def succeeded(
 ) -> Array:
     """Returns whether the task is done (...,); see `outcome`."""
     if task.success == "travelled":
-        return geometry.along(state, 0) > task.travel_success
+        return geometry.ways(state)[0] > task.travel_success
     if p_GBo is not None:
         return is_removed(p_GBo, geometry)
     axis = AXES.index(geometry.way[-1])
     force = state.f[..., axis]
     is_free = (force > -FREE_FORCE) & (force < FREE_FORCE)
-    return is_free & (geometry.along(state, -1) >= geometry.ends[-1] + PULL_AWAY)
+    return is_free & (geometry.ways(state)[-1] >= geometry.ends[-1] + PULL_AWAY)
 
 
 def is_removed(p_GBo: Array, geometry: TaskGeometry) -> Array:

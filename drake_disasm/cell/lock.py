@@ -33,7 +33,7 @@ class Lock:
         groove, bolt: the fixed and the moved body, whose frames are G and B.
         frame: the frame that the groove is welded to; its pose in Gn is a
             parameter of the plant's Context.
-        groove_ids: collision geometries of the groove.
+        groove_names, groove_ids: of its collision geometries.
         bolt_ids: collision geometries of the bolt that touch the groove, by name.
     """
 
@@ -42,6 +42,7 @@ class Lock:
     groove: RigidBody
     bolt: RigidBody
     frame: FixedOffsetFrame
+    groove_names: tuple[str, ...]
     groove_ids: tuple[GeometryId, ...]
     bolt_ids: dict[str, GeometryId]
 
@@ -70,17 +71,17 @@ def add_lock(
     actual = environment or part.environment(contact)
     frame = plant.AddFrame(FixedOffsetFrame("groove_pose", frame_Gn, actual.X_GnG))
     instance = plant.AddModelInstance("lock")
-    groove = plant.AddRigidBody("groove", instance, part.M_fixed_G)
+    groove = plant.AddRigidBody("groove", instance)  # it never moves
     plant.WeldFrames(frame, groove.body_frame())
     bolt = plant.AddRigidBody("bolt", plant.AddModelInstance("bolt"), part.M_moved_B)
-    materials = part.materials(actual, contact.resolution)
     fixed, moved = part.fixed_solids(actual), part.moved_solids
-    groove_ids = _add_geometry(plant, groove, fixed, materials, _BRASS)
-    bolt_ids = _add_geometry(plant, bolt, moved, materials, _STEEL)
+    of_fixed = {name: part.fixed_material(name, actual) for name in fixed}
+    of_moved = part.moved_materials(actual, contact.resolution)
+    groove_ids = _add_geometry(plant, groove, fixed, of_fixed, _BRASS)
+    bolt_ids = _add_geometry(plant, bolt, moved, of_moved, _STEEL)
     del bolt_ids["grip"]
-    return Lock(
-        part, contact, groove, bolt, frame, tuple(groove_ids.values()), bolt_ids
-    )
+    names, ids = tuple(groove_ids), tuple(groove_ids.values())
+    return Lock(part, contact, groove, bolt, frame, names, ids, bolt_ids)
 
 
 def reshape_groove(
@@ -119,17 +120,18 @@ def set_environment(
     All but its clearance, which `reshape_groove` writes.
     """
     set_pose(lock, environment, plant_context)
-    source = lock.groove.GetParentPlant().get_source_id()
-    materials = lock.part.materials(environment, lock.contact.resolution)
-    names = lock.part.fixed_solids(environment)
-    ids = dict(zip(names, lock.groove_ids, strict=True)) | lock.bolt_ids
-    for name, geometry_id in ids.items():
+    source, part = lock.groove.GetParentPlant().get_source_id(), lock.part
+    moved = part.moved_materials(environment, lock.contact.resolution)
+    materials = [
+        (geometry_id, part.fixed_material(name, environment))
+        for name, geometry_id in zip(lock.groove_names, lock.groove_ids, strict=True)
+    ]
+    materials += [
+        (geometry_id, moved[name]) for name, geometry_id in lock.bolt_ids.items()
+    ]
+    for geometry_id, material in materials:
         scene_graph.AssignRole(
-            scene_graph_context,
-            source,
-            geometry_id,
-            materials[name],
-            RoleAssign.kReplace,
+            scene_graph_context, source, geometry_id, material, RoleAssign.kReplace
         )
 
 

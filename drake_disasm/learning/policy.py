@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from drake_disasm.learning.training import TrainingSpec, action_map
-from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES, way_of
+from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 from drake_disasm.policies import (
     LearnedPolicy,
     Network,
@@ -42,7 +42,7 @@ def trained_policy(
             period=task.period,
             max_translation=task.max_translation,
             max_rotation=task.max_rotation,
-            way=way_of(spec.scenario),
+            way=spec.scenario.part.way,
             provenance=provenance,
             evaluation={},
         ),

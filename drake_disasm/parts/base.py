@@ -17,14 +17,15 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
-from pydrake.geometry import ProximityProperties, Shape
-from pydrake.math import RigidTransform
+from pydrake.geometry import Cylinder, ProximityProperties, Shape
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import SpatialInertia
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Environment
 from drake_disasm.parts.contact import ContactConfig
 from drake_disasm.parts.lock_shape import LockShape
+from drake_disasm.parts.materials import rigid_material
 
 #: Forces and torques (6,), [f; tau].
 Wrench = np.ndarray
@@ -37,6 +38,20 @@ AXES = ("x", "y", "z", "u", "v", "w")
 
 #: All ways out, of one or two stages.
 WAYS = (*AXES, *("".join(two) for two in itertools.permutations(AXES, 2)))
+
+
+_R_Y_AXIS = RotationMatrix.MakeXRotation(-np.pi / 2)
+
+
+def cylinder_along_y(middle: float, radius: float, length: float) -> Solid:
+    """Returns a cylinder about the body's y axis.
+
+    Args:
+        middle: its y [m].
+        radius, length: [m].
+    """
+    X = RigidTransform(_R_Y_AXIS, [0.0, middle, 0.0])
+    return X, Cylinder(radius, length)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,10 +83,13 @@ class Part(abc.ABC):
     Both are made of solids by name.
 
     Attributes:
+        clearance: of the moved body in the fixed one: difference of their widths [m].
         fixed_fields: names of the fields that shape the fixed body alone.
         has_spring: whether `spring_wrench` is ever more than zero.
         file_fields: names of the fields that name files, beside the scenario's.
     """
+
+    clearance: float
 
     fixed_fields: ClassVar[tuple[str, ...]] = ()
     has_spring: ClassVar[bool] = False
@@ -81,6 +99,11 @@ class Part(abc.ABC):
     @abc.abstractmethod
     def stages(self) -> tuple[Stage, ...]:
         """The way out, one or two stages; the last is no turn, and ends in the open."""
+
+    @property
+    def way(self) -> str:
+        """The coordinates along and about which the moved body leaves."""
+        return "".join(AXES[stage.axis] for stage in self.stages)
 
     @property
     def gaps(self) -> LockShape | None:
@@ -99,7 +122,7 @@ class Part(abc.ABC):
             modulus=contact.modulus,
             head_modulus=contact.head_modulus,
             dissipation=contact.dissipation,
-            clearance=self.play,
+            clearance=self.clearance,
             impact_stiffness=contact.impact.stiffness,
             impact_exponent=contact.impact.exponent,
             detent=self.detent,
@@ -109,16 +132,6 @@ class Part(abc.ABC):
     def detent(self) -> float:
         """Greatest torque of a detent, nominal [N m]."""
         return 0.0
-
-    @property
-    @abc.abstractmethod
-    def play(self) -> float:
-        """Of the moved body in the fixed one: difference of their widths [m]."""
-
-    @property
-    @abc.abstractmethod
-    def M_fixed_G(self) -> SpatialInertia:
-        """Inertia of the fixed body about Go."""
 
     @property
     @abc.abstractmethod
@@ -147,11 +160,6 @@ class Part(abc.ABC):
 
     @property
     @abc.abstractmethod
-    def touch_depth(self) -> float:
-        """Along y, of what touches at that radius [m]."""
-
-    @property
-    @abc.abstractmethod
     def moved_solids(self) -> Mapping[str, Solid]:
         """The solids of the moved body; the one named `grip` touches the fingers."""
 
@@ -159,11 +167,22 @@ class Part(abc.ABC):
     def fixed_solids(self, environment: Environment) -> Mapping[str, Solid]:
         """Returns the solids of the fixed body, which effects may have reshaped."""
 
+    def fixed_material(
+        self, name: str, environment: Environment
+    ) -> ProximityProperties:
+        """Returns the hydroelastic properties of a solid of the fixed body.
+
+        Args:
+            name: of the solid.
+            environment: of the moved body.
+        """
+        return rigid_material(environment)
+
     @abc.abstractmethod
-    def materials(
+    def moved_materials(
         self, environment: Environment, resolution: float
     ) -> Mapping[str, ProximityProperties]:
-        """Returns the hydroelastic properties of all solids, by name.
+        """Returns the hydroelastic properties of the moved body's solids, by name.
 
         Args:
             environment: of the moved body.
@@ -196,10 +215,11 @@ class Part(abc.ABC):
         Raises:
             DisasmError: the part has none; says what to use instead.
         """
-        if self.gaps is None:
+        gaps = self.gaps
+        if gaps is None:
             raise DisasmError(
                 f"contact.model: 'impact' is a law for simple gaps, and "
                 f"{type(self).__name__} has none; set it to hydroelastic, and leave "
                 "out what needs a batch (--envs, --lockstep)"
             )
-        return self.gaps
+        return gaps

@@ -9,22 +9,21 @@ import dataclasses
 from typing import ClassVar
 
 import numpy as np
-from pydrake.geometry import Box, Cylinder, ProximityProperties
+from pydrake.geometry import Box, ProximityProperties
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.tree import SpatialInertia
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import quantity
 from drake_disasm.common.spatial import rotation_vector
 from drake_disasm.effects import Environment
-from drake_disasm.parts.base import Solid, Stage, Wrench
+from drake_disasm.parts.base import Solid, Stage, Wrench, cylinder_along_y
 from drake_disasm.parts.gripped_block import GrippedBlock
 from drake_disasm.parts.materials import (
     compliant_material,
-    facet_length,
-    rigid_material,
+    facet_count,
+    fitting_edge,
 )
-from drake_disasm.parts.meshes import circle, facet_count, tube
+from drake_disasm.parts.meshes import circle, tube
 from drake_disasm.parts.registry import register_part
 
 _BORDER = 0.008  # m, of the socket around the lugs
@@ -33,7 +32,6 @@ _STOP = 0.003  # m, thickness of what stops the lugs
 _LIFT = 12.0  # N, of a scripted policy
 _MOST_OF_EFFORT = 0.6  # of the effort with which it turns, that the detent may take
 _NOTCH_POINTS = 3  # corners along each side of a notch
-_R_Y_AXIS = RotationMatrix.MakeXRotation(-np.pi / 2)  # a cylinder along y
 
 
 @register_part
@@ -80,19 +78,9 @@ class Bayonet(GrippedBlock):
         )
 
     @property
-    def play(self) -> float:
-        """See Part: of the shaft in the plate's hole."""
-        return self.clearance
-
-    @property
     def touch_radius(self) -> float:
         """See Part: of the lugs' ends."""
         return self.shaft_diameter / 2 + self.lug_length
-
-    @property
-    def touch_depth(self) -> float:
-        """See Part: of the lugs."""
-        return self.lug_height
 
     @property
     def surface(self) -> float:
@@ -159,7 +147,7 @@ class Bayonet(GrippedBlock):
         radius = (self.shaft_diameter + clearance) / 2
         half = (self.lug_width + self.notch_clearance) / 2
         end = self.touch_radius + self.notch_clearance / 2
-        facets = facet_count(radius, clearance)
+        facets = facet_count(2 * radius, clearance)
         ring = circle(radius, facets)
         across, along = ring[:, 1], np.abs(ring[:, 0])
         quarter = ring[(along < np.sqrt(radius**2 - half**2) - 1e-6) & (across > 0)]
@@ -182,11 +170,10 @@ class Bayonet(GrippedBlock):
         """See GrippedBlock: shaft and lugs."""
         radius, middle = self.shaft_diameter / 2, self._lug_middle
         low, top = middle - self.lug_height / 2, self.surface + self.grip_standoff
-        shaft = Cylinder(radius, top - low)
         lug = Box(self.lug_length, self.lug_height, self.lug_width)
         x = radius + self.lug_length / 2
         return {
-            "shaft": (RigidTransform(_R_Y_AXIS, [0.0, (top + low) / 2, 0.0]), shaft),
+            "shaft": cylinder_along_y((top + low) / 2, radius, top - low),
             "lug_0": (RigidTransform([x, middle, 0.0]), lug),
             "lug_1": (RigidTransform([-x, middle, 0.0]), lug),
         }
@@ -195,23 +182,10 @@ class Bayonet(GrippedBlock):
         self, environment: Environment, resolution: float
     ) -> dict[str, ProximityProperties]:
         """See GrippedBlock: the lugs, flat on flat, are softer."""
-        facets = facet_count(self.shaft_diameter / 2, self.clearance)
-        finest = np.pi * self.shaft_diameter / facets
-        edge = facet_length(self.shaft_diameter, min(resolution, finest))
+        edge = fitting_edge(self.shaft_diameter, self.clearance, resolution)
         shaft = compliant_material(environment, environment.modulus, edge)
         lug = compliant_material(environment, environment.head_modulus, resolution)
-        rigid = rigid_material(environment)
-        return dict.fromkeys(self.fixed_solids(environment), rigid) | {
-            "shaft": shaft,
-            "lug_0": lug,
-            "lug_1": lug,
-        }
-
-    @property
-    def M_fixed_G(self) -> SpatialInertia:
-        """See Part: a block of steel; it never moves."""
-        side = 2 * (self.touch_radius + _BORDER)
-        return SpatialInertia.SolidBoxWithDensity(7800.0, side, -self.bottom, side)
+        return {"shaft": shaft, "lug_0": lug, "lug_1": lug}
 
     def refuse_impossible(self) -> None:
         """See Part: the lugs must be wholly under the plate."""

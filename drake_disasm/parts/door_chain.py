@@ -8,22 +8,20 @@ import dataclasses
 from typing import ClassVar
 
 import numpy as np
-from pydrake.geometry import Box, Cylinder, ProximityProperties
-from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.tree import SpatialInertia
+from pydrake.geometry import Box, ProximityProperties
+from pydrake.math import RigidTransform
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import quantity
 from drake_disasm.effects import Environment
-from drake_disasm.parts.base import Solid, Stage
+from drake_disasm.parts.base import Solid, Stage, cylinder_along_y
 from drake_disasm.parts.gripped_block import GrippedBlock
 from drake_disasm.parts.lock_shape import LockShape
-from drake_disasm.parts.materials import bolt_materials, rigid_material
+from drake_disasm.parts.materials import bolt_materials
 from drake_disasm.parts.registry import register_part
 
 _BORDER = 0.010  # m, solid rim around the channel
 _FLOOR = 0.003  # m, plate under the channel
-_R_Y_AXIS = RotationMatrix.MakeXRotation(-np.pi / 2)  # a cylinder along y
 _PUSH, _LIFT = 12.0, 8.0  # N, of a scripted policy
 
 
@@ -93,19 +91,9 @@ class DoorChain(GrippedBlock):
         )
 
     @property
-    def play(self) -> float:
-        """See Part: of the neck in the slot."""
-        return self.clearance
-
-    @property
     def touch_radius(self) -> float:
         """See Part: the head's."""
         return self.head_diameter / 2.0
-
-    @property
-    def touch_depth(self) -> float:
-        """See Part: the head's."""
-        return self.head_thickness
 
     @property
     def surface(self) -> float:
@@ -157,13 +145,13 @@ class DoorChain(GrippedBlock):
         """See GrippedBlock: neck and head of the bolt."""
         top, neck_end = float(self.gaps.top), self.grip_height - self.grip_size[1] / 2
         return {
-            "neck": (
-                RigidTransform(_R_Y_AXIS, [0, (top + neck_end) / 2, 0]),
-                Cylinder(self.neck_diameter / 2, neck_end - top),
+            "neck": cylinder_along_y(
+                (top + neck_end) / 2, self.neck_diameter / 2, neck_end - top
             ),
-            "head": (
-                RigidTransform(_R_Y_AXIS, [0, top - self.head_thickness / 2, 0]),
-                Cylinder(self.head_diameter / 2, self.head_thickness),
+            "head": cylinder_along_y(
+                top - self.head_thickness / 2,
+                self.head_diameter / 2,
+                self.head_thickness,
             ),
         }
 
@@ -171,17 +159,8 @@ class DoorChain(GrippedBlock):
         self, environment: Environment, resolution: float
     ) -> dict[str, ProximityProperties]:
         """See GrippedBlock."""
-        groove = rigid_material(environment)
         diameters = self.neck_diameter, self.head_diameter
-        bolt = bolt_materials(environment, *diameters, resolution)
-        return dict.fromkeys(self.fixed_solids(environment), groove) | bolt
-
-    @property
-    def M_fixed_G(self) -> SpatialInertia:
-        """See Part: a brass bar of the groove's size; it never moves."""
-        return SpatialInertia.SolidBoxWithDensity(
-            8500.0, self.travel, self.lip_thickness, 2 * _BORDER
-        )
+        return bolt_materials(environment, *diameters, resolution)
 
     def refuse_impossible(self) -> None:
         """See Part: the lips must hold the head, the keyhole must let it through."""

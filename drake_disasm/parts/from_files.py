@@ -89,16 +89,6 @@ class FromFiles(Part):
         )
 
     @property
-    def play(self) -> float:
-        """See Part."""
-        return self.clearance
-
-    @property
-    def M_fixed_G(self) -> SpatialInertia:
-        """See Part."""
-        return _body(self.fixed, "part.fixed").M
-
-    @property
     def M_moved_B(self) -> SpatialInertia:
         """See Part."""
         return _body(self.moved, "part.moved").M
@@ -125,12 +115,6 @@ class FromFiles(Part):
         return float(np.abs([moved.low, moved.high])[:, [0, 2]].max())
 
     @property
-    def touch_depth(self) -> float:
-        """See Part."""
-        moved = _body(self.moved, "part.moved")
-        return float(moved.high[1] - moved.low[1])
-
-    @property
     def moved_solids(self) -> Mapping[str, Solid]:
         """See Part."""
         return _body(self.moved, "part.moved").solids
@@ -139,16 +123,20 @@ class FromFiles(Part):
         """See Part; no effect reshapes it."""
         return _body(self.fixed, "part.fixed").solids
 
-    def materials(
+    def fixed_material(
+        self, name: str, environment: Environment
+    ) -> ProximityProperties:
+        """See Part: the file's, with the environment's friction and dissipation."""
+        properties = _body(self.fixed, "part.fixed").properties
+        return with_surface(properties[name], environment)
+
+    def moved_materials(
         self, environment: Environment, resolution: float
     ) -> dict[str, ProximityProperties]:
-        """See Part: the files', with the environment's friction and dissipation."""
-        found = {}
-        for file, name in ((self.fixed, "part.fixed"), (self.moved, "part.moved")):
-            for solid, properties in _body(file, name).properties.items():
-                found[solid] = with_surface(properties, environment)
-        found[_GRIP] = grip_material(environment.dissipation)
-        return found
+        """See Part: the file's, with the environment's friction and dissipation."""
+        own = _body(self.moved, "part.moved").properties.items()
+        found = {name: with_surface(each, environment) for name, each in own}
+        return found | {_GRIP: grip_material(environment.dissipation)}
 
     def refuse_impossible(self) -> None:
         """See Part: files that can't be a part, bodies that overlap at the start."""

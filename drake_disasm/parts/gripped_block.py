@@ -62,9 +62,9 @@ class GrippedBlock(Part):
     def touching_materials(
         self, environment: Environment, resolution: float
     ) -> dict[str, ProximityProperties]:
-        """Returns the materials of all solids but the grip; see Part."""
+        """Returns the materials of `touching_solids`; see Part."""
 
-    def materials(
+    def moved_materials(
         self, environment: Environment, resolution: float
     ) -> dict[str, ProximityProperties]:
         """See Part; the grip's has the friction of the pads on it."""

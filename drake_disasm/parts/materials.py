@@ -68,6 +68,33 @@ def facet_length(diameter: float, resolution: float) -> float:
     return np.pi * diameter / facets * (1 + 1e-6)
 
 
+def facet_count(diameter: float, play: float, share: float = 0.05) -> int:
+    """Returns how many sides a round hole has, a multiple of four.
+
+    A facet's middle is nearer to the axis than its ends by r (1 - cos(pi / n)), which
+    is to be a small share of the play.
+
+    Args:
+        diameter: of the hole, or of what is in it [m].
+        play: difference of the two [m].
+        share: of the play.
+    """
+    nearer = share * play / (diameter / 2)
+    return 4 * int(np.ceil(np.pi / np.arccos(1.0 - nearer) / 4))
+
+
+def fitting_edge(diameter: float, play: float, resolution: float) -> float:
+    """Returns the edge length [m] of a cylinder that fits a round hole.
+
+    Args:
+        diameter: of the cylinder [m].
+        play: of it in the hole [m].
+        resolution: longest edge [m].
+    """
+    finest = np.pi * diameter / facet_count(diameter, play)
+    return facet_length(diameter, min(resolution, finest))
+
+
 def rigid_material(environment: Environment) -> ProximityProperties:
     """Returns a fixed body's material: rigid, with the environment's friction."""
     properties = _surface(environment)

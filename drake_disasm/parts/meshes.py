@@ -5,20 +5,6 @@ from pydrake.common import MemoryFile
 from pydrake.geometry import InMemoryMesh, Mesh
 
 
-def facet_count(radius: float, play: float, share: float = 0.05) -> int:
-    """Returns how many sides a round hole has, a multiple of four.
-
-    A facet's middle is nearer to the axis than its ends by r (1 - cos(pi / n)), which
-    is to be a small share of the play.
-
-    Args:
-        radius: of the hole [m].
-        play: of what is in it: difference of the diameters [m].
-        share: of the play.
-    """
-    return 4 * int(np.ceil(np.pi / np.arccos(1.0 - share * play / radius) / 4))
-
-
 def circle(radius: float, facets: int) -> np.ndarray:
     """Returns the corners (facets, 2) in x and z of a polygon around a circle [m].
 

@@ -7,29 +7,26 @@ on the peg's axis, at the mouth.
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-from pydrake.geometry import Box, Cylinder, ProximityProperties
-from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.tree import SpatialInertia
+from pydrake.geometry import Box, ProximityProperties
+from pydrake.math import RigidTransform
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import quantity
 from drake_disasm.effects import Environment
-from drake_disasm.parts.base import Solid, Stage
+from drake_disasm.parts.base import Solid, Stage, cylinder_along_y
 from drake_disasm.parts.gripped_block import GrippedBlock
 from drake_disasm.parts.materials import (
     compliant_material,
-    facet_length,
-    rigid_material,
+    facet_count,
+    fitting_edge,
 )
-from drake_disasm.parts.meshes import circle, facet_count, tube
+from drake_disasm.parts.meshes import circle, tube
 from drake_disasm.parts.registry import register_part
 
 _RIM = 0.010  # m, of the block around the hole
 _BELOW = 0.001  # m, from the peg's tip to the hole's bottom
 _FLOOR = 0.003  # m, of the block under the hole
 _PULL = 20.0  # N, of a scripted policy
-_R_Y_AXIS = RotationMatrix.MakeXRotation(-np.pi / 2)  # a cylinder along y
 
 
 @register_part
@@ -60,19 +57,9 @@ class PegInHole(GrippedBlock):
         return (Stage(1, self.depth, _PULL),)
 
     @property
-    def play(self) -> float:
-        """See Part."""
-        return self.clearance
-
-    @property
     def touch_radius(self) -> float:
         """See Part: half the width."""
         return self.width / 2.0
-
-    @property
-    def touch_depth(self) -> float:
-        """See Part."""
-        return self.depth
 
     @property
     def surface(self) -> float:
@@ -91,7 +78,8 @@ class PegInHole(GrippedBlock):
         low = -self.depth - _BELOW
         floor = RigidTransform([0.0, low - _FLOOR / 2, 0.0]), Box(outer, _FLOOR, outer)
         if self.cross_section == "round":
-            wall = tube(circle(width / 2, self._facets), outer / 2, low, 0.0)
+            facets = facet_count(self.width, self.clearance)
+            wall = tube(circle(width / 2, facets), outer / 2, low, 0.0)
             return {"wall": (RigidTransform(), wall), "floor": floor}
         at, long = (width + _RIM) / 2, width + _RIM
         walls = {
@@ -110,8 +98,7 @@ class PegInHole(GrippedBlock):
         top = self.surface + self.grip_standoff
         length, middle = top + self.depth, (top - self.depth) / 2
         if self.cross_section == "round":
-            X_BP = RigidTransform(_R_Y_AXIS, [0.0, middle, 0.0])
-            return {"peg": (X_BP, Cylinder(self.width / 2, length))}
+            return {"peg": cylinder_along_y(middle, self.width / 2, length)}
         box = Box(self.width, length, self.width)
         return {"peg": (RigidTransform([0.0, middle, 0.0]), box)}
 
@@ -119,25 +106,11 @@ class PegInHole(GrippedBlock):
         self, environment: Environment, resolution: float
     ) -> dict[str, ProximityProperties]:
         """See GrippedBlock: flat on flat is softer, or it chatters."""
-        rigid = rigid_material(environment)
         edge, modulus = resolution, environment.head_modulus
         if self.cross_section == "round":
-            finest = np.pi * self.width / self._facets
-            edge = facet_length(self.width, min(resolution, finest))
+            edge = fitting_edge(self.width, self.clearance, resolution)
             modulus = environment.modulus
-        peg = compliant_material(environment, modulus, edge)
-        return dict.fromkeys(self.fixed_solids(environment), rigid) | {"peg": peg}
-
-    @property
-    def _facets(self) -> int:
-        """How many sides the round hole has, and at least the peg."""
-        return facet_count(self.width / 2, self.clearance)
-
-    @property
-    def M_fixed_G(self) -> SpatialInertia:
-        """See Part: a block of steel; it never moves."""
-        side = self.width + 2 * _RIM
-        return SpatialInertia.SolidBoxWithDensity(7800.0, side, -self.bottom, side)
+        return {"peg": compliant_material(environment, modulus, edge)}
 
     def refuse_impossible(self) -> None:
         """See Part: a short peg of a large play would tip over."""

@@ -10,7 +10,6 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.common.text import clipped
 from drake_disasm.common.user_code import import_named
-from drake_disasm.mdp import way_of
 from drake_disasm.policies.files import find_policy, load_policy, shipped_policies
 from drake_disasm.policies.scripted import SCRIPTED, make_policy
 from drake_disasm.scenario import Scenario
@@ -21,7 +20,7 @@ _FORMS = "an .npz file, module:name or FILE.py:Class"
 
 def default_policy(scenario: Scenario) -> str:
     """Returns the name of the best shipped policy for a scenario's part."""
-    return "removal_randomised" if way_of(scenario) == "xy" else "admittance"
+    return "removal_randomised" if scenario.part.way == "xy" else "admittance"
 
 
 def resolve_policy(name: str, scenario: Scenario) -> Policy | System:

@@ -10,7 +10,7 @@ import numpy as np
 
 from drake_disasm.common.arrays import Array, array_like
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES, way_of
+from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 from drake_disasm.policies.scripted import Admittance, Straight
 from drake_disasm.scenario import Scenario
 
@@ -216,7 +216,7 @@ def _compared(
         ("state", trained.state_names, STATE_NAMES),
         ("action", trained.action_names, ACTION_NAMES),
         ("observation.variant", trained.observation_variant, variant),
-        ("the way out", trained.way, way_of(scenario)),
+        ("the way out", trained.way, scenario.part.way),
     ):
         yield name, then, now, then == now
     same = math.isclose(trained.period, task.period)

@@ -1,7 +1,6 @@
 """Two scripted policies: the naive one, and the classical baseline."""
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Self
 
 import array_api_compat
@@ -12,7 +11,7 @@ from drake_disasm.cell.twin_parameters import bolt_stiffness
 from drake_disasm.common.arrays import Array, at_most, namespace
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
-from drake_disasm.parts import AXES, Stage
+from drake_disasm.parts import AXES, Part
 from drake_disasm.scenario import Scenario
 
 #: Shares of a force or torque that a step of `Admittance` takes back, or adds.
@@ -93,7 +92,7 @@ class Admittance:
         cls,
         stiffness: np.ndarray,
         grip_compliance: np.ndarray,
-        stages: Sequence[Stage],
+        part: Part,
     ) -> Self:
         """Returns the policy for a bolt that is held with some stiffness.
 
@@ -106,17 +105,17 @@ class Admittance:
             stiffness: (6,) at the bolt, along and about x, y, z [N/m, N m/rad].
             grip_compliance: (6,) of the bolt in the grip along and about the same axes
                 by forces and torques along and about them [m/N, rad/(N m)].
-            stages: of the way out.
+            part: that the bolt leaves.
         """
         k, turning = float(stiffness[:3].max()), float(stiffness[3:].max())
-        first, last = stages[0], stages[-1]
+        first, last = part.stages[0], part.stages[-1]
         speed = min(_FASTEST, _STEP_FORCE / k)
         push_compliance, stop = _PUSH / k, _STOP + _STOP_SHARE * speed * k
         if first.is_turn:
             speed = min(_FASTEST_TURN, _STEP_EFFORT * first.effort / turning)
             push_compliance, stop = _PUSH / turning, _STOP_EFFORT * first.effort
         return cls(
-            way="".join(AXES[stage.axis] for stage in stages),
+            way=part.way,
             speed=speed,
             push=first.effort,
             stop=stop,
@@ -175,9 +174,9 @@ def make_policy(name: str, scenario: Scenario | None = None) -> Straight | Admit
         )
     if scenario is None:
         return SCRIPTED[name]()
-    stages = scenario.part.stages
+    part = scenario.part
     if name == "straight":
-        speed = _FASTEST_TURN if stages[0].is_turn else _FASTEST
-        return Straight(AXES[stages[0].axis], speed)
+        speed = _FASTEST_TURN if part.stages[0].is_turn else _FASTEST
+        return Straight(part.way[0], speed)
     grip = np.diag(bolt_compliance(scenario))
-    return Admittance.for_stiffness(bolt_stiffness(scenario), grip, stages)
+    return Admittance.for_stiffness(bolt_stiffness(scenario), grip, part)

@@ -205,13 +205,7 @@ class BatchedTwin:
         Raises:
             DisasmError: nothing was reset, or the actions have another shape.
         """
-        if tuple(np.shape(actions)) != (self.count, 6):
-            raise DisasmError(
-                f"actions: are of shape {tuple(np.shape(actions))}; give "
-                f"{(self.count, 6)}, [dx dy dz du dv dw] in m and rad"
-            )
-        if not hasattr(self, "episodes"):
-            raise DisasmError("step: nothing was reset; call reset first")
+        self._refuse_step(actions)
         xp, episodes, before = namespace(self.like), self.episodes, self.observation
         numbers = self._twins.numbers
         action = array_like(actions, self.like)
@@ -238,12 +232,21 @@ class BatchedTwin:
         terms = reward_terms(*states, numbers.task, numbers.geometry)
         terms = {name: xp.where(has_failed, 0.0, term) for name, term in terms.items()}
         p_GBo = self._p_GBo() if numbers.task.judged_by == "bolt" else None
-        ends = outcomes(
-            states[1], episodes.steps, numbers.task, numbers.geometry, p_GBo
-        )
+        judged = (numbers.task, numbers.geometry, p_GBo)
+        ends = outcomes(states[1], episodes.steps, *judged)
         reasons = self._reasons(has_failed, is_finite, is_solved)
         place = numbers.geometry.place(states[1])
         return BatchResult(after, place, terms, ends, has_failed, reasons)
+
+    def _refuse_step(self, actions: Array) -> None:
+        """Raises DisasmError for actions of another shape, or before a reset."""
+        if tuple(np.shape(actions)) != (self.count, 6):
+            raise DisasmError(
+                f"actions: are of shape {tuple(np.shape(actions))}; give "
+                f"{(self.count, 6)}, [dx dy dz du dv dw] in m and rad"
+            )
+        if not hasattr(self, "episodes"):
+            raise DisasmError("step: nothing was reset; call reset first")
 
     def _reasons(
         self, has_failed: Array, is_finite: Array, is_solved: Array

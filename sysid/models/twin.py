@@ -465,7 +465,9 @@ def _with_impact_as_stiff(scenario: Scenario) -> Scenario:
     """
     contact = scenario.contact
     most = find_field(scenario, "contact.impact.stiffness").metadata["high"]
-    stiffness = 2.0 * contact.head_modulus * scenario.part.touch_depth * _N_PER_MM
+    gaps = scenario.part.required_gaps()
+    thickness = float(gaps.top - gaps.bottom)
+    stiffness = 2.0 * contact.head_modulus * thickness * _N_PER_MM
     impact = dataclasses.replace(
         contact.impact, stiffness=min(stiffness, most), exponent=1.0
     )

@@ -41,7 +41,7 @@ def test_bodies_are_those_of_the_files() -> None:
 def test_friction_is_the_environments_and_stiffness_the_files() -> None:
     part = load_scenario(str(PLUG / "plug.yaml")).part
     environment = part.environment(ContactConfig(friction=0.37))
-    tongue = part.materials(environment, 1e-3)["tongue"]
+    tongue = part.moved_materials(environment, 1e-3)["tongue"]
     assert tongue.GetProperty("material", "coulomb_friction").static_friction() == 0.37
     assert tongue.GetProperty("hydroelastic", "hydroelastic_modulus") == 4e7
 

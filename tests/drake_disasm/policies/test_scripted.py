@@ -13,7 +13,7 @@ from drake_disasm.policies import SCRIPTED, Admittance, Exploring, Straight, mak
 from drake_disasm.scenario import TaskConfig, load_scenario
 from tests.refusals import refused
 
-STAGES = DoorChain().stages
+PART = DoorChain()
 
 
 def _observation(y: float = 0.0, **wrench: float) -> np.ndarray:
@@ -91,13 +91,13 @@ STIFFNESS = {
 def test_gains_follow_from_the_stiffness(held: str) -> None:
     """A step takes back less than a force or torque has, on every axis."""
     k = STIFFNESS[held]
-    policy = Admittance.for_stiffness(k, np.zeros(6), STAGES)
+    policy = Admittance.for_stiffness(k, np.zeros(6), PART)
     assert (policy.yield_compliance * k[:3]).max() == pytest.approx(0.4)
     assert (policy.rotation_compliance * k[3:]).max() == pytest.approx(0.6)
     assert policy.speed * k[0] < policy.push + 1.0
     assert policy.stop < policy.push
     # The stiff one's are those that were tuned for it.
-    policy = Admittance.for_stiffness(STIFFNESS["stiff"], np.zeros(6), STAGES)
+    policy = Admittance.for_stiffness(STIFFNESS["stiff"], np.zeros(6), PART)
     tuned, found = dataclasses.asdict(Admittance()), dataclasses.asdict(policy)
     assert found.pop("way") == tuned.pop("way") == "xy"
     assert found == pytest.approx(tuned, rel=0.1)
@@ -132,7 +132,7 @@ def test_a_bolt_that_is_held_down_is_pushed_on_along_x() -> None:
 def test_lifting_begins_with_the_bolt_and_not_with_the_grip() -> None:
     """Up by 3 mm against 1.5 N at 0.6 kN/m, the bolt has risen by 0.5 mm only."""
     policy = Admittance.for_stiffness(
-        STIFFNESS["yielding"], np.full(6, 1.0 / 600.0), STAGES
+        STIFFNESS["yielding"], np.full(6, 1.0 / 600.0), PART
     )
     assert policy(_observation(0.003, fy=-1.5))[0] == pytest.approx(policy.speed)
     free = policy(_observation(0.003, fy=-0.5))
